@@ -1,0 +1,86 @@
+//! Arrays of integers of a few bits each, least significant bit first.
+//!
+//! Value `i` of width `w` takes bits `i * w .. (i + 1) * w` of the bytes read as one little-endian
+//! number. Arrays are followed by at least 8 bytes, so that a reader may load 64 bits at once.
+
+/// Reads `width` bits (at most 32) from bit `at`. Bits beyond the end read as zero.
+#[inline]
+pub fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
+    let word = match bytes.get(at / 8..at / 8 + 8) {
+        Some(eight) => {
+            let mut word = [0; 8];
+            word.copy_from_slice(eight);
+            u64::from_le_bytes(word)
+        }
+        None => read_tail(bytes, at / 8),
+    };
+    ((word >> (at % 8)) & ((1u64 << width) - 1)) as u32
+}
+
+/// The last bytes of an array as a number.
+#[cold]
+fn read_tail(bytes: &[u8], start: usize) -> u64 {
+    let tail = bytes.get(start..).unwrap_or(&[]);
+    tail.iter().take(8).rev().fold(0, |word, &byte| word << 8 | u64::from(byte))
+}
+
+/// Appends values to an array.
+#[derive(Default)]
+pub struct BitWriter {
+    bytes: Vec<u8>,
+    pending: u64,
+    pending_bits: u32,
+}
+
+impl BitWriter {
+    /// Appends the low `width` bits (at most 32) of `value`.
+    #[inline]
+    pub fn push(&mut self, value: u32, width: u32) {
+        debug_assert!(width == 32 || value >> width == 0);
+        self.pending |= u64::from(value) << self.pending_bits;
+        self.pending_bits += width;
+        while self.pending_bits >= 8 {
+            self.bytes.push(self.pending as u8);
+            self.pending >>= 8;
+            self.pending_bits -= 8;
+        }
+    }
+
+    /// The bytes, the last one filled up with zeros.
+    pub fn finish(mut self) -> Vec<u8> {
+        if self.pending_bits > 0 {
+            self.bytes.push(self.pending as u8);
+        }
+        self.bytes
+    }
+}
+
+/// Bits needed to hold `value`: 0 for 0.
+pub fn bit_width(value: u32) -> u32 {
+    32 - value.leading_zeros()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_all_widths_round_trip() {
+        let mut writer = BitWriter::default();
+        let mut expected = Vec::new();
+        let mut at = 0;
+        for i in 0..2000u32 {
+            let width = i % 33;
+            let value = (u64::from(i.wrapping_mul(0x9e37_79b9)) & ((1 << width) - 1)) as u32;
+            writer.push(value, width);
+            expected.push((at, width, value));
+            at += width as usize;
+        }
+        let bytes = writer.finish();
+        assert_eq!(bytes.len(), at.div_ceil(8));
+        for (at, width, value) in expected {
+            assert_eq!(read_bits(&bytes, at, width), value);
+        }
+        assert_eq!(read_bits(&bytes, at + 1000, 32), 0);
+    }
+}

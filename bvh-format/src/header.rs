@@ -1,0 +1,218 @@
+//! The header page: magic, version, lengths and the section table. Byte for byte as in the specification.
+
+use crate::checksum::checksum;
+use crate::error::{FormatError, ensure, require};
+use crate::page::PAGE;
+use crate::rule::Rule;
+use std::ops::Range;
+use zerocopy::byteorder::little_endian::{U16, U32, U64};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+/// The first eight bytes of a file. A high bit and both line ends show damage by text transfers.
+pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
+/// Readers refuse another major version.
+pub const MAJOR: u16 = 1;
+/// Readers accept any minor version of their major version.
+pub const MINOR: u16 = 0;
+/// Most entries of the section table.
+pub const MAX_SECTIONS: usize = 64;
+
+/// The first 64 bytes of a file.
+#[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Header {
+    /// `MAGIC`.
+    pub magic: [u8; 8],
+    /// Major version.
+    pub major: U16,
+    /// Minor version.
+    pub minor: U16,
+    /// Entries in the section table.
+    pub sections: U32,
+    /// Length of the file in bytes.
+    pub file_length: U64,
+    /// XXH3 over the sections that make up the content; see `Layout`.
+    pub content_checksum: U64,
+    /// XXH3 of the header page with this field zero.
+    pub header_checksum: U64,
+    /// Zero.
+    pub reserved: [u8; 24],
+}
+
+/// An entry of the section table.
+#[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
+#[repr(C)]
+pub struct SectionEntry {
+    /// What the section holds: the number of a `SectionKind`.
+    pub kind: U32,
+    /// 1: a reader that does not know the kind refuses the file; 0: it skips the section.
+    pub required: U32,
+    /// Byte offset in the file, a multiple of the page size.
+    pub offset: U64,
+    /// Length in bytes; zeros fill the rest of the last page.
+    pub length: U64,
+    /// XXH3 of the section's bytes.
+    pub checksum: U64,
+}
+
+const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
+
+/// The sections of version 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum SectionKind {
+    /// The object table and the objects' names. Required.
+    Objects = 1,
+    /// Pages of treelets. Required.
+    Nodes = 2,
+    /// Leaf blocks. Required.
+    Leaves = 3,
+    /// Id blocks: original triangle numbers. Optional.
+    Ids = 4,
+    /// Numbers of exactly duplicated triangles. Optional.
+    Duplicates = 5,
+    /// Where the mesh came from and how it was baked; not part of the content. Optional.
+    Provenance = 6,
+}
+
+impl SectionKind {
+    /// All kinds, by number on disk from 1.
+    pub const ALL: [Self; 6] =
+        [Self::Objects, Self::Nodes, Self::Leaves, Self::Ids, Self::Duplicates, Self::Provenance];
+
+    /// The kind of a number on disk.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&kind| kind as u32 == number)
+    }
+
+    /// True if a reader cannot do without it.
+    pub fn required(self) -> bool {
+        matches!(self, Self::Objects | Self::Nodes | Self::Leaves)
+    }
+
+    /// True if the content checksum covers it.
+    pub fn is_content(self) -> bool {
+        self != Self::Provenance
+    }
+
+    /// The name in listings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Objects => "objects",
+            Self::Nodes => "nodes",
+            Self::Leaves => "leaves",
+            Self::Ids => "ids",
+            Self::Duplicates => "duplicates",
+            Self::Provenance => "provenance",
+        }
+    }
+}
+
+/// A section of a file by kind and place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Section {
+    /// What it holds.
+    pub kind: SectionKind,
+    /// Its bytes in the file.
+    pub range: Range<usize>,
+    /// The checksum that the table states.
+    pub checksum: u64,
+}
+
+/// Writes a header page. `sections` are in the order of the file.
+pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section]) -> Vec<u8> {
+    let header = Header {
+        magic: MAGIC,
+        major: MAJOR.into(),
+        minor: MINOR.into(),
+        sections: (sections.len() as u32).into(),
+        file_length: file_length.into(),
+        content_checksum: content_checksum.into(),
+        header_checksum: 0.into(),
+        reserved: [0; 24],
+    };
+    let mut page = header.as_bytes().to_vec();
+    for section in sections {
+        let entry = SectionEntry {
+            kind: (section.kind as u32).into(),
+            required: u32::from(section.kind.required()).into(),
+            offset: (section.range.start as u64).into(),
+            length: (section.range.len() as u64).into(),
+            checksum: section.checksum.into(),
+        };
+        page.extend_from_slice(entry.as_bytes());
+    }
+    page.resize(PAGE, 0);
+    let sum = checksum(&page);
+    page[32..40].copy_from_slice(&sum.to_le_bytes());
+    page
+}
+
+/// Reads and checks the header page and the section table; touches nothing else of the file.
+///
+/// # Errors
+/// The first of rules 1 to 9 that does not hold.
+pub fn read_header(bytes: &[u8]) -> Result<(Header, Vec<Section>), FormatError> {
+    let shown = &bytes[..bytes.len().min(8)];
+    ensure(shown == MAGIC, Rule::Magic, 0, || (format!("{MAGIC:02x?}"), format!("{shown:02x?}")))?;
+    let found = bytes.len();
+    let page = bytes
+        .get(..PAGE)
+        .ok_or_else(|| FormatError::new(Rule::HeaderSize, 0, "4096 bytes or more", found))?;
+    // A page of the right length always has a header; the error keeps the code free of panics.
+    let (header, rest) = Header::read_from_prefix(page)
+        .map_err(|_| FormatError::new(Rule::HeaderSize, 0, "a header", "none"))?;
+    require(Rule::Version, 8, MAJOR, header.major.get())?;
+    let mut zeroed = page.to_vec();
+    zeroed[32..40].fill(0);
+    require(Rule::HeaderChecksum, 32, hex(checksum(&zeroed)), hex(header.header_checksum.get()))?;
+    require(Rule::FileLength, 16, header.file_length.get(), bytes.len() as u64)?;
+    let count = header.sections.get() as usize;
+    ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
+    let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)
+        .map_err(|_| FormatError::new(Rule::SectionCount, 12, "a table within the page", count))?;
+    let sections = read_entries(entries, bytes.len())?;
+    Ok((header, sections))
+}
+
+fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Section>, FormatError> {
+    let mut sections: Vec<Section> = Vec::new();
+    let mut free_from = PAGE;
+    for (index, entry) in entries.iter().enumerate() {
+        let at = (size_of::<Header>() + index * size_of::<SectionEntry>()) as u64;
+        let (offset, length) = (entry.offset.get(), entry.length.get());
+        let place = || (format!("a multiple of {PAGE} from {free_from}"), format!("{offset}"));
+        let start = usize::try_from(offset).unwrap_or(usize::MAX);
+        let fits = start % PAGE == 0 && start >= free_from;
+        ensure(fits, Rule::SectionPlace, at + 8, place)?;
+        let end = usize::try_from(length).ok().and_then(|length| start.checked_add(length));
+        let end = end.filter(|&end| end <= file_length).ok_or_else(|| {
+            let expected = format!("at most {} bytes", file_length.saturating_sub(start));
+            FormatError::new(Rule::SectionPlace, at + 16, expected, length)
+        })?;
+        free_from = end;
+        match SectionKind::from_number(entry.kind.get()) {
+            Some(kind) => {
+                let once = sections.iter().all(|section| section.kind != kind);
+                ensure(once, Rule::SectionOnce, at, || (format!("one {}", kind.name()), "two".into()))?;
+                sections.push(Section { kind, range: start..end, checksum: entry.checksum.get() });
+            }
+            None => {
+                let skip = entry.required.get() == 0;
+                let unknown = || ("a known kind".into(), entry.kind.to_string());
+                ensure(skip, Rule::SectionKnown, at, unknown)?;
+            }
+        }
+    }
+    for kind in SectionKind::ALL.into_iter().filter(|kind| kind.required()) {
+        let there = sections.iter().any(|section| section.kind == kind);
+        let at = size_of::<Header>() as u64;
+        ensure(there, Rule::SectionOnce, at, || (format!("a section {}", kind.name()), "none".into()))?;
+    }
+    Ok(sections)
+}
+
+/// A checksum as people compare them.
+pub(crate) fn hex(sum: u64) -> String {
+    format!("{sum:016x}")
+}

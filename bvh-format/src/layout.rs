@@ -1,0 +1,200 @@
+//! From the bytes of a file to its sections, objects, pages and blocks, without copying any.
+
+use crate::checksum::{Hasher, checksum};
+use crate::error::{FormatError, ensure, require};
+use crate::header::{Section, SectionKind, hex, read_header};
+use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
+use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
+use crate::object::{Object, read_objects};
+use crate::page::{PAGE, Page, PageHeader};
+use crate::rule::Rule;
+use std::ops::Range;
+
+/// Where everything is in a file. Made by reading the header page and the object table alone.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// Major and minor version.
+    pub version: (u16, u16),
+    /// The content checksum that the header states.
+    pub content_checksum: u64,
+    /// The known sections in the order of the file.
+    pub sections: Vec<Section>,
+    /// The objects in the order of the table.
+    pub objects: Vec<Object>,
+    nodes: Range<usize>,
+    leaves: Range<usize>,
+    ids: Option<Range<usize>>,
+    duplicates: Option<Range<usize>>,
+}
+
+impl Layout {
+    /// Opens a file: header page, section table and object table. O(objects), whatever the
+    /// file's size.
+    ///
+    /// # Errors
+    /// The first of rules 1 to 14 that does not hold.
+    pub fn read(bytes: &[u8]) -> Result<Self, FormatError> {
+        let (header, sections) = read_header(bytes)?;
+        let find = |kind| {
+            let section = sections.iter().find(|section: &&Section| section.kind == kind);
+            section.map(|section| section.range.clone())
+        };
+        // `read_header` has made sure of the required sections.
+        let needed = |kind| find(kind).unwrap_or(0..0);
+        let (nodes, table) = (needed(SectionKind::Nodes), needed(SectionKind::Objects));
+        ensure(nodes.len() % PAGE == 0, Rule::ObjectPages, nodes.start as u64, || {
+            (format!("whole pages of {PAGE} bytes"), nodes.len().to_string())
+        })?;
+        let pages = (nodes.len() / PAGE) as u64;
+        let objects = read_objects(&bytes[table.clone()], table.start as u64, pages)?;
+        Ok(Self {
+            version: (header.major.get(), header.minor.get()),
+            content_checksum: header.content_checksum.get(),
+            objects,
+            nodes,
+            leaves: needed(SectionKind::Leaves),
+            ids: find(SectionKind::Ids),
+            duplicates: find(SectionKind::Duplicates),
+            sections,
+        })
+    }
+
+    /// Number of pages in the node section.
+    pub fn page_count(&self) -> u32 {
+        (self.nodes.len() / PAGE) as u32
+    }
+
+    /// Byte offset of a page in the file.
+    pub fn page_offset(&self, page: u32) -> u64 {
+        self.nodes.start as u64 + u64::from(page) * PAGE as u64
+    }
+
+    /// The bytes of a page; `None` beyond the last.
+    #[inline]
+    pub fn page_bytes<'a>(&self, bytes: &'a [u8], page: u32) -> Option<&'a [u8; PAGE]> {
+        let start = self.nodes.start + page as usize * PAGE;
+        if start + PAGE > self.nodes.end { None } else { bytes.get(start..)?.first_chunk() }
+    }
+
+    /// The leaf block of a page, empty if the page's header is nonsense.
+    #[inline]
+    pub fn leaf_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
+        let section = bytes.get(self.leaves.clone()).unwrap_or(&[]);
+        slice(section, header.leaf_line.get(), header.leaf_lines.get(), LINE)
+    }
+
+    /// The id block of a page, empty without ids.
+    #[inline]
+    pub fn id_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
+        let section = self.ids.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
+        slice(section, header.id_word.get(), header.id_words.get(), WORD)
+    }
+
+    /// True if the file holds original triangle ids.
+    pub fn has_ids(&self) -> bool {
+        self.ids.is_some()
+    }
+
+    /// The pairs (kept id, id of an exact duplicate left out), ascending.
+    pub fn duplicate_ids<'a>(&self, bytes: &'a [u8]) -> &'a [[zerocopy::little_endian::U32; 2]] {
+        let section = self.duplicates.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
+        let whole = section.len() / 8 * 8;
+        <[[zerocopy::little_endian::U32; 2]]>::ref_from_bytes(&section[..whole]).unwrap_or(&[])
+    }
+
+    /// Checks the place, size and checksum of a page's leaf block. Cost: one pass over its bytes.
+    ///
+    /// # Errors
+    /// Rules 26 to 28.
+    pub fn check_leaf_block(&self, bytes: &[u8], page: &Page, object: &Object) -> Result<(), FormatError> {
+        let header = page.header();
+        let at = self.page_offset(header.page_number.get());
+        let block = self.leaf_block(bytes, header);
+        let lines = header.leaf_lines.get() as usize;
+        let packets = usize::from(header.packets.get());
+        let there = |needed: usize| {
+            let holds = block.len() == lines * LINE && block.len() == needed.next_multiple_of(LINE);
+            ensure(holds, Rule::LeafPlace, at + 24, || {
+                (format!("a block of {needed} bytes"), format!("{} of {lines} lines", block.len()))
+            })
+        };
+        if object.triangle_encoding == TriangleEncoding::F32 {
+            there(packets * F32_PACKET_BYTES)?;
+        }
+        let sum = header.leaf_checksum.get();
+        require(Rule::LeafChecksum, at + 8, hex(sum), hex(checksum(block)))?;
+        if object.triangle_encoding != TriangleEncoding::F32 && packets > 0 {
+            let head = PackedHead::read(block).filter(|head| {
+                let vertex_bytes = (usize::from(head.vertices) * head.stride()).div_ceil(8);
+                head.bits.iter().all(|&bits| bits <= 32)
+                    && head.index_bits <= 16
+                    && head.vertices > 0
+                    && head.indices_at as usize == 32 + vertex_bytes
+            });
+            let head = head.ok_or_else(|| {
+                let found = format!("{:?}", PackedHead::read(block));
+                FormatError::new(Rule::PackedHeader, at + 24, "a consistent head", found)
+            })?;
+            there(head.block_bytes(packets))?;
+        }
+        Ok(())
+    }
+
+    /// Checks the place, size and checksum of a page's id block.
+    ///
+    /// # Errors
+    /// Rules 31 and 32.
+    pub fn check_id_block(&self, bytes: &[u8], page: &Page) -> Result<(), FormatError> {
+        let header = page.header();
+        let at = self.page_offset(header.page_number.get());
+        let block = self.id_block(bytes, header);
+        let words = header.id_words.get() as usize;
+        if !self.has_ids() || header.packets.get() == 0 {
+            return require(Rule::IdPlace, at + 52, 0, words);
+        }
+        let bits = block.get(4).copied().unwrap_or(0);
+        let needed = id_block_bytes(usize::from(header.packets.get()), bits);
+        let whole = block.len() == words * WORD && block.len() == needed && bits <= 32;
+        ensure(whole && block.len() >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
+            (format!("a block of {needed} bytes"), format!("{} of {words} words", block.len()))
+        })?;
+        let sum = header.id_checksum.get();
+        require(Rule::IdChecksum, at + 16, hex(sum), hex(checksum(block)))
+    }
+}
+
+use zerocopy::FromBytes;
+
+/// `count` units of `unit` bytes from unit `first`; empty if they are not all there.
+#[inline]
+fn slice(section: &[u8], first: u64, count: u32, unit: usize) -> &[u8] {
+    let start = usize::try_from(first).ok().and_then(|first| first.checked_mul(unit));
+    let end = start.and_then(|start| start.checked_add(count as usize * unit));
+    match (start, end) {
+        (Some(start), Some(end)) => section.get(start..end).unwrap_or(&[]),
+        _ => &[],
+    }
+}
+
+/// The content checksum: XXH3 over kind (`u32`), length (`u64`) and bytes of each content section in
+/// the order of the file. Equal meshes baked with equal options have equal contents.
+#[derive(Default)]
+pub struct ContentHasher(Hasher);
+
+impl ContentHasher {
+    /// Starts a section.
+    pub fn begin(&mut self, kind: SectionKind, length: u64) {
+        self.0.update(&(kind as u32).to_le_bytes());
+        self.0.update(&length.to_le_bytes());
+    }
+
+    /// Adds bytes of the section.
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum.
+    pub fn finish(&self) -> u64 {
+        self.0.finish()
+    }
+}

@@ -1,0 +1,434 @@
+//! Leaf packets: up to four triangles in lane order, and the block of all packets of a page.
+//!
+//! Two encodings of a block. `F32` holds plain lanes, 144 bytes a packet: corner by corner, axis by
+//! axis, four lanes. `Packed` (and `Quantized`, the same bytes after the baker has moved the
+//! vertices to a grid) holds one pool of the distinct vertices of the page, each coordinate as an
+//! offset of a few bits from the block's base, and three pool indices a triangle:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 0..2 | `u16` vertices in the pool |
+//! | 2 | `u8` bits of an index, at most 16 |
+//! | 3 | `u8` bit `a` set: axis `a` is fixed-point, else ordered |
+//! | 4..7 | `u8` bits of an offset per axis, at most 32 |
+//! | 7 | 0 |
+//! | 8..20 | `i32` base per axis |
+//! | 20..23 | `i8` exponent per axis (fixed-point), else 0 |
+//! | 23 | 0 |
+//! | 24..28 | `u32` byte offset of the index array in the block |
+//! | 28..32 | 0 |
+//! | 32.. | pool: per vertex the offsets of x, y, z, bit-packed |
+//! | | index array: per packet 12 indices, corner by corner, four lanes, bit-packed |
+//!
+//! An *ordered* coordinate is the `f32` whose bits, made monotone (`b ^ ((b >> 31) >>> 1)`), are
+//! base + offset; a *fixed-point* one is (base + offset) * 2^exponent. Both are exact. Lanes beyond
+//! a packet's triangles repeat its last triangle. A block ends with at least 8 spare bytes and fills
+//! whole lines of 64 bytes.
+
+use crate::bits::{BitWriter, bit_width, read_bits};
+use std::collections::HashMap;
+
+/// Triangles in a full packet.
+pub const PACKET: usize = 4;
+/// Bytes of a packet of plain lanes.
+pub const F32_PACKET_BYTES: usize = 144;
+/// Bytes of the head of a packed block.
+pub const PACKED_HEAD_BYTES: usize = 32;
+/// Leaf blocks fill whole lines of this many bytes.
+pub const LINE: usize = 64;
+
+/// How the triangles of an object are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum TriangleEncoding {
+    /// Plain `f32` lanes: the fastest to load.
+    F32 = 0,
+    /// The same values bit for bit in fewer bytes.
+    Packed = 1,
+    /// Packed, after moving vertices to a grid by a stated error.
+    Quantized = 2,
+}
+
+impl TriangleEncoding {
+    /// All encodings, by number on disk.
+    pub const ALL: [Self; 3] = [Self::F32, Self::Packed, Self::Quantized];
+
+    /// The encoding of a number on disk.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(number)).copied()
+    }
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::Packed => "packed",
+            Self::Quantized => "quantized",
+        }
+    }
+}
+
+/// Four triangles in lane order: `corners[corner][axis][lane]`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C, align(16))]
+pub struct Packet {
+    /// Coordinates in mesh units around the object's origin.
+    pub corners: [[[f32; PACKET]; 3]; 3],
+}
+
+impl Packet {
+    /// A packet of one to four triangles; the lanes beyond repeat the last.
+    pub fn new(triangles: &[[[f32; 3]; 3]]) -> Self {
+        let mut packet = Self::default();
+        for lane in 0..PACKET {
+            let triangle = triangles[lane.min(triangles.len() - 1)];
+            for corner in 0..3 {
+                for axis in 0..3 {
+                    packet.corners[corner][axis][lane] = triangle[corner][axis];
+                }
+            }
+        }
+        packet
+    }
+
+    /// One triangle: three corners.
+    #[inline]
+    pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| self.corners[corner][axis][lane]))
+    }
+}
+
+/// Makes the leaf block of a page in whole lines.
+pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet]) -> Vec<u8> {
+    let mut block = match encoding {
+        TriangleEncoding::F32 => encode_f32(packets),
+        TriangleEncoding::Packed | TriangleEncoding::Quantized => encode_packed(packets),
+    };
+    block.resize(block.len().next_multiple_of(LINE), 0);
+    block
+}
+
+fn encode_f32(packets: &[Packet]) -> Vec<u8> {
+    let mut block = Vec::with_capacity(packets.len() * F32_PACKET_BYTES + LINE);
+    for packet in packets {
+        for value in packet.corners.iter().flatten().flatten() {
+            block.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+    block
+}
+
+/// Reads packet `index` of an F32 block. Bytes beyond the block read as zero.
+#[inline]
+pub fn decode_f32(block: &[u8], index: usize) -> Packet {
+    let mut packet = Packet::default();
+    let start = index * F32_PACKET_BYTES;
+    if let Some(bytes) = block.get(start..start + F32_PACKET_BYTES) {
+        let lanes = bytes.as_chunks::<4>().0;
+        for (value, bytes) in packet.corners.iter_mut().flatten().flatten().zip(lanes) {
+            *value = f32::from_le_bytes(*bytes);
+        }
+    }
+    packet
+}
+
+/// The head of a packed block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PackedHead {
+    /// Vertices in the pool.
+    pub vertices: u16,
+    /// Bits of an index.
+    pub index_bits: u8,
+    /// Bit `a` set: axis `a` is fixed-point.
+    pub fixed: u8,
+    /// Bits of an offset, per axis.
+    pub bits: [u8; 3],
+    /// What offsets count from, per axis.
+    pub base: [i32; 3],
+    /// Power of two of fixed-point axes.
+    pub exponent: [i8; 3],
+    /// Byte offset of the index array in the block.
+    pub indices_at: u32,
+}
+
+impl PackedHead {
+    /// Reads the head; `None` if the block is shorter.
+    #[inline]
+    pub fn read(block: &[u8]) -> Option<Self> {
+        let head = block.first_chunk::<PACKED_HEAD_BYTES>()?;
+        let word = |at: usize| [head[at], head[at + 1], head[at + 2], head[at + 3]];
+        Some(Self {
+            vertices: u16::from_le_bytes([head[0], head[1]]),
+            index_bits: head[2],
+            fixed: head[3],
+            bits: [head[4], head[5], head[6]],
+            base: [8, 12, 16].map(|at| i32::from_le_bytes(word(at))),
+            exponent: [head[20] as i8, head[21] as i8, head[22] as i8],
+            indices_at: u32::from_le_bytes(word(24)),
+        })
+    }
+
+    fn write(&self, block: &mut Vec<u8>) {
+        block.extend_from_slice(&self.vertices.to_le_bytes());
+        block.extend_from_slice(&[self.index_bits, self.fixed]);
+        block.extend_from_slice(&self.bits);
+        block.push(0);
+        self.base.iter().for_each(|base| block.extend_from_slice(&base.to_le_bytes()));
+        block.extend(self.exponent.map(|e| e as u8));
+        block.push(0);
+        block.extend_from_slice(&self.indices_at.to_le_bytes());
+        block.extend_from_slice(&[0; 4]);
+    }
+
+    /// Bits of one vertex in the pool.
+    #[inline]
+    pub fn stride(&self) -> usize {
+        self.bits.iter().map(|&b| usize::from(b)).sum()
+    }
+
+    /// One coordinate from its offset.
+    #[inline]
+    pub fn coordinate(&self, axis: usize, offset: u32) -> f32 {
+        let value = self.base[axis].wrapping_add(offset as i32);
+        if self.fixed >> axis & 1 == 1 {
+            value as f32 * power_of_two(self.exponent[axis])
+        } else {
+            from_ordered(value)
+        }
+    }
+
+    /// The vertex in place `index` of the pool.
+    #[inline]
+    pub fn vertex(&self, block: &[u8], index: u32) -> [f32; 3] {
+        let mut at = PACKED_HEAD_BYTES * 8 + index as usize * self.stride();
+        [0, 1, 2].map(|axis| {
+            let width = u32::from(self.bits[axis]).min(32);
+            let offset = read_bits(block, at, width);
+            at += width as usize;
+            self.coordinate(axis, offset)
+        })
+    }
+
+    /// Pool index `place` (corner * 4 + lane) of packet `packet`.
+    #[inline]
+    pub fn index(&self, block: &[u8], packet: usize, place: usize) -> u32 {
+        let width = usize::from(self.index_bits.min(16));
+        let at = self.indices_at as usize * 8 + (packet * 12 + place) * width;
+        read_bits(block, at, width as u32)
+    }
+
+    /// Bytes that a block of `packets` packets needs before it is filled up to whole lines.
+    pub fn block_bytes(&self, packets: usize) -> usize {
+        self.indices_at as usize + (packets * 12 * usize::from(self.index_bits)).div_ceil(8) + 8
+    }
+}
+
+/// Reads packet `index` of a packed block. Bytes beyond the block read as zero.
+pub fn decode_packed(block: &[u8], index: usize) -> Packet {
+    let mut packet = Packet::default();
+    let Some(head) = PackedHead::read(block) else { return packet };
+    for place in 0..12 {
+        let vertex = head.vertex(block, head.index(block, index, place));
+        for axis in 0..3 {
+            packet.corners[place / PACKET][axis][place % PACKET] = vertex[axis];
+        }
+    }
+    packet
+}
+
+/// Reads packet `index` of a block.
+#[inline]
+pub fn decode_packet(encoding: TriangleEncoding, block: &[u8], index: usize) -> Packet {
+    match encoding {
+        TriangleEncoding::F32 => decode_f32(block, index),
+        TriangleEncoding::Packed | TriangleEncoding::Quantized => decode_packed(block, index),
+    }
+}
+
+/// The bits of a float as an integer in the order of the numbers.
+#[inline]
+pub fn to_ordered(value: f32) -> i32 {
+    flip(value.to_bits() as i32)
+}
+
+/// The float of an ordered integer.
+#[inline]
+pub fn from_ordered(ordered: i32) -> f32 {
+    f32::from_bits(flip(ordered) as u32)
+}
+
+/// Flips all bits but the sign of a negative number: its own inverse.
+#[inline]
+fn flip(bits: i32) -> i32 {
+    bits ^ ((bits >> 31) as u32 >> 1) as i32
+}
+
+/// 2^exponent for exponents of normal floats; smaller ones give 0.
+#[inline]
+pub fn power_of_two(exponent: i8) -> f32 {
+    f32::from_bits(((i32::from(exponent) + 127).max(0) as u32) << 23)
+}
+
+/// One axis of the pool: mode, base and width.
+struct Axis {
+    fixed: bool,
+    base: i32,
+    exponent: i8,
+    bits: u8,
+}
+
+/// Picks the mode that takes fewer bits; ordered on a tie.
+fn fit_axis(values: impl Iterator<Item = f32> + Clone) -> Axis {
+    let (mut lo, mut hi) = (i32::MAX, i32::MIN);
+    for value in values.clone() {
+        lo = lo.min(to_ordered(value));
+        hi = hi.max(to_ordered(value));
+    }
+    let bits = bit_width(hi.wrapping_sub(lo) as u32) as u8;
+    let ordered = Axis { fixed: false, base: lo, exponent: 0, bits };
+    match fit_fixed(values) {
+        Some(fixed) if fixed.bits < ordered.bits => fixed,
+        _ => ordered,
+    }
+}
+
+/// The coarsest power of two of which all values are multiples, if their quotients fit in 31 bits.
+fn fit_fixed(values: impl Iterator<Item = f32> + Clone) -> Option<Axis> {
+    let exponent = values.clone().filter(|&v| v != 0.0).map(lowest_bit).min().unwrap_or(0);
+    let exponent = i8::try_from(exponent).ok().filter(|&e| e >= -126)?;
+    let scale = f64::from(power_of_two(exponent));
+    let (mut lo, mut hi) = (i32::MAX, i32::MIN);
+    for value in values {
+        let quotient = f64::from(value) / scale;
+        if quotient.abs() > f64::from(1 << 30) {
+            return None;
+        }
+        lo = lo.min(quotient as i32);
+        hi = hi.max(quotient as i32);
+    }
+    let bits = bit_width(hi.wrapping_sub(lo) as u32) as u8;
+    Some(Axis { fixed: true, base: lo, exponent, bits })
+}
+
+/// Power of two of the lowest set bit of a non-zero float.
+fn lowest_bit(value: f32) -> i32 {
+    let bits = value.to_bits();
+    let biased = ((bits >> 23) & 0xff) as i32;
+    let mantissa = if biased == 0 { bits & 0x7f_ffff } else { bits & 0x7f_ffff | 0x80_0000 };
+    biased.max(1) - 150 + mantissa.trailing_zeros() as i32
+}
+
+fn encode_packed(packets: &[Packet]) -> Vec<u8> {
+    let mut pool: Vec<[f32; 3]> = Vec::new();
+    let mut places: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut indices = Vec::with_capacity(packets.len() * 12);
+    for packet in packets {
+        for corner in &packet.corners {
+            for lane in 0..PACKET {
+                let vertex = [0, 1, 2].map(|axis| corner[axis][lane]);
+                let place = *places.entry(vertex.map(f32::to_bits)).or_insert_with(|| {
+                    pool.push(vertex);
+                    pool.len() as u32 - 1
+                });
+                indices.push(place);
+            }
+        }
+    }
+    let axes = [0, 1, 2].map(|axis| fit_axis(pool.iter().map(move |vertex| vertex[axis])));
+    let mut head = PackedHead {
+        vertices: pool.len() as u16,
+        index_bits: bit_width(pool.len() as u32 - 1) as u8,
+        fixed: (0..3).map(|axis| u8::from(axes[axis].fixed) << axis).sum(),
+        bits: [0, 1, 2].map(|axis| axes[axis].bits),
+        base: [0, 1, 2].map(|axis| axes[axis].base),
+        exponent: [0, 1, 2].map(|axis| axes[axis].exponent),
+        indices_at: 0,
+    };
+    let mut writer = BitWriter::default();
+    for vertex in &pool {
+        for (axis, fit) in axes.iter().enumerate() {
+            let value = if fit.fixed {
+                (f64::from(vertex[axis]) / f64::from(power_of_two(fit.exponent))) as i32
+            } else {
+                to_ordered(vertex[axis])
+            };
+            writer.push(value.wrapping_sub(fit.base) as u32, u32::from(fit.bits));
+        }
+    }
+    let vertices = writer.finish();
+    let mut writer = BitWriter::default();
+    indices.iter().for_each(|&index| writer.push(index, u32::from(head.index_bits)));
+    let indices = writer.finish();
+    head.indices_at = (PACKED_HEAD_BYTES + vertices.len()) as u32;
+    let mut block = Vec::with_capacity(head.block_bytes(packets.len()) + LINE);
+    head.write(&mut block);
+    block.extend_from_slice(&vertices);
+    block.extend_from_slice(&indices);
+    block.extend_from_slice(&[0; 8]);
+    block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packets(seed: u64, count: usize, make: impl Fn(u64) -> f32) -> Vec<Packet> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            make(state >> 20)
+        };
+        (0..count)
+            .map(|i| {
+                let triangles: Vec<_> =
+                    (0..1 + i % 4).map(|_| [(); 3].map(|()| [(); 3].map(|()| next()))).collect();
+                Packet::new(&triangles)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn both_encodings_return_every_bit() {
+        let kinds: [fn(u64) -> f32; 6] = [
+            |r| (r & 0xfff) as f32 / 64.0 - 30.0,
+            |r| f32::from_bits((r as u32 & 0x7fff_ffff).min(0x7b80_0000) | (r as u32 & 1) << 31),
+            |r| (r % 3) as f32,
+            |_| 0.0,
+            |r| f32::from_bits(r as u32 & 0xff),
+            |r| ((r & 0xffff) as f32 - 32768.0) * 1e-3,
+        ];
+        for (kind, make) in kinds.into_iter().enumerate() {
+            for count in [1, 2, 7, 150] {
+                let packets = packets(kind as u64 + 1, count, make);
+                for encoding in TriangleEncoding::ALL {
+                    let block = encode_block(encoding, &packets);
+                    assert_eq!(block.len() % LINE, 0);
+                    for (index, packet) in packets.iter().enumerate() {
+                        let decoded = decode_packet(encoding, &block, index);
+                        let bits = |p: &Packet| p.corners.map(|c| c.map(|a| a.map(f32::to_bits)));
+                        assert_eq!(bits(&decoded), bits(packet), "kind {kind}, packet {index}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ordered_integers_keep_the_order() {
+        let values = [-1e30f32, -1.0, -1e-40, 0.0, 1e-45, 1e-40, 0.5, 1.0, 1e30];
+        for pair in values.windows(2) {
+            assert!(to_ordered(pair[0]) < to_ordered(pair[1]));
+        }
+        for value in values {
+            assert_eq!(from_ordered(to_ordered(value)).to_bits(), value.to_bits());
+        }
+    }
+
+    #[test]
+    fn a_grid_takes_the_bits_of_its_extent() {
+        // 16 steps of 2^-10 far from zero: 4 bits an axis, whatever the magnitude.
+        let packets = packets(3, 40, |r| 100.0 + (r % 16) as f32 / 1024.0);
+        let head = PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets)).unwrap();
+        assert_eq!(head.bits, [4, 4, 4]);
+    }
+}

@@ -1,0 +1,156 @@
+//! The profiles of a treelet: direction set, encoding of residuals, number of children, size.
+
+use crate::kdop::DirectionSet;
+
+/// How a child's slab ends are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Encoding {
+    /// 4-bit residual in 1/15 of the parent's slab.
+    U4,
+    /// 8-bit residual in 1/255 of the parent's slab.
+    U8,
+    /// 16-bit floating-point residual in units of the object's power of two.
+    F16,
+    /// The slab ends themselves, 32-bit: the uncompressed baseline.
+    F32,
+}
+
+/// A treelet layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Profile {
+    /// 14-DOP, 8-bit residuals, 4 children, 64 bytes: the default.
+    Dop14U8 = 0,
+    /// 6-DOP, 8-bit residuals, 8 children, 64 bytes.
+    Dop6U8 = 1,
+    /// 6-DOP, f16 residuals, 4 children, 64 bytes.
+    Dop6F16 = 2,
+    /// 14-DOP, f16 residuals, 2 children, 64 bytes.
+    Dop14F16 = 3,
+    /// 14-DOP, 4-bit residuals, 8 children, 64 bytes.
+    Dop14U4 = 4,
+    /// 26-DOP, 4-bit residuals, 4 children, 64 bytes.
+    Dop26U4 = 5,
+    /// 26-DOP, 8-bit residuals, 2 children, 64 bytes.
+    Dop26U8 = 6,
+    /// 14-DOP, f16 residuals, 4 children, 128 bytes.
+    Dop14F16Wide = 7,
+    /// 26-DOP, 8-bit residuals, 4 children, 128 bytes.
+    Dop26U8Wide = 8,
+    /// 14-DOP, f32 slabs, 4 children, 256 bytes: the baseline of reports.
+    Dop14F32 = 9,
+}
+
+impl Profile {
+    /// All profiles, by number on disk.
+    pub const ALL: [Profile; 10] = [
+        Self::Dop14U8,
+        Self::Dop6U8,
+        Self::Dop6F16,
+        Self::Dop14F16,
+        Self::Dop14U4,
+        Self::Dop26U4,
+        Self::Dop26U8,
+        Self::Dop14F16Wide,
+        Self::Dop26U8Wide,
+        Self::Dop14F32,
+    ];
+
+    /// The profile of a number on disk.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(number)).copied()
+    }
+
+    /// The number on disk.
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dop14U8 => "dop14-u8",
+            Self::Dop6U8 => "dop6-u8",
+            Self::Dop6F16 => "dop6-f16",
+            Self::Dop14F16 => "dop14-f16",
+            Self::Dop14U4 => "dop14-u4",
+            Self::Dop26U4 => "dop26-u4",
+            Self::Dop26U8 => "dop26-u8",
+            Self::Dop14F16Wide => "dop14-f16-wide",
+            Self::Dop26U8Wide => "dop26-u8-wide",
+            Self::Dop14F32 => "dop14-f32",
+        }
+    }
+
+    /// The profile of a name on the command line.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|profile| profile.name() == name)
+    }
+
+    /// The directions its k-DOPs have.
+    pub const fn directions(self) -> DirectionSet {
+        match self {
+            Self::Dop6U8 | Self::Dop6F16 => DirectionSet::Dop6,
+            Self::Dop14U8 | Self::Dop14F16 | Self::Dop14U4 | Self::Dop14F16Wide | Self::Dop14F32 => {
+                DirectionSet::Dop14
+            }
+            Self::Dop26U4 | Self::Dop26U8 | Self::Dop26U8Wide => DirectionSet::Dop26,
+        }
+    }
+
+    /// How residuals are written.
+    pub const fn encoding(self) -> Encoding {
+        match self {
+            Self::Dop14U4 | Self::Dop26U4 => Encoding::U4,
+            Self::Dop14U8 | Self::Dop6U8 | Self::Dop26U8 | Self::Dop26U8Wide => Encoding::U8,
+            Self::Dop6F16 | Self::Dop14F16 | Self::Dop14F16Wide => Encoding::F16,
+            Self::Dop14F32 => Encoding::F32,
+        }
+    }
+
+    /// The most children a treelet has: 2, 4 or 8.
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Dop6U8 | Self::Dop14U4 => 8,
+            Self::Dop14F16 | Self::Dop26U8 => 2,
+            _ => 4,
+        }
+    }
+
+    /// Bytes of a treelet: 64, 128 or 256.
+    pub const fn treelet_bytes(self) -> usize {
+        match self {
+            Self::Dop14F16Wide | Self::Dop26U8Wide => 128,
+            Self::Dop14F32 => 256,
+            _ => 64,
+        }
+    }
+
+    /// Bytes of a subtree root's anchor: 64, or 128 for 26-DOPs.
+    pub const fn anchor_bytes(self) -> usize {
+        match self.directions() {
+            DirectionSet::Dop26 => 128,
+            _ => 64,
+        }
+    }
+
+    /// Groups of four children a treelet is decoded in: 2 at width 8, else 1.
+    pub const fn groups(self) -> usize {
+        if self.width() == 8 { 2 } else { 1 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_round_trip() {
+        for (number, profile) in Profile::ALL.into_iter().enumerate() {
+            assert_eq!(Profile::from_number(number as u8), Some(profile));
+            assert_eq!(usize::from(profile.number()), number);
+            assert_eq!(Profile::from_name(profile.name()), Some(profile));
+        }
+        assert_eq!(Profile::from_number(10), None);
+    }
+}

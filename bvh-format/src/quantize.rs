@@ -1,0 +1,158 @@
+//! The predictor-corrector: a child's slab end is its parent's *decoded* end moved inward by a residual.
+//!
+//! Decoder and encoder stand side by side. The encoder searches the largest residual whose decoded
+//! value, computed by the decoder's own operations, still lies outside the true value; so a decoded
+//! slab always contains the true one, and because the prediction starts from the decoded parent,
+//! errors of successive levels do not add up. Method: Tan, Weller, Zachmann, arXiv 2012.05348,
+//! section 4, with the rounding made explicit.
+//!
+//! A quantisation step has 16 significant bits, a code at most 8: their product is exact in `f32`,
+//! so that a decoder may or may not fuse the product with the sum and gets the same bits.
+
+use crate::profile::Encoding;
+use half::f16;
+
+/// `1 / 255`, rounded to `f32`.
+pub const STEP_U8: f32 = 1.0 / 255.0;
+/// `1 / 15`, rounded to `f32`.
+pub const STEP_U4: f32 = 1.0 / 15.0;
+/// The largest code of an f16 residual: the largest finite f16.
+const F16_MAX_CODE: u16 = 0x7bff;
+
+/// Rounds a non-negative step up to 16 significant bits.
+#[inline]
+pub fn round_step_up(step: f32) -> f32 {
+    f32::from_bits(step.to_bits().wrapping_add(0xff) & !0xff)
+}
+
+/// The unit that the integer codes of one slab count, from the parent's decoded slab.
+/// `object_scale` is the object's power of two, used by `F16` alone.
+#[inline]
+pub fn residual_unit(encoding: Encoding, parent_lo: f32, parent_hi: f32, object_scale: f32) -> f32 {
+    match encoding {
+        Encoding::U4 => round_step_up((parent_hi - parent_lo) * STEP_U4),
+        Encoding::U8 => round_step_up((parent_hi - parent_lo) * STEP_U8),
+        Encoding::F16 => object_scale,
+        Encoding::F32 => 0.0,
+    }
+}
+
+/// How far inward from the parent's end a code leads, in mesh units along the direction.
+#[inline]
+pub fn residual(encoding: Encoding, code: u16, unit: f32) -> f32 {
+    match encoding {
+        Encoding::U4 | Encoding::U8 => f32::from(code) * unit,
+        Encoding::F16 => f16::from_bits(code).to_f32() * unit,
+        Encoding::F32 => 0.0,
+    }
+}
+
+/// Decodes a lower end.
+#[inline]
+pub fn decode_min(encoding: Encoding, code: u16, parent_lo: f32, unit: f32) -> f32 {
+    parent_lo + residual(encoding, code, unit)
+}
+
+/// Decodes an upper end.
+#[inline]
+pub fn decode_max(encoding: Encoding, code: u16, parent_hi: f32, unit: f32) -> f32 {
+    parent_hi - residual(encoding, code, unit)
+}
+
+/// The largest code whose decoded lower end is at most `true_lo`. Needs `parent_lo <= true_lo`.
+pub fn encode_min_outward(encoding: Encoding, true_lo: f32, parent_lo: f32, unit: f32) -> u16 {
+    largest_code(encoding, true_lo - parent_lo, unit, |code| {
+        decode_min(encoding, code, parent_lo, unit) <= true_lo
+    })
+}
+
+/// The largest code whose decoded upper end is at least `true_hi`. Needs `parent_hi >= true_hi`.
+pub fn encode_max_outward(encoding: Encoding, true_hi: f32, parent_hi: f32, unit: f32) -> u16 {
+    largest_code(encoding, parent_hi - true_hi, unit, |code| {
+        decode_max(encoding, code, parent_hi, unit) >= true_hi
+    })
+}
+
+/// Searches from a guess: codes are ordered by the residual they stand for, and `fits` holds for a
+/// prefix of them that includes 0.
+fn largest_code(encoding: Encoding, gap: f32, unit: f32, fits: impl Fn(u16) -> bool) -> u16 {
+    let (guess, last) = match encoding {
+        Encoding::U4 => (saturated(gap / unit, 15), 15),
+        Encoding::U8 => (saturated(gap / unit, 255), 255),
+        Encoding::F16 => {
+            let guess = f16::from_f32(gap / unit);
+            let code = if guess > f16::ZERO { guess.to_bits().min(F16_MAX_CODE) } else { 0 };
+            (code, F16_MAX_CODE)
+        }
+        Encoding::F32 => return 0,
+    };
+    let mut code = guess;
+    while code > 0 && !fits(code) {
+        code -= 1;
+    }
+    while code < last && fits(code + 1) {
+        code += 1;
+    }
+    code
+}
+
+/// The integer part of a quotient, 0 where there is none (0 / 0), at most `last`.
+fn saturated(quotient: f32, last: u16) -> u16 {
+    (quotient as u16).min(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decoded_ends_contain_the_true_ones_and_are_the_tightest() {
+        let mut state = 7u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            ((state >> 40) as f32 / (1u64 << 24) as f32) * 2.0 - 1.0
+        };
+        for encoding in [Encoding::U4, Encoding::U8, Encoding::F16] {
+            for round in 0..200_000 {
+                let scale = 2f32.powi(round % 100 - 50);
+                let mut ends = [random(), random(), random(), random()].map(|v| v * scale);
+                if round % 7 == 0 {
+                    ends[1] = ends[0];
+                }
+                ends.sort_by(f32::total_cmp);
+                let [parent_lo, lo, hi, parent_hi] = ends;
+                let unit = residual_unit(encoding, parent_lo, parent_hi, scale * 2f32.powi(-14));
+                let code_lo = encode_min_outward(encoding, lo, parent_lo, unit);
+                let code_hi = encode_max_outward(encoding, hi, parent_hi, unit);
+                assert!(decode_min(encoding, code_lo, parent_lo, unit) <= lo);
+                assert!(decode_max(encoding, code_hi, parent_hi, unit) >= hi);
+                // One code further would cut, unless the codes end there.
+                let last = match encoding {
+                    Encoding::U4 => 15,
+                    Encoding::U8 => 255,
+                    _ => F16_MAX_CODE,
+                };
+                if code_lo < last {
+                    assert!(decode_min(encoding, code_lo + 1, parent_lo, unit) > lo);
+                }
+                if code_hi < last {
+                    assert!(decode_max(encoding, code_hi + 1, parent_hi, unit) < hi);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn products_of_code_and_step_are_exact() {
+        for seed in 0..50_000u32 {
+            let width = f32::from_bits(0x2000_0000 + seed.wrapping_mul(0x9e37_79b9) % 0x3000_0000);
+            for (step, last) in [(STEP_U8, 255u16), (STEP_U4, 15)] {
+                let unit = round_step_up(width * step);
+                for code in [1, 7, last / 2, last] {
+                    let product = f32::from(code) * unit;
+                    assert_eq!(f64::from(product), f64::from(code) * f64::from(unit));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The numbered rules of the specification, one name each.
+
+use std::fmt;
+
+macro_rules! rules {
+    ($($name:ident = $number:literal, $text:literal;)*) => {
+        /// A numbered rule of `spec/format.md`. Errors and test files name rules by number.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Rule { $(#[doc = $text] $name = $number,)* }
+
+        impl Rule {
+            /// All rules in the order of their numbers.
+            pub const ALL: &'static [Rule] = &[$(Rule::$name,)*];
+
+            /// The rule in one phrase, as the specification has it.
+            pub fn text(self) -> &'static str {
+                match self { $(Rule::$name => $text,)* }
+            }
+        }
+    };
+}
+
+rules! {
+    Magic = 1, "the file starts with the magic bytes";
+    Version = 2, "the major version is one that this reader knows";
+    HeaderSize = 3, "the file holds a whole header page";
+    HeaderChecksum = 4, "the header page has the checksum it states";
+    FileLength = 5, "the file is as long as the header states";
+    SectionCount = 6, "the section table has at most 64 entries";
+    SectionPlace = 7, "sections are page-aligned, in order, and within the file";
+    SectionKnown = 8, "a required section is of a kind that this reader knows";
+    SectionOnce = 9, "the needed sections are there, each once";
+    SectionChecksum = 10, "a section has the checksum that the table states";
+    ObjectTable = 11, "the object table has one record of 192 bytes per object and names within its bytes";
+    ObjectNumbers = 12, "an object's numbers are finite, ordered and within the limits";
+    ObjectPages = 13, "the objects' pages follow each other and fill the node section";
+    ObjectProfile = 14, "an object's profile and triangle encoding are known";
+    PageChecksum = 15, "a page has the checksum that it states";
+    PageNumber = 16, "a page states its own number";
+    PageShape = 17, "header, anchors, remote links and treelets of a page fit in it";
+    PageProfile = 18, "a page has its object's profile";
+    AnchorSlabs = 19, "an anchor's slabs are finite and ordered";
+    AnchorParent = 20, "a subtree root names the page and remote link that lead to it";
+    ChildKinds = 21, "a treelet has at least one child, of known kinds, without gaps, at most its width";
+    TreeletLinks = 22, "treelets are numbered breadth-first: roots first, then the children in order";
+    RemoteLinks = 23, "remote links are numbered in treelet order and lead to later pages of the object";
+    LeafLinks = 24, "leaf packets are numbered in treelet order";
+    Reserved = 25, "reserved bytes are zero";
+    LeafPlace = 26, "a leaf block lies within the leaf section and has the size its packets need";
+    LeafChecksum = 27, "a leaf block has the checksum that its page states";
+    PackedHeader = 28, "a packed leaf block's bit widths are within the limits and its parts within the block";
+    PackedIndex = 29, "a packed vertex index is below the block's vertex count";
+    VertexFinite = 30, "a vertex coordinate is finite and at most 2^120 in magnitude";
+    IdPlace = 31, "an id block lies within the id section and has the size its packets need";
+    IdChecksum = 32, "an id block has the checksum that its page states";
+    IdRange = 33, "a triangle id is below the number of triangles of the input";
+    Counts = 34, "an object's counts of treelets, packets and triangles are those of its pages";
+    BoundContains = 35, "every decoded slab contains the triangles below it";
+    DuplicateIds = 36, "duplicate ids come in ascending pairs (kept, dropped)";
+    VertexOnGrid = 37, "the origin plus a vertex is exact in 64-bit floating point";
+}
+
+impl Rule {
+    /// The rule's number in the specification, from 1.
+    pub fn number(self) -> u32 {
+        self as u32
+    }
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "R{:02} ({})", self.number(), self.text())
+    }
+}

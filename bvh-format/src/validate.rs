@@ -1,0 +1,284 @@
+//! Checks a whole file by the rules, page by page; and whether its bounds contain its triangles.
+//!
+//! `validate` looks at structure and checksums. `Bounds` is the proof of the geometry: going through
+//! the pages from the last to the first it finds the tight k-DOP of every subtree from the stored
+//! triangles and compares it with what a query decodes.
+
+use crate::checksum::checksum;
+use crate::decode::{NodeSlabs, decode_child};
+use crate::error::{FormatError, ensure, require};
+use crate::header::{SectionKind, hex};
+use crate::ids::decode_id;
+use crate::kdop::Kdop;
+use crate::layout::{ContentHasher, Layout};
+use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
+use crate::object::{MAX_COORDINATE, Object};
+use crate::page::{PAGE, Page, RootRef, check_crossing, check_page};
+use crate::rule::Rule;
+use crate::treelet::{Child, Links};
+
+/// Checks structure and checksums of the whole file.
+///
+/// Cost: two passes over the bytes, no memory beyond the object table.
+///
+/// # Errors
+/// The first rule that does not hold; bounds (rule 35) are `Bounds`' business.
+pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
+    let layout = Layout::read(bytes)?;
+    let mut content = ContentHasher::default();
+    for section in &layout.sections {
+        let data = &bytes[section.range.clone()];
+        let at = section.range.start as u64;
+        require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(data)))?;
+        if section.kind.is_content() {
+            content.begin(section.kind, data.len() as u64);
+            content.update(data);
+        }
+    }
+    require(Rule::SectionChecksum, 24, hex(layout.content_checksum), hex(content.finish()))?;
+    for object in &layout.objects {
+        validate_object(&layout, bytes, object)?;
+    }
+    check_duplicates(&layout, bytes)?;
+    Ok(layout)
+}
+
+fn validate_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<(), FormatError> {
+    let record = &object.record;
+    let first = record.first_page.get();
+    let (mut treelets, mut packets, mut triangles) = (0u64, 0u64, 0u64);
+    for number in first..first + record.pages.get() {
+        let page = checked_page(layout, bytes, number, object)?;
+        let header = page.header();
+        let at = layout.page_offset(number);
+        require(Rule::Counts, at + 40, packets, u64::from(header.first_packet.get()))?;
+        treelets += u64::from(header.treelets);
+        packets += u64::from(header.packets.get());
+        triangles += check_leaves(layout, bytes, object, &page)?;
+        for link in 0..header.remotes {
+            let to = page.remote(link);
+            let target = checked_page(layout, bytes, to.page(), object)?;
+            check_crossing(&target, to, number, link, layout.page_offset(to.page()))?;
+        }
+    }
+    let at = layout.page_offset(first);
+    let found = [treelets, packets, triangles];
+    let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
+    ensure(found == stated, Rule::Counts, at, || {
+        (format!("treelets, packets, triangles {stated:?}"), format!("{found:?}"))
+    })
+}
+
+fn checked_page<'a>(
+    layout: &Layout,
+    bytes: &'a [u8],
+    number: u32,
+    object: &Object,
+) -> Result<Page<'a>, FormatError> {
+    let at = layout.page_offset(number);
+    let page: &[u8; PAGE] = layout
+        .page_bytes(bytes, number)
+        .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section"))?;
+    check_page(page, number, object, at)?;
+    Ok(Page::new(page, object.profile))
+}
+
+/// Checks a page's leaf and id blocks value by value; returns the number of its triangles.
+fn check_leaves(layout: &Layout, bytes: &[u8], object: &Object, page: &Page) -> Result<u64, FormatError> {
+    layout.check_leaf_block(bytes, page, object)?;
+    layout.check_id_block(bytes, page)?;
+    let header = page.header();
+    let at = layout.page_offset(header.page_number.get());
+    let (block, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
+    let origin = object.record.origin.map(|o| o.get());
+    let mut triangles = 0;
+    for (packet, count) in packets(page) {
+        triangles += count as u64;
+        if object.triangle_encoding != TriangleEncoding::F32 {
+            check_indices(block, usize::from(packet), at)?;
+        }
+        let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+        check_vertices(&values, origin, at)?;
+        for lane in 0..if ids.is_empty() { 0 } else { count } {
+            let id = u64::from(decode_id(ids, usize::from(packet), lane));
+            ensure(id < object.record.input_triangles.get(), Rule::IdRange, at + 32, || {
+                (format!("below {}", object.record.input_triangles), id.to_string())
+            })?;
+        }
+    }
+    Ok(triangles)
+}
+
+fn check_indices(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError> {
+    let Some(head) = PackedHead::read(block) else { return Ok(()) };
+    for place in 0..3 * PACKET {
+        let index = head.index(block, packet, place);
+        ensure(index < u32::from(head.vertices), Rule::PackedIndex, at + 24, || {
+            (format!("below {}", head.vertices), index.to_string())
+        })?;
+    }
+    Ok(())
+}
+
+fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), FormatError> {
+    for corner in &packet.corners {
+        for axis in 0..3 {
+            for value in corner[axis].map(f64::from) {
+                ensure(value.abs() <= MAX_COORDINATE, Rule::VertexFinite, at + 24, || {
+                    ("a finite coordinate of at most 2^120".into(), value.to_string())
+                })?;
+                let sum = origin[axis] + value;
+                let exact = sum - origin[axis] == value && sum - value == origin[axis];
+                ensure(exact, Rule::VertexOnGrid, at + 24, || {
+                    (format!("{} + v exact", origin[axis]), value.to_string())
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The leaf packets of a checked page with their numbers of triangles, in slot order.
+pub fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u16, usize)> + 'a {
+    (0..page.header().treelets).flat_map(|slot| {
+        let links = Links::read(page.treelet(slot));
+        (0..8).filter_map(move |child| match links.child(child) {
+            Child::Leaf { packet, triangles } => Some((packet, usize::from(triangles))),
+            _ => None,
+        })
+    })
+}
+
+fn check_duplicates(layout: &Layout, bytes: &[u8]) -> Result<(), FormatError> {
+    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
+    let Some(section) = section else { return Ok(()) };
+    let at = section.range.start as u64;
+    require(Rule::DuplicateIds, at, 0, section.range.len() % 8)?;
+    let pairs = layout.duplicate_ids(bytes);
+    let ascending = pairs.iter().all(|[kept, dropped]| kept.get() < dropped.get())
+        && pairs.windows(2).all(|w| w[0].map(|v| v.get()) < w[1].map(|v| v.get()));
+    ensure(ascending, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
+}
+
+/// The tight k-DOP of the triangles below every subtree root of a page, found from the stored
+/// triangles, after checking that every slab decoded in the page contains what is below it.
+///
+/// `below` gives the tight k-DOPs of roots in later pages. The page and its leaf block have been
+/// checked. Returns one k-DOP a root and the sums that inflation is reported from.
+///
+/// # Errors
+/// Rule 35 where a decoded slab cuts its triangles.
+pub fn check_bounds(
+    layout: &Layout,
+    bytes: &[u8],
+    object: &Object,
+    page: &Page,
+    below: impl Fn(RootRef) -> Kdop,
+) -> Result<(Vec<Kdop>, Inflation), FormatError> {
+    let header = page.header();
+    let slabs = object.profile.directions().slabs();
+    let at = layout.page_offset(header.page_number.get());
+    let block = layout.leaf_block(bytes, header);
+    let treelets = usize::from(header.treelets);
+    // Children have higher slots: tight bounds go up from the last slot, decoded ones down.
+    let mut tight = vec![Kdop::EMPTY; treelets];
+    let mut children = vec![[Kdop::EMPTY; 8]; treelets];
+    for slot in (0..treelets).rev() {
+        let links = Links::read(page.treelet(slot as u8));
+        for child in 0..links.children() {
+            let kdop = match links.child(child) {
+                Child::Treelet(slot) => tight[usize::from(slot)],
+                Child::Remote(link) => below(page.remote(link)),
+                Child::Leaf { packet, triangles } => {
+                    packet_kdop(object, block, usize::from(packet), usize::from(triangles), slabs)
+                }
+                Child::Empty => continue,
+            };
+            children[slot][child] = kdop;
+            tight[slot].join(&kdop, slabs);
+        }
+    }
+    let mut decoded = vec![NodeSlabs::default(); treelets];
+    let mut inflation = Inflation::default();
+    for root in 0..header.roots {
+        decoded[usize::from(root)] = page.anchor(root).slabs;
+    }
+    for slot in 0..treelets {
+        let held = decoded[slot].to_kdop(slabs);
+        ensure(held.contains(&tight[slot], slabs), Rule::BoundContains, at, || {
+            (format!("slot {slot} to contain {:?}", tight[slot]), format!("{held:?}"))
+        })?;
+        let links = Links::read(page.treelet(slot as u8));
+        for child in 0..links.children() {
+            let treelet = page.treelet(slot as u8);
+            let node = decode_child(object.profile, object.f16_scale, treelet, child, &decoded[slot]);
+            let (held, inner) = (node.to_kdop(slabs), &children[slot][child]);
+            ensure(held.contains(inner, slabs), Rule::BoundContains, at, || {
+                (format!("slot {slot}, child {child} to contain {inner:?}"), format!("{held:?}"))
+            })?;
+            inflation.add(&held, inner, slabs);
+            if let Child::Treelet(slot) = links.child(child) {
+                decoded[usize::from(slot)] = node;
+            }
+        }
+    }
+    tight.truncate(usize::from(header.roots));
+    Ok((tight, inflation))
+}
+
+/// The tight k-DOP of a packet's triangles.
+fn packet_kdop(object: &Object, block: &[u8], packet: usize, triangles: usize, slabs: usize) -> Kdop {
+    let values = decode_packet(object.triangle_encoding, block, packet);
+    let mut kdop = Kdop::EMPTY;
+    for lane in 0..triangles {
+        values.triangle(lane).iter().for_each(|corner| kdop.add_point(*corner, slabs));
+    }
+    kdop
+}
+
+/// How much wider decoded bounds are than tight ones.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inflation {
+    /// Nodes counted.
+    pub nodes: u64,
+    /// Sum over nodes of the mean over slabs of decoded width / tight width.
+    pub width: f64,
+    /// Sum over nodes of the product over the box's sides of decoded width / tight width.
+    pub volume: f64,
+}
+
+impl Inflation {
+    fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize) {
+        let ratio = |slab: usize| {
+            let tight = f64::from(tight.hi[slab]) - f64::from(tight.lo[slab]);
+            let held = f64::from(held.hi[slab]) - f64::from(held.lo[slab]);
+            (tight > 0.0).then_some(held / tight)
+        };
+        let (sum, count) =
+            (0..slabs).filter_map(ratio).fold((0.0, 0), |(sum, n), ratio| (sum + ratio, n + 1));
+        // Flat in every direction (a point): no ratio is defined.
+        if count == 0 {
+            return;
+        }
+        self.nodes += 1;
+        self.width += sum / f64::from(count);
+        self.volume += (0..3).filter_map(ratio).product::<f64>();
+    }
+
+    /// Adds the sums of other nodes.
+    pub fn join(&mut self, other: &Self) {
+        self.nodes += other.nodes;
+        self.width += other.width;
+        self.volume += other.volume;
+    }
+
+    /// Mean width ratio, 1 without nodes.
+    pub fn mean_width(&self) -> f64 {
+        if self.nodes == 0 { 1.0 } else { self.width / self.nodes as f64 }
+    }
+
+    /// Mean volume ratio, 1 without nodes.
+    pub fn mean_volume(&self) -> f64 {
+        if self.nodes == 0 { 1.0 } else { self.volume / self.nodes as f64 }
+    }
+}
