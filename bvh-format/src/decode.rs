@@ -4,6 +4,7 @@ use crate::kdop::Kdop;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
 use crate::treelet::{read_codes, read_ends, row};
+use bytemuck::{Pod, Zeroable};
 
 /// The decoded slabs of one node in row order (slab `s` in row `s`, from 7 on in row `s + 1`).
 /// Rows beyond the profile's directions hold nothing of meaning.
@@ -40,7 +41,7 @@ impl NodeSlabs {
 /// The decoded slabs of four children in register order: element `4 * r + c` of register `q` is row
 /// `4 * q + r` of child `c`. Elements of absent children and of rows beyond the profile's
 /// directions hold nothing of meaning.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Group {
     /// Lower ends.
@@ -52,6 +53,12 @@ pub struct Group {
 impl Group {
     /// All zero.
     pub const ZERO: Self = Self { lo: [[0.0; 16]; 4], hi: [[0.0; 16]; 4] };
+
+    /// The rows one by one, four children each: lower ends in rows 0 to 15, upper ends in 16 to 31.
+    #[inline(always)]
+    pub fn rows(&self) -> &[[f32; 4]; 32] {
+        bytemuck::cast_ref(self)
+    }
 
     /// A group of one child, the first.
     pub fn of_one(node: &NodeSlabs) -> Self {

@@ -1,0 +1,315 @@
+//! The tables of the specification say what the code does: each is read from the Markdown and compared.
+//!
+//! A table is found by the comment `<!-- table: name -->` before it. Byte tables must name every
+//! field of their structure, in order, without gaps.
+
+use bvh_format::Rule;
+use bvh_format::checksum::checksum;
+use bvh_format::decode::{NodeSlabs, decode_child};
+use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind};
+use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
+use bvh_format::kdop::{DIRECTIONS, Kdop};
+use bvh_format::leaf::{F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PackedHead, TriangleEncoding};
+use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
+use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, write_anchor};
+use bvh_format::profile::{Encoding, Profile};
+use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
+use bvh_format::treelet::{self, Child, Links};
+use std::any::type_name_of_val;
+use std::mem::offset_of;
+use zerocopy::FromZeros;
+
+fn specification(file: &str) -> String {
+    let path = format!("{}/../spec/{file}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// The rows of a table, without its heading; cells without the backquotes around them.
+fn table(file: &str, name: &str) -> Vec<Vec<String>> {
+    let text = specification(file);
+    let marker = format!("<!-- table: {name} -->");
+    assert_eq!(text.matches(&marker).count(), 1, "{marker}");
+    let lines = text.lines().skip_while(|line| *line != marker).skip(1);
+    let cells = |line: &str| -> Vec<String> {
+        let line = line.trim().trim_start_matches('|').trim_end_matches('|');
+        line.split('|').map(|cell| cell.trim().trim_matches('`').to_owned()).collect()
+    };
+    let rows: Vec<_> = lines.take_while(|line| line.starts_with('|')).map(cells).collect();
+    assert!(rows.len() > 2 && rows.iter().all(|row| row.len() == rows[0].len()), "{marker}: ragged");
+    rows[2..].to_vec()
+}
+
+/// `12` or `0xff`; text behind a space is for people.
+fn number(cell: &str) -> u64 {
+    let cell = cell.split(' ').next().unwrap_or_default();
+    let (digits, radix) = cell.strip_prefix("0x").map_or((cell, 10), |hex| (hex, 16));
+    u64::from_str_radix(digits, radix).unwrap_or_else(|_| panic!("not a number: {cell}"))
+}
+
+/// A byte table as (offset, size, type, field), after checking that it has no gaps and that sizes
+/// are those of the types.
+fn byte_table(name: &str, total: usize) -> Vec<(usize, usize, String, String)> {
+    let mut next = 0;
+    let rows = table("format.md", name).into_iter().map(|row| {
+        let (offset, size) = (number(&row[0]) as usize, number(&row[1]) as usize);
+        let (base, count) = match row[2].split_once('[') {
+            Some((base, count)) => (base, number(count.trim_end_matches(']')) as usize),
+            None => (row[2].as_str(), 1),
+        };
+        assert!(
+            ["u8", "u16", "u32", "u64", "i8", "i32", "f32", "f64"].contains(&base),
+            "{name}: type {base}"
+        );
+        assert_eq!(offset, next, "{name}: gap or overlap before {}", row[3]);
+        assert_eq!(size, count * number(&base[1..]) as usize / 8, "{name}: size of {}", row[3]);
+        next += size;
+        (offset, size, base.to_owned(), row[3].clone())
+    });
+    let rows = rows.collect();
+    assert_eq!(next, total, "{name}: size");
+    rows
+}
+
+/// Compares a byte table with a structure. A field left out of the list does not compile.
+macro_rules! compare {
+    ($structure:ident: $($field:ident),*) => {{
+        let $structure { $($field),* } = &$structure::new_zeroed();
+        let fields = [$((
+            offset_of!($structure, $field), size_of_val($field), type_name_of_val($field), stringify!($field)
+        )),*];
+        let rows = byte_table(stringify!($structure), size_of::<$structure>());
+        assert_eq!(rows.len(), fields.len(), "fields of {}", stringify!($structure));
+        for (row, field) in rows.iter().zip(fields) {
+            assert_eq!((row.0, row.1, row.3.as_str()), (field.0, field.1, field.3));
+            let kind = field.2.to_lowercase();
+            assert!(kind.contains(&row.2), "type of {}: {} is no {}", field.3, kind, row.2);
+        }
+    }};
+}
+
+#[test]
+fn structures() {
+    compare!(Header: magic, major, minor, sections, file_length, content_checksum, header_checksum, reserved);
+    compare!(SectionEntry: kind, required, offset, length, checksum);
+    compare!(ObjectRecord: name_offset, name_length, origin, box_lo, box_hi, triangles, packets, treelets,
+        first_page, pages, max_vertex_rounding, max_quantization_error, input_triangles, degenerate,
+        duplicates, f16_exponent, profile, triangle_encoding, reserved, sphere_centre, sphere_radius,
+        reserved_end);
+    compare!(PageHeader: checksum, leaf_checksum, id_checksum, leaf_line, id_word, first_packet,
+        page_number, leaf_lines, id_words, packets, roots, treelets, remotes, treelet_line, profile,
+        reserved);
+}
+
+#[test]
+fn heads_of_blocks() {
+    let offset = |rows: &[(usize, usize, String, String)], field: &str| {
+        rows.iter().find(|row| row.3 == field).unwrap_or_else(|| panic!("no field {field}")).0
+    };
+
+    let rows = byte_table("object-head", write_objects(&[]).len());
+    let section = write_objects(&[("name".into(), ObjectRecord::new_zeroed())]);
+    assert_eq!([section[offset(&rows, "objects")], section[offset(&rows, "names_length")]], [1, 4]);
+
+    // Bytes that differ from each other: a value is known by the byte it starts with.
+    let bytes: Vec<u8> = (1..=PACKED_HEAD_BYTES as u8).collect();
+    let head = PackedHead::read(&bytes).unwrap();
+    macro_rules! fields {
+        ($($field:ident $first:expr),*) => {
+            [$((stringify!($field), type_name_of_val(&head.$field), $first as u8)),*]
+        };
+    }
+    let fields = fields![vertices head.vertices, index_bits head.index_bits, fixed head.fixed,
+        bits head.bits[0], base head.base[0], exponent head.exponent[0], indices_at head.indices_at];
+    let rows = byte_table("PackedHead", PACKED_HEAD_BYTES);
+    let named: Vec<_> = rows.iter().filter(|row| !row.3.starts_with("reserved")).collect();
+    assert_eq!(named.len(), fields.len());
+    for (row, (name, kind, first)) in named.into_iter().zip(fields) {
+        assert_eq!((row.3.as_str(), bytes[row.0]), (name, first));
+        assert!(kind.contains(&row.2), "type of {name}: {kind} is no {}", row.2);
+    }
+
+    let rows = byte_table("id-head", ID_HEAD_BYTES);
+    let mut block = [0; 24];
+    (block[offset(&rows, "base")], block[offset(&rows, "bits")]) = (100, 8);
+    block[ID_HEAD_BYTES + 5] = 7;
+    assert_eq!(decode_id(&block, 1, 1), 107);
+
+    let rows = byte_table("links", 4);
+    let mut treelet = [0; 64];
+    Links { kinds: 0, first_treelet: 1, first_remote: 2, first_leaf: 3 }.write(&mut treelet);
+    for (first, field) in (1..).zip(["first_treelet", "first_remote", "first_leaf"]) {
+        assert_eq!(treelet[60 + offset(&rows, field)], first, "{field}");
+    }
+}
+
+#[test]
+fn anchors() {
+    let slabs = Kdop { lo: [1; 13].map(f32::from_bits), hi: [2; 13].map(f32::from_bits) };
+    for (column, profile) in [(2, Profile::Dop6U8), (3, Profile::Dop14U8), (4, Profile::Dop26U8)] {
+        let mut anchor = vec![0; profile.anchor_bytes()];
+        write_anchor(profile, &slabs, Some((3, 4)), &mut anchor);
+        let mut next = 0;
+        for row in table("format.md", "anchor") {
+            let (start, end) = row[column].split_once("..").unwrap();
+            let (start, end) = (number(start) as usize, number(end) as usize);
+            assert_eq!(start, next, "{}", row[0]);
+            next = end;
+            let place = &anchor[start..end];
+            match row[0].as_str() {
+                "lo" | "hi" => {
+                    let value = if row[0] == "lo" { 1u32 } else { 2 };
+                    assert_eq!(place, value.to_le_bytes().repeat(profile.directions().slabs()));
+                }
+                "parent_page" => assert_eq!(place, 3u32.to_le_bytes()),
+                "parent_link" => assert_eq!(place, [4]),
+                "gap" | "reserved" => assert!(place.iter().all(|&byte| byte == 0)),
+                other => panic!("no field {other} in an anchor"),
+            }
+        }
+        assert_eq!(next, anchor.len());
+    }
+}
+
+#[test]
+fn lists() {
+    let rows = |name: &str, columns: usize| -> Vec<String> {
+        table("format.md", name).iter().map(|row| row[..columns].join("|")).collect()
+    };
+    let yes = |yes| if yes { "yes" } else { "no" };
+    let sections = SectionKind::ALL.map(|kind| {
+        format!("{}|{}|{}|{}", kind as u32, kind.name(), yes(kind.required()), yes(kind.is_content()))
+    });
+    assert_eq!(rows("sections", 4), sections);
+
+    let profiles = Profile::ALL.map(|p| {
+        let (slabs, encoding) = (p.directions().slabs(), format!("{:?}", p.encoding()).to_lowercase());
+        let head = format!("{}|{}|{}|{slabs}|{encoding}", p.number(), p.name(), 2 * slabs);
+        format!("{head}|{}|{}|{}", p.width(), p.treelet_bytes(), p.anchor_bytes())
+    });
+    assert_eq!(rows("profiles", 8), profiles);
+
+    let numbered = (0..).zip(DIRECTIONS);
+    let directions = numbered.map(|(slab, [x, y, z])| format!("{slab}|{}|{x}|{y}|{z}", treelet::row(slab)));
+    assert_eq!(rows("directions", 5), directions.collect::<Vec<_>>());
+
+    let rules = Rule::ALL.iter().map(|rule| format!("R{:02}|{}", rule.number(), rule.text()));
+    assert_eq!(rows("rules", 2), rules.collect::<Vec<_>>());
+
+    let encodings = TriangleEncoding::ALL.map(|encoding| format!("{}|{}", encoding as u8, encoding.name()));
+    assert_eq!(rows("triangle-encodings", 2), encodings);
+
+    assert_eq!(table("versions.md", "versions").pop().unwrap()[0], format!("{MAJOR}.{MINOR}"));
+}
+
+macro_rules! named {
+    ($($constant:ident),*) => { [$((stringify!($constant), $constant as u64)),*] };
+}
+
+#[test]
+fn constants() {
+    const LOG2_MAX_COORDINATE: i32 = 120;
+    assert_eq!(2f64.powi(LOG2_MAX_COORDINATE), MAX_COORDINATE);
+    let mut expected = named![
+        PAGE,
+        LINE,
+        WORD,
+        MAJOR,
+        MINOR,
+        MAX_SECTIONS,
+        PAGE_HEADER_BYTES,
+        NO_PARENT,
+        PACKET,
+        F32_PACKET_BYTES,
+        PACKED_HEAD_BYTES,
+        ID_HEAD_BYTES,
+        LOG2_MAX_COORDINATE
+    ]
+    .to_vec();
+    let steps = [("STEP_U8", STEP_U8), ("STEP_U4", STEP_U4)];
+    expected.extend(steps.map(|(name, step)| (name, step.to_bits().into())));
+    let rows = table("format.md", "constants");
+    let found: Vec<_> = rows.iter().map(|row| (row[0].as_str(), number(&row[1]))).collect();
+    assert_eq!(found, expected);
+
+    let text = specification("format.md");
+    let magic = MAGIC.map(|byte| format!("{byte:02x}")).join(" ");
+    assert_eq!(text.matches(&magic).count(), 2);
+    assert!(text.contains(&format!("`{:#018x}`", checksum(&[]))));
+}
+
+/// Writes one code where the table says, and expects that one end of one child changes.
+#[test]
+fn places_of_codes() {
+    let rows = table("format.md", "places");
+    assert_eq!(rows.len(), Profile::ALL.len());
+    for row in rows {
+        let profile = Profile::from_name(&row[0]).unwrap_or_else(|| panic!("no profile {}", row[0]));
+        let strides = [1, 2, 3, 4, 5, 6, 7].map(|column| number(&row[column]) as usize);
+        let [bytes, block, row_stride, child_stride, hi, kinds, links] = strides;
+        let (slabs, width) = (profile.directions().slabs(), profile.width());
+        let parent = NodeSlabs { lo: [-1.0; 16], hi: [2.0; 16] };
+        let decode = |treelet: &[u8]| -> Vec<f32> {
+            let child = |c| decode_child(profile, 1.0, treelet, c, &parent).to_kdop(slabs);
+            let ends = |kdop: Kdop| (0..slabs).flat_map(move |slab| [kdop.lo[slab], kdop.hi[slab]]);
+            (0..width).flat_map(|c| ends(child(c))).collect()
+        };
+        let code: [&[u8]; 2] = match profile.encoding() {
+            Encoding::U4 => [&[1], &[0x10]],
+            Encoding::U8 => [&[1]; 2],
+            Encoding::F16 => [&[0, 0x3c]; 2],
+            Encoding::F32 => [&[0, 0, 0x80, 0x3f]; 2],
+        };
+        assert_eq!(code[0].len(), bytes, "{}: code bytes", profile.name());
+        let zero = vec![0; profile.treelet_bytes()];
+        let before = decode(&zero);
+        for place in 0..width * slabs * 2 {
+            let (child, slab, end) = (place / 2 / slabs, place / 2 % slabs, place % 2);
+            let at = block * (child / 4) + row_stride * treelet::row(slab) + child_stride * (child % 4);
+            let mut treelet = zero.clone();
+            treelet[at + end * hi..][..bytes].copy_from_slice(code[end]);
+            let after = decode(&treelet);
+            let changed: Vec<_> = (0..before.len()).filter(|&i| after[i] != before[i]).collect();
+            assert_eq!(changed, [place], "{}: child {child}, slab {slab}", profile.name());
+        }
+        let mut treelet = zero.clone();
+        (treelet[kinds], treelet[links]) = (1, 9);
+        assert_eq!(Links::read(&treelet).child(0), Child::Treelet(9), "{}", profile.name());
+    }
+}
+
+#[test]
+fn example() {
+    let rows = table("format.md", "example-treelet");
+    let mut treelet = Vec::new();
+    for row in rows {
+        assert_eq!(number(&row[0]) as usize, treelet.len());
+        treelet.extend(row[1].split(' ').map(|byte| u8::from_str_radix(byte, 16).unwrap()));
+    }
+    assert_eq!(treelet.len(), Profile::Dop14U8.treelet_bytes());
+    let links = Links::read(&treelet);
+    let children = [0, 1, 2, 3].map(|child| links.child(child));
+    let leaf = Child::Leaf { packet: 300, triangles: 3 };
+    assert_eq!(children, [Child::Treelet(5), leaf, Child::Remote(2), Child::Empty]);
+
+    let rows = table("format.md", "example-child");
+    let value = |cell: &String| f32::from_bits(number(cell) as u32);
+    let mut parent = NodeSlabs::default();
+    for (slab, row) in rows.iter().enumerate() {
+        (parent.lo[slab], parent.hi[slab]) = (value(&row[1]), value(&row[2]));
+    }
+    let child = decode_child(Profile::Dop14U8, 0.0, &treelet, 1, &parent);
+    for (slab, row) in rows.iter().enumerate() {
+        assert_eq!(
+            [number(&row[0]), number(&row[3]), number(&row[4])],
+            [slab as u64, treelet[4 * slab + 1].into(), treelet[32 + 4 * slab + 1].into()]
+        );
+        let unit = residual_unit(Encoding::U8, parent.lo[slab], parent.hi[slab], 0.0);
+        let found = [unit, child.lo[slab], child.hi[slab]].map(f32::to_bits);
+        assert_eq!(found, [5, 6, 7].map(|column| value(&row[column]).to_bits()), "slab {slab}");
+        for cell in [&row[1], &row[2], &row[6], &row[7]] {
+            let (_, decimal) = cell.split_once(" (").unwrap();
+            assert_eq!(decimal.trim_end_matches(')').parse(), Ok(value(cell)), "slab {slab}");
+        }
+    }
+    assert_eq!(rows.len(), 7);
+}
