@@ -171,18 +171,43 @@ impl<'a> Page<'a> {
     /// The anchor of a root.
     #[inline]
     pub fn anchor(&self, root: u8) -> Anchor {
+        let (parent_page, parent_link) = self.anchor_parent(root);
+        Anchor { slabs: self.anchor_slabs(root), parent_page, parent_link }
+    }
+
+    /// The slabs of a root.
+    #[inline]
+    pub fn anchor_slabs(&self, root: u8) -> NodeSlabs {
+        let bytes = self.anchor_bytes(root);
+        let slabs = self.profile.directions().slabs();
+        let mut node = NodeSlabs::default();
+        let (lo, hi) = (bytes.as_chunks::<4>().0, bytes[4 * slabs..].as_chunks::<4>().0);
+        // Slabs up to 6 stand in their own rows, the others one row further.
+        for row in 0..slabs.min(7) {
+            node.lo[row] = f32::from_le_bytes(lo[row]);
+            node.hi[row] = f32::from_le_bytes(hi[row]);
+        }
+        for slab in 7..slabs {
+            node.lo[row(slab)] = f32::from_le_bytes(lo[slab]);
+            node.hi[row(slab)] = f32::from_le_bytes(hi[slab]);
+        }
+        node
+    }
+
+    /// The page and remote link that lead to a root.
+    #[inline]
+    pub fn anchor_parent(&self, root: u8) -> (u32, u8) {
+        let bytes = self.anchor_bytes(root);
+        let end = bytes.len();
+        let page = [bytes[end - 8], bytes[end - 7], bytes[end - 6], bytes[end - 5]];
+        (u32::from_le_bytes(page), bytes[end - 4])
+    }
+
+    #[inline]
+    fn anchor_bytes(&self, root: u8) -> &'a [u8] {
         let size = self.profile.anchor_bytes();
         let start = PAGE_HEADER_BYTES + usize::from(root) * size;
-        let bytes = self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size]);
-        let word = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
-        let count = self.profile.directions().slabs();
-        let mut slabs = NodeSlabs::default();
-        for slab in 0..count {
-            slabs.lo[row(slab)] = f32::from_le_bytes(word(slab * 4));
-            slabs.hi[row(slab)] = f32::from_le_bytes(word((count + slab) * 4));
-        }
-        let parent_page = u32::from_le_bytes(word(size - 8));
-        Anchor { slabs, parent_page, parent_link: bytes[size - 4] }
+        self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size])
     }
 
     /// A remote link: the subtree root in another page.
@@ -310,8 +335,7 @@ fn check_remotes(page: &Page, number: u32, object: &Object, at: u64) -> Result<(
 #[inline]
 pub fn check_crossing(target: &Page, to: RootRef, from: u32, link: u8, at: u64) -> Result<(), FormatError> {
     let found = if to.root() < target.header().roots {
-        let anchor = target.anchor(to.root());
-        (anchor.parent_page, anchor.parent_link)
+        target.anchor_parent(to.root())
     } else {
         (NO_PARENT, 0)
     };

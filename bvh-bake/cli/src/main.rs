@@ -1,0 +1,2 @@
+//! The command `cbvh`.
+fn main() {}

@@ -1,0 +1,126 @@
+//! Reads meshes from files: OBJ, STL, PLY and glTF.
+//!
+//! Every reader takes the whole file as bytes and gives a [`Mesh`] that keeps the contract of
+//! [`Mesh::check`], or one line that says what is wrong and where. No reader panics, and none allocates from
+//! a count that the file declares before checking that the file is long enough to hold what it counts.
+//!
+//! Polygons are triangulated (module `polygon`), objects without triangles are left out, degenerate triangles
+//! stay, and -0.0 is read as 0.0.
+
+mod error;
+mod gltf;
+mod obj;
+mod ply;
+mod polygon;
+mod stl;
+mod text;
+
+pub(crate) use error::excerpt;
+pub use error::{Place, ReadError};
+
+use crate::mesh::Mesh;
+use error::Fault;
+use std::path::Path;
+
+/// A format of mesh files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum MeshFormat {
+    /// Wavefront OBJ, text.
+    Obj,
+    /// STL, text or binary.
+    Stl,
+    /// PLY, text or binary of either byte order.
+    Ply,
+    /// glTF 2.0, as JSON or as one binary file (GLB).
+    Gltf,
+}
+
+const KNOWN: &str = "a mesh in a file named .obj, .stl, .ply, .gltf or .glb";
+
+impl MeshFormat {
+    /// Tells the format from the end of a file's name, whatever its case.
+    pub fn from_extension(path: &Path) -> Option<MeshFormat> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "obj" => Some(MeshFormat::Obj),
+            "stl" => Some(MeshFormat::Stl),
+            "ply" => Some(MeshFormat::Ply),
+            "gltf" | "glb" => Some(MeshFormat::Gltf),
+            _ => None,
+        }
+    }
+
+    /// Tells the format from the beginning of a file.
+    pub fn from_content(bytes: &[u8]) -> Option<MeshFormat> {
+        let head = &bytes[..bytes.len().min(4096)];
+        let trimmed = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+        let is_statement = |line: &[u8]| {
+            matches!(text::words(line).next(), Some(b"v" | b"vn" | b"vt" | b"o" | b"g" | b"mtllib"))
+        };
+        if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
+            Some(MeshFormat::Ply)
+        } else if head.starts_with(b"glTF") || trimmed.starts_with(b"{") {
+            Some(MeshFormat::Gltf)
+        } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes) {
+            Some(MeshFormat::Stl)
+        } else if !head.contains(&0) && text::Lines::new(head).any(is_statement) {
+            Some(MeshFormat::Obj)
+        } else {
+            None
+        }
+    }
+}
+
+/// Reads a mesh file, whole, into memory. The format is that of the file's extension, or, if that is unknown
+/// or missing, what the content looks like.
+///
+/// # Errors
+/// [`ReadError`]: the system's, or the first thing that the file gets wrong.
+pub fn read(path: &Path) -> Result<Mesh, ReadError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| Fault::Io { path: path.to_owned(), source }.in_file(path))?;
+    let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
+    let Some(format) = format else {
+        let found = match path.extension() {
+            Some(extension) => format!("an unsupported format, .{}", excerpt(extension.as_encoded_bytes())),
+            None => "content of no known format".to_owned(),
+        };
+        return Err(Fault::new(Place::File, KNOWN, found).in_file(path));
+    };
+    read_bytes(&bytes, format, path)
+}
+
+/// Reads a mesh from the bytes of a file. `source` names the file in errors; the files that a glTF file
+/// refers to are looked for beside it.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
+    let mesh = match format {
+        MeshFormat::Obj => obj::read(bytes),
+        MeshFormat::Stl => stl::read(bytes),
+        MeshFormat::Ply => ply::read(bytes),
+        MeshFormat::Gltf => gltf::read(bytes, source),
+    };
+    let mut mesh = mesh.map_err(|fault| fault.in_file(source))?;
+    mesh.objects.retain(|object| !object.triangles.is_empty());
+    mesh.drop_negative_zeros();
+    mesh.check().map_err(|error| ReadError::Mesh { path: source.to_owned(), source: error })?;
+    Ok(mesh)
+}
+
+/// The ids of the next `count` triangles.
+fn next_ids(next: &mut u32, count: usize) -> Result<Vec<u32>, Fault> {
+    let most = crate::mesh::MAX_TRIANGLES;
+    let end = u64::from(*next) + count as u64;
+    if end > most {
+        return Err(Fault::Limit { place: Place::File, most, what: "triangles" });
+    }
+    let ids = (*next..end as u32).collect();
+    *next = end as u32;
+    Ok(ids)
+}
+
+/// What a coordinate has to be, for messages.
+const COORDINATE: &str = "a finite coordinate of at most 2^120 in magnitude";

@@ -1,0 +1,246 @@
+//! An opened `.cbvh` file: its bytes, its objects, and which of its pages have been checked.
+
+use crate::error::{OpenError, QueryError};
+use crate::mapped;
+use bvh_format::leaf::{Packet, decode_packet};
+use bvh_format::object::Object;
+use bvh_format::page::{PAGE, Page, check_page};
+use bvh_format::{FormatError, Layout, Rule, ids};
+use memmap2::Mmap;
+use std::path::Path;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// A bounding volume hierarchy that can be queried. `Send` and `Sync`: share it between threads.
+///
+/// Opening reads the header page and the object table, whatever the file's size. A page is checked
+/// when a query first touches it; the memory for that is one byte a page.
+pub struct Bvh {
+    bytes: Bytes,
+    layout: Layout,
+    /// What has been checked of each page.
+    checked: Box<[AtomicU8]>,
+}
+
+enum Bytes {
+    Mapped(Mmap),
+    Owned(Vec<u8>),
+    Static(&'static [u8]),
+}
+
+impl Bytes {
+    #[inline(always)]
+    fn get(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Owned(bytes) => bytes,
+            Self::Static(bytes) => bytes,
+        }
+    }
+}
+
+/// The page's own bytes are right.
+const PAGE_CHECKED: u8 = 1;
+/// The page's leaf block is right.
+const LEAVES_CHECKED: u8 = 2;
+/// The page's id block is right.
+const IDS_CHECKED: u8 = 4;
+
+impl Bvh {
+    /// Maps a file.
+    ///
+    /// Cost: microseconds, whatever the file's size. The file must not be changed while it is
+    /// open; see `from_bytes` for a way that does not ask for this.
+    ///
+    /// # Errors
+    /// If the system refuses the file, or its header or object table break the format.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        let map = mapped::map(path).map_err(|source| OpenError::io(path, source))?;
+        Self::new(Bytes::Mapped(map)).map_err(|source| OpenError::format(path, source))
+    }
+
+    /// Takes a file's bytes in memory, such as those that `bvh_bake::to_bytes` makes.
+    ///
+    /// # Errors
+    /// If the header or the object table break the format.
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, FormatError> {
+        Self::new(Bytes::Owned(bytes))
+    }
+
+    /// Borrows bytes that live as long as the program: see `include_cbvh!`.
+    ///
+    /// # Errors
+    /// If the header or the object table break the format.
+    pub fn from_static(bytes: &'static [u8]) -> Result<Self, FormatError> {
+        Self::new(Bytes::Static(bytes))
+    }
+
+    fn new(bytes: Bytes) -> Result<Self, FormatError> {
+        let layout = Layout::read(bytes.get())?;
+        let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
+        Ok(Self { bytes, layout, checked })
+    }
+
+    /// Where everything is in the file.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The bytes of the file.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get()
+    }
+
+    /// The objects of the file, at least one.
+    pub fn objects(&self) -> &[Object] {
+        &self.layout.objects
+    }
+
+    /// The number of the object of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.objects().iter().position(|object| object.name == name)
+    }
+
+    /// The whole file as one thing to query: all its objects.
+    pub fn all(&self) -> Shape<'_> {
+        Shape { bvh: self, first: 0, end: self.objects().len() }
+    }
+
+    /// One object of the file; `None` if there is none of this number.
+    pub fn object(&self, number: usize) -> Option<Shape<'_>> {
+        (number < self.objects().len()).then_some(Shape { bvh: self, first: number, end: number + 1 })
+    }
+
+    /// The ids of the input's triangles that are exact duplicates of triangle `id`, ascending.
+    pub fn duplicates_of(&self, id: u32) -> impl Iterator<Item = u32> + '_ {
+        let pairs = self.layout.duplicate_ids(self.bytes());
+        let start = pairs.partition_point(|[kept, _]| kept.get() < id);
+        pairs[start..].iter().take_while(move |[kept, _]| kept.get() == id).map(|[_, dropped]| dropped.get())
+    }
+
+    /// A page, checked if it never was.
+    #[inline(always)]
+    pub(crate) fn page(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
+        match self.checked.get(number as usize) {
+            Some(flags) if flags.load(Ordering::Acquire) & PAGE_CHECKED != 0 => {}
+            _ => self.check_page(object, number)?,
+        }
+        self.page_unchecked(object, number)
+    }
+
+    #[inline(always)]
+    fn page_unchecked(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
+        match self.layout.page_bytes(self.bytes.get(), number) {
+            Some(bytes) => Ok(Page::new(bytes, object.profile)),
+            None => Err(self.no_page(number)),
+        }
+    }
+
+    #[cold]
+    fn no_page(&self, number: u32) -> QueryError {
+        let at = self.layout.page_offset(number);
+        FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section").into()
+    }
+
+    #[cold]
+    fn check_page(&self, object: &Object, number: u32) -> Result<(), QueryError> {
+        let bytes: &[u8; PAGE] =
+            self.layout.page_bytes(self.bytes(), number).ok_or_else(|| self.no_page(number))?;
+        check_page(bytes, number, object, self.layout.page_offset(number))?;
+        self.checked[number as usize].fetch_or(PAGE_CHECKED, Ordering::Release);
+        Ok(())
+    }
+
+    /// The leaf block of a checked page, checked if it never was.
+    #[inline(always)]
+    pub(crate) fn leaf_block(&self, object: &Object, page: &Page) -> Result<&[u8], QueryError> {
+        let number = page.header().page_number.get();
+        match self.checked.get(number as usize) {
+            Some(flags) if flags.load(Ordering::Acquire) & LEAVES_CHECKED != 0 => {}
+            _ => self.check_leaves(object, page, number)?,
+        }
+        Ok(self.layout.leaf_block(self.bytes.get(), page.header()))
+    }
+
+    #[cold]
+    fn check_leaves(&self, object: &Object, page: &Page, number: u32) -> Result<(), QueryError> {
+        self.layout.check_leaf_block(self.bytes(), page, object)?;
+        self.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
+        Ok(())
+    }
+
+    /// A leaf packet.
+    #[inline(always)]
+    pub(crate) fn packet(&self, object: &Object, page: u32, packet: u16) -> Result<Packet, QueryError> {
+        let page = self.page(object, page)?;
+        let block = self.leaf_block(object, &page)?;
+        Ok(decode_packet(object.triangle_encoding, block, usize::from(packet)))
+    }
+
+    /// The id of a triangle: its number in the input, or without ids its place in the order of the
+    /// leaves.
+    pub(crate) fn triangle_id(&self, object: &Object, place: TrianglePlace) -> Result<u32, QueryError> {
+        let page = self.page(object, place.page)?;
+        if !self.layout.has_ids() {
+            let packet = page.header().first_packet.get().wrapping_add(u32::from(place.packet));
+            return Ok(packet.wrapping_mul(4).wrapping_add(u32::from(place.lane)));
+        }
+        let flags = &self.checked[place.page as usize];
+        if flags.load(Ordering::Acquire) & IDS_CHECKED == 0 {
+            self.layout.check_id_block(self.bytes(), &page)?;
+            flags.fetch_or(IDS_CHECKED, Ordering::Release);
+        }
+        let block = self.layout.id_block(self.bytes(), page.header());
+        Ok(ids::decode_id(block, usize::from(place.packet), usize::from(place.lane)))
+    }
+}
+
+impl std::fmt::Debug for Bvh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bvh").field("bytes", &self.bytes().len()).field("objects", &self.objects().len()).finish()
+    }
+}
+
+/// Where a triangle is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct TrianglePlace {
+    pub(crate) page: u32,
+    pub(crate) packet: u16,
+    pub(crate) lane: u8,
+}
+
+/// One side of a query: one object of a file, or all of them as one.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape<'a> {
+    bvh: &'a Bvh,
+    first: usize,
+    end: usize,
+}
+
+impl<'a> Shape<'a> {
+    /// The file.
+    pub fn bvh(&self) -> &'a Bvh {
+        self.bvh
+    }
+
+    /// The objects of this side.
+    pub fn objects(&self) -> &'a [Object] {
+        &self.bvh.objects()[self.first..self.end]
+    }
+
+    /// Number of its first object in the file.
+    pub(crate) fn first(&self) -> usize {
+        self.first
+    }
+
+    /// Triangles of all its objects.
+    pub fn triangles(&self) -> u64 {
+        self.objects().iter().map(|object| object.record.triangles.get()).sum()
+    }
+}
+
+impl<'a> From<&'a Bvh> for Shape<'a> {
+    fn from(bvh: &'a Bvh) -> Self {
+        bvh.all()
+    }
+}

@@ -1,0 +1,325 @@
+//! The AVX2 backend: two registers of 8 lanes, four lanes in an SSE register.
+//!
+//! All `unsafe` here rests on one fact: an `Avx2` can only be had from `detect`, which makes sure that
+//! the CPU has the features below, and `Y` and `X` can only be made with an `Avx2`.
+
+use super::{Isa, Lanes, Task};
+use std::arch::x86_64::*;
+
+/// The token of the AVX2 backend.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(());
+
+/// Sixteen lanes: 0-7 and 8-15.
+#[derive(Clone, Copy)]
+pub(crate) struct Y(__m256, __m256);
+
+/// Four lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct X(__m128);
+
+impl Avx2 {
+    /// The token, if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
+    #[inline]
+    pub(crate) fn detect() -> Option<Self> {
+        let all = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("f16c")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        all.then_some(Self(()))
+    }
+}
+
+/// Runs the task with the features enabled.
+#[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
+fn run_with_features<T: Task>(isa: Avx2, task: T) -> T::Output {
+    task.run(isa)
+}
+
+/// Calls intrinsics whose features the token stands for.
+macro_rules! with_features {
+    ($body:expr) => {
+        // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
+        // all features that these intrinsics need; loads and stores go through references to
+        // arrays of just their size, or halves of them, and ask for no alignment.
+        unsafe { $body }
+    };
+}
+
+impl Lanes for Y {
+    type Mask = Y;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm256_add_ps(self.0, other.0)), with_features!(_mm256_add_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(with_features!(_mm256_sub_ps(self.0, other.0)), with_features!(_mm256_sub_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(with_features!(_mm256_mul_ps(self.0, other.0)), with_features!(_mm256_mul_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(with_features!(_mm256_div_ps(self.0, other.0)), with_features!(_mm256_div_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm256_fmadd_ps(self.0, factor.0, term.0)), with_features!(_mm256_fmadd_ps(self.1, factor.1, term.1)))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm256_fnmadd_ps(self.0, factor.0, term.0)), with_features!(_mm256_fnmadd_ps(self.1, factor.1, term.1)))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(with_features!(_mm256_sqrt_ps(self.0)), with_features!(_mm256_sqrt_ps(self.1)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        with_features!({
+            let sign = _mm256_set1_ps(-0.0);
+            Self(_mm256_andnot_ps(sign, self.0), _mm256_andnot_ps(sign, self.1))
+        })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(with_features!(_mm256_min_ps(self.0, other.0)), with_features!(_mm256_min_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(with_features!(_mm256_max_ps(self.0, other.0)), with_features!(_mm256_max_ps(self.1, other.1)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Y {
+        with_features!(Y(
+            _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0),
+            _mm256_cmp_ps::<_CMP_LE_OQ>(self.1, other.1)
+        ))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Y {
+        with_features!(Y(
+            _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0),
+            _mm256_cmp_ps::<_CMP_LT_OQ>(self.1, other.1)
+        ))
+    }
+    #[inline(always)]
+    fn and(a: Y, b: Y) -> Y {
+        with_features!(Y(_mm256_and_ps(a.0, b.0), _mm256_and_ps(a.1, b.1)))
+    }
+    #[inline(always)]
+    fn select(mask: Y, yes: Self, no: Self) -> Self {
+        with_features!(Y(
+            _mm256_blendv_ps(no.0, yes.0, mask.0),
+            _mm256_blendv_ps(no.1, yes.1, mask.1)
+        ))
+    }
+    #[inline(always)]
+    fn bits(mask: Y) -> u16 {
+        with_features!((_mm256_movemask_ps(mask.0) | _mm256_movemask_ps(mask.1) << 8) as u16)
+    }
+}
+
+impl Lanes for X {
+    type Mask = X;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm_add_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(with_features!(_mm_sub_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(with_features!(_mm_mul_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(with_features!(_mm_div_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm_fmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm_fnmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(with_features!(_mm_sqrt_ps(self.0)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(with_features!(_mm_min_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(with_features!(_mm_max_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> X {
+        X(with_features!(_mm_cmple_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> X {
+        X(with_features!(_mm_cmplt_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn and(a: X, b: X) -> X {
+        X(with_features!(_mm_and_ps(a.0, b.0)))
+    }
+    #[inline(always)]
+    fn select(mask: X, yes: Self, no: Self) -> Self {
+        Self(with_features!(_mm_blendv_ps(no.0, yes.0, mask.0)))
+    }
+    #[inline(always)]
+    fn bits(mask: X) -> u16 {
+        with_features!(_mm_movemask_ps(mask.0) as u16)
+    }
+}
+
+impl Isa for Avx2 {
+    type V = Y;
+    type H = X;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Y {
+        with_features!(Y(_mm256_set1_ps(value), _mm256_set1_ps(value)))
+    }
+    #[inline(always)]
+    fn load(self, from: &[f32; 16]) -> Y {
+        with_features!(Y(_mm256_loadu_ps(from.as_ptr()), _mm256_loadu_ps(from.as_ptr().add(8))))
+    }
+    #[inline(always)]
+    fn store(self, value: Y, to: &mut [f32; 16]) {
+        with_features!({
+            _mm256_storeu_ps(to.as_mut_ptr(), value.0);
+            _mm256_storeu_ps(to.as_mut_ptr().add(8), value.1);
+        })
+    }
+    #[inline(always)]
+    fn repeat(self, from: &[f32; 4]) -> Y {
+        with_features!({
+            let both = _mm256_broadcast_ps(&_mm_loadu_ps(from.as_ptr()));
+            let low = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
+            let high = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
+            Y(_mm256_permutevar_ps(both, low), _mm256_permutevar_ps(both, high))
+        })
+    }
+    #[inline(always)]
+    fn tile(self, from: &[f32; 4]) -> Y {
+        with_features!({
+            let both = _mm256_broadcast_ps(&_mm_loadu_ps(from.as_ptr()));
+            Y(both, both)
+        })
+    }
+    #[inline(always)]
+    fn quad_splat(self, value: Y, column: usize) -> Y {
+        with_features!({
+            let places = _mm256_set1_epi32(column as i32);
+            Y(_mm256_permutevar_ps(value.0, places), _mm256_permutevar_ps(value.1, places))
+        })
+    }
+    #[inline(always)]
+    fn round_step_up(self, step: Y) -> Y {
+        with_features!(Y(round_up_half_register(step.0), round_up_half_register(step.1)))
+    }
+    #[inline(always)]
+    fn codes_u8(self, from: &[u8; 16]) -> Y {
+        with_features!(bytes_to_lanes(_mm_loadu_si128(from.as_ptr().cast())))
+    }
+    #[inline(always)]
+    fn codes_u8_pairs(self, from: &[u8; 8]) -> Y {
+        with_features!({
+            let codes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(from.as_ptr().cast()));
+            spread_pairs(_mm256_cvtepi32_ps(codes))
+        })
+    }
+    #[inline(always)]
+    fn codes_low(self, from: &[u8; 16]) -> Y {
+        with_features!({
+            let bytes = _mm_loadu_si128(from.as_ptr().cast());
+            bytes_to_lanes(_mm_and_si128(bytes, _mm_set1_epi8(15)))
+        })
+    }
+    #[inline(always)]
+    fn codes_high(self, from: &[u8; 16]) -> Y {
+        with_features!({
+            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+            bytes_to_lanes(_mm_and_si128(bytes, _mm_set1_epi8(15)))
+        })
+    }
+    #[inline(always)]
+    fn codes_f16(self, from: &[u8; 32]) -> Y {
+        with_features!(Y(
+            _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())),
+            _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().add(16).cast()))
+        ))
+    }
+    #[inline(always)]
+    fn codes_f16_pairs(self, from: &[u8; 16]) -> Y {
+        with_features!(spread_pairs(_mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast()))))
+    }
+    #[inline(always)]
+    fn codes_f32(self, from: &[u8; 64]) -> Y {
+        with_features!(Y(
+            _mm256_loadu_ps(from.as_ptr().cast()),
+            _mm256_loadu_ps(from.as_ptr().add(32).cast())
+        ))
+    }
+    #[inline(always)]
+    fn splat4(self, value: f32) -> X {
+        X(with_features!(_mm_set1_ps(value)))
+    }
+    #[inline(always)]
+    fn load4(self, from: &[f32; 4]) -> X {
+        X(with_features!(_mm_loadu_ps(from.as_ptr())))
+    }
+    #[inline(always)]
+    fn store4(self, value: X, to: &mut [f32; 4]) {
+        with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
+    }
+    fn run<T: Task>(self, task: T) -> T::Output {
+        // SAFETY: `self` shows that the CPU has the features that the function enables.
+        unsafe { run_with_features(self, task) }
+    }
+}
+
+/// Rounds each step up to 16 significant bits.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn round_up_half_register(step: __m256) -> __m256 {
+    let bits = _mm256_add_epi32(_mm256_castps_si256(step), _mm256_set1_epi32(0xff));
+    _mm256_castsi256_ps(_mm256_and_si256(bits, _mm256_set1_epi32(!0xff)))
+}
+
+/// Sixteen bytes as lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn bytes_to_lanes(bytes: __m128i) -> Y {
+    let low = _mm256_cvtepu8_epi32(bytes);
+    let high = _mm256_cvtepu8_epi32(_mm_srli_si128::<8>(bytes));
+    Y(_mm256_cvtepi32_ps(low), _mm256_cvtepi32_ps(high))
+}
+
+/// Eight values, two a row, to the first two columns of four rows.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn spread_pairs(pairs: __m256) -> Y {
+    let low = _mm256_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3);
+    let high = _mm256_setr_epi32(4, 5, 4, 5, 6, 7, 6, 7);
+    Y(_mm256_permutevar8x32_ps(pairs, low), _mm256_permutevar8x32_ps(pairs, high))
+}

@@ -1,0 +1,291 @@
+//! The AVX-512 backend: one register of 16 lanes, four lanes in an SSE register.
+//!
+//! All `unsafe` here rests on one fact: an `Avx512` can only be had from `detect`, which makes sure
+//! that the CPU has the features below, and `Z` and `X` can only be made with an `Avx512`.
+
+use super::{Isa, Lanes, Task};
+use std::arch::x86_64::*;
+
+/// The token of the AVX-512 backend.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(());
+
+/// Sixteen lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Z(__m512);
+
+/// Four lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct X(__m128);
+
+impl Avx512 {
+    /// The token, if the CPU has AVX-512 F, VL, DQ and BW, AVX2, FMA, F16C, BMI1, BMI2, LZCNT and
+    /// POPCNT.
+    #[inline]
+    pub(crate) fn detect() -> Option<Self> {
+        let all = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("f16c")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        all.then_some(Self(()))
+    }
+}
+
+/// Runs the task with the features enabled.
+#[target_feature(
+    enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt"
+)]
+fn run_with_features<T: Task>(isa: Avx512, task: T) -> T::Output {
+    task.run(isa)
+}
+
+/// Calls intrinsics whose features the token stands for.
+macro_rules! with_features {
+    ($body:expr) => {
+        // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
+        // all features that these intrinsics need; loads and stores go through references to
+        // arrays of just their size and ask for no alignment.
+        unsafe { $body }
+    };
+}
+
+impl Lanes for Z {
+    type Mask = __mmask16;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm512_add_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(with_features!(_mm512_sub_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(with_features!(_mm512_mul_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(with_features!(_mm512_div_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm512_fnmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(with_features!(_mm512_sqrt_ps(self.0)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(with_features!(_mm512_abs_ps(self.0)))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(with_features!(_mm512_min_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(with_features!(_mm512_max_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> __mmask16 {
+        with_features!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> __mmask16 {
+        with_features!(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
+    }
+    #[inline(always)]
+    fn and(a: __mmask16, b: __mmask16) -> __mmask16 {
+        a & b
+    }
+    #[inline(always)]
+    fn select(mask: __mmask16, yes: Self, no: Self) -> Self {
+        Self(with_features!(_mm512_mask_blend_ps(mask, no.0, yes.0)))
+    }
+    #[inline(always)]
+    fn bits(mask: __mmask16) -> u16 {
+        mask
+    }
+}
+
+impl Lanes for X {
+    type Mask = __mmask8;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm_add_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(with_features!(_mm_sub_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(with_features!(_mm_mul_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(with_features!(_mm_div_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm_fmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(_mm_fnmadd_ps(self.0, factor.0, term.0)))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(with_features!(_mm_sqrt_ps(self.0)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(with_features!(_mm_min_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(with_features!(_mm_max_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> __mmask8 {
+        with_features!(_mm_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> __mmask8 {
+        with_features!(_mm_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
+    }
+    #[inline(always)]
+    fn and(a: __mmask8, b: __mmask8) -> __mmask8 {
+        a & b
+    }
+    #[inline(always)]
+    fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
+        Self(with_features!(_mm_mask_blend_ps(mask, no.0, yes.0)))
+    }
+    #[inline(always)]
+    fn bits(mask: __mmask8) -> u16 {
+        u16::from(mask)
+    }
+}
+
+impl Isa for Avx512 {
+    type V = Z;
+    type H = X;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Z {
+        Z(with_features!(_mm512_set1_ps(value)))
+    }
+    #[inline(always)]
+    fn load(self, from: &[f32; 16]) -> Z {
+        Z(with_features!(_mm512_loadu_ps(from.as_ptr())))
+    }
+    #[inline(always)]
+    fn store(self, value: Z, to: &mut [f32; 16]) {
+        with_features!(_mm512_storeu_ps(to.as_mut_ptr(), value.0))
+    }
+    #[inline(always)]
+    fn repeat(self, from: &[f32; 4]) -> Z {
+        Z(with_features!({
+            let each = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+            _mm512_permutexvar_ps(each, _mm512_castps128_ps512(_mm_loadu_ps(from.as_ptr())))
+        }))
+    }
+    #[inline(always)]
+    fn tile(self, from: &[f32; 4]) -> Z {
+        Z(with_features!(_mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()))))
+    }
+    #[inline(always)]
+    fn quad_splat(self, value: Z, column: usize) -> Z {
+        Z(with_features!(_mm512_permutevar_ps(value.0, _mm512_set1_epi32(column as i32))))
+    }
+    #[inline(always)]
+    fn round_step_up(self, step: Z) -> Z {
+        Z(with_features!({
+            let bits = _mm512_add_epi32(_mm512_castps_si512(step.0), _mm512_set1_epi32(0xff));
+            _mm512_castsi512_ps(_mm512_and_si512(bits, _mm512_set1_epi32(!0xff)))
+        }))
+    }
+    #[inline(always)]
+    fn codes_u8(self, from: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let bytes = _mm_loadu_si128(from.as_ptr().cast());
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))
+        }))
+    }
+    #[inline(always)]
+    fn codes_u8_pairs(self, from: &[u8; 8]) -> Z {
+        Z(with_features!({
+            let codes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(from.as_ptr().cast()));
+            spread_pairs(_mm256_cvtepi32_ps(codes))
+        }))
+    }
+    #[inline(always)]
+    fn codes_low(self, from: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let bytes = _mm_loadu_si128(from.as_ptr().cast());
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_and_si128(bytes, _mm_set1_epi8(15))))
+        }))
+    }
+    #[inline(always)]
+    fn codes_high(self, from: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_and_si128(bytes, _mm_set1_epi8(15))))
+        }))
+    }
+    #[inline(always)]
+    fn codes_f16(self, from: &[u8; 32]) -> Z {
+        Z(with_features!(_mm512_cvtph_ps(_mm256_loadu_si256(from.as_ptr().cast()))))
+    }
+    #[inline(always)]
+    fn codes_f16_pairs(self, from: &[u8; 16]) -> Z {
+        Z(with_features!(spread_pairs(_mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())))))
+    }
+    #[inline(always)]
+    fn codes_f32(self, from: &[u8; 64]) -> Z {
+        Z(with_features!(_mm512_loadu_ps(from.as_ptr().cast())))
+    }
+    #[inline(always)]
+    fn splat4(self, value: f32) -> X {
+        X(with_features!(_mm_set1_ps(value)))
+    }
+    #[inline(always)]
+    fn load4(self, from: &[f32; 4]) -> X {
+        X(with_features!(_mm_loadu_ps(from.as_ptr())))
+    }
+    #[inline(always)]
+    fn store4(self, value: X, to: &mut [f32; 4]) {
+        with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
+    }
+    fn run<T: Task>(self, task: T) -> T::Output {
+        // SAFETY: `self` shows that the CPU has the features that the function enables.
+        unsafe { run_with_features(self, task) }
+    }
+}
+
+/// Eight values, two a row, to the first two columns of four rows.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn spread_pairs(pairs: __m256) -> __m512 {
+    let places = _mm512_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3, 4, 5, 4, 5, 6, 7, 6, 7);
+    _mm512_permutexvar_ps(places, _mm512_castps256_ps512(pairs))
+}

@@ -1,0 +1,201 @@
+//! The vector operations that kernels are written in, and the choice of a backend at run time.
+//!
+//! A backend is a zero-sized token that can only be had on a CPU with the features it stands for.
+//! Kernels are generic over the token and `#[inline(always)]`; each backend has one function with
+//! the features enabled, into which a whole query is inlined. Registers are 16 lanes wide (`V`: four
+//! children of A against four of B) or 4 lanes (`H`: four children or triangles of one side).
+//!
+//! Decoding gives the same bits on every backend: it uses exact products only. Other operations may
+//! round differently (`mul_add` is fused where the CPU can), so what is computed with them only ever
+//! filters, within derived bounds.
+
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
+pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
+pub(crate) mod avx512;
+pub(crate) mod scalar;
+
+use std::fmt;
+use std::sync::OnceLock;
+
+/// A set of equal lanes of `f32`.
+pub(crate) trait Lanes: Copy {
+    /// One truth value a lane.
+    type Mask: Copy;
+
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// `self * factor + term`, rounded once or twice.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `term - self * factor`, rounded once or twice.
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self;
+    fn sqrt(self) -> Self;
+    fn abs(self) -> Self;
+    /// The smaller; the second operand if either is NaN.
+    fn min(self, other: Self) -> Self;
+    /// The larger; the second operand if either is NaN.
+    fn max(self, other: Self) -> Self;
+    /// `self <= other`, false for NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// `self < other`, false for NaN.
+    fn lt(self, other: Self) -> Self::Mask;
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// `yes` where the mask is set, `no` elsewhere.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Bit i is lane i.
+    fn bits(mask: Self::Mask) -> u16;
+}
+
+/// A backend.
+pub(crate) trait Isa: Copy {
+    /// Sixteen lanes.
+    type V: Lanes;
+    /// Four lanes.
+    type H: Lanes;
+
+    fn splat(self, value: f32) -> Self::V;
+    fn load(self, from: &[f32; 16]) -> Self::V;
+    fn store(self, value: Self::V, to: &mut [f32; 16]);
+    /// Lane `4 * i + j` is `from[i]`.
+    fn repeat(self, from: &[f32; 4]) -> Self::V;
+    /// Lane `4 * i + j` is `from[j]`.
+    fn tile(self, from: &[f32; 4]) -> Self::V;
+    /// Lane `4 * i + j` is lane `4 * i + column`.
+    fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
+    /// `bvh_format::quantize::round_step_up` in each lane.
+    fn round_step_up(self, step: Self::V) -> Self::V;
+
+    /// 16 codes of a byte.
+    fn codes_u8(self, from: &[u8; 16]) -> Self::V;
+    /// 8 codes of a byte, two a row: lane `4 * i + j` is code `2 * i + j` for j below 2.
+    fn codes_u8_pairs(self, from: &[u8; 8]) -> Self::V;
+    /// The low nibbles of 16 bytes.
+    fn codes_low(self, from: &[u8; 16]) -> Self::V;
+    /// The high nibbles of 16 bytes.
+    fn codes_high(self, from: &[u8; 16]) -> Self::V;
+    /// 16 f16.
+    fn codes_f16(self, from: &[u8; 32]) -> Self::V;
+    /// 8 f16, two a row, as `codes_u8_pairs`.
+    fn codes_f16_pairs(self, from: &[u8; 16]) -> Self::V;
+    /// 16 little-endian f32.
+    fn codes_f32(self, from: &[u8; 64]) -> Self::V;
+
+    fn splat4(self, value: f32) -> Self::H;
+    fn load4(self, from: &[f32; 4]) -> Self::H;
+    fn store4(self, value: Self::H, to: &mut [f32; 4]);
+
+    /// Runs a task with the features of the backend enabled.
+    fn run<T: Task>(self, task: T) -> T::Output;
+}
+
+/// Work that is compiled once for each backend. `run` must be `#[inline(always)]`, and so must all
+/// generic functions it calls.
+pub(crate) trait Task {
+    type Output;
+    fn run<I: Isa>(self, isa: I) -> Self::Output;
+}
+
+/// A vector backend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Backend {
+    /// Portable code.
+    Scalar,
+    /// AVX2, FMA and F16C.
+    Avx2,
+    /// AVX-512 F, VL, DQ and BW.
+    Avx512,
+}
+
+impl Backend {
+    /// All backends, the slowest first.
+    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
+
+    /// The fastest backend of this CPU, or the one that the environment variable `CBVH_ISA` names.
+    /// Decided once.
+    ///
+    /// # Errors
+    /// If `CBVH_ISA` names no backend or one that the CPU lacks.
+    pub fn detect() -> Result<Self, BackendError> {
+        static CHOICE: OnceLock<Result<Backend, BackendError>> = OnceLock::new();
+        let choose = || match std::env::var("CBVH_ISA") {
+            Ok(name) if !name.is_empty() && name != "auto" => Self::from_name(&name),
+            _ => Ok(Self::ALL.into_iter().rev().find(|b| b.is_available()).unwrap_or(Self::Scalar)),
+        };
+        CHOICE.get_or_init(choose).clone()
+    }
+
+    /// The backend called `scalar`, `avx2` or `avx512`, if the CPU has it.
+    ///
+    /// # Errors
+    /// If there is no such name or the CPU lacks the features.
+    pub fn from_name(name: &str) -> Result<Self, BackendError> {
+        let backend = Self::ALL.into_iter().find(|backend| backend.name() == name);
+        let backend = backend.ok_or_else(|| BackendError::Unknown(name.to_owned()))?;
+        if backend.is_available() { Ok(backend) } else { Err(BackendError::Missing(backend)) }
+    }
+
+    /// The name on the command line and in `CBVH_ISA`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+
+    /// True if this CPU can run it.
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::Avx2::detect().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::Avx512::detect().is_some(),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
+        }
+    }
+
+    /// Runs a task on this backend; on the scalar one if the CPU lacks it.
+    pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Self::Avx512 => {
+                if let Some(isa) = avx512::Avx512::detect() {
+                    return isa.run(task);
+                }
+            }
+            Self::Avx2 => {
+                if let Some(isa) = avx2::Avx2::detect() {
+                    return isa.run(task);
+                }
+            }
+            Self::Scalar => {}
+        }
+        scalar::Scalar.run(task)
+    }
+}
+
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A backend that cannot be had.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BackendError {
+    /// No backend has this name.
+    #[error("expected a backend scalar, avx2 or avx512, found {0:?}")]
+    Unknown(String),
+    /// The CPU lacks its features.
+    #[error("this CPU lacks the instructions of the backend {0}")]
+    Missing(Backend),
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! The portable backend: arrays, one element at a time. What it does defines what the others do.
+
+use super::{Isa, Lanes, Task};
+use bvh_format::quantize::round_step_up;
+use half::f16;
+
+/// The token of the portable backend.
+#[derive(Clone, Copy)]
+pub(crate) struct Scalar;
+
+/// N lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Array<const N: usize>([f32; N]);
+
+impl<const N: usize> Array<N> {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+
+    #[inline(always)]
+    fn compare(self, other: Self, f: impl Fn(f32, f32) -> bool) -> u16 {
+        (0..N).fold(0, |bits, i| bits | u16::from(f(self.0[i], other.0[i])) << i)
+    }
+}
+
+impl<const N: usize> Lanes for Array<N> {
+    type Mask = u16;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] * factor.0[i] + term.0[i]))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(std::array::from_fn(|i| term.0[i] - self.0[i] * factor.0[i]))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f32::abs))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> u16 {
+        self.compare(other, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> u16 {
+        self.compare(other, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn and(a: u16, b: u16) -> u16 {
+        a & b
+    }
+    #[inline(always)]
+    fn select(mask: u16, yes: Self, no: Self) -> Self {
+        Self(std::array::from_fn(|i| if mask >> i & 1 == 1 { yes.0[i] } else { no.0[i] }))
+    }
+    #[inline(always)]
+    fn bits(mask: u16) -> u16 {
+        mask
+    }
+}
+
+impl Isa for Scalar {
+    type V = Array<16>;
+    type H = Array<4>;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Array<16> {
+        Array([value; 16])
+    }
+    #[inline(always)]
+    fn load(self, from: &[f32; 16]) -> Array<16> {
+        Array(*from)
+    }
+    #[inline(always)]
+    fn store(self, value: Array<16>, to: &mut [f32; 16]) {
+        *to = value.0;
+    }
+    #[inline(always)]
+    fn repeat(self, from: &[f32; 4]) -> Array<16> {
+        Array(std::array::from_fn(|i| from[i / 4]))
+    }
+    #[inline(always)]
+    fn tile(self, from: &[f32; 4]) -> Array<16> {
+        Array(std::array::from_fn(|i| from[i % 4]))
+    }
+    #[inline(always)]
+    fn quad_splat(self, value: Array<16>, column: usize) -> Array<16> {
+        Array(std::array::from_fn(|i| value.0[i / 4 * 4 + column % 4]))
+    }
+    #[inline(always)]
+    fn round_step_up(self, step: Array<16>) -> Array<16> {
+        Array(step.0.map(round_step_up))
+    }
+    #[inline(always)]
+    fn codes_u8(self, from: &[u8; 16]) -> Array<16> {
+        Array(from.map(f32::from))
+    }
+    #[inline(always)]
+    fn codes_u8_pairs(self, from: &[u8; 8]) -> Array<16> {
+        Array(std::array::from_fn(|i| f32::from(from[i / 4 * 2 + i % 2])))
+    }
+    #[inline(always)]
+    fn codes_low(self, from: &[u8; 16]) -> Array<16> {
+        Array(from.map(|byte| f32::from(byte & 15)))
+    }
+    #[inline(always)]
+    fn codes_high(self, from: &[u8; 16]) -> Array<16> {
+        Array(from.map(|byte| f32::from(byte >> 4)))
+    }
+    #[inline(always)]
+    fn codes_f16(self, from: &[u8; 32]) -> Array<16> {
+        Array(std::array::from_fn(|i| f16::from_le_bytes([from[2 * i], from[2 * i + 1]]).to_f32()))
+    }
+    #[inline(always)]
+    fn codes_f16_pairs(self, from: &[u8; 16]) -> Array<16> {
+        Array(std::array::from_fn(|i| {
+            let at = 2 * (i / 4 * 2 + i % 2);
+            f16::from_le_bytes([from[at], from[at + 1]]).to_f32()
+        }))
+    }
+    #[inline(always)]
+    fn codes_f32(self, from: &[u8; 64]) -> Array<16> {
+        let lane = |i: usize| [from[4 * i], from[4 * i + 1], from[4 * i + 2], from[4 * i + 3]];
+        Array(std::array::from_fn(|i| f32::from_le_bytes(lane(i))))
+    }
+    #[inline(always)]
+    fn splat4(self, value: f32) -> Array<4> {
+        Array([value; 4])
+    }
+    #[inline(always)]
+    fn load4(self, from: &[f32; 4]) -> Array<4> {
+        Array(*from)
+    }
+    #[inline(always)]
+    fn store4(self, value: Array<4>, to: &mut [f32; 4]) {
+        *to = value.0;
+    }
+    fn run<T: Task>(self, task: T) -> T::Output {
+        task.run(self)
+    }
+}

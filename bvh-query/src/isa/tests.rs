@@ -1,0 +1,81 @@
+//! Every backend decodes every profile to the bits of the scalar reference decoder.
+
+use super::{Backend, Isa, Task};
+use crate::traverse::decode::decode_group;
+use bvh_format::decode::{Group, NodeSlabs, decode_child};
+use bvh_format::profile::Profile;
+use bvh_format::treelet::{child_slabs, row};
+
+struct Decode<'a> {
+    profile: Profile,
+    scale: f32,
+    treelet: &'a [u8],
+    part: usize,
+    parent: &'a Group,
+    column: usize,
+}
+
+impl Task for Decode<'_> {
+    type Output = Group;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Group {
+        let mut out = Group::ZERO;
+        decode_group(
+            isa,
+            self.profile,
+            self.scale,
+            self.treelet,
+            self.part,
+            self.parent,
+            self.column,
+            &mut out,
+        );
+        out
+    }
+}
+
+#[test]
+fn every_backend_decodes_to_the_bits_of_the_reference() {
+    let mut state = 3u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 32) as u32
+    };
+    for backend in Backend::ALL {
+        if !backend.is_available() {
+            println!("skipped: this CPU lacks {backend}");
+            continue;
+        }
+        for profile in Profile::ALL {
+            for round in 0..300 {
+                let mut treelet: Vec<u8> = (0..profile.treelet_bytes()).map(|_| random() as u8).collect();
+                if profile.encoding() == bvh_format::profile::Encoding::F16 {
+                    // Codes are non-negative and finite.
+                    treelet.as_chunks_mut::<2>().0.iter_mut().for_each(|code| code[1] &= 0x7b);
+                }
+                let scale = 2f32.powi(round % 80 - 40);
+                let mut parent = Group::ZERO;
+                for (lo, hi) in parent.lo.iter_mut().flatten().zip(parent.hi.iter_mut().flatten()) {
+                    *lo = (random() as f32 / 1e9 - 2.0) * scale;
+                    *hi = *lo + random() as f32 / 1e9 * scale;
+                }
+                let column = (random() % 4) as usize;
+                let above: NodeSlabs = child_slabs(&parent, column);
+                for part in 0..profile.groups() {
+                    let task =
+                        Decode { profile, scale, treelet: &treelet, part, parent: &parent, column };
+                    let group = backend.run(task);
+                    for child in 0..profile.width().min(4) {
+                        let expected = decode_child(profile, scale, &treelet, 4 * part + child, &above);
+                        let found = child_slabs(&group, child);
+                        for slab in 0..profile.directions().slabs() {
+                            let bits = |n: &NodeSlabs| (n.lo[row(slab)].to_bits(), n.hi[row(slab)].to_bits());
+                            assert_eq!(bits(&found), bits(&expected), "{backend} {} {slab}", profile.name());
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Which of 16 triangle pairs may intersect: separating axes in two stages.
+//!
+//! Stage one looks at the two face planes of each pair of a packet pair and settles most of them.
+//! What is left is queued, so that stage two, the nine cross products of edges, has full lanes.
+//! Axes are not normalised. What stage two leaves goes to exact arithmetic.
+//!
+//! Error. Let e bound the error of every coordinate, r the sum of the magnitudes of a coordinate of
+//! A and one of B (`Local`), and E the largest edge component. A product of two edge components is
+//! off by 4 E e + 4u E^2, a component of the axis by twice that and u of itself; a projection sums
+//! three products of an axis component (at most 2 E^2) and a coordinate or difference (at most r).
+//! Together that stays below `E r (48 e + 112 u E)`. Squares of numbers below 2^-75 vanish; the frame's
+//! unit makes 2^-120 far less than any projection that matters, and it is added.
+
+use crate::isa::{Isa, Lanes};
+use crate::leaf::local::{Local, U, valid_lanes};
+use crate::leaf::math::{Vec3, cross, dot, edges, largest, map3, max3, min3, sub};
+use crate::traverse::opened::Leaf;
+
+/// 2^-120: more than all underflows of a projection together.
+const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
+
+/// A triangle pair that face planes do not separate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) a: Leaf,
+    pub(crate) b: Leaf,
+    pub(crate) lane_a: u8,
+    pub(crate) lane_b: u8,
+}
+
+/// Up to 16 candidates with their local corners.
+pub(crate) struct Queue {
+    /// `[side][corner][axis]`
+    corners: [[[[f32; 16]; 3]; 3]; 2],
+    error: [f32; 16],
+    reach: [f32; 16],
+    candidates: [Option<Candidate>; 16],
+    len: usize,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Self {
+            corners: [[[[0.0; 16]; 3]; 3]; 2],
+            error: [0.0; 16],
+            reach: [0.0; 16],
+            candidates: [None; 16],
+            len: 0,
+        }
+    }
+}
+
+impl Queue {
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.len == 16
+    }
+
+    pub(crate) fn push(&mut self, local: &Local, candidate: Candidate) {
+        let at = self.len & 15;
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.corners[0][corner][axis][at] = local.a[corner][axis][usize::from(candidate.lane_a & 3)];
+                self.corners[1][corner][axis][at] = local.b[corner][axis][usize::from(candidate.lane_b & 3)];
+            }
+        }
+        self.error[at] = local.error;
+        self.reach[at] = local.reach;
+        self.candidates[at] = Some(candidate);
+        self.len = at + 1;
+    }
+
+    /// Empties the queue; what no edge axis separates, in the order of arrival.
+    #[inline(always)]
+    pub(crate) fn drain<I: Isa>(&mut self, isa: I) -> Survivors {
+        let load = |side: usize| -> Vec3<Vec3<I::V>> {
+            let corners = &self.corners[side];
+            map3([0, 1, 2], |corner: usize| map3([0, 1, 2], |axis: usize| isa.load(&corners[corner][axis])))
+        };
+        let (a, b) = (load(0), load(1));
+        let apart = edge_axes(isa, &a, &b, isa.load(&self.error), isa.load(&self.reach));
+        let filled = ((1u32 << self.len) - 1) as u16;
+        self.len = 0;
+        Survivors { candidates: self.candidates, mask: filled & !apart }
+    }
+}
+
+/// Candidates left by stage two.
+pub(crate) struct Survivors {
+    candidates: [Option<Candidate>; 16],
+    mask: u16,
+}
+
+impl Iterator for Survivors {
+    type Item = Candidate;
+
+    fn next(&mut self) -> Option<Candidate> {
+        if self.mask == 0 {
+            return None;
+        }
+        let at = self.mask.trailing_zeros() as usize;
+        self.mask &= self.mask - 1;
+        self.candidates[at]
+    }
+}
+
+/// Stage one: the lanes of a packet pair that neither face plane separates.
+#[inline(always)]
+pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: Leaf, b: Leaf) -> u16 {
+    let (lanes_a, lanes_b) = local.lanes(isa);
+    let plane_a = Plane::new(isa, &Local::quads(isa, &local.a), local);
+    let apart_a = plane_a.one_sided(isa, |isa, row| isa.repeat(row), &lanes_b);
+    let plane_b = Plane::new(isa, &Local::quads(isa, &local.b), local);
+    let apart_b = plane_b.one_sided(isa, |isa, row| isa.tile(row), &lanes_a);
+    valid_lanes(a.triangles, b.triangles) & !(apart_a | apart_b)
+}
+
+/// The planes of four triangles: normal, offset and the error of a projection.
+struct Plane {
+    normal: [[f32; 4]; 3],
+    offset: [f32; 4],
+    error: [f32; 4],
+}
+
+impl Plane {
+    #[inline(always)]
+    fn new<I: Isa>(isa: I, corners: &Vec3<Vec3<I::H>>, local: &Local) -> Self {
+        let (edge_1, edge_2) = (sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+        let normal = cross(edge_1, edge_2);
+        let edge = largest(edge_1).max(largest(edge_2));
+        let relative = edge.mul_add(isa.splat4(112.0 * U), isa.splat4(48.0 * local.error));
+        let error = edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(UNDERFLOW));
+        let mut plane = Self { normal: [[0.0; 4]; 3], offset: [0.0; 4], error: [0.0; 4] };
+        for axis in 0..3 {
+            isa.store4(normal[axis], &mut plane.normal[axis]);
+        }
+        isa.store4(dot(normal, corners[0]), &mut plane.offset);
+        isa.store4(error, &mut plane.error);
+        plane
+    }
+
+    /// Lanes whose three points are all certainly on one side.
+    #[inline(always)]
+    fn one_sided<I: Isa>(
+        &self,
+        isa: I,
+        spread: impl Fn(I, &[f32; 4]) -> I::V,
+        points: &Vec3<Vec3<I::V>>,
+    ) -> u16 {
+        let rows = &self.normal;
+        let normal = [spread(isa, &rows[0]), spread(isa, &rows[1]), spread(isa, &rows[2])];
+        let offset = spread(isa, &self.offset);
+        let error = spread(isa, &self.error);
+        let heights = map3(*points, |point| dot(normal, point).sub(offset));
+        let above = I::V::bits(error.lt(min3(heights)));
+        let below = I::V::bits(max3(heights).lt(isa.splat(0.0).sub(error)));
+        above | below
+    }
+}
+
+/// Stage two: the lanes that one of the nine cross products of edges separates.
+#[inline(always)]
+fn edge_axes<I: Isa>(
+    isa: I,
+    a: &Vec3<Vec3<I::V>>,
+    b: &Vec3<Vec3<I::V>>,
+    error: I::V,
+    reach: I::V,
+) -> u16 {
+    let (edges_a, edges_b) = (edges(a), edges(b));
+    let edge = max3(map3(edges_a, largest)).max(max3(map3(edges_b, largest)));
+    let relative = edge.mul_add(isa.splat(112.0 * U), error.mul(isa.splat(48.0)));
+    // Two projections are compared, each with its error.
+    let both = edge.mul(reach).mul(isa.splat(2.0));
+    let error = both.mul_add(relative, isa.splat(2.0 * UNDERFLOW));
+    let mut apart = 0;
+    for i in 0..3 {
+        for j in 0..3 {
+            let axis = cross(edges_a[i], edges_b[j]);
+            // Both ends of an edge project to one value; the third corner is the one before it.
+            let (a0, a1) = (dot(axis, a[i]), dot(axis, a[(i + 2) % 3]));
+            let (b0, b1) = (dot(axis, b[j]), dot(axis, b[(j + 2) % 3]));
+            let gap_up = b0.min(b1).sub(a0.max(a1));
+            let gap_down = a0.min(a1).sub(b0.max(b1));
+            apart |= I::V::bits(error.lt(gap_up.max(gap_down)));
+        }
+    }
+    apart
+}

@@ -1,0 +1,147 @@
+//! Bounds on the distances of 16 triangle pairs.
+//!
+//! The closest features are guessed in plain f32, with no care for rounding; then the guess is
+//! certified. Upper bound: both points of the guess are convex combinations of corners, so that they
+//! lie on the triangles but for the error of the coordinates. Lower bound: all six corners are
+//! projected on the line between the two points; the gap of the projections is a lower bound
+//! whatever the line is, and the distance itself if the guess was right. Intersecting triangles give
+//! no gap, degenerate ones are no exception.
+//!
+//! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the
+//! distance of two within 4 e. Combinations and projections of coordinates of magnitude r or less
+//! round by at most 16u r.
+
+use crate::isa::{Isa, Lanes};
+use crate::leaf::local::{Local, U};
+use crate::leaf::math::{Vec3, along, dot, edges, map3, max3, min3, sub};
+
+/// Bounds on 16 distances, in units of the local frame.
+pub(crate) struct Bounds {
+    pub(crate) lower: [f32; 16],
+    pub(crate) upper: [f32; 16],
+    /// From the point on A to the point on B.
+    pub(crate) direction: [[f32; 16]; 3],
+}
+
+/// The error of a bound: see above.
+#[inline(always)]
+fn slack(local: &Local) -> f32 {
+    4.0 * local.error + 16.0 * U * local.reach
+}
+
+/// Lanes whose triangles may be closer than `limit`, looking along `direction` (at most of length 1)
+/// alone.
+#[inline(always)]
+pub(crate) fn near_along<I: Isa>(isa: I, local: &Local, direction: [f32; 3], limit: f32) -> u16 {
+    let axis = map3(direction, |d| isa.splat4(d));
+    let (mut upper_a, mut lower_b) = ([0.0; 4], [0.0; 4]);
+    isa.store4(max3(map3(Local::quads(isa, &local.a), |corner| dot(axis, corner))), &mut upper_a);
+    isa.store4(min3(map3(Local::quads(isa, &local.b), |corner| dot(axis, corner))), &mut lower_b);
+    let gap = isa.tile(&lower_b).sub(isa.repeat(&upper_a));
+    I::V::bits(gap.le(isa.splat(limit + slack(local))))
+}
+
+/// The best guess so far.
+#[derive(Clone, Copy)]
+struct Guess<V> {
+    squared: V,
+    direction: Vec3<V>,
+}
+
+impl<V: Lanes> Guess<V> {
+    #[inline(always)]
+    fn improve(&mut self, direction: Vec3<V>) {
+        let squared = dot(direction, direction);
+        let closer = squared.lt(self.squared);
+        self.squared = V::select(closer, squared, self.squared);
+        for axis in 0..3 {
+            self.direction[axis] = V::select(closer, direction[axis], self.direction[axis]);
+        }
+    }
+}
+
+/// Bounds the distances of all 16 pairs of a packet pair.
+#[inline(always)]
+pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
+    let (a, b) = local.lanes(isa);
+    let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
+    let mut guess = Guess { squared: isa.splat(f32::INFINITY), direction: [zero; 3] };
+    let (edges_a, edges_b) = (edges(&a), edges(&b));
+    let inverse = |edges: Vec3<Vec3<I::V>>| map3(edges, |edge| one.div(dot(edge, edge)));
+    let (inverse_a, inverse_b) = (inverse(edges_a), inverse(edges_b));
+    // NaN, from edges of no length, ends as 0 here: `max` returns its second operand.
+    let clamp = |value: I::V| value.max(zero).min(one);
+    for i in 0..3 {
+        for j in 0..3 {
+            // Closest points of two segments: Ericson, Real-Time Collision Detection, 5.1.9.
+            let (edge_a, edge_b) = (edges_a[i], edges_b[j]);
+            let between = sub(a[i], b[j]);
+            let across = dot(edge_a, edge_b);
+            let (along_a, along_b) = (dot(edge_a, between), dot(edge_b, between));
+            let (s, t) = (along_a.mul(inverse_a[i]), along_b.mul(inverse_b[j]));
+            let (slope_a, slope_b) = (across.mul(inverse_a[i]), across.mul(inverse_b[j]));
+            // s minimises over both lines, then t over the segment of B, then s again.
+            let parallel = slope_a.neg_mul_add(slope_b, one);
+            let first = clamp(slope_a.mul(t).sub(s).div(parallel));
+            let on_b = clamp(slope_b.mul_add(first, t));
+            let on_a = clamp(slope_a.mul_add(on_b, zero.sub(s)));
+            let point_b = along([zero; 3], on_b, edge_b);
+            guess.improve(sub(point_b, along(between, on_a, edge_a)));
+        }
+    }
+    corners_on_face(isa, &a, &edges_a, &b, &mut guess, false);
+    corners_on_face(isa, &b, &edges_b, &a, &mut guess, true);
+    certify(isa, local, &a, &b, guess)
+}
+
+/// Each corner in `points` against the face of `t`. `towards` tells that the points are A's.
+#[inline(always)]
+fn corners_on_face<I: Isa>(
+    isa: I,
+    t: &Vec3<Vec3<I::V>>,
+    edges: &Vec3<Vec3<I::V>>,
+    points: &Vec3<Vec3<I::V>>,
+    guess: &mut Guess<I::V>,
+    towards: bool,
+) {
+    let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
+    let edge_1 = edges[0];
+    let edge_2 = sub(t[2], t[0]);
+    let (d11, d12, d22) = (dot(edge_1, edge_1), dot(edge_1, edge_2), dot(edge_2, edge_2));
+    let inverse = one.div(d12.neg_mul_add(d12, d11.mul(d22)));
+    for corner in 0..3 {
+        let v = sub(points[corner], t[0]);
+        let (p1, p2) = (dot(v, edge_1), dot(v, edge_2));
+        let first = p2.neg_mul_add(d12, p1.mul(d22)).mul(inverse);
+        let second = p1.neg_mul_add(d12, p2.mul(d11)).mul(inverse);
+        // Into the triangle: what lies outside is the business of the edges.
+        let first = first.max(zero).min(one);
+        let second = second.max(zero).min(one.sub(first));
+        let foot = along(along([zero; 3], first, edge_1), second, edge_2);
+        guess.improve(if towards { sub(foot, v) } else { sub(v, foot) });
+    }
+}
+
+#[inline(always)]
+fn certify<I: Isa>(
+    isa: I,
+    local: &Local,
+    a: &Vec3<Vec3<I::V>>,
+    b: &Vec3<Vec3<I::V>>,
+    guess: Guess<I::V>,
+) -> Bounds {
+    let slack = isa.splat(slack(local));
+    let length = guess.squared.sqrt();
+    let n = guess.direction;
+    let gap = min3(map3(*b, |corner| dot(n, corner))).sub(max3(map3(*a, |corner| dot(n, corner))));
+    let shrink = isa.splat(1.0 - 16.0 * U);
+    let lower = gap.div(length).mul(shrink).sub(slack).max(isa.splat(0.0));
+    let upper = length.mul_add(isa.splat(1.0 + 16.0 * U), slack);
+    let mut bounds = Bounds { lower: [0.0; 16], upper: [0.0; 16], direction: [[0.0; 16]; 3] };
+    isa.store(lower, &mut bounds.lower);
+    isa.store(upper, &mut bounds.upper);
+    for axis in 0..3 {
+        isa.store(n[axis], &mut bounds.direction[axis]);
+    }
+    bounds
+}

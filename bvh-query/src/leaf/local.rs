@@ -1,0 +1,136 @@
+//! Brings a packet of A and a packet of B into one local frame, with a bound on the error.
+//!
+//! The frame has A's directions, the first corner of A's packet as its origin, and a unit that makes
+//! the larger object about 1 in size, so that squares and products stay within f32's range whatever
+//! the mesh's unit. The packets' offset from each other is computed in f64: what remains for f32 is
+//! as small as the packets and their distance, and so is its rounding.
+//!
+//! With u = 2^-24, w the corners of B relative to its packet's first corner, |w| <= m_b, c the offset,
+//! |c| <= m_c, |a| <= m_a: a corner of A is off by u m_a (one rounded difference); a corner R w + c of B
+//! by at most 9u sum |R||w| + 4u m_c (rounded w, R and c, three products, three sums), and the sum is
+//! at most sqrt(3) m_b because rows of R have length 1 (within 2^-20). The pose's f64 error comes on
+//! top. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`.
+
+use crate::isa::{Isa, Lanes};
+use crate::leaf::math::{Vec3, map3};
+use crate::traverse::align::Placement;
+use bvh_format::leaf::Packet;
+use bvh_format::object::Object;
+
+/// Unit roundoff of f32.
+pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
+
+/// What all packet pairs of a query share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalFrame {
+    rotation: [[f64; 3]; 3],
+    translation: [f64; 3],
+    /// Rotation in units of the frame.
+    rotation32: [[f32; 3]; 3],
+    /// Units of the frame in a mesh unit, a power of two.
+    pub(crate) scale: f32,
+    /// Bound on the f64 error, units of the frame.
+    error: f32,
+}
+
+impl LocalFrame {
+    pub(crate) fn new(placement: &Placement, a: &Object, b: &Object) -> Self {
+        let size = |object: &Object| {
+            let record = &object.record;
+            (0..3).fold(0.0f64, |m, i| {
+                m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
+            })
+        };
+        let size = size(a).max(size(b));
+        // A point against a point has no size; any unit will do.
+        let exponent = if size > 0.0 { -size.log2().floor() as i32 } else { 0 };
+        let scale = 2f64.powi(exponent.clamp(-120, 120));
+        let rotation32 = placement.rotation.map(|row| row.map(|r| (r * scale) as f32));
+        Self {
+            rotation: placement.rotation,
+            translation: placement.translation,
+            rotation32,
+            scale: scale as f32,
+            error: ((placement.error * scale) as f32).next_up(),
+        }
+    }
+}
+
+/// Corners of both packets, `[corner][axis]`, four lanes each, and how wrong they may be.
+pub(crate) struct Local {
+    pub(crate) a: [[[f32; 4]; 3]; 3],
+    pub(crate) b: [[[f32; 4]; 3]; 3],
+    /// Bound on the error of each coordinate.
+    pub(crate) error: f32,
+    /// Bound on the magnitude of each coordinate of A plus one of B.
+    pub(crate) reach: f32,
+}
+
+impl Local {
+    #[inline(always)]
+    pub(crate) fn new<I: Isa>(isa: I, frame: &LocalFrame, packet_a: &Packet, packet_b: &Packet) -> Self {
+        let origin = |packet: &Packet| map3([0, 1, 2], |axis: usize| packet.corners[0][axis][0]);
+        let (origin_a, origin_b) = (origin(packet_a), origin(packet_b));
+        let scale = isa.splat4(frame.scale);
+        let mut local = Self { a: [[[0.0; 4]; 3]; 3], b: [[[0.0; 4]; 3]; 3], error: 0.0, reach: 0.0 };
+        let mut reach_a = isa.splat4(0.0);
+        let mut reach_b = reach_a;
+        let offset = map3([0, 1, 2], |i: usize| {
+            let r = &frame.rotation[i];
+            let placed = r[0] * f64::from(origin_b[0])
+                + r[1] * f64::from(origin_b[1])
+                + r[2] * f64::from(origin_b[2])
+                + frame.translation[i];
+            ((placed - f64::from(origin_a[i])) * f64::from(frame.scale)) as f32
+        });
+        for corner in 0..3 {
+            let difference: Vec3<I::H> = map3([0, 1, 2], |axis: usize| {
+                isa.load4(&packet_b.corners[corner][axis]).sub(isa.splat4(origin_b[axis]))
+            });
+            for axis in 0..3 {
+                let a = isa.load4(&packet_a.corners[corner][axis]).sub(isa.splat4(origin_a[axis])).mul(scale);
+                reach_a = reach_a.max(a.abs());
+                reach_b = reach_b.max(difference[axis].abs());
+                isa.store4(a, &mut local.a[corner][axis]);
+                let r = map3(frame.rotation32[axis], |r| isa.splat4(r));
+                let sum = difference[2].mul_add(r[2], isa.splat4(offset[axis]));
+                let b = difference[0].mul_add(r[0], difference[1].mul_add(r[1], sum));
+                isa.store4(b, &mut local.b[corner][axis]);
+            }
+        }
+        let largest = |isa: I, lanes: I::H| {
+            let mut values = [0.0; 4];
+            isa.store4(lanes, &mut values);
+            values[0].max(values[1]).max(values[2].max(values[3]))
+        };
+        let (m_a, m_b) = (largest(isa, reach_a), largest(isa, reach_b) * frame.scale);
+        let m_c = offset[0].abs().max(offset[1].abs()).max(offset[2].abs());
+        local.error = U * (2.0 * m_a + 16.0 * m_b + 5.0 * m_c) + frame.error;
+        local.reach = m_a + 1.75 * m_b + m_c;
+        local
+    }
+
+    /// Corners of A in the first index of the pair, those of B in the second, as 16 lanes each.
+    #[inline(always)]
+    pub(crate) fn lanes<I: Isa>(&self, isa: I) -> (Vec3<Vec3<I::V>>, Vec3<Vec3<I::V>>) {
+        let [a, b] = [&self.a, &self.b];
+        (
+            map3([&a[0], &a[1], &a[2]], |c| [isa.repeat(&c[0]), isa.repeat(&c[1]), isa.repeat(&c[2])]),
+            map3([&b[0], &b[1], &b[2]], |c| [isa.tile(&c[0]), isa.tile(&c[1]), isa.tile(&c[2])]),
+        )
+    }
+
+    /// Corners of one side as four lanes each.
+    #[inline(always)]
+    pub(crate) fn quads<I: Isa>(isa: I, side: &[[[f32; 4]; 3]; 3]) -> Vec3<Vec3<I::H>> {
+        let load = |c: &[[f32; 4]; 3]| [isa.load4(&c[0]), isa.load4(&c[1]), isa.load4(&c[2])];
+        map3([&side[0], &side[1], &side[2]], load)
+    }
+}
+
+/// The lanes of a packet pair that hold pairs of triangles.
+#[inline(always)]
+pub(crate) fn valid_lanes(triangles_a: u8, triangles_b: u8) -> u16 {
+    let a = (1u32 << (4 * u32::from(triangles_a))) - 1;
+    a as u16 & (0x1111 * ((1u16 << triangles_b) - 1))
+}

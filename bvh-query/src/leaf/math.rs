@@ -1,0 +1,57 @@
+//! Three-vectors of lanes.
+
+use crate::isa::Lanes;
+
+/// x, y, z of several lanes.
+pub(crate) type Vec3<T> = [T; 3];
+
+/// `f` of each element. The standard library's `map` is not always inlined, and code that is not
+/// inlined into a backend's function lacks its features.
+#[inline(always)]
+pub(crate) fn map3<A: Copy, B>(v: [A; 3], f: impl Fn(A) -> B) -> [B; 3] {
+    [f(v[0]), f(v[1]), f(v[2])]
+}
+
+#[inline(always)]
+pub(crate) fn sub<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+
+/// The edges of a triangle: from each corner to the next.
+#[inline(always)]
+pub(crate) fn edges<T: Lanes>(t: &Vec3<Vec3<T>>) -> Vec3<Vec3<T>> {
+    [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])]
+}
+
+#[inline(always)]
+pub(crate) fn dot<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> T {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
+}
+
+#[inline(always)]
+pub(crate) fn cross<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    let component = |i: usize, j: usize| a[j].neg_mul_add(b[i], a[i].mul(b[j]));
+    [component(1, 2), component(2, 0), component(0, 1)]
+}
+
+/// `v * factor + base`.
+#[inline(always)]
+pub(crate) fn along<T: Lanes>(base: Vec3<T>, factor: T, v: Vec3<T>) -> Vec3<T> {
+    [v[0].mul_add(factor, base[0]), v[1].mul_add(factor, base[1]), v[2].mul_add(factor, base[2])]
+}
+
+/// The largest magnitude of the components.
+#[inline(always)]
+pub(crate) fn largest<T: Lanes>(v: Vec3<T>) -> T {
+    v[0].abs().max(v[1].abs()).max(v[2].abs())
+}
+
+#[inline(always)]
+pub(crate) fn min3<T: Lanes>(v: Vec3<T>) -> T {
+    v[0].min(v[1]).min(v[2])
+}
+
+#[inline(always)]
+pub(crate) fn max3<T: Lanes>(v: Vec3<T>) -> T {
+    v[0].max(v[1]).max(v[2])
+}

@@ -1,0 +1,461 @@
+//! Measures the distance between two closed triangles, with witness points and certified bounds.
+//!
+//! # Method
+//! Unless the triangles meet, the closest points are in the relative interiors of two features (corner, edge
+//! or face) on which the line between them is perpendicular, and one of four kinds: corner and corner, corner
+//! and edge, edge and edge, corner and face. So the distance is the least over 9 + 18 + 9 + 6 candidates,
+//! each of which counts only where its feet lie strictly inside both features; what is lost to a wrong
+//! decision near a border is found again as a candidate of the border. Whether the triangles meet is never
+//! read off the distance: a positive lower bound proves that they don't, and else [`triangles_intersect`]
+//! decides.
+//!
+//! # Why it is accurate
+//! All that enters is differences of two input points, so an offset of both triangles costs nothing, and a
+//! gap between two corners has full relative accuracy. The least-squares problem of two edges, or of a corner
+//! and a face, is solved by modified Gram-Schmidt orthogonalisation (Å. Björck, "Solving Linear Least Squares
+//! Problems by Gram-Schmidt Orthogonalization", BIT 7, 1967), which is backward stable: one direction is
+//! projected out of the other and out of the gap, `r` and `h` are left, and the distance is that of `r` from
+//! the line along `h`. Each has an absolute error of a few roundings of the lengths at hand, and the weight
+//! on `h` is at most 1, so however short `h` is (a sliver, or two nearly parallel edges) the distance is off
+//! by a few roundings of these lengths. The textbook formula divides by `|d|²|e|² - (d·e)²` and loses half
+//! the digits there; one that skips small normals below an absolute length misses the face altogether.
+//!
+//! # Units
+//! Differences are scaled by a power of two, exactly, so that the largest coordinate is in [1, 2). What
+//! underflows after that is too small, relative to the sizes at hand, to show in the result.
+
+use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, subtract, triangles_intersect};
+
+/// How far two triangles are apart, and where; lengths in mesh units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// The distance of the closest points found: 0 if and only if the triangles intersect.
+    pub distance: f64,
+    /// A certified lower bound of the exact distance, at most `distance`; 0 where nothing better is proven.
+    pub lower: f64,
+    /// A certified upper bound of the exact distance, at least `distance`.
+    pub upper: f64,
+    /// A point of the first triangle, up to the rounding of its coordinates.
+    pub point_a: Point,
+    /// A point of the second triangle, up to the rounding of its coordinates; `point_a` if they intersect.
+    pub point_b: Point,
+}
+
+/// The distance of two closed triangles and a pair of closest points.
+///
+/// `distance` is 0 if and only if [`triangles_intersect`], and both witness points then are the same.
+/// Otherwise it is positive, and within a few roundings (2^-53 each) of the size of the triangles and the
+/// gap; the exact value is in `lower..=upper`. Where both bounds of a gap near 2^-53 of the size fail to tell
+/// it from zero, the distance is still positive but may be as small as the smallest normal number. A triangle
+/// without area is the segment or point that its corners span. Constant cost.
+#[must_use]
+pub fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
+    let Some(differences) = Differences::new(a, b) else {
+        return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: a[0], point_b: b[0] };
+    };
+    let closest = differences.closest();
+    let lower = differences.separation(differences.direction(&closest));
+    if lower == 0.0 && triangles_intersect(a, b) {
+        let point = common_point(a, b, &differences, &closest);
+        return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: point, point_b: point };
+    }
+    let (distance, upper) = differences.length(&closest);
+    // A length that rounds to zero is still not a contact.
+    let distance = (distance * differences.unit).max(f64::MIN_POSITIVE);
+    let lower = lower * differences.unit;
+    Closest {
+        distance,
+        // Multiplying by a power of two is exact down to the smallest normal number.
+        lower: if lower < f64::MIN_POSITIVE { 0.0 } else { lower.min(distance) },
+        upper: (upper * differences.unit).max(distance),
+        point_a: closest.foot_a.place(a, &differences.edges_a, differences.unit),
+        point_b: closest.foot_b.place(b, &differences.edges_b, differences.unit),
+    }
+}
+
+/// A point of a triangle: `corner + along * (next - corner) + across * (previous - corner)`.
+///
+/// In the relative interior of the feature that its nonzero weights span: both are at least 0, and their
+/// exact sum is below 1.
+#[derive(Clone, Copy)]
+struct Foot {
+    corner: usize,
+    along: f64,
+    across: f64,
+}
+
+impl Foot {
+    fn corner(corner: usize) -> Self {
+        Self { corner, along: 0.0, across: 0.0 }
+    }
+
+    fn edge(corner: usize, along: f64) -> Self {
+        Self { corner, along, across: 0.0 }
+    }
+
+    /// The two terms that are added to the corner. `edges[i]` leads from corner `i` to the next one.
+    fn offsets(&self, edges: &Triangle) -> [Point; 2] {
+        let (next, previous) = (edges[self.corner], edges[(self.corner + 2) % 3]);
+        [times(self.along, next), times(-self.across, previous)]
+    }
+
+    /// The point in mesh units, given the edges in multiples of `unit`.
+    fn place(&self, triangle: &Triangle, edges: &Triangle, unit: f64) -> Point {
+        let [along, across] = self.offsets(edges);
+        let corner = triangle[self.corner];
+        [0, 1, 2].map(|k| corner[k] + (along[k] + across[k]) * unit)
+    }
+}
+
+/// A candidate for the closest pair of points.
+#[derive(Clone, Copy)]
+struct Candidate {
+    squared: f64,
+    foot_a: Foot,
+    foot_b: Foot,
+}
+
+impl Candidate {
+    /// Ties go to the candidate that came first, so that the result is a function of the input.
+    #[inline(always)]
+    fn improve(&mut self, squared: f64, foot_a: Foot, foot_b: Foot) {
+        if squared < self.squared {
+            *self = Self { squared, foot_a, foot_b };
+        }
+    }
+}
+
+/// The gaps between two triangles and their edges, in multiples of `unit`, each coordinate rounded once.
+struct Differences {
+    /// `gaps[i][j]` leads from corner `i` of `a` to corner `j` of `b`.
+    gaps: [Triangle; 3],
+    /// `edges_a[i]` leads from corner `i` to the next one.
+    edges_a: Triangle,
+    edges_b: Triangle,
+    /// The power of two that turns a length back to mesh units.
+    unit: f64,
+}
+
+impl Differences {
+    /// `None` if all six corners are the same point.
+    #[inline(always)]
+    fn new(a: &Triangle, b: &Triangle) -> Option<Self> {
+        let from = |p: Point| [subtract(b[0], p), subtract(b[1], p), subtract(b[2], p)];
+        let gaps = [from(a[0]), from(a[1]), from(a[2])];
+        let edges = |t: &Triangle| [subtract(t[1], t[0]), subtract(t[2], t[1]), subtract(t[0], t[2])];
+        let (edges_a, edges_b) = (edges(a), edges(b));
+        let largest = |t: &Triangle| t.as_flattened().iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+        let [p, q, r] = &gaps;
+        let size = largest(p).max(largest(q)).max(largest(r)).max(largest(&edges_a)).max(largest(&edges_b));
+        if size == 0.0 {
+            return None;
+        }
+        let scale = reciprocal_exponent(size);
+        let scaled = |t: Triangle| [times(scale, t[0]), times(scale, t[1]), times(scale, t[2])];
+        Some(Self {
+            gaps: [scaled(gaps[0]), scaled(gaps[1]), scaled(gaps[2])],
+            edges_a: scaled(edges_a),
+            edges_b: scaled(edges_b),
+            unit: 1.0 / scale,
+        })
+    }
+
+    /// The same with the roles of the triangles exchanged.
+    fn swapped(&self) -> Self {
+        Self {
+            gaps: [self.gaps_to(0), self.gaps_to(1), self.gaps_to(2)],
+            edges_a: self.edges_b,
+            edges_b: self.edges_a,
+            unit: self.unit,
+        }
+    }
+
+    /// From corner `j` of `b` to the corners of `a`.
+    #[inline(always)]
+    fn gaps_to(&self, j: usize) -> Triangle {
+        [negated(self.gaps[0][j]), negated(self.gaps[1][j]), negated(self.gaps[2][j])]
+    }
+
+    /// The closest pair among all candidates.
+    fn closest(&self) -> Candidate {
+        let mut best = Candidate { squared: f64::INFINITY, foot_a: Foot::corner(0), foot_b: Foot::corner(0) };
+        for i in 0..3 {
+            for j in 0..3 {
+                let gap = self.gaps[i][j];
+                best.improve(dot(gap, gap), Foot::corner(i), Foot::corner(j));
+            }
+        }
+
+        let line_a = |i: usize| Line::new(self.edges_a[i], &self.gaps[i]);
+        let line_b = |j: usize| Line::new(self.edges_b[j], &self.gaps_to(j));
+        let lines_a = [line_a(0), line_a(1), line_a(2)];
+        let lines_b = [line_b(0), line_b(1), line_b(2)];
+
+        for (i, line) in lines_a.iter().enumerate() {
+            for k in 0..3 {
+                best.improve(line.corner(k), Foot::edge(i, line.along[k]), Foot::corner(k));
+            }
+        }
+        for (j, line) in lines_b.iter().enumerate() {
+            for k in 0..3 {
+                best.improve(line.corner(k), Foot::corner(k), Foot::edge(j, line.along[k]));
+            }
+        }
+        for (i, line) in lines_a.iter().enumerate() {
+            for (j, edge) in self.edges_b.iter().enumerate() {
+                let (squared, s, t) = line.edge(*edge, j);
+                best.improve(squared, Foot::edge(i, s), Foot::edge(j, t));
+            }
+        }
+        face(&self.edges_a, &lines_a, |squared, foot, k| best.improve(squared, foot, Foot::corner(k)));
+        face(&self.edges_b, &lines_b, |squared, foot, k| best.improve(squared, Foot::corner(k), foot));
+        best
+    }
+
+    /// The direction in which the triangles are most likely separated: the one between the closest points.
+    ///
+    /// Of a face or of two edges the normal is taken instead, which a small gap doesn't make inaccurate.
+    #[inline(always)]
+    fn direction(&self, closest: &Candidate) -> Point {
+        let (a, b) = (&closest.foot_a, &closest.foot_b);
+        if a.across != 0.0 {
+            perpendicular_normal(self.edges_a[a.corner], self.edges_a[(a.corner + 2) % 3])
+        } else if b.across != 0.0 {
+            perpendicular_normal(self.edges_b[b.corner], self.edges_b[(b.corner + 2) % 3])
+        } else if a.along != 0.0 && b.along != 0.0 {
+            perpendicular_normal(self.edges_a[a.corner], self.edges_b[b.corner])
+        } else {
+            // Of a small gap little but noise may be left, so it is made perpendicular to the edge once more.
+            let gap = self.between(closest);
+            let edge = if a.along != 0.0 { self.edges_a[a.corner] } else { self.edges_b[b.corner] };
+            if a.along != 0.0 || b.along != 0.0 { perpendicular_part(edge, gap) } else { gap }
+        }
+    }
+
+    /// The vectors whose sum leads from the first foot to the second.
+    #[inline(always)]
+    fn terms(&self, closest: &Candidate) -> [Point; 5] {
+        let (a, b) = (&closest.foot_a, &closest.foot_b);
+        let [along_a, across_a] = a.offsets(&self.edges_a);
+        let [along_b, across_b] = b.offsets(&self.edges_b);
+        [self.gaps[a.corner][b.corner], negated(along_a), negated(across_a), along_b, across_b]
+    }
+
+    /// The vector from the first foot to the second.
+    #[inline(always)]
+    fn between(&self, closest: &Candidate) -> Point {
+        self.terms(closest).into_iter().fold([0.0; 3], |sum, term| add_scaled(sum, 1.0, term))
+    }
+
+    /// The distance of the feet, and a certified upper bound of the triangles' exact distance, both scaled.
+    ///
+    /// The exact points with the weights of the feet are in the triangles, so their exact distance is an
+    /// upper bound. In each coordinate the sum differs from theirs by at most one rounding of the gap, two of
+    /// each other term (edge and product) and one for each of the two additions of terms that aren't zero:
+    /// less than five roundings of the sum of magnitudes. Square, sum and root add less than four, relative.
+    #[inline(always)]
+    fn length(&self, closest: &Candidate) -> (f64, f64) {
+        let sum = self.between(closest);
+        let magnitude: f64 = self.terms(closest).iter().flatten().map(|x| x.abs()).sum();
+        let length = dot(sum, sum).sqrt();
+        (length, length * (1.0 + 8.0 * UNIT_ROUNDOFF) + 8.0 * UNIT_ROUNDOFF * magnitude)
+    }
+
+    /// A certified lower bound of the distance, scaled: the width of the slab across `direction` between the
+    /// triangles, on either side, or 0.
+    ///
+    /// Any direction gives a bound, so its own error doesn't matter. A computed product `direction · gap` is
+    /// off by at most four roundings (one of the gap, one of the product, two of the additions), relative to
+    /// the sum of the magnitudes of its three terms; subtracting the bound from it rounds once more. Eight of
+    /// them also cover the rounding of the bound itself. The largest coordinate of `direction` is scaled to
+    /// [1, 2), so that what underflows is less than the smallest normal number in total, and that the norm,
+    /// the division and the last product are off by less than eight roundings, relative.
+    #[inline(always)]
+    fn separation(&self, direction: Point) -> f64 {
+        let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+        if size == 0.0 {
+            return 0.0;
+        }
+        let scale = reciprocal_exponent(size);
+        let direction = direction.map(|x| x * scale);
+        let magnitude = direction.map(f64::abs);
+        let (mut ahead, mut behind) = (f64::INFINITY, f64::INFINITY);
+        for gap in self.gaps.iter().flatten() {
+            let height = dot(direction, *gap);
+            let error = 8.0 * UNIT_ROUNDOFF * dot(magnitude, gap.map(f64::abs));
+            ahead = ahead.min(height - error);
+            behind = behind.min(-height - error);
+        }
+        let width = ahead.max(behind) - f64::MIN_POSITIVE;
+        if width > 0.0 { width / dot(direction, direction).sqrt() * (1.0 - 8.0 * UNIT_ROUNDOFF) } else { 0.0 }
+    }
+}
+
+/// An edge of one triangle with the three corners of the other, seen from the edge's first corner.
+struct Line {
+    edge: Point,
+    /// 1 over the edge's squared length; infinite or NaN are never used, an edge without length has 0.
+    inverse: f64,
+    /// For each corner of the other triangle the weight on `edge` of the foot of its perpendicular.
+    along: [f64; 3],
+    /// For each corner of the other triangle the perpendicular that leads to it.
+    perpendicular: Triangle,
+}
+
+impl Line {
+    #[inline(always)]
+    fn new(edge: Point, gaps: &Triangle) -> Self {
+        let squared = dot(edge, edge);
+        let inverse = if squared >= f64::MIN_POSITIVE { 1.0 / squared } else { 0.0 };
+        let along = [0, 1, 2].map(|k: usize| dot(gaps[k], edge) * inverse);
+        let part = |k: usize| add_scaled(gaps[k], -along[k], edge);
+        let perpendicular = [part(0), part(1), part(2)];
+        Self { edge, inverse, along, perpendicular }
+    }
+
+    /// The squared distance of corner `k` of the other triangle, infinite unless its foot is inside the edge.
+    #[inline(always)]
+    fn corner(&self, k: usize) -> f64 {
+        let inside = (self.along[k] > 0.0) & (self.along[k] < 1.0);
+        if inside { dot(self.perpendicular[k], self.perpendicular[k]) } else { f64::INFINITY }
+    }
+
+    /// The squared distance from an edge of the other triangle, which begins at its corner `k`, and the
+    /// weights on both edges; infinite unless the feet are inside both.
+    #[inline(always)]
+    fn edge(&self, other: Point, k: usize) -> (f64, f64, f64) {
+        let slope = dot(other, self.edge) * self.inverse;
+        let across = add_scaled(other, -slope, self.edge);
+        // NaN or infinite, hence not inside, if nothing is left of the edge.
+        let t = -dot(self.perpendicular[k], across) / dot(across, across);
+        let s = self.along[k] + t * slope;
+        let inside = (t > 0.0) & (t < 1.0) & (s > 0.0) & (s < 1.0);
+        let perpendicular = add_scaled(self.perpendicular[k], t, across);
+        (if inside { dot(perpendicular, perpendicular) } else { f64::INFINITY }, s, t)
+    }
+}
+
+/// Calls `found(squared distance, foot, corner)` for the corners of the other triangle; the distance is
+/// infinite unless the foot is inside the face. The longest edge is projected out first, so that the height
+/// on it is as small as the sliver.
+#[inline(always)]
+fn face(edges: &Triangle, lines: &[Line; 3], mut found: impl FnMut(f64, Foot, usize)) {
+    let base = longest(edges);
+    let line = &lines[base];
+    let apex = negated(edges[(base + 2) % 3]);
+    let slope = dot(apex, line.edge) * line.inverse;
+    let height = add_scaled(apex, -slope, line.edge);
+    let whole = dot(height, height);
+    if whole < f64::MIN_POSITIVE {
+        return;
+    }
+    let inverse = 1.0 / whole;
+    for k in 0..3 {
+        let across = dot(line.perpendicular[k], height) * inverse;
+        let along = line.along[k] - across * slope;
+        // A sum that rounds to less than 1 is less than 1.
+        let inside = (across > 0.0) & (along > 0.0) & (across + along < 1.0);
+        let perpendicular = add_scaled(line.perpendicular[k], -across, height);
+        let squared = if inside { dot(perpendicular, perpendicular) } else { f64::INFINITY };
+        found(squared, Foot { corner: base, along, across }, k);
+    }
+}
+
+/// A point that two intersecting triangles have in common, as well as f64 gives it.
+///
+/// Where they touch or overlap in a plane the closest feet are it. Where an edge pierces a face they are
+/// apart, and the crossing is computed; whichever is least far from the other triangle counts.
+#[cold]
+fn common_point(a: &Triangle, b: &Triangle, differences: &Differences, closest: &Candidate) -> Point {
+    let swapped = differences.swapped();
+    let unit = differences.unit;
+    let mut best = closest.squared;
+    let mut point = closest.foot_a.place(a, &differences.edges_a, unit);
+    for (triangle, differences) in [(a, differences), (b, &swapped)] {
+        if let Some((squared, foot)) = differences.crossing()
+            && squared < best
+        {
+            best = squared;
+            point = foot.place(triangle, &differences.edges_a, unit);
+        }
+    }
+    point
+}
+
+impl Differences {
+    /// Of the points where the edges of `a` pass through the plane of `b` the one closest to `b`, with its
+    /// squared distance.
+    ///
+    /// The plane of a sliver is known well only near the sliver, so each crossing is found by Newton's method
+    /// from the plane: the remaining height is measured from the closest point of `b`, and shrinks by some
+    /// seven digits in a step even where rounding tilts the plane that much.
+    fn crossing(&self) -> Option<(f64, Foot)> {
+        const STEPS: usize = 3;
+        // Four roundings of the size, which is at least 1: no step improves on that.
+        const ENOUGH: f64 = (4.0 * UNIT_ROUNDOFF) * (4.0 * UNIT_ROUNDOFF);
+        let base = longest(&self.edges_b);
+        let normal = perpendicular_normal(self.edges_b[base], self.edges_b[(base + 2) % 3]);
+        let heights = self.gaps.map(|gaps| -dot(normal, gaps[base]));
+        let mut best: Option<(f64, Foot)> = None;
+        for i in 0..3 {
+            let (p, q) = (heights[i], heights[(i + 1) % 3]);
+            if !((p < 0.0 && q > 0.0) || (p > 0.0 && q < 0.0)) {
+                continue;
+            }
+            let mut along = p / (p - q);
+            for _ in 0..STEPS {
+                let gaps = self.gaps[i].map(|gap| add_scaled(gap, -along, self.edges_a[i]));
+                let from_foot = Self { gaps: [gaps; 3], edges_a: [[0.0; 3]; 3], ..*self };
+                let closest = from_foot.closest();
+                if best.is_none_or(|(least, _)| closest.squared < least) {
+                    best = Some((closest.squared, Foot::edge(i, along)));
+                    if closest.squared <= ENOUGH {
+                        return best;
+                    }
+                }
+                along = (along + dot(normal, from_foot.between(&closest)) / (q - p)).clamp(0.0, 1.0);
+            }
+        }
+        best
+    }
+}
+
+/// The edge to project out first.
+fn longest(edges: &Triangle) -> usize {
+    let [p, q, r] = edges.map(|edge| dot(edge, edge));
+    if p >= q && p >= r {
+        0
+    } else if q >= r {
+        1
+    } else {
+        2
+    }
+}
+
+/// A normal of two vectors, of which the first is not too short to be squared; perpendicular to it up to one
+/// rounding, however small the angle between them.
+fn perpendicular_normal(d: Point, e: Point) -> Point {
+    cross(d, perpendicular_part(d, e))
+}
+
+/// `e` without its component along `d`, which is not too short to be squared.
+#[inline(always)]
+fn perpendicular_part(d: Point, e: Point) -> Point {
+    add_scaled(e, -dot(d, e) / dot(d, d), d)
+}
+
+#[inline(always)]
+fn times(factor: f64, p: Point) -> Point {
+    [factor * p[0], factor * p[1], factor * p[2]]
+}
+
+#[inline(always)]
+fn negated(p: Point) -> Point {
+    [-p[0], -p[1], -p[2]]
+}
+
+/// The power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
+fn reciprocal_exponent(x: f64) -> f64 {
+    let exponent = x.to_bits() >> 52 & 0x7ff;
+    f64::from_bits(2046_u64.saturating_sub(exponent) << 52)
+}

@@ -1,0 +1,55 @@
+//! Two triangles at a time, decided exactly: do they meet, and how far apart are they.
+//!
+//! Everything above this module only filters; what a filter can't decide ends here. Both routines are scalar,
+//! use no fused multiply-add and no platform-dependent operation, so the answer is a function of the eighteen
+//! input numbers alone.
+//!
+//! # Precondition: the range in which nothing under- or overflows
+//! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-266.
+//!
+//! `robust` computes signs of determinants with error-free transformations, which are exact as long as no
+//! intermediate falls off either end of the exponent range. A rounded difference of two multiples of 2^-266
+//! is again one, and so is its rounding error. A product of up to three of them is a multiple of 2^-798, and
+//! with it each partial product, rounding error and Dekker half: all lie on a grid coarser than the smallest
+//! subnormal, 2^-1074, so none is lost. The error bounds, at least 2^-110 times a nonzero permanent, stay
+//! above 2^-908. At the other end a difference is at most 2^126, a product of three 2^378, and splitting
+//! costs a factor 2^27. Outside this range no routine panics, but the answer is no longer proven.
+
+mod distance;
+mod intersect;
+
+pub use distance::{Closest, triangle_distance};
+pub use intersect::triangles_intersect;
+
+#[cfg(test)]
+mod tests;
+
+/// A point in mesh units.
+pub type Point = [f64; 3];
+
+/// The closed triangle on three points; collinear ones make a segment, equal ones a point.
+pub type Triangle = [Point; 3];
+
+/// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
+const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
+
+#[inline(always)]
+fn subtract(p: Point, q: Point) -> Point {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+#[inline(always)]
+fn dot(p: Point, q: Point) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+#[inline(always)]
+fn cross(p: Point, q: Point) -> Point {
+    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+}
+
+/// `p + factor * q`, each coordinate rounded twice.
+#[inline(always)]
+fn add_scaled(p: Point, factor: f64, q: Point) -> Point {
+    [p[0] + factor * q[0], p[1] + factor * q[1], p[2] + factor * q[2]]
+}

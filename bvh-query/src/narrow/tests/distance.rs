@@ -1,0 +1,149 @@
+//! `triangle_distance` against the oracle: value, bounds and witness points.
+
+use super::generate::{KINDS, Random, float, pair};
+use super::oracle::{Exact, dot_triangle};
+use crate::narrow::{Closest, Point, Triangle, triangle_distance, triangles_intersect};
+
+/// The largest error allowed, relative to the largest difference of two coordinates.
+const TOLERANCE: f64 = 1e-14;
+
+fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    numbers.into_iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+#[track_caller]
+fn check(name: &str, a: &Triangle, b: &Triangle) -> Closest {
+    let exact = Exact::new(a, b);
+    let closest = triangle_distance(a, b);
+    let Closest { distance, lower, upper, point_a, point_b } = closest;
+    let context = format!("{name}: {a:?} {b:?} {closest:?}");
+
+    let size = largest(a.iter().chain(b).flat_map(|p| [0, 1, 2].map(|k| p[k] - a[0][k])));
+    let ulp = largest(a.iter().chain(b).flatten().copied()) * f64::EPSILON;
+    assert!(0.0 <= lower && lower <= distance && distance <= upper, "{context}");
+    assert!(exact.compare(lower).is_ge(), "lower: {context}");
+    assert!(exact.compare(upper).is_le(), "upper: {context}");
+    assert!(exact.compare(distance - TOLERANCE * size).is_ge(), "too far: {context}");
+    assert!(exact.compare(distance + TOLERANCE * size).is_le(), "too near: {context}");
+    assert!(upper - distance <= TOLERANCE * size + f64::MIN_POSITIVE, "{context}");
+    assert_eq!(distance == 0.0, exact.compare(0.0).is_eq(), "{context}");
+    assert_eq!(distance == 0.0, triangles_intersect(a, b), "{context}");
+
+    for (triangle, point) in [(a, point_a), (b, point_b)] {
+        let off = Exact::new(triangle, &dot_triangle(point));
+        assert!(off.compare(2.0 * ulp + TOLERANCE * size).is_le(), "witness point: {context}");
+    }
+    if distance == 0.0 {
+        assert_eq!(point_a, point_b, "{context}");
+    } else {
+        let between = length(&point_a, &point_b);
+        assert!((between - distance).abs() <= 4.0 * ulp + TOLERANCE * size, "{between} {context}");
+    }
+    closest
+}
+
+fn length(p: &Point, q: &Point) -> f64 {
+    let size = largest([0, 1, 2].map(|k| q[k] - p[k]));
+    if size == 0.0 {
+        0.0
+    } else {
+        size * [0, 1, 2].map(|k| ((q[k] - p[k]) / size).powi(2)).iter().sum::<f64>().sqrt()
+    }
+}
+
+#[test]
+fn grid_pairs_agree_with_the_oracle() {
+    for (n, rounds) in [(2, 100), (3, 200), (5, 300)] {
+        let mut random = Random(n);
+        for _ in 0..rounds {
+            let (a, b) = (random.grid_triangle(n), random.grid_triangle(n));
+            check("grid", &float(&a), &float(&b));
+        }
+    }
+}
+
+#[test]
+fn hard_pairs_agree_with_the_oracle() {
+    let mut random = Random(11);
+    for round in 0..KINDS * 40 {
+        let (name, a, b) = pair(round % KINDS, &mut random);
+        check(name, &random.shuffled(&a), &random.shuffled(&b));
+    }
+}
+
+#[test]
+fn hard_pairs_of_any_scale_agree_with_the_oracle() {
+    let mut random = Random(13);
+    for round in 0..KINDS * 20 {
+        let (name, a, b) = pair(round % KINDS, &mut random);
+        let scale = 2_f64.powi(random.below(201) as i32 - 100);
+        let scaled = |t: Triangle| t.map(|p| p.map(|x| x * scale));
+        check(name, &scaled(a), &scaled(b));
+    }
+}
+
+#[test]
+fn a_common_offset_costs_no_accuracy() {
+    let mut random = Random(17);
+    for round in 0..KINDS * 20 {
+        let (name, a, b) = pair(round % KINDS, &mut random);
+        // The rounded corners are the input, and the distance is as good as if they were at the origin.
+        let offset = random.point().map(|x| x * 1e10);
+        let moved = |t: Triangle| t.map(|p| [0, 1, 2].map(|k| p[k] + offset[k]));
+        check(name, &moved(a), &moved(b));
+    }
+}
+
+#[test]
+fn the_distance_scales_with_a_power_of_two() {
+    let mut random = Random(19);
+    for round in 0..KINDS * 200 {
+        let (name, a, b) = pair(round % KINDS, &mut random);
+        let scale = 2_f64.powi(random.below(301) as i32 - 190);
+        let scaled = |t: Triangle| t.map(|p| p.map(|x| x * scale));
+        let (plain, large) = (triangle_distance(&a, &b), triangle_distance(&scaled(a), &scaled(b)));
+        if plain.distance > f64::MIN_POSITIVE {
+            assert_eq!(plain.distance * scale, large.distance, "{name}: {a:?} {b:?} {scale:e}");
+            assert_eq!(plain.lower * scale, large.lower, "{name}: {a:?} {b:?} {scale:e}");
+        }
+    }
+}
+
+#[test]
+fn small_gaps_keep_a_positive_lower_bound() {
+    for exponent in -40..0 {
+        let gap = 2_f64.powi(exponent);
+        let a = [[0.0; 3], [1.0, 0.0, 0.25], [0.0, 1.0, 0.5]];
+        let over = [[0.25, 0.25, 0.1875 + gap], [1.25, 0.25, 0.4375 + gap], [0.25, 1.25, 0.6875 + gap]];
+        let closest = check("parallel faces", &a, &over);
+        assert!(closest.lower > 0.9 * closest.distance && closest.distance > 0.8 * gap, "{closest:?}");
+        let edge = [[-0.5, -1.0, -gap], [1.5, 1.0, -gap], [0.5, 0.0, -1.0]];
+        let closest = check("crossing edges", &[[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.0, 1.0]], &edge);
+        assert!(closest.lower > 0.9 * closest.distance && closest.distance > 0.8 * gap, "{closest:?}");
+    }
+}
+
+#[test]
+fn simple_distances_are_exact() {
+    let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let distance = |b: &Triangle| check("simple", &a, b).distance;
+    assert_eq!(distance(&[[1.0, 1.0, 3.0], [1.0, 1.0, 4.0], [2.0, 1.0, 4.0]]), 3.0); // corner and face
+    assert_eq!(distance(&[[7.0, 0.0, 4.0]; 3]), 5.0); // corners
+    assert_eq!(distance(&[[2.0, -3.0, 4.0]; 3]), 5.0); // corner and edge
+    assert_eq!(distance(&[[2.0, -3.0, 0.0], [2.0, -3.0, 9.0], [2.0, -9.0, 0.0]]), 3.0);
+    assert_eq!(distance(&[[2.0, -2.0, -1.0], [2.0, -2.0, 1.0], [2.0, -9.0, 0.0]]), 2.0); // edges
+    assert_eq!(distance(&[[2.0, -2.0, -1.0], [2.0, -2.0, 1.0], [2.0, -2.0, 1.0]]), 2.0); // edge and segment
+    assert_eq!(distance(&[[-3.0, 0.0, 0.0], [-3.0, 4.0, 0.0], [-9.0, 0.0, 0.0]]), 3.0); // coplanar
+    assert_eq!(distance(&[[0.0, 0.0, 2.0], [4.0, 0.0, 2.0], [0.0, 4.0, 2.0]]), 2.0); // parallel
+    assert_eq!(distance(&[[1.0, 1.0, 0.0], [2.0, 1.0, 0.0], [1.0, 1.5, 0.0]]), 0.0); // nested
+    let points = check("points", &[[1.0; 3]; 3], &[[1.0, 4.0, 5.0]; 3]);
+    assert_eq!((points.distance, points.point_a, points.point_b), (5.0, [1.0; 3], [1.0, 4.0, 5.0]));
+    assert_eq!(check("one point", &[[1.0; 3]; 3], &[[1.0; 3]; 3]).distance, 0.0);
+}
+
+#[test]
+fn crossing_triangles_share_their_witness_point() {
+    let a = [[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]];
+    let closest = check("pierced", &a, &[[0.25, 0.5, -1.0], [0.25, 0.5, 1.0], [9.0, 9.0, 0.5]]);
+    assert_eq!((closest.distance, closest.point_a), (0.0, [0.25, 0.5, 0.0]));
+}

@@ -1,0 +1,143 @@
+//! Do the meshes touch? Also the first contact in the order of the trees.
+
+use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
+use crate::bvh::Shape;
+use crate::error::QueryError;
+use crate::isa::Isa;
+use crate::leaf::collide::{Candidate, Queue, face_planes};
+use crate::leaf::local::Local;
+use crate::narrow::triangles_intersect;
+use crate::pose::Pose;
+use crate::traverse::opened::Leaf;
+use crate::traverse::pair::{Measure, Order, Visitor};
+use std::ops::ControlFlow;
+
+impl Querier {
+    /// True if the meshes touch or intersect with B placed by `pose` in A's frame.
+    ///
+    /// Exact: equals exact predicates on the placed vertices, for all pairs of triangles. Touching
+    /// counts; a mesh wholly inside another without touching it does not (meshes are surfaces).
+    ///
+    /// # Errors
+    /// If a page that the query touches is damaged.
+    pub fn collide<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+    ) -> Result<bool, QueryError> {
+        self.stats = QueryStats::default();
+        let found = each_pair(a.into(), b.into(), pose, |scene| {
+            Ok(self.find_contact(&scene, Order::Nearest)?.map(|_| ()))
+        });
+        Ok(found?.is_some())
+    }
+
+    /// One pair of triangles in contact. In `Order::Tree` it is the same on every backend.
+    pub(super) fn find_contact(
+        &mut self,
+        scene: &Scene<'_>,
+        order: Order,
+    ) -> Result<Option<Candidate>, QueryError> {
+        if sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b) > 0.0 {
+            return Ok(None);
+        }
+        self.queue.clear();
+        let mut visitor = Contacts {
+            scene,
+            queue: &mut self.queue,
+            order,
+            stats: QueryStats::default(),
+            visit: |candidate| Ok(ControlFlow::Break(candidate)),
+            found: None,
+        };
+        let task = Traversal { pair: scene.pair, stack: &mut self.stack, visitor: &mut visitor };
+        let tests = self.backend.run(task)?;
+        let (found, stats) = (visitor.found, visitor.stats);
+        self.stats.add(tests, stats);
+        Ok(found)
+    }
+}
+
+impl QueryStats {
+    /// Adds what a traversal did.
+    pub(super) fn add(&mut self, node_tests: u64, other: Self) {
+        self.node_tests += node_tests;
+        self.packet_tests += other.packet_tests;
+        self.exact_tests += other.exact_tests;
+    }
+}
+
+/// Decides triangle pairs exactly and hands those in contact to `visit`, until it breaks.
+pub(super) struct Contacts<'a, F> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) queue: &'a mut Queue,
+    pub(super) order: Order,
+    pub(super) stats: QueryStats,
+    pub(super) visit: F,
+    /// What `visit` broke with.
+    pub(super) found: Option<Candidate>,
+}
+
+impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts<'_, F> {
+    #[inline(always)]
+    fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
+        for candidate in self.queue.drain(isa) {
+            if self.decide(candidate)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    #[inline(never)]
+    fn decide(&mut self, candidate: Candidate) -> Result<ControlFlow<()>, QueryError> {
+        self.stats.exact_tests += 1;
+        let a = self.scene.triangle_a(candidate.a, candidate.lane_a)?;
+        let b = self.scene.triangle_b(candidate.b, candidate.lane_b)?;
+        if triangles_intersect(&a, &b) {
+            if let ControlFlow::Break(found) = (self.visit)(candidate)? {
+                self.found = Some(found);
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor for Contacts<'_, F> {
+    const MEASURE: Measure = Measure::Overlap;
+
+    fn order(&self) -> Order {
+        self.order
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        0.0
+    }
+
+    #[inline(always)]
+    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError> {
+        self.stats.packet_tests += 1;
+        let pair = &self.scene.pair;
+        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
+        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
+        let local = Local::new(isa, &self.scene.frame, &packet_a, &packet_b);
+        let mut mask = face_planes(isa, &local, a, b);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as u8;
+            mask &= mask - 1;
+            self.queue.push(&local, Candidate { a, b, lane_a: lane >> 2, lane_b: lane & 3 });
+            if self.queue.is_full() && self.drain(isa)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    #[inline(always)]
+    fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
+        self.drain(isa).map(|_| ())
+    }
+}

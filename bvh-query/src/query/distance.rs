@@ -1,0 +1,399 @@
+//! How far apart are the meshes, where, and is it less than d?
+//!
+//! Pairs of triangles are bounded in f32, 16 at a time; those that may be the closest are kept as
+//! candidates and settled in f64 at the end, nearest first. Pruning is strict: a pair is left out
+//! only if its distance certainly exceeds that of another, so that the answer - the least f64
+//! distance, of equal ones that with the smallest triangle numbers - does not depend on the order of
+//! visits. Touching meshes are at distance 0, and the pair of triangles is the first in the order of
+//! the trees.
+
+use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
+use crate::bvh::Shape;
+use crate::error::QueryError;
+use crate::isa::Isa;
+use crate::leaf;
+use crate::leaf::local::Local;
+use crate::narrow::{Closest, triangle_distance};
+use crate::pose::Pose;
+use crate::traverse::align::round_up;
+use crate::traverse::opened::Leaf;
+use crate::traverse::pair::{Measure, Order, Visitor};
+use std::ops::ControlFlow;
+
+/// Leaf pairs to visit best-first before going on depth-first.
+const BEST_FIRST_LEAVES: u32 = 2;
+/// Candidates kept before the nearest are settled and the rest thinned out.
+const MANY_CANDIDATES: usize = 256;
+
+/// How exact a distance has to be.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DistanceOptions {
+    /// The answer may exceed the least distance by this fraction of it.
+    pub rel_err: f64,
+    /// And by this much, mesh units.
+    pub abs_err: f64,
+}
+
+/// The least distance of two meshes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// The distance in mesh units; 0 if and only if the meshes touch.
+    pub distance: f64,
+    /// The least distance is certainly at least this.
+    pub lower: f64,
+    /// The least distance is certainly at most this.
+    pub upper: f64,
+    /// The closest point on A, in A's frame.
+    pub point_a: [f64; 3],
+    /// The closest point on B, in A's frame.
+    pub point_b: [f64; 3],
+    /// Number of the object of A in its file.
+    pub object_a: u32,
+    /// Triangle of A with that point: its number in the input.
+    pub triangle_a: u32,
+    /// Number of the object of B in its file.
+    pub object_b: u32,
+    /// Triangle of B with that point.
+    pub triangle_b: u32,
+}
+
+/// A pair of triangles that may be the closest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    /// Bounds of the distance, mesh units.
+    lower: f32,
+    upper: f32,
+    pair: leaf::collide::Candidate,
+}
+
+/// The closest pair so far.
+#[derive(Clone, Copy)]
+struct Best {
+    closest: Closest,
+    pair: leaf::collide::Candidate,
+    numbers: (u32, u32),
+    ids: (u32, u32),
+}
+
+impl Querier {
+    /// The least distance of the meshes with B placed by `pose` in A's frame, with both closest
+    /// points and their triangles.
+    ///
+    /// The distance is that of the placed vertices' triangles to within a few roundings of f64 at
+    /// the scale of the two closest triangles. Bit-identical on all backends.
+    ///
+    /// # Errors
+    /// If a page that the query touches is damaged.
+    pub fn distance<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+    ) -> Result<Distance, QueryError> {
+        self.distance_with(a, b, pose, &DistanceOptions::default())
+    }
+
+    /// The same, not necessarily the least: allowed errors save time. `lower` says what has been
+    /// proved. With an allowed error, which of the allowed answers is found may depend on the
+    /// backend.
+    ///
+    /// # Errors
+    /// If a page that the query touches is damaged.
+    pub fn distance_with<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        options: &DistanceOptions,
+    ) -> Result<Distance, QueryError> {
+        let (a, b) = (a.into(), b.into());
+        let mut search = Search::new(*options, f64::INFINITY);
+        self.search(a, b, pose, &mut search)?;
+        // Shapes have triangles, and nothing is pruned before a distance is known.
+        let best = search.best.ok_or_else(|| no_answer(a))?;
+        if best.closest.distance == 0.0 {
+            return self.touching(a, b, pose, best);
+        }
+        let lower = search.limit_of(best.closest.distance).min(best.closest.lower);
+        Ok(best.distance(lower))
+    }
+
+    /// True if the meshes are at most `d` apart (mesh units): exactly, if `distance` is at most `d`.
+    /// NaN is no distance: false.
+    ///
+    /// # Errors
+    /// If a page that the query touches is damaged.
+    pub fn within<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        d: f64,
+    ) -> Result<bool, QueryError> {
+        let (a, b) = (a.into(), b.into());
+        if d.is_nan() || d < 0.0 {
+            self.stats = QueryStats::default();
+            return Ok(false);
+        }
+        if d == 0.0 {
+            return self.collide(a, b, pose);
+        }
+        let mut search = Search::new(DistanceOptions::default(), d);
+        self.search(a, b, pose, &mut search)?;
+        Ok(search.best.is_some_and(|best| best.closest.distance <= d))
+    }
+
+    fn search(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        search: &mut Search,
+    ) -> Result<(), QueryError> {
+        self.stats = QueryStats::default();
+        each_pair(a, b, pose, |scene| {
+            let gap = sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b);
+            if gap > f64::from(search.limit) {
+                return Ok(None);
+            }
+            self.candidates.clear();
+            let mut visitor = Nearest {
+                scene: &scene,
+                search,
+                candidates: &mut self.candidates,
+                direction: None,
+                stats: QueryStats::default(),
+            };
+            let task = Traversal { pair: scene.pair, stack: &mut self.stack, visitor: &mut visitor };
+            let tests = self.backend.run(task)?;
+            let stats = visitor.stats;
+            self.stats.add(tests, stats);
+            Ok(search.done.then_some(()))
+        })?;
+        Ok(())
+    }
+
+    /// The answer for touching meshes: the first contact in the order of the trees.
+    #[cold]
+    fn touching(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose, best: Best) -> Result<Distance, QueryError> {
+        let first = each_pair(a, b, pose, |scene| {
+            let Some(pair) = self.find_contact(&scene, Order::Tree)? else { return Ok(None) };
+            let closest = triangle_distance(
+                &scene.triangle_a(pair.a, pair.lane_a)?,
+                &scene.triangle_b(pair.b, pair.lane_b)?,
+            );
+            let ids = ids(&scene, &pair)?;
+            Ok(Some(Best { closest, pair, numbers: scene.numbers, ids }))
+        })?;
+        Ok(first.unwrap_or(best).distance(0.0))
+    }
+}
+
+/// A distance without a pair of triangles: only a forged file can bring it about.
+#[cold]
+fn no_answer(a: Shape<'_>) -> QueryError {
+    let at = a.bvh().layout().page_offset(0);
+    bvh_format::FormatError::new(bvh_format::Rule::VertexFinite, at, "finite triangles", "none").into()
+}
+
+fn ids(scene: &Scene<'_>, pair: &leaf::collide::Candidate) -> Result<(u32, u32), QueryError> {
+    let (a, b) = (&scene.pair.object_a, &scene.pair.object_b);
+    Ok((
+        scene.pair.bvh_a.triangle_id(a, pair.place_a())?,
+        scene.pair.bvh_b.triangle_id(b, pair.place_b())?,
+    ))
+}
+
+impl Best {
+    fn distance(&self, lower: f64) -> Distance {
+        Distance {
+            distance: self.closest.distance,
+            lower,
+            upper: self.closest.upper,
+            point_a: self.closest.point_a,
+            point_b: self.closest.point_b,
+            object_a: self.numbers.0,
+            triangle_a: self.ids.0,
+            object_b: self.numbers.1,
+            triangle_b: self.ids.1,
+        }
+    }
+}
+
+/// What is known of the distance, over all pairs of objects.
+struct Search {
+    options: DistanceOptions,
+    /// `within`'s question: stop at the first pair at most this far apart.
+    enough: Option<f64>,
+    best: Option<Best>,
+    /// No pair is farther apart than this: f32, rounded up.
+    upper: f32,
+    /// Pairs with a lower bound beyond this do not matter.
+    limit: f32,
+    done: bool,
+}
+
+impl Search {
+    fn new(options: DistanceOptions, enough: f64) -> Self {
+        let mut search = Self {
+            options,
+            enough: enough.is_finite().then_some(enough),
+            best: None,
+            upper: f32::INFINITY,
+            limit: f32::INFINITY,
+            done: false,
+        };
+        search.lower_upper(round_up(enough * (1.0 + 2f64.powi(-40))));
+        search
+    }
+
+    /// What has been proved when pairs beyond `limit_of(upper)` are pruned.
+    fn limit_of(&self, upper: f64) -> f64 {
+        ((upper - self.options.abs_err) / (1.0 + self.options.rel_err)).max(0.0)
+    }
+
+    /// Takes over a better upper bound.
+    fn lower_upper(&mut self, upper: f32) {
+        if upper < self.upper {
+            self.upper = upper;
+            self.limit = round_up(self.limit_of(f64::from(upper)));
+        }
+    }
+
+    /// Settles a pair in f64.
+    fn settle(&mut self, scene: &Scene<'_>, pair: leaf::collide::Candidate) -> Result<(), QueryError> {
+        let closest = triangle_distance(
+            &scene.triangle_a(pair.a, pair.lane_a)?,
+            &scene.triangle_b(pair.b, pair.lane_b)?,
+        );
+        let nearer = match &self.best {
+            None => true,
+            Some(best) if closest.distance == best.closest.distance => {
+                let order = |numbers: (u32, u32), ids: (u32, u32)| (numbers.0, ids.0, numbers.1, ids.1);
+                order(scene.numbers, ids(scene, &pair)?) < order(best.numbers, best.ids)
+            }
+            Some(best) => closest.distance < best.closest.distance,
+        };
+        if nearer {
+            self.best = Some(Best { closest, pair, numbers: scene.numbers, ids: ids(scene, &pair)? });
+        }
+        // Slack for the f64 distance's own error: equal and nearly equal pairs stay candidates.
+        self.lower_upper(round_up(closest.upper * (1.0 + 2f64.powi(-40))));
+        let enough = self.enough.unwrap_or(0.0);
+        self.done |= closest.distance <= enough;
+        Ok(())
+    }
+}
+
+/// Looks for the closest pair of triangles.
+struct Nearest<'a> {
+    scene: &'a Scene<'a>,
+    search: &'a mut Search,
+    candidates: &'a mut Vec<Candidate>,
+    /// Of the closest pair so far, at most of length 1.
+    direction: Option<[f32; 3]>,
+    stats: QueryStats,
+}
+
+impl Nearest<'_> {
+    #[inline(never)]
+    fn settle(&mut self, pair: leaf::collide::Candidate) -> Result<ControlFlow<()>, QueryError> {
+        self.stats.exact_tests += 1;
+        self.search.settle(self.scene, pair)?;
+        Ok(if self.search.done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    }
+
+    /// Settles the candidates that still may be the closest, nearest first.
+    #[inline(never)]
+    fn settle_candidates(&mut self) -> Result<ControlFlow<()>, QueryError> {
+        self.candidates.sort_unstable_by(|x, y| y.lower.total_cmp(&x.lower));
+        while let Some(candidate) = self.candidates.pop() {
+            // With an allowed error, the pair that the limit came from may be beyond it.
+            if candidate.lower > self.search.limit && candidate.upper > self.search.upper {
+                continue;
+            }
+            if self.settle(candidate.pair)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// Remembers the direction of the closest pair, made at most 1 long.
+    fn look_along(&mut self, direction: [f32; 3]) {
+        let length = direction.map(f64::from).iter().map(|d| d * d).sum::<f64>().sqrt();
+        let unit = direction.map(|d| (f64::from(d) / length * (1.0 - 2f64.powi(-20))) as f32);
+        if length > 0.0 && unit.iter().all(|d| d.is_finite()) {
+            self.direction = Some(unit);
+        }
+    }
+}
+
+impl Visitor for Nearest<'_> {
+    const MEASURE: Measure = Measure::Distance;
+
+    fn order(&self) -> Order {
+        Order::Best { leaves: BEST_FIRST_LEAVES }
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.search.limit
+    }
+
+    #[inline(always)]
+    fn witness(&self) -> Option<[f32; 3]> {
+        self.direction
+    }
+
+    #[inline(always)]
+    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError> {
+        self.stats.packet_tests += 1;
+        let pair = &self.scene.pair;
+        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
+        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
+        let local = Local::new(isa, &self.scene.frame, &packet_a, &packet_b);
+        let mut mask = leaf::local::valid_lanes(a.triangles, b.triangles);
+        let scale = self.scene.frame.scale;
+        if let Some(direction) = self.direction {
+            mask &= leaf::distance::near_along(isa, &local, direction, self.search.limit * scale);
+            if mask == 0 {
+                return Ok(ControlFlow::Continue(()));
+            }
+        }
+        let bounds = leaf::distance::bounds(isa, &local);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            // A power of two: exact, unless the meshes are so tiny that it takes a last outward step.
+            let lower = (bounds.lower[lane] / scale).next_down().max(0.0);
+            let upper = (bounds.upper[lane] / scale).next_up();
+            if lower > self.search.limit {
+                continue;
+            }
+            let (lane_a, lane_b) = ((lane >> 2) as u8, (lane & 3) as u8);
+            let candidate = Candidate { lower, upper, pair: leaf::collide::Candidate { a, b, lane_a, lane_b } };
+            if upper < self.search.upper {
+                self.search.lower_upper(upper);
+                self.look_along(bounds.direction.map(|axis| axis[lane]));
+            }
+            if lower <= 0.0 {
+                // Perhaps touching: knowing at once may end the search.
+                if self.settle(candidate.pair)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            } else {
+                self.candidates.push(candidate);
+                if self.candidates.len() >= MANY_CANDIDATES && self.settle_candidates()?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    #[inline(always)]
+    fn finish<I: Isa>(&mut self, _isa: I) -> Result<(), QueryError> {
+        self.settle_candidates().map(|_| ())
+    }
+}

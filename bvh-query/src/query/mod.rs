@@ -1,0 +1,152 @@
+//! The questions: collide, contacts, distance, within. Each is a visitor of one pair traversal.
+
+pub(crate) mod collide;
+pub(crate) mod contacts;
+pub(crate) mod distance;
+mod exact;
+
+use crate::bvh::Shape;
+use crate::error::QueryError;
+use crate::isa::{Backend, Isa, Task};
+use crate::leaf::collide::Queue;
+use crate::leaf::local::LocalFrame;
+use crate::pose::Pose;
+use crate::traverse::align::Placement;
+use crate::traverse::pair::{Pair, Stack, Visitor, traverse};
+use bvh_format::object::Object;
+pub use distance::{Distance, DistanceOptions};
+
+/// Asks questions. Holds the backend and the memory that queries work in, so that a query allocates
+/// nothing once the memory has grown to what the meshes need. Use one a thread.
+pub struct Querier {
+    backend: Backend,
+    stack: Stack,
+    queue: Queue,
+    candidates: Vec<distance::Candidate>,
+    stats: QueryStats,
+}
+
+/// What the last query did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct QueryStats {
+    /// Tests of up to 16 node pairs each.
+    pub node_tests: u64,
+    /// Pairs of leaf packets tested, up to 16 triangle pairs each.
+    pub packet_tests: u64,
+    /// Triangle pairs that went to exact arithmetic.
+    pub exact_tests: u64,
+}
+
+impl Querier {
+    /// With the fastest backend of this CPU, or the one that `CBVH_ISA` names.
+    ///
+    /// # Errors
+    /// If `CBVH_ISA` names no backend or one that the CPU lacks.
+    pub fn new() -> Result<Self, QueryError> {
+        Ok(Self::with_backend(Backend::detect()?))
+    }
+
+    /// With a backend; one that the CPU lacks is replaced by the scalar one.
+    pub fn with_backend(backend: Backend) -> Self {
+        let backend = if backend.is_available() { backend } else { Backend::Scalar };
+        Self {
+            backend,
+            stack: Stack::default(),
+            queue: Queue::default(),
+            candidates: Vec::new(),
+            stats: QueryStats::default(),
+        }
+    }
+
+    /// The backend in use.
+    pub fn backend(&self) -> Backend {
+        self.backend
+    }
+
+    /// What the last query did.
+    pub fn stats(&self) -> QueryStats {
+        self.stats
+    }
+}
+
+/// A triangle pair in contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Contact {
+    /// Number of the object of A in its file.
+    pub object_a: u32,
+    /// Triangle of A: its number in the input (without ids, its place in the order of the leaves).
+    pub triangle_a: u32,
+    /// Number of the object of B in its file.
+    pub object_b: u32,
+    /// Triangle of B.
+    pub triangle_b: u32,
+}
+
+/// Two objects in place, with all that the leaf tests need.
+#[derive(Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    pub(crate) pair: Pair<'a>,
+    pub(crate) pose: &'a Pose,
+    pub(crate) frame: LocalFrame,
+    /// Numbers of the objects in their files.
+    pub(crate) numbers: (u32, u32),
+}
+
+/// Calls `visit` for each pair of objects of the two sides, in the order of the files.
+fn each_pair<R>(
+    a: Shape<'_>,
+    b: Shape<'_>,
+    pose: &Pose,
+    mut visit: impl FnMut(Scene<'_>) -> Result<Option<R>, QueryError>,
+) -> Result<Option<R>, QueryError> {
+    for (index_a, object_a) in a.objects().iter().enumerate() {
+        for (index_b, object_b) in b.objects().iter().enumerate() {
+            let placement = Placement::new(pose, object_a, object_b);
+            let scene = Scene {
+                pair: Pair { bvh_a: a.bvh(), object_a, bvh_b: b.bvh(), object_b, placement: &placement },
+                pose,
+                frame: LocalFrame::new(&placement, object_a, object_b),
+                numbers: ((a.first() + index_a) as u32, (b.first() + index_b) as u32),
+            };
+            if let Some(result) = visit(scene)? {
+                return Ok(Some(result));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// A lower bound of the distance of two objects by their bounding spheres, mesh units; negative if
+/// the spheres overlap. Costs a few nanoseconds.
+fn sphere_gap(placement: &Placement, a: &Object, b: &Object) -> f64 {
+    let centre = |object: &Object| object.record.sphere_centre.map(|c| f64::from(c.get()));
+    let (centre_a, centre_b) = (centre(a), centre(b));
+    let squared: f64 = (0..3)
+        .map(|i| {
+            let r = &placement.rotation[i];
+            let placed = r[0] * centre_b[0] + r[1] * centre_b[1] + r[2] * centre_b[2];
+            (placed + placement.translation[i] - centre_a[i]).powi(2)
+        })
+        .sum();
+    let radius = |object: &Object| f64::from(object.record.sphere_radius.get());
+    let radii = radius(a) + radius(b);
+    // A pose may stretch by 2^-20 and the f64 error of a placed point is charged to the radii too.
+    let gap = squared.sqrt() * (1.0 - 2f64.powi(-40));
+    gap - radii * (1.0 + 2f64.powi(-19)) - 3.0 * placement.error
+}
+
+/// A traversal with a visitor, compiled for each backend.
+struct Traversal<'a, W> {
+    pair: Pair<'a>,
+    stack: &'a mut Stack,
+    visitor: &'a mut W,
+}
+
+impl<W: Visitor> Task for Traversal<'_, W> {
+    type Output = Result<u64, QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        traverse(isa, self.pair, self.stack, self.visitor)
+    }
+}

@@ -1,0 +1,173 @@
+//! The node test: 16 pairs of nodes at a time along A's directions.
+
+use crate::isa::{Isa, Lanes};
+use crate::traverse::align::{Alignment, Form, Placement, form_error, mirrored, round_down, upper_form};
+use crate::traverse::opened::{Aligned, Opened};
+use crate::traverse::pair::{Measure, Pair};
+use bvh_format::decode::Group;
+use bvh_format::kdop::DirectionSet;
+use bvh_format::treelet::row;
+
+/// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
+const INVERSE_LENGTHS: [f32; 13] = {
+    const CUBE: f32 = 0.577_350_2;
+    const FACE: f32 = 0.707_106_7;
+    [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
+};
+
+/// Bounds on the slab ends of all nodes, by row: those of the root.
+fn reach(root: &Group, set: DirectionSet) -> [f32; 16] {
+    let mut reach = [0.0; 16];
+    for slab in 0..set.slabs() {
+        let rows = root.rows();
+        let (lo, hi) = (rows[row(slab)][0], rows[16 + row(slab)][0]);
+        reach[row(slab)] = lo.abs().max(hi.abs());
+    }
+    reach
+}
+
+/// A direction in A's frame as one more pair of slab ends to compare.
+#[derive(Clone, Copy)]
+pub(crate) struct Witness {
+    direction: [f32; 3],
+    /// The upper end of a node of A.
+    form_a: Form,
+    /// The lower end of a node of B, less the offset.
+    form_b: Form,
+    offset: f32,
+}
+
+/// The test of 16 pairs of nodes, for one pose.
+pub(crate) struct NodeTest {
+    alignment: Alignment,
+    placement: Placement,
+    set_a: DirectionSet,
+    set_b: DirectionSet,
+    reach_a: [f32; 16],
+    reach_b: [f32; 16],
+}
+
+impl NodeTest {
+    pub(crate) fn new(pair: &Pair<'_>, root_a: &Group, root_b: &Group) -> Self {
+        let (set_a, set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
+        let (reach_a, reach_b) = (reach(root_a, set_a), reach(root_b, set_b));
+        let alignment = Alignment::new(pair.placement, set_a, set_b, &reach_b);
+        Self { alignment, placement: *pair.placement, set_a, set_b, reach_a, reach_b }
+    }
+
+    /// Takes over a new witness direction.
+    #[inline(always)]
+    pub(crate) fn update_witness(&self, witness: &mut Option<Witness>, direction: Option<[f32; 3]>) {
+        if let Some(direction) = direction {
+            if witness.is_none_or(|held| held.direction != direction) {
+                *witness = Some(self.witness(direction));
+            }
+        }
+    }
+
+    /// `direction` is at most of length 1.
+    fn witness(&self, direction: [f32; 3]) -> Witness {
+        let d = direction.map(f64::from);
+        let form_a = upper_form(d, self.set_a);
+        let form_b = mirrored(upper_form(self.placement.to_b(d), self.set_b));
+        let t = self.placement.translation;
+        let offset = d[0] * t[0] + d[1] * t[1] + d[2] * t[2];
+        let error = form_error(&form_a, &self.reach_a, 0.0)
+            + form_error(&form_b, &self.reach_b, offset)
+            + 3.0 * self.placement.error;
+        Witness { direction, form_a, form_b, offset: round_down(offset - error) }
+    }
+
+    /// B's slab ends along A's directions, outward.
+    #[inline(always)]
+    pub(crate) fn align<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
+        for slab in 0..self.set_a.slabs() {
+            let axis = &self.alignment.axes[slab];
+            let lo = evaluate(isa, &axis.lo, group, isa.splat4(axis.offset_lo));
+            let hi = evaluate(isa, &axis.hi, group, isa.splat4(axis.offset_hi));
+            isa.store4(lo, &mut aligned[slab][0]);
+            isa.store4(hi, &mut aligned[slab][1]);
+        }
+    }
+
+    /// Tests four nodes of A against four of B: element `4 * a + b` of `bounds` is the pair `(a, b)`,
+    /// and its bit is set if the bound is at most `limit`.
+    #[inline(always)]
+    pub(crate) fn run<I: Isa>(
+        &self,
+        isa: I,
+        measure: Measure,
+        (group_a, group_b): (&Group, &Group),
+        aligned: &Aligned,
+        witness: &Option<Witness>,
+        limit: f32,
+        bounds: &mut [f32; 16],
+    ) -> u16 {
+        let mut gaps = match self.set_a {
+            DirectionSet::Dop6 => gaps::<I, 3>(isa, measure, group_a, aligned),
+            DirectionSet::Dop14 => gaps::<I, 7>(isa, measure, group_a, aligned),
+            DirectionSet::Dop26 => gaps::<I, 13>(isa, measure, group_a, aligned),
+        };
+        if let Some(witness) = witness {
+            gaps = gaps.max(witness.gaps(isa, group_a, group_b));
+        }
+        isa.store(gaps, bounds);
+        I::V::bits(gaps.le(isa.splat(limit)))
+    }
+}
+
+impl Witness {
+    #[inline(always)]
+    fn gaps<I: Isa>(&self, isa: I, group_a: &Group, group_b: &Group) -> I::V {
+        let (mut upper_a, mut lower_b) = ([0.0; 4], [0.0; 4]);
+        isa.store4(evaluate(isa, &self.form_a, group_a, isa.splat4(0.0)), &mut upper_a);
+        isa.store4(evaluate(isa, &self.form_b, group_b, isa.splat4(self.offset)), &mut lower_b);
+        isa.tile(&lower_b).sub(isa.repeat(&upper_a))
+    }
+}
+
+/// A form over the rows of a group, plus an offset.
+#[inline(always)]
+fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
+    let rows = group.rows();
+    let term = |j: usize, sum: I::H| {
+        let row = isa.load4(&rows[usize::from(form.rows[j] & 31)]);
+        row.mul_add(isa.splat4(form.coefficients[j]), sum)
+    };
+    term(0, term(1, term(2, offset)))
+}
+
+/// The gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
+/// `Distance` a lower bound of the distance.
+#[inline(always)]
+fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, aligned: &Aligned) -> I::V {
+    let rows = group_a.rows();
+    let gap = |slab: usize| {
+        let lo_a = isa.repeat(&rows[row(slab)]);
+        let hi_a = isa.repeat(&rows[16 + row(slab)]);
+        let [lo_b, hi_b] = &aligned[slab];
+        lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
+    };
+    let mut largest = gap(0);
+    if measure == Measure::Overlap {
+        for slab in 1..SLABS {
+            largest = largest.max(gap(slab));
+        }
+        return largest;
+    }
+    // Along the three axes gaps add up like the sides of a box.
+    let zero = isa.splat(0.0);
+    let mut sum = zero;
+    for slab in 0..3 {
+        let gap = gap(slab);
+        largest = largest.max(gap);
+        let positive = gap.max(zero);
+        sum = positive.mul_add(positive, sum);
+    }
+    for slab in 3..SLABS {
+        largest = largest.max(gap(slab).mul(isa.splat(INVERSE_LENGTHS[slab])));
+    }
+    // Up to four roundings of the sum and one of the root, each 2^-24 relative or, where a square
+    // underflows, less than the largest gap loses.
+    largest.max(sum.sqrt()).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
+}

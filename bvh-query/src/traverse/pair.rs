@@ -1,0 +1,272 @@
+//! The pair traversal on which every query stands.
+//!
+//! ```text
+//! entries := {(root a, root b)}
+//! while entry := pop(entries):
+//!     if its lower bound exceeds the visitor's limit: skip
+//!     if both nodes are leaf packets: visitor.leaves(a, b)
+//!     else open a, b or both; for each of the pairs of their children:
+//!         bound := lower bound of their distance along A's directions
+//!         if bound <= limit: push
+//! ```
+//!
+//! Depth-first, entries are a stack; best-first, a binary heap, until the visitor has seen enough
+//! leaves to go on depth-first.
+
+use crate::bvh::Bvh;
+use crate::error::QueryError;
+use crate::isa::Isa;
+use crate::traverse::align::Placement;
+use crate::traverse::node_test::{NodeTest, Witness};
+use crate::traverse::opened::{Aligned, ChildRef, Leaf, Node, OpenedNodes};
+use bvh_format::object::Object;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
+
+/// What a bound is good for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Measure {
+    /// Sign only: positive if the nodes are apart.
+    Overlap,
+    /// A lower bound of the distance, mesh units.
+    Distance,
+}
+
+/// The order in which pairs are visited.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// Depth-first, the pair of least bound first.
+    Nearest,
+    /// Depth-first in the order of the trees, whatever the bounds: what is found first does not
+    /// depend on how bounds are rounded.
+    Tree,
+    /// The pair of least bound of all, until the visitor has seen so many leaf pairs; then nearest.
+    Best { leaves: u32 },
+}
+
+/// What a query does with the pairs of leaf packets that a traversal comes by.
+pub(crate) trait Visitor {
+    const MEASURE: Measure;
+
+    fn order(&self) -> Order;
+
+    /// Pairs with a larger bound are not visited.
+    fn limit(&self) -> f32;
+
+    /// A direction in A's frame, at most 1 long, along which A and B are likely apart.
+    fn witness(&self) -> Option<[f32; 3]> {
+        None
+    }
+
+    /// Two leaf packets.
+    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError>;
+
+    /// After the last pair.
+    fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError>;
+}
+
+/// Two objects in place.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair<'a> {
+    pub(crate) bvh_a: &'a Bvh,
+    pub(crate) object_a: &'a Object,
+    pub(crate) bvh_b: &'a Bvh,
+    pub(crate) object_b: &'a Object,
+    pub(crate) placement: &'a Placement,
+}
+
+/// Memory of a traversal, kept from one query to the next.
+#[derive(Default)]
+pub(crate) struct Stack {
+    opened_a: OpenedNodes,
+    opened_b: OpenedNodes,
+    /// The groups of B's opened nodes along A's directions.
+    aligned_b: Vec<[Aligned; 2]>,
+    /// Depth-first: the top is next.
+    entries: Vec<Entry>,
+    /// Best-first: the least is next.
+    heap: BinaryHeap<Reverse<Entry>>,
+}
+
+/// A pair of nodes to visit. Sorts by bound.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry {
+    /// The bits of the bound, made monotone.
+    key: u32,
+    a: ChildRef,
+    b: ChildRef,
+}
+
+impl Entry {
+    #[inline(always)]
+    fn new(bound: f32, a: ChildRef, b: ChildRef) -> Self {
+        let bits = bound.to_bits();
+        let key = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+        Self { key, a, b }
+    }
+
+    #[inline(always)]
+    fn bound(self) -> f32 {
+        f32::from_bits(if self.key >> 31 == 1 { self.key & !(1 << 31) } else { !self.key })
+    }
+}
+
+/// Nodes this many times larger than their partner are opened alone, to meet it at its size.
+const MUCH_LARGER: f32 = 2.0;
+
+/// Visits all pairs of leaf packets that may be within the visitor's limit. Returns node tests.
+#[inline(always)]
+pub(crate) fn traverse<I: Isa, W: Visitor>(
+    isa: I,
+    pair: Pair<'_>,
+    stack: &mut Stack,
+    visitor: &mut W,
+) -> Result<u64, QueryError> {
+    let Stack { opened_a, opened_b, aligned_b, entries, heap } = stack;
+    entries.clear();
+    heap.clear();
+    opened_a.start(pair.bvh_a, pair.object_a)?;
+    opened_b.start(pair.bvh_b, pair.object_b)?;
+    let node_test = NodeTest::new(&pair, &opened_a.get(0).groups[0], &opened_b.get(0).groups[0]);
+    let mut witness: Option<Witness> = None;
+    let mut tests = 0;
+    let mut leaves = 0;
+    let order = visitor.order();
+    let mut best_first = matches!(order, Order::Best { .. });
+    let root = ChildRef::new(0, 0);
+    entries.push(Entry::new(f32::NEG_INFINITY, root, root));
+    loop {
+        let next = match entries.pop() {
+            // Best-first, the stack holds the root pair at the start and nothing afterwards.
+            None if best_first => heap.pop().map(|Reverse(least)| least),
+            top => top,
+        };
+        let Some(next) = next else { break };
+        if next.bound() > visitor.limit() {
+            if best_first {
+                // It is the least bound of all.
+                break;
+            }
+            continue;
+        }
+        let (node_a, node_b) = (opened_a.get(next.a.node()), opened_b.get(next.b.node()));
+        let (child_a, child_b) = (next.a.child(), next.b.child());
+        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
+        let (open_a, open_b) = match (node_a.nodes[child_a], node_b.nodes[child_b]) {
+            (Node::Leaf(a), Node::Leaf(b)) => {
+                if visitor.leaves(isa, a, b)?.is_break() {
+                    return Ok(tests);
+                }
+                leaves += 1;
+                node_test.update_witness(&mut witness, visitor.witness());
+                if matches!(order, Order::Best { leaves: enough } if best_first && leaves >= enough) {
+                    best_first = false;
+                    entries.extend(heap.drain().map(|Reverse(entry)| entry));
+                    entries.sort_unstable_by(|x, y| y.cmp(x));
+                }
+                continue;
+            }
+            (Node::Leaf(_), _) => (false, true),
+            (_, Node::Leaf(_)) => (true, false),
+            _ => (extent_b <= MUCH_LARGER * extent_a, extent_a <= MUCH_LARGER * extent_b),
+        };
+        // A node that is not opened takes part as the only child in question of its parent.
+        let (mut number_a, mut only_a) = (next.a.node(), Some(child_a));
+        if open_a || !open_b {
+            (number_a, _) = opened_a.open(isa, pair.bvh_a, pair.object_a, next.a)?;
+            only_a = None;
+        }
+        let (mut number_b, mut only_b) = (next.b.node(), Some(child_b));
+        if open_b {
+            let new;
+            (number_b, new) = opened_b.open(isa, pair.bvh_b, pair.object_b, next.b)?;
+            only_b = None;
+            if aligned_b.len() <= number_b {
+                aligned_b.resize(2 * number_b + 64, [[[[0.0; 4]; 2]; 13]; 2]);
+            }
+            if new {
+                let opened = opened_b.get(number_b);
+                for part in 0..opened.count.div_ceil(4) {
+                    node_test.align(isa, &opened.groups[part], &mut aligned_b[number_b][part]);
+                }
+            }
+        } else if number_b == 0 {
+            // The root, kept for a much larger partner.
+            if aligned_b.is_empty() {
+                aligned_b.resize(64, [[[[0.0; 4]; 2]; 13]; 2]);
+            }
+            node_test.align(isa, &opened_b.get(0).groups[0], &mut aligned_b[0][0]);
+        }
+        let (side_a, side_b) = (opened_a.get(number_a), opened_b.get(number_b));
+        let start = entries.len();
+        let parts = |only: Option<usize>, count: usize| match only {
+            Some(child) => child / 4..child / 4 + 1,
+            None => 0..count.div_ceil(4),
+        };
+        for part_a in parts(only_a, side_a.count) {
+            for part_b in parts(only_b, side_b.count) {
+                tests += 1;
+                let mut bounds = [0.0; 16];
+                let mut mask = node_test.run(
+                    isa,
+                    W::MEASURE,
+                    (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1]),
+                    &aligned_b[number_b][part_b & 1],
+                    &witness,
+                    visitor.limit(),
+                    &mut bounds,
+                );
+                mask &= lanes_of_a(only_a, side_a.count, part_a) & lanes_of_b(only_b, side_b.count, part_b);
+                while mask != 0 {
+                    let bit = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
+                    let a = ChildRef::new(number_a, 4 * part_a + bit / 4);
+                    let b = ChildRef::new(number_b, 4 * part_b + bit % 4);
+                    entries.push(Entry::new(bounds[bit & 15], a, b));
+                }
+            }
+        }
+        if best_first {
+            entries.drain(start..).for_each(|entry| heap.push(Reverse(entry)));
+        } else if order == Order::Tree {
+            entries[start..].reverse();
+        } else {
+            sort_descending(&mut entries[start..]);
+        }
+    }
+    visitor.finish(isa)?;
+    Ok(tests)
+}
+
+/// The lanes whose child of A is there, or is the only one in question.
+#[inline(always)]
+fn lanes_of_a(only: Option<usize>, count: usize, part: usize) -> u16 {
+    match only {
+        Some(child) => 0xf << (4 * (child % 4)),
+        None => ((1u32 << (4 * (count - 4 * part).min(4))) - 1) as u16,
+    }
+}
+
+/// The same for B.
+#[inline(always)]
+fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
+    match only {
+        Some(child) => 0x1111 << (child % 4),
+        None => 0x1111 * ((1u16 << (count - 4 * part).min(4)) - 1),
+    }
+}
+
+/// Insertion sort: there are at most 64 entries, mostly a handful.
+#[inline(always)]
+fn sort_descending(entries: &mut [Entry]) {
+    for index in 1..entries.len() {
+        let moved = entries[index];
+        let mut to = index;
+        while to > 0 && entries[to - 1].key < moved.key {
+            entries[to] = entries[to - 1];
+            to -= 1;
+        }
+        entries[to] = moved;
+    }
+}
