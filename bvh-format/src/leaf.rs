@@ -26,6 +26,7 @@
 //! whole lines of 64 bytes.
 
 use crate::bits::{BitWriter, bit_width, read_bits};
+use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
 
 /// Triangles in a full packet.
@@ -69,7 +70,7 @@ impl TriangleEncoding {
 }
 
 /// Four triangles in lane order: `corners[corner][axis][lane]`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Packet {
     /// Coordinates in mesh units around the object's origin.
@@ -121,12 +122,13 @@ fn encode_f32(packets: &[Packet]) -> Vec<u8> {
 /// Reads packet `index` of an F32 block. Bytes beyond the block read as zero.
 #[inline]
 pub fn decode_f32(block: &[u8], index: usize) -> Packet {
-    let mut packet = Packet::default();
     let start = index * F32_PACKET_BYTES;
-    if let Some(bytes) = block.get(start..start + F32_PACKET_BYTES) {
-        let lanes = bytes.as_chunks::<4>().0;
-        for (value, bytes) in packet.corners.iter_mut().flatten().flatten().zip(lanes) {
-            *value = f32::from_le_bytes(*bytes);
+    let Some(bytes) = block.get(start..start + F32_PACKET_BYTES) else { return Packet::default() };
+    // In memory as on disk, but for the order of bytes.
+    let mut packet: Packet = bytemuck::pod_read_unaligned(bytes);
+    if cfg!(target_endian = "big") {
+        for value in packet.corners.iter_mut().flatten().flatten() {
+            *value = f32::from_bits(value.to_bits().swap_bytes());
         }
     }
     packet

@@ -88,6 +88,7 @@ impl Profile {
     }
 
     /// The directions its k-DOPs have.
+    #[inline]
     pub const fn directions(self) -> DirectionSet {
         match self {
             Self::Dop6U8 | Self::Dop6F16 => DirectionSet::Dop6,
@@ -109,21 +110,18 @@ impl Profile {
     }
 
     /// The most children a treelet has: 2, 4 or 8.
+    #[inline]
     pub const fn width(self) -> usize {
-        match self {
-            Self::Dop6U8 | Self::Dop14U4 => 8,
-            Self::Dop14F16 | Self::Dop26U8 => 2,
-            _ => 4,
-        }
+        const WIDTHS: [u8; 10] = [4, 8, 4, 2, 8, 4, 2, 4, 4, 4];
+        WIDTHS[self as usize] as usize
     }
 
     /// Bytes of a treelet: 64, 128 or 256.
+    #[inline]
     pub const fn treelet_bytes(self) -> usize {
-        match self {
-            Self::Dop14F16Wide | Self::Dop26U8Wide => 128,
-            Self::Dop14F32 => 256,
-            _ => 64,
-        }
+        // A table, not a match: this is asked at every node of a traversal.
+        const BYTES: [u16; 10] = [64, 64, 64, 64, 64, 64, 64, 128, 128, 256];
+        BYTES[self as usize] as usize
     }
 
     /// Bytes of a subtree root's anchor: 64, or 128 for 26-DOPs.
@@ -135,6 +133,7 @@ impl Profile {
     }
 
     /// Groups of four children a treelet is decoded in: 2 at width 8, else 1.
+    #[inline]
     pub const fn groups(self) -> usize {
         if self.width() == 8 { 2 } else { 1 }
     }

@@ -67,10 +67,7 @@ pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
     let mut guess = Guess { squared: isa.splat(f32::INFINITY), direction: [zero; 3] };
     let (edges_a, edges_b) = (edges(&a), edges(&b));
-    let inverse = |edges: Vec3<Vec3<I::V>>| map3(edges, |edge| one.div(dot(edge, edge)));
-    let (inverse_a, inverse_b) = (inverse(edges_a), inverse(edges_b));
-    // NaN, from edges of no length, ends as 0 here: `max` returns its second operand.
-    let clamp = |value: I::V| value.max(zero).min(one);
+    let (inverse_a, inverse_b) = (inverse_squares(one, edges_a), inverse_squares(one, edges_b));
     for i in 0..3 {
         for j in 0..3 {
             // Closest points of two segments: Ericson, Real-Time Collision Detection, 5.1.9.
@@ -82,9 +79,9 @@ pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
             let (slope_a, slope_b) = (across.mul(inverse_a[i]), across.mul(inverse_b[j]));
             // s minimises over both lines, then t over the segment of B, then s again.
             let parallel = slope_a.neg_mul_add(slope_b, one);
-            let first = clamp(slope_a.mul(t).sub(s).div(parallel));
-            let on_b = clamp(slope_b.mul_add(first, t));
-            let on_a = clamp(slope_a.mul_add(on_b, zero.sub(s)));
+            let first = clamp(zero, one, slope_a.mul(t).sub(s).div(parallel));
+            let on_b = clamp(zero, one, slope_b.mul_add(first, t));
+            let on_a = clamp(zero, one, slope_a.mul_add(on_b, zero.sub(s)));
             let point_b = along([zero; 3], on_b, edge_b);
             guess.improve(sub(point_b, along(between, on_a, edge_a)));
         }
@@ -92,6 +89,18 @@ pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
     corners_on_face(isa, &a, &edges_a, &b, &mut guess, false);
     corners_on_face(isa, &b, &edges_b, &a, &mut guess, true);
     certify(isa, local, &a, &b, guess)
+}
+
+/// Between 0 and 1. NaN, from edges of no length, ends as 0: `max` returns its second operand.
+#[inline(always)]
+fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
+    value.max(zero).min(one)
+}
+
+/// One over the squared length of each edge.
+#[inline(always)]
+fn inverse_squares<V: Lanes>(one: V, edges: Vec3<Vec3<V>>) -> Vec3<V> {
+    map3(edges, |edge| one.div(dot(edge, edge)))
 }
 
 /// Each corner in `points` against the face of `t`. `towards` tells that the points are A's.

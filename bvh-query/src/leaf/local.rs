@@ -41,10 +41,10 @@ impl LocalFrame {
                 m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
             })
         };
-        let size = size(a).max(size(b));
-        // A point against a point has no size; any unit will do.
-        let exponent = if size > 0.0 { -size.log2().floor() as i32 } else { 0 };
-        let scale = 2f64.powi(exponent.clamp(-120, 120));
+        // A power of two near 1 / size, by its exponent; a point against a point has no size, and any
+        // unit will do.
+        let exponent = (size(a).max(size(b)).to_bits() >> 52) as i64 - 1023;
+        let scale = f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52);
         let rotation32 = placement.rotation.map(|row| row.map(|r| (r * scale) as f32));
         Self {
             rotation: placement.rotation,

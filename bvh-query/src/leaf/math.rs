@@ -30,8 +30,11 @@ pub(crate) fn dot<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> T {
 
 #[inline(always)]
 pub(crate) fn cross<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
-    let component = |i: usize, j: usize| a[j].neg_mul_add(b[i], a[i].mul(b[j]));
-    [component(1, 2), component(2, 0), component(0, 1)]
+    [
+        a[2].neg_mul_add(b[1], a[1].mul(b[2])),
+        a[0].neg_mul_add(b[2], a[2].mul(b[0])),
+        a[1].neg_mul_add(b[0], a[0].mul(b[1])),
+    ]
 }
 
 /// `v * factor + base`.

@@ -5,6 +5,42 @@ use bvh_format::decode::Group;
 use bvh_format::profile::Profile;
 use bvh_format::quantize::{STEP_U4, STEP_U8};
 
+/// The predictor-corrector over `$quads` registers of lower and of upper ends. `$unit` is the unit of
+/// the codes, given the parent's ends; `$codes` the codes of register `$q`. A macro, because a
+/// closure may not be inlined, and what is not inlined into a backend's function lacks its features.
+macro_rules! quads {
+    ($isa:ident, $parent:ident, $column:ident, $out:ident, $quads:literal, $unit:expr, |$q:ident| $codes:expr) => {
+        for $q in 0..$quads {
+            let parent_lo = $isa.quad_splat($isa.load(&$parent.lo[$q]), $column);
+            let parent_hi = $isa.quad_splat($isa.load(&$parent.hi[$q]), $column);
+            let unit = $unit.of($isa, parent_lo, parent_hi);
+            // The products are exact, so that fusing them or not gives the same bits.
+            let (code_lo, code_hi) = $codes;
+            $isa.store(code_lo.mul_add(unit, parent_lo), &mut $out.lo[$q]);
+            $isa.store(code_hi.neg_mul_add(unit, parent_hi), &mut $out.hi[$q]);
+        }
+    };
+}
+
+/// What a code counts.
+#[derive(Clone, Copy)]
+enum Unit<V> {
+    /// This fraction of the parent's slab, rounded up.
+    Step(V),
+    /// The object's power of two.
+    Fixed(V),
+}
+
+impl<V: Lanes> Unit<V> {
+    #[inline(always)]
+    fn of<I: Isa<V = V>>(self, isa: I, parent_lo: V, parent_hi: V) -> V {
+        match self {
+            Self::Step(step) => isa.round_step_up(parent_hi.sub(parent_lo).mul(step)),
+            Self::Fixed(scale) => scale,
+        }
+    }
+}
+
 /// Decodes children `4 * part ..` of a treelet into `out`. Column `column` of `parent` holds the
 /// parent's decoded slabs. Elements beyond the profile's rows and children hold nothing of meaning.
 #[inline(always)]
@@ -18,55 +54,62 @@ pub(crate) fn decode_group<I: Isa>(
     column: usize,
     out: &mut Group,
 ) {
-    let scale = isa.splat(object_scale);
-    let integer = |step: f32| Unit::Step(isa.splat(step));
+    let scale = Unit::Fixed(isa.splat(object_scale));
+    let (u8_step, u4_step) = (Unit::Step(isa.splat(STEP_U8)), Unit::Step(isa.splat(STEP_U4)));
     match profile {
         Profile::Dop14U8 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            let codes = |q: usize| (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 32 + 16 * q)));
-            quads::<I, 2>(isa, integer(STEP_U8), parent, column, out, codes);
+            quads!(isa, parent, column, out, 2, u8_step, |q| {
+                (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 32 + 16 * q)))
+            });
         }
         Profile::Dop6U8 => {
             let t: &[u8; 32] = fixed(treelet, 32 * part);
-            let codes = |_| (isa.codes_u8(fixed(t, 0)), isa.codes_u8(fixed(t, 16)));
-            quads::<I, 1>(isa, integer(STEP_U8), parent, column, out, codes);
+            quads!(isa, parent, column, out, 1, u8_step, |q| {
+                (isa.codes_u8(fixed(t, 32 * q)), isa.codes_u8(fixed(t, 16 + 32 * q)))
+            });
         }
         Profile::Dop6F16 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            let codes = |_| (isa.codes_f16(fixed(t, 0)), isa.codes_f16(fixed(t, 32)));
-            quads::<I, 1>(isa, Unit::Fixed(scale), parent, column, out, codes);
+            quads!(isa, parent, column, out, 1, scale, |q| {
+                (isa.codes_f16(fixed(t, 64 * q)), isa.codes_f16(fixed(t, 32 + 64 * q)))
+            });
         }
         Profile::Dop14F16 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            let pairs = |at| isa.codes_f16_pairs(fixed(t, at));
-            let codes = |q: usize| (pairs(16 * q), pairs(32 + 16 * q));
-            quads::<I, 2>(isa, Unit::Fixed(scale), parent, column, out, codes);
+            quads!(isa, parent, column, out, 2, scale, |q| {
+                (isa.codes_f16_pairs(fixed(t, 16 * q)), isa.codes_f16_pairs(fixed(t, 32 + 16 * q)))
+            });
         }
         Profile::Dop14U4 => {
             let t: &[u8; 32] = fixed(treelet, 32 * part);
-            let codes = |q: usize| (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)));
-            quads::<I, 2>(isa, integer(STEP_U4), parent, column, out, codes);
+            quads!(isa, parent, column, out, 2, u4_step, |q| {
+                (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)))
+            });
         }
         Profile::Dop26U4 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            let codes = |q: usize| (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)));
-            quads::<I, 4>(isa, integer(STEP_U4), parent, column, out, codes);
+            quads!(isa, parent, column, out, 4, u4_step, |q| {
+                (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)))
+            });
         }
         Profile::Dop26U8 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            let pairs = |at| isa.codes_u8_pairs(fixed(t, at));
-            let codes = |q: usize| (pairs(8 * q), pairs(32 + 8 * q));
-            quads::<I, 4>(isa, integer(STEP_U8), parent, column, out, codes);
+            quads!(isa, parent, column, out, 4, u8_step, |q| {
+                (isa.codes_u8_pairs(fixed(t, 8 * q)), isa.codes_u8_pairs(fixed(t, 32 + 8 * q)))
+            });
         }
         Profile::Dop14F16Wide => {
             let t: &[u8; 128] = fixed(treelet, 0);
-            let codes = |q: usize| (isa.codes_f16(fixed(t, 32 * q)), isa.codes_f16(fixed(t, 64 + 32 * q)));
-            quads::<I, 2>(isa, Unit::Fixed(scale), parent, column, out, codes);
+            quads!(isa, parent, column, out, 2, scale, |q| {
+                (isa.codes_f16(fixed(t, 32 * q)), isa.codes_f16(fixed(t, 64 + 32 * q)))
+            });
         }
         Profile::Dop26U8Wide => {
             let t: &[u8; 128] = fixed(treelet, 0);
-            let codes = |q: usize| (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 64 + 16 * q)));
-            quads::<I, 4>(isa, integer(STEP_U8), parent, column, out, codes);
+            quads!(isa, parent, column, out, 4, u8_step, |q| {
+                (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 64 + 16 * q)))
+            });
         }
         Profile::Dop14F32 => {
             let t: &[u8; 256] = fixed(treelet, 0);
@@ -75,39 +118,6 @@ pub(crate) fn decode_group<I: Isa>(
                 isa.store(isa.codes_f32(fixed(t, 128 + 64 * q)), &mut out.hi[q]);
             }
         }
-    }
-}
-
-/// What a code counts.
-#[derive(Clone, Copy)]
-enum Unit<V> {
-    /// This fraction of the parent's slab, rounded up.
-    Step(V),
-    /// The object's power of two.
-    Fixed(V),
-}
-
-/// The predictor-corrector over `Q` registers of lower and of upper ends.
-#[inline(always)]
-fn quads<I: Isa, const Q: usize>(
-    isa: I,
-    unit: Unit<I::V>,
-    parent: &Group,
-    column: usize,
-    out: &mut Group,
-    codes: impl Fn(usize) -> (I::V, I::V),
-) {
-    for q in 0..Q {
-        let parent_lo = isa.quad_splat(isa.load(&parent.lo[q]), column);
-        let parent_hi = isa.quad_splat(isa.load(&parent.hi[q]), column);
-        let unit = match unit {
-            Unit::Step(step) => isa.round_step_up(parent_hi.sub(parent_lo).mul(step)),
-            Unit::Fixed(scale) => scale,
-        };
-        // The products are exact, so that fusing them or not gives the same bits.
-        let (code_lo, code_hi) = codes(q);
-        isa.store(code_lo.mul_add(unit, parent_lo), &mut out.lo[q]);
-        isa.store(code_hi.neg_mul_add(unit, parent_hi), &mut out.hi[q]);
     }
 }
 

@@ -130,44 +130,54 @@ impl Witness {
 #[inline(always)]
 fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
     let rows = group.rows();
-    let term = |j: usize, sum: I::H| {
+    let mut sum = offset;
+    for j in 0..3 {
         let row = isa.load4(&rows[usize::from(form.rows[j] & 31)]);
-        row.mul_add(isa.splat4(form.coefficients[j]), sum)
-    };
-    term(0, term(1, term(2, offset)))
+        sum = row.mul_add(isa.splat4(form.coefficients[j]), sum);
+    }
+    sum
+}
+
+/// The signed gap of each of 16 pairs along one direction.
+#[inline(always)]
+fn gap<I: Isa>(isa: I, group_a: &Group, aligned: &Aligned, slab: usize) -> I::V {
+    let rows = group_a.rows();
+    let lo_a = isa.repeat(&rows[row(slab)]);
+    let hi_a = isa.repeat(&rows[16 + row(slab)]);
+    let [lo_b, hi_b] = &aligned[slab];
+    lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
 }
 
 /// The gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
 /// `Distance` a lower bound of the distance.
 #[inline(always)]
 fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, aligned: &Aligned) -> I::V {
-    let rows = group_a.rows();
-    let gap = |slab: usize| {
-        let lo_a = isa.repeat(&rows[row(slab)]);
-        let hi_a = isa.repeat(&rows[16 + row(slab)]);
-        let [lo_b, hi_b] = &aligned[slab];
-        lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
-    };
-    let mut largest = gap(0);
+    let mut largest = gap(isa, group_a, aligned, 0);
     if measure == Measure::Overlap {
         for slab in 1..SLABS {
-            largest = largest.max(gap(slab));
+            largest = largest.max(gap(isa, group_a, aligned, slab));
         }
         return largest;
     }
     // Along the three axes gaps add up like the sides of a box.
     let zero = isa.splat(0.0);
-    let mut sum = zero;
-    for slab in 0..3 {
-        let gap = gap(slab);
+    let positive = largest.max(zero);
+    let mut sum = positive.mul(positive);
+    for slab in 1..3 {
+        let gap = gap(isa, group_a, aligned, slab);
         largest = largest.max(gap);
         let positive = gap.max(zero);
         sum = positive.mul_add(positive, sum);
     }
     for slab in 3..SLABS {
-        largest = largest.max(gap(slab).mul(isa.splat(INVERSE_LENGTHS[slab])));
+        let gap = gap(isa, group_a, aligned, slab);
+        largest = largest.max(gap.mul(isa.splat(INVERSE_LENGTHS[slab])));
     }
     // Up to four roundings of the sum and one of the root, each 2^-24 relative or, where a square
     // underflows, less than the largest gap loses.
-    largest.max(sum.sqrt()).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
+    //
+    // Where the boxes overlap, the largest gap itself, perhaps negative, tells which pair overlaps
+    // most.
+    let apart = I::V::select(zero.lt(sum), sum.sqrt(), largest);
+    largest.max(apart).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
 }

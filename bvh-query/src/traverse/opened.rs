@@ -5,25 +5,12 @@
 
 use crate::bvh::Bvh;
 use crate::error::QueryError;
-use crate::isa::Isa;
+use crate::isa::{Isa, Lanes};
 use crate::traverse::decode::decode_group;
 use bvh_format::decode::{Group, NodeSlabs};
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
 use bvh_format::treelet::{Child, Links};
-
-/// A node by the place where its own children or triangles are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Node {
-    /// No node.
-    Empty,
-    /// A treelet.
-    Treelet { page: u32, slot: u8 },
-    /// A subtree root in another page: the link of this page that leads to it.
-    Remote { page: u32, link: u8 },
-    /// A leaf packet.
-    Leaf(Leaf),
-}
 
 /// A leaf packet: its page, its number there and how many triangles it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,11 +48,13 @@ pub(crate) type Aligned = [[[f32; 4]; 2]; 13];
 #[derive(Clone, Copy)]
 pub(crate) struct Opened {
     pub(crate) groups: [Group; 2],
-    pub(crate) nodes: [Node; 8],
     /// Largest extents of the children's boxes, mesh units.
     pub(crate) extents: [f32; 8],
     /// Numbers of the children's opened nodes, `CLOSED` if they are not.
     opened: [u32; 8],
+    /// Where the children are.
+    links: Links,
+    page: u32,
     pub(crate) count: usize,
 }
 
@@ -74,28 +63,39 @@ const CLOSED: u32 = u32::MAX;
 impl Opened {
     const EMPTY: Self = Self {
         groups: [Group::ZERO; 2],
-        nodes: [Node::Empty; 8],
         extents: [0.0; 8],
         opened: [CLOSED; 8],
+        links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
+        page: 0,
         count: 0,
     };
 
-    /// Reads links and extents after the slabs of `count` children have been decoded.
+    /// The child, if it is a leaf packet.
     #[inline(always)]
-    fn finish(&mut self, page: u32, links: Links, width: usize) {
-        self.count = links.children().min(width);
-        self.opened = [CLOSED; 8];
-        for child in 0..self.count {
-            self.nodes[child & 7] = match links.child(child) {
-                Child::Empty => Node::Empty,
-                Child::Treelet(slot) => Node::Treelet { page, slot },
-                Child::Remote(link) => Node::Remote { page, link },
-                Child::Leaf { packet, triangles } => Node::Leaf(Leaf { page, packet, triangles }),
-            };
-            let rows = self.groups[(child / 4) & 1].rows();
-            let width = |axis: usize| rows[16 + axis][child % 4] - rows[axis][child % 4];
-            let larger = |a: f32, b: f32| if a > b { a } else { b };
-            self.extents[child & 7] = larger(larger(width(0), width(1)), width(2));
+    pub(crate) fn leaf(&self, child: usize) -> Option<Leaf> {
+        match self.links.child(child) {
+            Child::Leaf { packet, triangles } => Some(Leaf { page: self.page, packet, triangles }),
+            _ => None,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_leaf(&self, child: usize) -> bool {
+        self.links.kinds >> (4 * child + 2) & 1 == 1
+    }
+
+    /// Finds extents after the slabs have been decoded.
+    #[inline(always)]
+    fn measure<I: Isa>(&mut self, isa: I, parts: usize) {
+        for part in 0..parts {
+            let rows = self.groups[part & 1].rows();
+            let mut widest = isa.load4(&rows[16]).sub(isa.load4(&rows[0]));
+            for axis in 1..3 {
+                widest = widest.max(isa.load4(&rows[16 + axis]).sub(isa.load4(&rows[axis])));
+            }
+            if let Some(extents) = self.extents.as_chunks_mut::<4>().0.get_mut(part) {
+                isa.store4(widest, extents);
+            }
         }
     }
 }
@@ -116,7 +116,8 @@ impl OpenedNodes {
         let page = object.record.first_page.get();
         let root = &mut self.nodes[0];
         root.groups[0] = Group::of_one(&bvh.page(object, page)?.anchor_slabs(0));
-        root.nodes[0] = Node::Treelet { page, slot: 0 };
+        root.links = Links { kinds: 1, ..Links::default() };
+        root.page = page;
         root.extents[0] = f32::INFINITY;
         root.opened = [CLOSED; 8];
         root.count = 1;
@@ -165,19 +166,18 @@ fn decode_node<I: Isa>(
     to: &mut Opened,
 ) -> Result<(), QueryError> {
     let (page, slot, anchor);
-    let (slabs, column) = match parent.nodes[child] {
-        Node::Treelet { page: number, slot: place } => {
-            page = bvh.page(object, number)?;
+    let (slabs, column) = match parent.links.child(child) {
+        Child::Treelet(place) => {
+            page = bvh.page(object, parent.page)?;
             slot = place;
-            (&parent.groups[child / 4], child % 4)
+            (&parent.groups[(child / 4) & 1], child % 4)
         }
-        Node::Remote { page: number, link } => {
-            page = cross(bvh, object, number, link)?;
-            slot = bvh.page(object, number)?.remote(link).root();
+        Child::Remote(link) => {
+            (page, slot) = cross(bvh, object, parent.page, link)?;
             anchor = spread(isa, &page.anchor_slabs(slot));
             (&anchor, 0)
         }
-        Node::Leaf(_) | Node::Empty => {
+        Child::Leaf { .. } | Child::Empty => {
             to.count = 0;
             return Ok(());
         }
@@ -187,17 +187,21 @@ fn decode_node<I: Isa>(
     for part in 0..profile.groups() {
         decode_group(isa, profile, object.f16_scale, treelet, part, slabs, column, &mut to.groups[part]);
     }
-    to.finish(page.header().page_number.get(), Links::read(treelet), profile.width());
+    to.links = Links::read(treelet);
+    to.page = page.header().page_number.get();
+    to.count = to.links.children().min(profile.width());
+    to.opened = [CLOSED; 8];
+    to.measure(isa, profile.groups());
     Ok(())
 }
 
-/// The page that a remote link leads to, after checking that link and root name each other.
+/// The page and root that a remote link leads to, after checking that they name each other.
 #[inline(always)]
-fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<Page<'a>, QueryError> {
+fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page<'a>, u8), QueryError> {
     let to = bvh.page(object, from)?.remote(link);
     let page = bvh.page(object, to.page())?;
     check_crossing(&page, to, from, link, bvh.layout().page_offset(to.page()))?;
-    Ok(page)
+    Ok((page, to.root()))
 }
 
 /// A group with the same node in all four columns.

@@ -18,7 +18,7 @@ use crate::error::QueryError;
 use crate::isa::Isa;
 use crate::traverse::align::Placement;
 use crate::traverse::node_test::{NodeTest, Witness};
-use crate::traverse::opened::{Aligned, ChildRef, Leaf, Node, OpenedNodes};
+use crate::traverse::opened::{Aligned, ChildRef, Leaf, OpenedNodes};
 use bvh_format::object::Object;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -41,7 +41,8 @@ pub(crate) enum Order {
     /// Depth-first in the order of the trees, whatever the bounds: what is found first does not
     /// depend on how bounds are rounded.
     Tree,
-    /// The pair of least bound of all, until the visitor has seen so many leaf pairs; then nearest.
+    /// First straight down to one leaf pair, for a limit; then the pair of least bound of all, until
+    /// the visitor has seen so many more leaf pairs; then nearest.
     Best { leaves: u32 },
 }
 
@@ -112,6 +113,17 @@ impl Entry {
     }
 }
 
+/// How the next pair is found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// From each pair on to the nearest of its children alone.
+    Dive,
+    /// From a heap.
+    BestFirst,
+    /// From a stack.
+    DepthFirst,
+}
+
 /// Nodes this many times larger than their partner are opened alone, to meet it at its size.
 const MUCH_LARGER: f32 = 2.0;
 
@@ -133,18 +145,25 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     let mut tests = 0;
     let mut leaves = 0;
     let order = visitor.order();
-    let mut best_first = matches!(order, Order::Best { .. });
+    let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
     let root = ChildRef::new(0, 0);
     entries.push(Entry::new(f32::NEG_INFINITY, root, root));
     loop {
-        let next = match entries.pop() {
-            // Best-first, the stack holds the root pair at the start and nothing afterwards.
-            None if best_first => heap.pop().map(|Reverse(least)| least),
-            top => top,
+        let next = match (entries.pop(), phase) {
+            (Some(top), _) => top,
+            (None, Phase::DepthFirst) => break,
+            (None, Phase::Dive) => {
+                // At the end of the dive: a leaf pair, or a node none of whose children is in reach.
+                phase = Phase::BestFirst;
+                Entry::new(f32::NEG_INFINITY, root, root)
+            }
+            (None, Phase::BestFirst) => match heap.pop() {
+                Some(Reverse(least)) => least,
+                None => break,
+            },
         };
-        let Some(next) = next else { break };
         if next.bound() > visitor.limit() {
-            if best_first {
+            if phase == Phase::BestFirst {
                 // It is the least bound of all.
                 break;
             }
@@ -152,25 +171,29 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         }
         let (node_a, node_b) = (opened_a.get(next.a.node()), opened_b.get(next.b.node()));
         let (child_a, child_b) = (next.a.child(), next.b.child());
-        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
-        let (open_a, open_b) = match (node_a.nodes[child_a], node_b.nodes[child_b]) {
-            (Node::Leaf(a), Node::Leaf(b)) => {
+        let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
+        if leaf_a && leaf_b {
+            if let (Some(a), Some(b)) = (node_a.leaf(child_a), node_b.leaf(child_b)) {
                 if visitor.leaves(isa, a, b)?.is_break() {
                     return Ok(tests);
                 }
+            }
+            node_test.update_witness(&mut witness, visitor.witness());
+            if phase == Phase::BestFirst {
                 leaves += 1;
-                node_test.update_witness(&mut witness, visitor.witness());
-                if matches!(order, Order::Best { leaves: enough } if best_first && leaves >= enough) {
-                    best_first = false;
-                    entries.extend(heap.drain().map(|Reverse(entry)| entry));
+                if matches!(order, Order::Best { leaves: enough } if leaves >= enough) {
+                    phase = Phase::DepthFirst;
+                    let limit = visitor.limit();
+                    let near = heap.drain().map(|Reverse(entry)| entry).filter(|entry| entry.bound() <= limit);
+                    entries.extend(near);
                     entries.sort_unstable_by(|x, y| y.cmp(x));
                 }
-                continue;
             }
-            (Node::Leaf(_), _) => (false, true),
-            (_, Node::Leaf(_)) => (true, false),
-            _ => (extent_b <= MUCH_LARGER * extent_a, extent_a <= MUCH_LARGER * extent_b),
-        };
+            continue;
+        }
+        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
+        let open_a = !leaf_a && (leaf_b || extent_b <= MUCH_LARGER * extent_a);
+        let open_b = !leaf_b && (leaf_a || extent_a <= MUCH_LARGER * extent_b);
         // A node that is not opened takes part as the only child in question of its parent.
         let (mut number_a, mut only_a) = (next.a.node(), Some(child_a));
         if open_a || !open_b {
@@ -200,12 +223,10 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         }
         let (side_a, side_b) = (opened_a.get(number_a), opened_b.get(number_b));
         let start = entries.len();
-        let parts = |only: Option<usize>, count: usize| match only {
-            Some(child) => child / 4..child / 4 + 1,
-            None => 0..count.div_ceil(4),
-        };
-        for part_a in parts(only_a, side_a.count) {
-            for part_b in parts(only_b, side_b.count) {
+        let (mut part_a, end_a) = parts(only_a, side_a.count);
+        while part_a < end_a {
+            let (mut part_b, end_b) = parts(only_b, side_b.count);
+            while part_b < end_b {
                 tests += 1;
                 let mut bounds = [0.0; 16];
                 let mut mask = node_test.run(
@@ -218,6 +239,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
                     &mut bounds,
                 );
                 mask &= lanes_of_a(only_a, side_a.count, part_a) & lanes_of_b(only_b, side_b.count, part_b);
+                entries.reserve(16);
                 while mask != 0 {
                     let bit = mask.trailing_zeros() as usize;
                     mask &= mask - 1;
@@ -225,18 +247,31 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
                     let b = ChildRef::new(number_b, 4 * part_b + bit % 4);
                     entries.push(Entry::new(bounds[bit & 15], a, b));
                 }
+                part_b += 1;
             }
+            part_a += 1;
         }
-        if best_first {
-            entries.drain(start..).for_each(|entry| heap.push(Reverse(entry)));
-        } else if order == Order::Tree {
-            entries[start..].reverse();
-        } else {
-            sort_descending(&mut entries[start..]);
+        match (phase, order) {
+            (Phase::BestFirst, _) => entries.drain(start..).for_each(|entry| heap.push(Reverse(entry))),
+            (_, Order::Tree) => entries[start..].reverse(),
+            (Phase::Dive, _) => {
+                nearest_last(&mut entries[start..]);
+                entries.drain(..entries.len().saturating_sub(1));
+            }
+            (Phase::DepthFirst, _) => nearest_last(&mut entries[start..]),
         }
     }
     visitor.finish(isa)?;
     Ok(tests)
+}
+
+/// The groups of four children to test: all, or that of the only child in question.
+#[inline(always)]
+fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
+    match only {
+        Some(child) => (child / 4, child / 4 + 1),
+        None => (0, (count + 3) / 4),
+    }
 }
 
 /// The lanes whose child of A is there, or is the only one in question.
@@ -257,16 +292,14 @@ fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
     }
 }
 
-/// Insertion sort: there are at most 64 entries, mostly a handful.
+/// Moves the entry of least bound to the end, from where it is popped first. A full sort gains little
+/// and costs several mispredicted branches.
 #[inline(always)]
-fn sort_descending(entries: &mut [Entry]) {
-    for index in 1..entries.len() {
-        let moved = entries[index];
-        let mut to = index;
-        while to > 0 && entries[to - 1].key < moved.key {
-            entries[to] = entries[to - 1];
-            to -= 1;
-        }
-        entries[to] = moved;
+fn nearest_last(entries: &mut [Entry]) {
+    let Some(last) = entries.len().checked_sub(1) else { return };
+    let mut least = last;
+    for index in 0..last {
+        least = if entries[index].key < entries[least].key { index } else { least };
     }
+    entries.swap(least, last);
 }
