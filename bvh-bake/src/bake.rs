@@ -15,8 +15,8 @@ use bvh_format::checksum::checksum;
 use bvh_format::header::{Section, SectionKind, write_header};
 use bvh_format::layout::ContentHasher;
 use bvh_format::leaf::TriangleEncoding;
-use bvh_format::object::{ObjectRecord, write_objects};
-use bvh_format::page::PAGE;
+use bvh_format::object::{F16_EXPONENTS, ObjectRecord, write_objects};
+use bvh_format::page::{MAX_PAGES, PAGE};
 use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use std::time::Instant;
@@ -82,7 +82,9 @@ pub fn to_bytes_with(
         &merged.objects
     };
     let triangles_in = mesh.objects.iter().map(|object| object.triangles.len() as u64).sum();
-    let mut baker = Baker::new(options, triangles_in);
+    let largest_id = mesh.objects.iter().flat_map(|object| &object.triangle_ids).max();
+    let id_count = largest_id.map_or(0, |&id| u64::from(id) + 1);
+    let mut baker = Baker::new(options, triangles_in, id_count);
     for object in objects.iter().filter(|object| !object.triangles.is_empty()) {
         baker.add(object, progress)?;
     }
@@ -106,7 +108,8 @@ fn prove(bytes: &[u8], report: &mut BakeReport) -> Result<(), BakeError> {
 /// Gathers the objects of a file.
 struct Baker<'a> {
     options: &'a Options,
-    triangles_in: u64,
+    /// One more than the largest triangle id.
+    id_count: u64,
     sections: Sections,
     records: Vec<(String, ObjectRecord)>,
     duplicates: Vec<[u32; 2]>,
@@ -116,7 +119,7 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(options: &'a Options, triangles_in: u64) -> Self {
+    fn new(options: &'a Options, triangles_in: u64, id_count: u64) -> Self {
         let report = BakeReport {
             profile: Profile::Dop14U8,
             triangle_encoding: TriangleEncoding::F32,
@@ -141,7 +144,7 @@ impl<'a> Baker<'a> {
         };
         Self {
             options,
-            triangles_in,
+            id_count,
             sections: Sections::default(),
             records: Vec::new(),
             duplicates: Vec::new(),
@@ -154,8 +157,7 @@ impl<'a> Baker<'a> {
     fn add(&mut self, object: &mesh::Object, progress: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
         progress(Stage::Prepare);
         let quantized = self.options.triangles == Some(TriangleEncoding::Quantized);
-        let grid_error =
-            quantized.then(|| self.options.max_error.unwrap_or_else(|| 1e-5 * diagonal(object)));
+        let grid_error = quantized.then(|| self.options.max_error.unwrap_or_else(|| 1e-5 * diagonal(object)));
         let prepared = prepare(object, grid_error.filter(|&error| error > 0.0));
         let choice = auto::choose(&prepared.triangles, self.options);
         progress(Stage::Build);
@@ -169,7 +171,7 @@ impl<'a> Baker<'a> {
         progress(Stage::Encode);
         let plan = pages::plan(&arena, profile);
         let first_page = self.sections.nodes.len() / PAGE;
-        if first_page + plan.pages.len() > 1 << 26 {
+        if (first_page + plan.pages.len()) as u64 > MAX_PAGES {
             return Err(BakeError::Limit("2^26 pages".into()));
         }
         let f16_exponent = f16_exponent(&bounds);
@@ -198,7 +200,7 @@ impl<'a> Baker<'a> {
             pages: (plan.pages.len() as u32).into(),
             max_vertex_rounding: prepared.max_rounding.into(),
             max_quantization_error: prepared.max_quantization.into(),
-            input_triangles: self.triangles_in.into(),
+            input_triangles: self.id_count.into(),
             degenerate: prepared.degenerate.into(),
             duplicates: (prepared.duplicates.len() as u64).into(),
             f16_exponent: f16_exponent.into(),
@@ -253,7 +255,11 @@ fn diagonal(object: &mesh::Object) -> f64 {
 /// of f16's range.
 fn f16_exponent(bounds: &bvh_format::kdop::Kdop) -> i32 {
     let widest = (0..3).map(|a| f64::from(bounds.hi[a]) - f64::from(bounds.lo[a])).sum::<f64>();
-    if widest > 0.0 { (widest.log2().ceil() as i32 - 14).clamp(-126, 127) } else { 0 }
+    if widest > 0.0 {
+        (widest.log2().ceil() as i32 - 14).clamp(*F16_EXPONENTS.start(), *F16_EXPONENTS.end())
+    } else {
+        0
+    }
 }
 
 /// Lays the sections out page by page and writes the header.

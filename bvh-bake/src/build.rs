@@ -151,10 +151,11 @@ impl Builder {
         let spread = centres.iter().any(|[lo, hi]| lo < hi);
         let costed = spread && depth < MAX_COSTED_DEPTH;
         let margin = bounds.extents().into_iter().fold(0.0, f64::max) / 2.0;
-        if costed && count > SWEEP {
-            if let Some(split) = self.binned(references, scratch, centres, margin) {
-                return split;
-            }
+        if costed
+            && count > SWEEP
+            && let Some(split) = self.binned(references, scratch, centres, margin)
+        {
+            return split;
         }
         if costed && count <= SWEEP {
             return self.swept(references, margin);

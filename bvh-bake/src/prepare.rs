@@ -62,8 +62,8 @@ pub(crate) fn prepare(object: &mesh::Object, grid_error: Option<f64>) -> Prepare
         triangles,
         ids,
         duplicates,
-        max_rounding: max(|placed| placed.rounding),
-        max_quantization: max(|placed| placed.quantization),
+        max_rounding: rounded_up(max(|placed| placed.rounding)),
+        max_quantization: rounded_up(max(|placed| placed.quantization)),
         vertices: used.par_iter().filter(|&&used| used).count() as u64,
     }
 }
@@ -86,7 +86,8 @@ struct AxisOrigin {
 /// than two bits; else the middle of the axis, rounded to the grid of the f64 in use there.
 fn choose_origin(object: &mesh::Object, used: &[bool]) -> [AxisOrigin; 3] {
     [0, 1, 2].map(|axis| {
-        let values = || object.positions.par_iter().zip(used).filter(|(_, used)| **used).map(|(p, _)| p[axis]);
+        let values =
+            || object.positions.par_iter().zip(used).filter(|(_, used)| **used).map(|(p, _)| p[axis]);
         let lo = values().reduce(|| f64::INFINITY, f64::min);
         let hi = values().reduce(|| f64::NEG_INFINITY, f64::max);
         let largest = lo.abs().max(hi.abs());
@@ -143,6 +144,11 @@ fn norm(v: [f64; 3]) -> f64 {
         return 0.0;
     }
     largest * v.iter().map(|c| (c / largest).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Above the true value for a length computed by `norm`: five roundings of 2^-53 at most.
+fn rounded_up(length: f64) -> f64 {
+    if length == 0.0 { 0.0 } else { (length * (1.0 + 2f64.powi(-49))).next_up() }
 }
 
 /// The largest power of two whose grid moves no vertex by more than `error`: half a step along each

@@ -64,5 +64,13 @@ fn prove_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<Inflat
         }
         stop = start;
     }
+    let record = &object.record;
+    let root = done.first().and_then(|roots| roots.first()).copied().unwrap_or(Kdop::EMPTY);
+    let inside = (0..3).all(|a| record.box_lo[a].get() <= root.lo[a] && root.hi[a] <= record.box_hi[a].get());
+    if !inside {
+        let at = layout.page_offset(first);
+        let expected = "the object's box to contain its triangles";
+        return Err(FormatError::new(Rule::BoundContains, at, expected, format!("{record:?}")));
+    }
     Ok(inflation)
 }

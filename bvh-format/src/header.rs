@@ -31,7 +31,7 @@ pub struct Header {
     pub sections: U32,
     /// Length of the file in bytes.
     pub file_length: U64,
-    /// XXH3 over the sections that make up the content; see `Layout`.
+    /// XXH3 over the sections that make up the content; see `ContentHasher`.
     pub content_checksum: U64,
     /// XXH3 of the header page with this field zero.
     pub header_checksum: U64,

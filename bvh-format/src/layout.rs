@@ -6,7 +6,7 @@ use crate::header::{Section, SectionKind, hex, read_header};
 use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
-use crate::page::{PAGE, Page, PageHeader};
+use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
 use crate::rule::Rule;
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ impl Layout {
     /// file's size.
     ///
     /// # Errors
-    /// The first of rules 1 to 14 that does not hold.
+    /// The first of rules 1 to 9 and 11 to 14 that does not hold, or rule 10 for the object table.
     pub fn read(bytes: &[u8]) -> Result<Self, FormatError> {
         let (header, sections) = read_header(bytes)?;
         let find = |kind| {
@@ -42,10 +42,18 @@ impl Layout {
         // `read_header` has made sure of the required sections.
         let needed = |kind| find(kind).unwrap_or(0..0);
         let (nodes, table) = (needed(SectionKind::Nodes), needed(SectionKind::Objects));
+        // Origins and exponents have no page checksum to guard them.
+        let stated = sections.iter().find(|section| section.kind == SectionKind::Objects);
+        let stated = stated.map_or(0, |section| section.checksum);
+        let found = checksum(&bytes[table.clone()]);
+        require(Rule::SectionChecksum, table.start as u64, hex(stated), hex(found))?;
         ensure(nodes.len() % PAGE == 0, Rule::ObjectPages, nodes.start as u64, || {
             (format!("whole pages of {PAGE} bytes"), nodes.len().to_string())
         })?;
         let pages = (nodes.len() / PAGE) as u64;
+        ensure(pages <= MAX_PAGES, Rule::ObjectPages, nodes.start as u64, || {
+            (format!("at most {MAX_PAGES} pages"), pages.to_string())
+        })?;
         let objects = read_objects(&bytes[table.clone()], table.start as u64, pages)?;
         Ok(Self {
             version: (header.major.get(), header.minor.get()),

@@ -12,6 +12,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 /// The largest magnitude of a coordinate, 2^120, and of an origin.
 pub const MAX_COORDINATE: f64 = (1u128 << 120) as f64;
+/// Exponents of f16 residuals for which every product of a code and the unit is exact.
+pub const F16_EXPONENTS: std::ops::RangeInclusive<i32> = -125..=112;
 /// Bytes before the first record.
 const TABLE_HEAD: usize = 16;
 
@@ -159,7 +161,7 @@ fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
     });
     let errors = [record.max_vertex_rounding, record.max_quantization_error];
     let errors = errors.iter().all(|v| v.get() >= 0.0 && v.get() <= limit);
-    let exponent = (-126..=127).contains(&record.f16_exponent.get());
+    let exponent = F16_EXPONENTS.contains(&record.f16_exponent.get());
     let sphere = record.sphere_centre.iter().all(|v| coordinate(v.get().into()))
         && record.sphere_radius.get() >= 0.0
         && record.sphere_radius.get().is_finite();

@@ -18,9 +18,10 @@ use crate::error::{FormatError, ensure, require};
 use crate::header::hex;
 use crate::kdop::Kdop;
 use crate::object::Object;
-use crate::profile::Profile;
+use crate::profile::{Encoding, Profile};
+use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;
-use crate::treelet::{Links, row};
+use crate::treelet::{Links, read_codes, read_ends, row};
 use zerocopy::byteorder::little_endian::{U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
@@ -28,6 +29,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 pub const PAGE: usize = 4096;
 /// Bytes of a page header.
 pub const PAGE_HEADER_BYTES: usize = 64;
+/// Most pages of a file: references hold 26 bits of page number.
+pub const MAX_PAGES: u64 = 1 << 26;
 /// Parent of an object's root.
 pub const NO_PARENT: u32 = u32::MAX;
 /// Remote links in one line.
@@ -232,7 +235,7 @@ pub fn page_checksum(bytes: &[u8; PAGE]) -> u64 {
 /// and links. `at` is the page's byte offset in the file.
 ///
 /// # Errors
-/// The first of rules 15 to 25 that does not hold. What a remote link leads to is checked when it
+/// The first of rules 15 to 25 and 38 that does not hold. What a remote link leads to is checked when it
 /// is followed (rule 20).
 pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> Result<(), FormatError> {
     let page = Page::new(bytes, object.profile);
@@ -252,9 +255,13 @@ pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> 
     })?;
     ensure(header.reserved == 0, Rule::Reserved, at + 63, || ("0".into(), header.reserved.to_string()))?;
     check_anchors(&page, number, object, at)?;
+    check_codes(&page, at)?;
     check_links(&page, at)?;
     check_remotes(&page, number, object, at)
 }
+
+/// The largest magnitude of a slab end, 2^122: three coordinates of at most 2^120.
+const MAX_END: f32 = f32::from_bits((127 + 122) << 23);
 
 fn check_anchors(page: &Page, number: u32, object: &Object, at: u64) -> Result<(), FormatError> {
     let slabs = object.profile.directions().slabs();
@@ -263,9 +270,11 @@ fn check_anchors(page: &Page, number: u32, object: &Object, at: u64) -> Result<(
         let anchor = page.anchor(root);
         let ordered = (0..slabs).all(|slab| {
             let (lo, hi) = (anchor.slabs.lo[row(slab)], anchor.slabs.hi[row(slab)]);
-            lo.is_finite() && hi.is_finite() && lo <= hi
+            -MAX_END <= lo && lo <= hi && hi <= MAX_END
         });
-        ensure(ordered, Rule::AnchorSlabs, at, || ("finite lo <= hi".into(), format!("{anchor:?}")))?;
+        ensure(ordered, Rule::AnchorSlabs, at, || {
+            ("lo <= hi, both within 2^122".into(), format!("{anchor:?}"))
+        })?;
         let is_object_root = number == object.record.first_page.get() && root == 0;
         let parent = anchor.parent_page;
         let known = if is_object_root {
@@ -276,6 +285,36 @@ fn check_anchors(page: &Page, number: u32, object: &Object, at: u64) -> Result<(
         ensure(known, Rule::AnchorParent, at, || {
             ("a parent in an earlier page of the object".into(), parent.to_string())
         })?;
+    }
+    Ok(())
+}
+
+/// Checks that codes which are floats decode to finite numbers, inward from the parent.
+fn check_codes(page: &Page, at: u64) -> Result<(), FormatError> {
+    let profile = page.profile;
+    if !matches!(profile.encoding(), Encoding::F16 | Encoding::F32) {
+        return Ok(());
+    }
+    let start = usize::from(page.header().treelet_line) * 64;
+    for slot in 0..page.header().treelets {
+        let treelet = page.treelet(slot);
+        let at = at + (start + usize::from(slot) * profile.treelet_bytes()) as u64;
+        for child in 0..Links::read(treelet).children().min(profile.width()) {
+            for slab in 0..profile.directions().slabs() {
+                let (code_lo, code_hi) = read_codes(profile, treelet, child, slab);
+                let (lo, hi) = read_ends(profile, treelet, child, slab);
+                let finite = match profile.encoding() {
+                    Encoding::F16 => code_lo <= F16_MAX_CODE && code_hi <= F16_MAX_CODE,
+                    _ => lo.abs() <= MAX_END && hi.abs() <= MAX_END,
+                };
+                ensure(finite, Rule::Codes, at, || {
+                    (
+                        format!("finite codes for child {child}, slab {slab}"),
+                        format!("{code_lo:#06x}, {code_hi:#06x}, {lo}, {hi}"),
+                    )
+                })?;
+            }
+        }
     }
     Ok(())
 }
@@ -334,11 +373,8 @@ fn check_remotes(page: &Page, number: u32, object: &Object, at: u64) -> Result<(
 /// Rule 20.
 #[inline]
 pub fn check_crossing(target: &Page, to: RootRef, from: u32, link: u8, at: u64) -> Result<(), FormatError> {
-    let found = if to.root() < target.header().roots {
-        target.anchor_parent(to.root())
-    } else {
-        (NO_PARENT, 0)
-    };
+    let found =
+        if to.root() < target.header().roots { target.anchor_parent(to.root()) } else { (NO_PARENT, 0) };
     ensure(found == (from, link), Rule::AnchorParent, at, || {
         (format!("root {} with parent {from}, link {link}", to.root()), format!("{found:?}"))
     })

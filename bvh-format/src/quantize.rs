@@ -17,7 +17,7 @@ pub const STEP_U8: f32 = 1.0 / 255.0;
 /// `1 / 15`, rounded to `f32`.
 pub const STEP_U4: f32 = 1.0 / 15.0;
 /// The largest code of an f16 residual: the largest finite f16.
-const F16_MAX_CODE: u16 = 0x7bff;
+pub(crate) const F16_MAX_CODE: u16 = 0x7bff;
 
 /// Rounds a non-negative step up to 16 significant bits.
 #[inline]

@@ -58,6 +58,7 @@ rules! {
     BoundContains = 35, "every decoded slab contains the triangles below it";
     DuplicateIds = 36, "duplicate ids come in ascending pairs (kept, dropped)";
     VertexOnGrid = 37, "the origin plus a vertex is exact in 64-bit floating point";
+    Codes = 38, "codes that are floats are finite, and f16 codes not negative";
 }
 
 impl Rule {

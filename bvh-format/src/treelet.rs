@@ -177,8 +177,11 @@ pub(crate) fn read_codes(profile: Profile, treelet: &[u8], child: usize, slab: u
     }
 }
 
-/// The two ends of a child's slab of the F32 profile.
+/// The two ends of a child's slab of the F32 profile, 0 for others.
 pub(crate) fn read_ends(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (f32, f32) {
+    if profile.encoding() != Encoding::F32 {
+        return (0.0, 0.0);
+    }
     let Place { lo, hi } = place(profile, child, slab);
     let end = |at: usize| {
         let mut bytes = [0; 4];

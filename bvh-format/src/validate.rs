@@ -47,12 +47,15 @@ fn validate_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<(),
     let record = &object.record;
     let first = record.first_page.get();
     let (mut treelets, mut packets, mut triangles) = (0u64, 0u64, 0u64);
+    let (mut roots, mut remotes) = (0u64, 0u64);
     for number in first..first + record.pages.get() {
         let page = checked_page(layout, bytes, number, object)?;
         let header = page.header();
         let at = layout.page_offset(number);
         require(Rule::Counts, at + 40, packets, u64::from(header.first_packet.get()))?;
         treelets += u64::from(header.treelets);
+        roots += u64::from(header.roots);
+        remotes += u64::from(header.remotes);
         packets += u64::from(header.packets.get());
         triangles += check_leaves(layout, bytes, object, &page)?;
         for link in 0..header.remotes {
@@ -62,6 +65,9 @@ fn validate_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<(),
         }
     }
     let at = layout.page_offset(first);
+    // Each link has been followed to a root that names it back: no two share a root, so that equal
+    // numbers leave no root without a way to it.
+    require(Rule::Counts, at, remotes + 1, roots)?;
     let found = [treelets, packets, triangles];
     let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
     ensure(found == stated, Rule::Counts, at, || {

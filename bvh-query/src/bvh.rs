@@ -197,7 +197,10 @@ impl Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bvh").field("bytes", &self.bytes().len()).field("objects", &self.objects().len()).finish()
+        f.debug_struct("Bvh")
+            .field("bytes", &self.bytes().len())
+            .field("objects", &self.objects().len())
+            .finish()
     }
 }
 

@@ -24,10 +24,8 @@ const TINY_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
 
 impl Pose {
     /// A in B's place: no motion.
-    pub const IDENTITY: Self = Self {
-        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        translation: [0.0; 3],
-    };
+    pub const IDENTITY: Self =
+        Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
     /// From the rows of a rotation matrix and a translation in mesh units.
     ///
@@ -69,10 +67,7 @@ impl Pose {
     /// # Errors
     /// As `new`.
     pub fn from_rows(m: &[f64; 12]) -> Result<Self, PoseError> {
-        Self::new(
-            [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]],
-            [m[3], m[7], m[11]],
-        )
+        Self::new([[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]], [m[3], m[7], m[11]])
     }
 
     /// Rows of the rotation.
@@ -89,10 +84,11 @@ impl Pose {
     #[inline]
     pub fn place(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = point;
-        std::array::from_fn(|i| {
+        let along = |i: usize| {
             let r = &self.rotation[i];
             ((r[0] * x + r[1] * y) + r[2] * z) + self.translation[i]
-        })
+        };
+        [along(0), along(1), along(2)]
     }
 }
 
@@ -164,7 +160,9 @@ mod tests {
     fn refuses_what_is_not_rigid_and_says_by_how_much() {
         let mut rows = Pose::IDENTITY.rotation;
         rows[0][0] = 1.0 + 1e-3;
-        assert!(matches!(Pose::new(rows, [0.0; 3]), Err(PoseError::NotRigid(e)) if (e - 2.001e-3).abs() < 1e-6));
+        assert!(
+            matches!(Pose::new(rows, [0.0; 3]), Err(PoseError::NotRigid(e)) if (e - 2.001e-3).abs() < 1e-6)
+        );
         rows[0][0] = f64::NAN;
         assert_eq!(Pose::new(rows, [0.0; 3]), Err(PoseError::NotFinite));
         rows[0][0] = -1.0;

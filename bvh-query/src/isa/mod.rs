@@ -25,7 +25,6 @@ pub(crate) trait Lanes: Copy {
     /// One truth value a lane.
     type Mask: Copy;
 
-    fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
@@ -43,7 +42,6 @@ pub(crate) trait Lanes: Copy {
     fn le(self, other: Self) -> Self::Mask;
     /// `self < other`, false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// `yes` where the mask is set, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Bit i is lane i.

@@ -23,12 +23,9 @@ impl Task for Decode<'_> {
         let mut out = Group::ZERO;
         decode_group(
             isa,
-            self.profile,
-            self.scale,
-            self.treelet,
-            self.part,
-            self.parent,
-            self.column,
+            (self.profile, self.scale),
+            (self.treelet, self.part),
+            (self.parent, self.column),
             &mut out,
         );
         out
@@ -63,8 +60,7 @@ fn every_backend_decodes_to_the_bits_of_the_reference() {
                 let column = (random() % 4) as usize;
                 let above: NodeSlabs = child_slabs(&parent, column);
                 for part in 0..profile.groups() {
-                    let task =
-                        Decode { profile, scale, treelet: &treelet, part, parent: &parent, column };
+                    let task = Decode { profile, scale, treelet: &treelet, part, parent: &parent, column };
                     let group = backend.run(task);
                     for child in 0..profile.width().min(4) {
                         let expected = decode_child(profile, scale, &treelet, 4 * part + child, &above);

@@ -12,8 +12,8 @@
 //! unit makes 2^-120 far less than any projection that matters, and it is added.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{Local, U, valid_lanes};
-use crate::leaf::math::{Vec3, cross, dot, edges, largest, map3, max3, min3, sub};
+use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
+use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, largest_of, max3, min3, project, sub};
 use crate::traverse::opened::Leaf;
 
 /// 2^-120: more than all underflows of a projection together.
@@ -73,14 +73,20 @@ impl Queue {
         self.len = at + 1;
     }
 
+    #[inline(always)]
+    fn lanes<I: Isa>(&self, isa: I, side: usize) -> Corners<I::V> {
+        let c = &self.corners[side];
+        [
+            [isa.load(&c[0][0]), isa.load(&c[0][1]), isa.load(&c[0][2])],
+            [isa.load(&c[1][0]), isa.load(&c[1][1]), isa.load(&c[1][2])],
+            [isa.load(&c[2][0]), isa.load(&c[2][1]), isa.load(&c[2][2])],
+        ]
+    }
+
     /// Empties the queue; what no edge axis separates, in the order of arrival.
     #[inline(always)]
     pub(crate) fn drain<I: Isa>(&mut self, isa: I) -> Survivors {
-        let load = |side: usize| -> Vec3<Vec3<I::V>> {
-            let corners = &self.corners[side];
-            map3([0, 1, 2], |corner: usize| map3([0, 1, 2], |axis: usize| isa.load(&corners[corner][axis])))
-        };
-        let (a, b) = (load(0), load(1));
+        let (a, b) = (self.lanes(isa, 0), self.lanes(isa, 1));
         let apart = edge_axes(isa, &a, &b, isa.load(&self.error), isa.load(&self.reach));
         let filled = ((1u32 << self.len) - 1) as u16;
         self.len = 0;
@@ -112,9 +118,11 @@ impl Iterator for Survivors {
 pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: Leaf, b: Leaf) -> u16 {
     let (lanes_a, lanes_b) = local.lanes(isa);
     let plane_a = Plane::new(isa, &Local::quads(isa, &local.a), local);
-    let apart_a = plane_a.one_sided(isa, |isa, row| isa.repeat(row), &lanes_b);
+    let (offset, error) = (isa.repeat(&plane_a.offset), isa.repeat(&plane_a.error));
+    let apart_a = one_sided(isa, repeat(isa, &plane_a.normal), offset, error, &lanes_b);
     let plane_b = Plane::new(isa, &Local::quads(isa, &local.b), local);
-    let apart_b = plane_b.one_sided(isa, |isa, row| isa.tile(row), &lanes_a);
+    let (offset, error) = (isa.tile(&plane_b.offset), isa.tile(&plane_b.error));
+    let apart_b = one_sided(isa, tile(isa, &plane_b.normal), offset, error, &lanes_a);
     valid_lanes(a.triangles, b.triangles) & !(apart_a | apart_b)
 }
 
@@ -127,7 +135,7 @@ struct Plane {
 
 impl Plane {
     #[inline(always)]
-    fn new<I: Isa>(isa: I, corners: &Vec3<Vec3<I::H>>, local: &Local) -> Self {
+    fn new<I: Isa>(isa: I, corners: &Corners<I::H>, local: &Local) -> Self {
         let (edge_1, edge_2) = (sub(corners[1], corners[0]), sub(corners[2], corners[0]));
         let normal = cross(edge_1, edge_2);
         let edge = largest(edge_1).max(largest(edge_2));
@@ -141,37 +149,22 @@ impl Plane {
         isa.store4(error, &mut plane.error);
         plane
     }
+}
 
-    /// Lanes whose three points are all certainly on one side.
-    #[inline(always)]
-    fn one_sided<I: Isa>(
-        &self,
-        isa: I,
-        spread: impl Fn(I, &[f32; 4]) -> I::V,
-        points: &Vec3<Vec3<I::V>>,
-    ) -> u16 {
-        let rows = &self.normal;
-        let normal = [spread(isa, &rows[0]), spread(isa, &rows[1]), spread(isa, &rows[2])];
-        let offset = spread(isa, &self.offset);
-        let error = spread(isa, &self.error);
-        let heights = map3(*points, |point| dot(normal, point).sub(offset));
-        let above = I::V::bits(error.lt(min3(heights)));
-        let below = I::V::bits(max3(heights).lt(isa.splat(0.0).sub(error)));
-        above | below
-    }
+/// Lanes whose three points are all certainly on one side of the plane.
+#[inline(always)]
+fn one_sided<I: Isa>(isa: I, normal: Vec3<I::V>, offset: I::V, error: I::V, points: &Corners<I::V>) -> u16 {
+    let heights = project(points, normal);
+    let above = I::V::bits(error.lt(min3(heights).sub(offset)));
+    let below = I::V::bits(max3(heights).sub(offset).lt(isa.splat(0.0).sub(error)));
+    above | below
 }
 
 /// Stage two: the lanes that one of the nine cross products of edges separates.
 #[inline(always)]
-fn edge_axes<I: Isa>(
-    isa: I,
-    a: &Vec3<Vec3<I::V>>,
-    b: &Vec3<Vec3<I::V>>,
-    error: I::V,
-    reach: I::V,
-) -> u16 {
+fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, reach: I::V) -> u16 {
     let (edges_a, edges_b) = (edges(a), edges(b));
-    let edge = max3(map3(edges_a, largest)).max(max3(map3(edges_b, largest)));
+    let edge = largest_of(&edges_a).max(largest_of(&edges_b));
     let relative = edge.mul_add(isa.splat(112.0 * U), error.mul(isa.splat(48.0)));
     // Two projections are compared, each with its error.
     let both = edge.mul(reach).mul(isa.splat(2.0));

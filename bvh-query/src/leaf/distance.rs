@@ -12,8 +12,8 @@
 //! round by at most 16u r.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{Local, U};
-use crate::leaf::math::{Vec3, along, dot, edges, map3, max3, min3, sub};
+use crate::leaf::local::{Local, U, splat4};
+use crate::leaf::math::{Corners, Vec3, along, dot, edges, max3, min3, project, sub};
 
 /// Bounds on 16 distances, in units of the local frame.
 pub(crate) struct Bounds {
@@ -33,10 +33,10 @@ fn slack(local: &Local) -> f32 {
 /// alone.
 #[inline(always)]
 pub(crate) fn near_along<I: Isa>(isa: I, local: &Local, direction: [f32; 3], limit: f32) -> u16 {
-    let axis = map3(direction, |d| isa.splat4(d));
+    let axis = splat4(isa, direction);
     let (mut upper_a, mut lower_b) = ([0.0; 4], [0.0; 4]);
-    isa.store4(max3(map3(Local::quads(isa, &local.a), |corner| dot(axis, corner))), &mut upper_a);
-    isa.store4(min3(map3(Local::quads(isa, &local.b), |corner| dot(axis, corner))), &mut lower_b);
+    isa.store4(max3(project(&Local::quads(isa, &local.a), axis)), &mut upper_a);
+    isa.store4(min3(project(&Local::quads(isa, &local.b), axis)), &mut lower_b);
     let gap = isa.tile(&lower_b).sub(isa.repeat(&upper_a));
     I::V::bits(gap.le(isa.splat(limit + slack(local))))
 }
@@ -99,17 +99,18 @@ fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
 
 /// One over the squared length of each edge.
 #[inline(always)]
-fn inverse_squares<V: Lanes>(one: V, edges: Vec3<Vec3<V>>) -> Vec3<V> {
-    map3(edges, |edge| one.div(dot(edge, edge)))
+fn inverse_squares<V: Lanes>(one: V, edges: Corners<V>) -> Vec3<V> {
+    let [x, y, z] = edges;
+    [one.div(dot(x, x)), one.div(dot(y, y)), one.div(dot(z, z))]
 }
 
 /// Each corner in `points` against the face of `t`. `towards` tells that the points are A's.
 #[inline(always)]
 fn corners_on_face<I: Isa>(
     isa: I,
-    t: &Vec3<Vec3<I::V>>,
-    edges: &Vec3<Vec3<I::V>>,
-    points: &Vec3<Vec3<I::V>>,
+    t: &Corners<I::V>,
+    edges: &Corners<I::V>,
+    points: &Corners<I::V>,
     guess: &mut Guess<I::V>,
     towards: bool,
 ) {
@@ -135,14 +136,14 @@ fn corners_on_face<I: Isa>(
 fn certify<I: Isa>(
     isa: I,
     local: &Local,
-    a: &Vec3<Vec3<I::V>>,
-    b: &Vec3<Vec3<I::V>>,
+    a: &Corners<I::V>,
+    b: &Corners<I::V>,
     guess: Guess<I::V>,
 ) -> Bounds {
     let slack = isa.splat(slack(local));
     let length = guess.squared.sqrt();
     let n = guess.direction;
-    let gap = min3(map3(*b, |corner| dot(n, corner))).sub(max3(map3(*a, |corner| dot(n, corner))));
+    let gap = min3(project(b, n)).sub(max3(project(a, n)));
     let shrink = isa.splat(1.0 - 16.0 * U);
     let lower = gap.div(length).mul(shrink).sub(slack).max(isa.splat(0.0));
     let upper = length.mul_add(isa.splat(1.0 + 16.0 * U), slack);

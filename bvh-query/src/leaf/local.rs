@@ -12,7 +12,7 @@
 //! top. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::math::{Vec3, map3};
+use crate::leaf::math::{Corners, Vec3};
 use crate::traverse::align::Placement;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
@@ -56,6 +56,27 @@ impl LocalFrame {
     }
 }
 
+impl LocalFrame {
+    /// Where the first corner of B's packet is, seen from that of A's: units of the frame.
+    #[inline(always)]
+    fn offset(&self, origin_a: [f32; 3], origin_b: [f32; 3]) -> [f32; 3] {
+        let b = [f64::from(origin_b[0]), f64::from(origin_b[1]), f64::from(origin_b[2])];
+        let mut offset = [0.0; 3];
+        for axis in 0..3 {
+            let r = &self.rotation[axis];
+            let placed = r[0] * b[0] + r[1] * b[1] + r[2] * b[2] + self.translation[axis];
+            offset[axis] = ((placed - f64::from(origin_a[axis])) * f64::from(self.scale)) as f32;
+        }
+        offset
+    }
+}
+
+#[inline(always)]
+fn first_corner(packet: &Packet) -> [f32; 3] {
+    let corner = &packet.corners[0];
+    [corner[0][0], corner[1][0], corner[2][0]]
+}
+
 /// Corners of both packets, `[corner][axis]`, four lanes each, and how wrong they may be.
 pub(crate) struct Local {
     pub(crate) a: [[[f32; 4]; 3]; 3],
@@ -69,41 +90,32 @@ pub(crate) struct Local {
 impl Local {
     #[inline(always)]
     pub(crate) fn new<I: Isa>(isa: I, frame: &LocalFrame, packet_a: &Packet, packet_b: &Packet) -> Self {
-        let origin = |packet: &Packet| map3([0, 1, 2], |axis: usize| packet.corners[0][axis][0]);
-        let (origin_a, origin_b) = (origin(packet_a), origin(packet_b));
+        let origin_a = first_corner(packet_a);
+        let origin_b = first_corner(packet_b);
+        let offset = frame.offset(origin_a, origin_b);
         let scale = isa.splat4(frame.scale);
         let mut local = Self { a: [[[0.0; 4]; 3]; 3], b: [[[0.0; 4]; 3]; 3], error: 0.0, reach: 0.0 };
         let mut reach_a = isa.splat4(0.0);
         let mut reach_b = reach_a;
-        let offset = map3([0, 1, 2], |i: usize| {
-            let r = &frame.rotation[i];
-            let placed = r[0] * f64::from(origin_b[0])
-                + r[1] * f64::from(origin_b[1])
-                + r[2] * f64::from(origin_b[2])
-                + frame.translation[i];
-            ((placed - f64::from(origin_a[i])) * f64::from(frame.scale)) as f32
-        });
         for corner in 0..3 {
-            let difference: Vec3<I::H> = map3([0, 1, 2], |axis: usize| {
-                isa.load4(&packet_b.corners[corner][axis]).sub(isa.splat4(origin_b[axis]))
-            });
+            let (from_a, from_b) = (&packet_a.corners[corner], &packet_b.corners[corner]);
+            let difference: Vec3<I::H> = [
+                isa.load4(&from_b[0]).sub(isa.splat4(origin_b[0])),
+                isa.load4(&from_b[1]).sub(isa.splat4(origin_b[1])),
+                isa.load4(&from_b[2]).sub(isa.splat4(origin_b[2])),
+            ];
             for axis in 0..3 {
-                let a = isa.load4(&packet_a.corners[corner][axis]).sub(isa.splat4(origin_a[axis])).mul(scale);
+                let a = isa.load4(&from_a[axis]).sub(isa.splat4(origin_a[axis])).mul(scale);
                 reach_a = reach_a.max(a.abs());
                 reach_b = reach_b.max(difference[axis].abs());
                 isa.store4(a, &mut local.a[corner][axis]);
-                let r = map3(frame.rotation32[axis], |r| isa.splat4(r));
+                let r = splat4(isa, frame.rotation32[axis]);
                 let sum = difference[2].mul_add(r[2], isa.splat4(offset[axis]));
                 let b = difference[0].mul_add(r[0], difference[1].mul_add(r[1], sum));
                 isa.store4(b, &mut local.b[corner][axis]);
             }
         }
-        let largest = |isa: I, lanes: I::H| {
-            let mut values = [0.0; 4];
-            isa.store4(lanes, &mut values);
-            values[0].max(values[1]).max(values[2].max(values[3]))
-        };
-        let (m_a, m_b) = (largest(isa, reach_a), largest(isa, reach_b) * frame.scale);
+        let (m_a, m_b) = (largest_lane(isa, reach_a), largest_lane(isa, reach_b) * frame.scale);
         let m_c = offset[0].abs().max(offset[1].abs()).max(offset[2].abs());
         local.error = U * (2.0 * m_a + 16.0 * m_b + 5.0 * m_c) + frame.error;
         local.reach = m_a + 1.75 * m_b + m_c;
@@ -112,20 +124,47 @@ impl Local {
 
     /// Corners of A in the first index of the pair, those of B in the second, as 16 lanes each.
     #[inline(always)]
-    pub(crate) fn lanes<I: Isa>(&self, isa: I) -> (Vec3<Vec3<I::V>>, Vec3<Vec3<I::V>>) {
-        let [a, b] = [&self.a, &self.b];
+    pub(crate) fn lanes<I: Isa>(&self, isa: I) -> (Corners<I::V>, Corners<I::V>) {
+        let (a, b) = (&self.a, &self.b);
         (
-            map3([&a[0], &a[1], &a[2]], |c| [isa.repeat(&c[0]), isa.repeat(&c[1]), isa.repeat(&c[2])]),
-            map3([&b[0], &b[1], &b[2]], |c| [isa.tile(&c[0]), isa.tile(&c[1]), isa.tile(&c[2])]),
+            [repeat(isa, &a[0]), repeat(isa, &a[1]), repeat(isa, &a[2])],
+            [tile(isa, &b[0]), tile(isa, &b[1]), tile(isa, &b[2])],
         )
     }
 
     /// Corners of one side as four lanes each.
     #[inline(always)]
-    pub(crate) fn quads<I: Isa>(isa: I, side: &[[[f32; 4]; 3]; 3]) -> Vec3<Vec3<I::H>> {
-        let load = |c: &[[f32; 4]; 3]| [isa.load4(&c[0]), isa.load4(&c[1]), isa.load4(&c[2])];
-        map3([&side[0], &side[1], &side[2]], load)
+    pub(crate) fn quads<I: Isa>(isa: I, side: &[[[f32; 4]; 3]; 3]) -> Corners<I::H> {
+        [load4(isa, &side[0]), load4(isa, &side[1]), load4(isa, &side[2])]
     }
+}
+
+#[inline(always)]
+pub(crate) fn repeat<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
+    [isa.repeat(&v[0]), isa.repeat(&v[1]), isa.repeat(&v[2])]
+}
+
+#[inline(always)]
+pub(crate) fn tile<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
+    [isa.tile(&v[0]), isa.tile(&v[1]), isa.tile(&v[2])]
+}
+
+#[inline(always)]
+fn load4<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::H> {
+    [isa.load4(&v[0]), isa.load4(&v[1]), isa.load4(&v[2])]
+}
+
+#[inline(always)]
+pub(crate) fn splat4<I: Isa>(isa: I, v: [f32; 3]) -> Vec3<I::H> {
+    [isa.splat4(v[0]), isa.splat4(v[1]), isa.splat4(v[2])]
+}
+
+/// The largest of four lanes.
+#[inline(always)]
+fn largest_lane<I: Isa>(isa: I, lanes: I::H) -> f32 {
+    let mut values = [0.0; 4];
+    isa.store4(lanes, &mut values);
+    values[0].max(values[1]).max(values[2].max(values[3]))
 }
 
 /// The lanes of a packet pair that hold pairs of triangles.

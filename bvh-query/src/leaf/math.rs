@@ -1,16 +1,15 @@
 //! Three-vectors of lanes.
+//!
+//! Functions, not closures, take registers here and elsewhere: a closure may not be inlined, and what
+//! is not inlined into a backend's function lacks its features.
 
 use crate::isa::Lanes;
 
 /// x, y, z of several lanes.
 pub(crate) type Vec3<T> = [T; 3];
 
-/// `f` of each element. The standard library's `map` is not always inlined, and code that is not
-/// inlined into a backend's function lacks its features.
-#[inline(always)]
-pub(crate) fn map3<A: Copy, B>(v: [A; 3], f: impl Fn(A) -> B) -> [B; 3] {
-    [f(v[0]), f(v[1]), f(v[2])]
-}
+/// Three points, or three edges.
+pub(crate) type Corners<T> = [Vec3<T>; 3];
 
 #[inline(always)]
 pub(crate) fn sub<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
@@ -19,7 +18,7 @@ pub(crate) fn sub<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
 
 /// The edges of a triangle: from each corner to the next.
 #[inline(always)]
-pub(crate) fn edges<T: Lanes>(t: &Vec3<Vec3<T>>) -> Vec3<Vec3<T>> {
+pub(crate) fn edges<T: Lanes>(t: &Corners<T>) -> Corners<T> {
     [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])]
 }
 
@@ -57,4 +56,16 @@ pub(crate) fn min3<T: Lanes>(v: Vec3<T>) -> T {
 #[inline(always)]
 pub(crate) fn max3<T: Lanes>(v: Vec3<T>) -> T {
     v[0].max(v[1]).max(v[2])
+}
+
+/// The products of each corner with a direction.
+#[inline(always)]
+pub(crate) fn project<T: Lanes>(corners: &Corners<T>, direction: Vec3<T>) -> Vec3<T> {
+    [dot(direction, corners[0]), dot(direction, corners[1]), dot(direction, corners[2])]
+}
+
+/// The largest magnitude of a component of three vectors.
+#[inline(always)]
+pub(crate) fn largest_of<T: Lanes>(vectors: &Corners<T>) -> T {
+    largest(vectors[0]).max(largest(vectors[1])).max(largest(vectors[2]))
 }

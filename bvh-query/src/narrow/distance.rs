@@ -28,17 +28,17 @@ use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, subtract, tr
 
 /// How far two triangles are apart, and where; lengths in mesh units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closest {
+pub(crate) struct Closest {
     /// The distance of the closest points found: 0 if and only if the triangles intersect.
-    pub distance: f64,
+    pub(crate) distance: f64,
     /// A certified lower bound of the exact distance, at most `distance`; 0 where nothing better is proven.
-    pub lower: f64,
+    pub(crate) lower: f64,
     /// A certified upper bound of the exact distance, at least `distance`.
-    pub upper: f64,
+    pub(crate) upper: f64,
     /// A point of the first triangle, up to the rounding of its coordinates.
-    pub point_a: Point,
+    pub(crate) point_a: Point,
     /// A point of the second triangle, up to the rounding of its coordinates; `point_a` if they intersect.
-    pub point_b: Point,
+    pub(crate) point_b: Point,
 }
 
 /// The distance of two closed triangles and a pair of closest points.
@@ -49,7 +49,7 @@ pub struct Closest {
 /// it from zero, the distance is still positive but may be as small as the smallest normal number. A triangle
 /// without area is the segment or point that its corners span. Constant cost.
 #[must_use]
-pub fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
+pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
     let Some(differences) = Differences::new(a, b) else {
         return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: a[0], point_b: b[0] };
     };

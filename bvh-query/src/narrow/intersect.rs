@@ -22,7 +22,7 @@ use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
 /// on the order of the triangles nor on that of their corners. Constant cost: 3 to 8 orientations if the
 /// planes differ, some tens if they don't.
 #[must_use]
-pub fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
+pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     let sides_a = heights(b, a);
     if all_on_one_side(sides_a) {
         return false;

@@ -18,17 +18,17 @@
 mod distance;
 mod intersect;
 
-pub use distance::{Closest, triangle_distance};
-pub use intersect::triangles_intersect;
+pub(crate) use distance::{Closest, triangle_distance};
+pub(crate) use intersect::triangles_intersect;
 
 #[cfg(test)]
 mod tests;
 
 /// A point in mesh units.
-pub type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
 /// The closed triangle on three points; collinear ones make a segment, equal ones a point.
-pub type Triangle = [Point; 3];
+pub(crate) type Triangle = [Point; 3];
 
 /// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
 const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;

@@ -95,11 +95,11 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts
         self.stats.exact_tests += 1;
         let a = self.scene.triangle_a(candidate.a, candidate.lane_a)?;
         let b = self.scene.triangle_b(candidate.b, candidate.lane_b)?;
-        if triangles_intersect(&a, &b) {
-            if let ControlFlow::Break(found) = (self.visit)(candidate)? {
-                self.found = Some(found);
-                return Ok(ControlFlow::Break(()));
-            }
+        if triangles_intersect(&a, &b)
+            && let ControlFlow::Break(found) = (self.visit)(candidate)?
+        {
+            self.found = Some(found);
+            return Ok(ControlFlow::Break(()));
         }
         Ok(ControlFlow::Continue(()))
     }

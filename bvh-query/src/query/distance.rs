@@ -70,7 +70,6 @@ pub(crate) struct Candidate {
 #[derive(Clone, Copy)]
 struct Best {
     closest: Closest,
-    pair: leaf::collide::Candidate,
     numbers: (u32, u32),
     ids: (u32, u32),
 }
@@ -175,7 +174,13 @@ impl Querier {
 
     /// The answer for touching meshes: the first contact in the order of the trees.
     #[cold]
-    fn touching(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose, best: Best) -> Result<Distance, QueryError> {
+    fn touching(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        best: Best,
+    ) -> Result<Distance, QueryError> {
         let first = each_pair(a, b, pose, |scene| {
             let Some(pair) = self.find_contact(&scene, Order::Tree)? else { return Ok(None) };
             let closest = triangle_distance(
@@ -183,7 +188,7 @@ impl Querier {
                 &scene.triangle_b(pair.b, pair.lane_b)?,
             );
             let ids = ids(&scene, &pair)?;
-            Ok(Some(Best { closest, pair, numbers: scene.numbers, ids }))
+            Ok(Some(Best { closest, numbers: scene.numbers, ids }))
         })?;
         Ok(first.unwrap_or(best).distance(0.0))
     }
@@ -198,10 +203,7 @@ fn no_answer(a: Shape<'_>) -> QueryError {
 
 fn ids(scene: &Scene<'_>, pair: &leaf::collide::Candidate) -> Result<(u32, u32), QueryError> {
     let (a, b) = (&scene.pair.object_a, &scene.pair.object_b);
-    Ok((
-        scene.pair.bvh_a.triangle_id(a, pair.place_a())?,
-        scene.pair.bvh_b.triangle_id(b, pair.place_b())?,
-    ))
+    Ok((scene.pair.bvh_a.triangle_id(a, pair.place_a())?, scene.pair.bvh_b.triangle_id(b, pair.place_b())?))
 }
 
 impl Best {
@@ -275,7 +277,7 @@ impl Search {
             Some(best) => closest.distance < best.closest.distance,
         };
         if nearer {
-            self.best = Some(Best { closest, pair, numbers: scene.numbers, ids: ids(scene, &pair)? });
+            self.best = Some(Best { closest, numbers: scene.numbers, ids: ids(scene, &pair)? });
         }
         // Slack for the f64 distance's own error: equal and nearly equal pairs stay candidates.
         self.lower_upper(round_up(closest.upper * (1.0 + 2f64.powi(-40))));
@@ -372,7 +374,8 @@ impl Visitor for Nearest<'_> {
                 continue;
             }
             let (lane_a, lane_b) = ((lane >> 2) as u8, (lane & 3) as u8);
-            let candidate = Candidate { lower, upper, pair: leaf::collide::Candidate { a, b, lane_a, lane_b } };
+            let candidate =
+                Candidate { lower, upper, pair: leaf::collide::Candidate { a, b, lane_a, lane_b } };
             if upper < self.search.upper {
                 self.search.lower_upper(upper);
                 self.look_along(bounds.direction.map(|axis| axis[lane]));

@@ -46,12 +46,9 @@ impl<V: Lanes> Unit<V> {
 #[inline(always)]
 pub(crate) fn decode_group<I: Isa>(
     isa: I,
-    profile: Profile,
-    object_scale: f32,
-    treelet: &[u8],
-    part: usize,
-    parent: &Group,
-    column: usize,
+    (profile, object_scale): (Profile, f32),
+    (treelet, part): (&[u8], usize),
+    (parent, column): (&Group, usize),
     out: &mut Group,
 ) {
     let scale = Unit::Fixed(isa.splat(object_scale));

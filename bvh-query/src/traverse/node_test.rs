@@ -1,17 +1,18 @@
 //! The node test: 16 pairs of nodes at a time along A's directions.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{Alignment, Form, Placement, form_error, mirrored, round_down, upper_form};
-use crate::traverse::opened::{Aligned, Opened};
+use crate::traverse::align::{Alignment, Placement, form_error, round_down};
+use crate::traverse::opened::Aligned;
 use crate::traverse::pair::{Measure, Pair};
 use bvh_format::decode::Group;
 use bvh_format::kdop::DirectionSet;
+use bvh_format::support::{Form, upper_form};
 use bvh_format::treelet::row;
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
 const INVERSE_LENGTHS: [f32; 13] = {
     const CUBE: f32 = 0.577_350_2;
-    const FACE: f32 = 0.707_106_7;
+    const FACE: f32 = std::f32::consts::FRAC_1_SQRT_2.next_down();
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
 };
 
@@ -58,10 +59,10 @@ impl NodeTest {
     /// Takes over a new witness direction.
     #[inline(always)]
     pub(crate) fn update_witness(&self, witness: &mut Option<Witness>, direction: Option<[f32; 3]>) {
-        if let Some(direction) = direction {
-            if witness.is_none_or(|held| held.direction != direction) {
-                *witness = Some(self.witness(direction));
-            }
+        if let Some(direction) = direction
+            && witness.is_none_or(|held| held.direction != direction)
+        {
+            *witness = Some(self.witness(direction));
         }
     }
 
@@ -69,7 +70,7 @@ impl NodeTest {
     fn witness(&self, direction: [f32; 3]) -> Witness {
         let d = direction.map(f64::from);
         let form_a = upper_form(d, self.set_a);
-        let form_b = mirrored(upper_form(self.placement.to_b(d), self.set_b));
+        let form_b = upper_form(self.placement.seen_from_b(d), self.set_b).mirrored();
         let t = self.placement.translation;
         let offset = d[0] * t[0] + d[1] * t[1] + d[2] * t[2];
         let error = form_error(&form_a, &self.reach_a, 0.0)
@@ -97,8 +98,7 @@ impl NodeTest {
         &self,
         isa: I,
         measure: Measure,
-        (group_a, group_b): (&Group, &Group),
-        aligned: &Aligned,
+        (group_a, group_b, aligned): (&Group, &Group, &Aligned),
         witness: &Option<Witness>,
         limit: f32,
         bounds: &mut [f32; 16],

@@ -185,7 +185,8 @@ fn decode_node<I: Isa>(
     let profile = object.profile;
     let treelet = page.treelet(slot);
     for part in 0..profile.groups() {
-        decode_group(isa, profile, object.f16_scale, treelet, part, slabs, column, &mut to.groups[part]);
+        let coding = (profile, object.f16_scale);
+        decode_group(isa, coding, (treelet, part), (slabs, column), &mut to.groups[part]);
     }
     to.links = Links::read(treelet);
     to.page = page.header().page_number.get();

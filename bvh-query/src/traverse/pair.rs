@@ -173,10 +173,10 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         let (child_a, child_b) = (next.a.child(), next.b.child());
         let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
         if leaf_a && leaf_b {
-            if let (Some(a), Some(b)) = (node_a.leaf(child_a), node_b.leaf(child_b)) {
-                if visitor.leaves(isa, a, b)?.is_break() {
-                    return Ok(tests);
-                }
+            if let (Some(a), Some(b)) = (node_a.leaf(child_a), node_b.leaf(child_b))
+                && visitor.leaves(isa, a, b)?.is_break()
+            {
+                return Ok(tests);
             }
             node_test.update_witness(&mut witness, visitor.witness());
             if phase == Phase::BestFirst {
@@ -184,7 +184,8 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
                 if matches!(order, Order::Best { leaves: enough } if leaves >= enough) {
                     phase = Phase::DepthFirst;
                     let limit = visitor.limit();
-                    let near = heap.drain().map(|Reverse(entry)| entry).filter(|entry| entry.bound() <= limit);
+                    let near =
+                        heap.drain().map(|Reverse(entry)| entry).filter(|entry| entry.bound() <= limit);
                     entries.extend(near);
                     entries.sort_unstable_by(|x, y| y.cmp(x));
                 }
@@ -232,8 +233,11 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
                 let mut mask = node_test.run(
                     isa,
                     W::MEASURE,
-                    (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1]),
-                    &aligned_b[number_b][part_b & 1],
+                    (
+                        &side_a.groups[part_a & 1],
+                        &side_b.groups[part_b & 1],
+                        &aligned_b[number_b][part_b & 1],
+                    ),
                     &witness,
                     visitor.limit(),
                     &mut bounds,
@@ -270,7 +274,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
 fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
     match only {
         Some(child) => (child / 4, child / 4 + 1),
-        None => (0, (count + 3) / 4),
+        None => (0, count.div_ceil(4)),
     }
 }
 

@@ -53,10 +53,6 @@ impl Lanes for Y {
     type Mask = Y;
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm256_add_ps(self.0, other.0)), with_features!(_mm256_add_ps(self.1, other.1)))
-    }
-    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm256_sub_ps(self.0, other.0)), with_features!(_mm256_sub_ps(self.1, other.1)))
     }
@@ -70,11 +66,17 @@ impl Lanes for Y {
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm256_fmadd_ps(self.0, factor.0, term.0)), with_features!(_mm256_fmadd_ps(self.1, factor.1, term.1)))
+        Self(
+            with_features!(_mm256_fmadd_ps(self.0, factor.0, term.0)),
+            with_features!(_mm256_fmadd_ps(self.1, factor.1, term.1)),
+        )
     }
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm256_fnmadd_ps(self.0, factor.0, term.0)), with_features!(_mm256_fnmadd_ps(self.1, factor.1, term.1)))
+        Self(
+            with_features!(_mm256_fnmadd_ps(self.0, factor.0, term.0)),
+            with_features!(_mm256_fnmadd_ps(self.1, factor.1, term.1)),
+        )
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -110,15 +112,8 @@ impl Lanes for Y {
         ))
     }
     #[inline(always)]
-    fn and(a: Y, b: Y) -> Y {
-        with_features!(Y(_mm256_and_ps(a.0, b.0), _mm256_and_ps(a.1, b.1)))
-    }
-    #[inline(always)]
     fn select(mask: Y, yes: Self, no: Self) -> Self {
-        with_features!(Y(
-            _mm256_blendv_ps(no.0, yes.0, mask.0),
-            _mm256_blendv_ps(no.1, yes.1, mask.1)
-        ))
+        with_features!(Y(_mm256_blendv_ps(no.0, yes.0, mask.0), _mm256_blendv_ps(no.1, yes.1, mask.1)))
     }
     #[inline(always)]
     fn bits(mask: Y) -> u16 {
@@ -129,10 +124,6 @@ impl Lanes for Y {
 impl Lanes for X {
     type Mask = X;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm_add_ps(self.0, other.0)))
-    }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm_sub_ps(self.0, other.0)))
@@ -176,10 +167,6 @@ impl Lanes for X {
     #[inline(always)]
     fn lt(self, other: Self) -> X {
         X(with_features!(_mm_cmplt_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn and(a: X, b: X) -> X {
-        X(with_features!(_mm_and_ps(a.0, b.0)))
     }
     #[inline(always)]
     fn select(mask: X, yes: Self, no: Self) -> Self {

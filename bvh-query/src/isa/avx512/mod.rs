@@ -39,9 +39,7 @@ impl Avx512 {
 }
 
 /// Runs the task with the features enabled.
-#[target_feature(
-    enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt"
-)]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
 fn run_with_features<T: Task>(isa: Avx512, task: T) -> T::Output {
     task.run(isa)
 }
@@ -59,10 +57,6 @@ macro_rules! with_features {
 impl Lanes for Z {
     type Mask = __mmask16;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm512_add_ps(self.0, other.0)))
-    }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm512_sub_ps(self.0, other.0)))
@@ -108,10 +102,6 @@ impl Lanes for Z {
         with_features!(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
     }
     #[inline(always)]
-    fn and(a: __mmask16, b: __mmask16) -> __mmask16 {
-        a & b
-    }
-    #[inline(always)]
     fn select(mask: __mmask16, yes: Self, no: Self) -> Self {
         Self(with_features!(_mm512_mask_blend_ps(mask, no.0, yes.0)))
     }
@@ -124,10 +114,6 @@ impl Lanes for Z {
 impl Lanes for X {
     type Mask = __mmask8;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm_add_ps(self.0, other.0)))
-    }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm_sub_ps(self.0, other.0)))
@@ -171,10 +157,6 @@ impl Lanes for X {
     #[inline(always)]
     fn lt(self, other: Self) -> __mmask8 {
         with_features!(_mm_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
-    }
-    #[inline(always)]
-    fn and(a: __mmask8, b: __mmask8) -> __mmask8 {
-        a & b
     }
     #[inline(always)]
     fn select(mask: __mmask8, yes: Self, no: Self) -> Self {

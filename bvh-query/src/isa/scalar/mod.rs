@@ -28,10 +28,6 @@ impl<const N: usize> Lanes for Array<N> {
     type Mask = u16;
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         self.zip(other, |a, b| a - b)
     }
@@ -74,10 +70,6 @@ impl<const N: usize> Lanes for Array<N> {
     #[inline(always)]
     fn lt(self, other: Self) -> u16 {
         self.compare(other, |a, b| a < b)
-    }
-    #[inline(always)]
-    fn and(a: u16, b: u16) -> u16 {
-        a & b
     }
     #[inline(always)]
     fn select(mask: u16, yes: Self, no: Self) -> Self {
