@@ -11,6 +11,7 @@
 //! sums of integers, partitions are stable, and ties go to the lower axis and position.
 
 use crate::prepare::Corners;
+use bvh_format::leaf::to_ordered;
 use rayon::prelude::*;
 
 /// Triangles in a leaf packet.
@@ -32,9 +33,10 @@ struct Reference {
 }
 
 impl Reference {
-    /// Twice the centre of the box, along an axis. In f64: the sum of two f32 may overflow.
-    fn centre(&self, axis: usize) -> f64 {
-        f64::from(self.lo[axis]) + f64::from(self.hi[axis])
+    /// Twice the centre of the box, along an axis; coordinates of at most 2^120 do not overflow.
+    #[inline]
+    fn centre(&self, axis: usize) -> f32 {
+        self.lo[axis] + self.hi[axis]
     }
 }
 
@@ -144,7 +146,7 @@ impl Builder {
         references: &mut [Reference],
         scratch: &mut [Reference],
         bounds: &Aabb,
-        centres: &[[f64; 2]; 3],
+        centres: &[[f32; 2]; 3],
         depth: usize,
     ) -> usize {
         let count = references.len();
@@ -180,10 +182,10 @@ impl Builder {
         &self,
         references: &mut [Reference],
         scratch: &mut [Reference],
-        centres: &[[f64; 2]; 3],
+        centres: &[[f32; 2]; 3],
         margin: f64,
     ) -> Option<usize> {
-        let scale = centres.map(|[lo, hi]| if hi > lo { BINS as f64 / (hi - lo) } else { 0.0 });
+        let scale = centres.map(|[lo, hi]| if hi > lo { BINS as f32 / (hi - lo) } else { 0.0 });
         let bin = |reference: &Reference, axis: usize| {
             (((reference.centre(axis) - centres[axis][0]) * scale[axis]) as usize).min(BINS - 1)
         };
@@ -222,13 +224,15 @@ impl Builder {
         let mut best: Option<(f64, usize, usize)> = None;
         let mut orders = [[0u8; SWEEP]; 3];
         for axis in 0..3 {
+            // The place in the list below the centre: ties keep their order.
+            let mut keys = [0u64; SWEEP];
+            for (place, reference) in references.iter().enumerate() {
+                let centre = to_ordered(reference.centre(axis)) as u32 ^ 1 << 31;
+                keys[place] = u64::from(centre) << 32 | place as u64;
+            }
+            keys[..count].sort_unstable();
             let order = &mut orders[axis][..count];
-            (0..count).for_each(|i| order[i] = i as u8);
-            let key = |i: &u8| references[usize::from(*i)].centre(axis);
-            order.sort_unstable_by(|a, b| {
-                let number = |i: &u8| references[usize::from(*i)].triangle;
-                key(a).total_cmp(&key(b)).then_with(|| number(a).cmp(&number(b)))
-            });
+            (0..count).for_each(|i| order[i] = keys[i] as u8);
             let mut right_cost = [0.0; SWEEP];
             let mut bounds = Aabb::EMPTY;
             for position in (1..count).rev() {
@@ -266,15 +270,15 @@ fn side_size(bounds: &Aabb, margin: f64) -> f64 {
     if margin > 0.0 { (x + margin) * (y + margin) * (z + margin) } else { x * y + y * z + z * x }
 }
 
-fn longest(centres: &[[f64; 2]; 3]) -> usize {
+fn longest(centres: &[[f32; 2]; 3]) -> usize {
     let extent = |axis: usize| centres[axis][1] - centres[axis][0];
     (1..3).fold(0, |best, axis| if extent(axis) > extent(best) { axis } else { best })
 }
 
-type Bounds = (Aabb, [[f64; 2]; 3]);
+type Bounds = (Aabb, [[f32; 2]; 3]);
 
 fn bounds_of(references: &[Reference]) -> Bounds {
-    let empty = || (Aabb::EMPTY, [[f64::INFINITY, f64::NEG_INFINITY]; 3]);
+    let empty = || (Aabb::EMPTY, [[f32::INFINITY, f32::NEG_INFINITY]; 3]);
     let add = |(mut bounds, mut centres): Bounds, reference: &Reference| {
         bounds.join(&reference.lo, &reference.hi);
         for axis in 0..3 {

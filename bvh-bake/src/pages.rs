@@ -1,8 +1,8 @@
 //! Gathers treelets into pages: bottom subtrees first, then the tree above them, up to the root.
 //!
-//! On every level the largest subtrees of at most a third of a page are taken off the tree and put
+//! On every level the largest subtrees of at most half a page are taken off the tree and put
 //! into pages, several to a page, in depth-first order; what is left above them, with remote links
-//! in their places, is the tree of the next level. A third keeps both losses small: anchors (one
+//! in their places, is the tree of the next level. Half a page keeps both losses small: anchors (one
 //! line a subtree) and room that no subtree fits. Pages of the last level, the root's, come first
 //! in the file, so that children are always in later pages than their parents.
 
@@ -12,7 +12,7 @@ use bvh_format::profile::Profile;
 use std::collections::VecDeque;
 
 /// Pages that are filled side by side; more fill better and scatter neighbours.
-const OPEN_PAGES: usize = 12;
+const OPEN_PAGES: usize = 24;
 
 /// A treelet by number in the arena, in depth-first order: children have higher numbers.
 pub(crate) type TreeletIndex = usize;
@@ -117,11 +117,11 @@ pub(crate) fn plan(arena: &Arena, profile: Profile) -> Plan {
 /// Takes one level of subtrees off the tree.
 fn plan_level(arena: &Arena, profile: Profile, taken: &mut [bool]) -> Vec<PagePlan> {
     let loads = loads(arena, taken);
-    let third = (PAGE / 64 - 1) / 3;
-    // What fits a page may be a root; a third of a page is the aim, a single treelet always fits.
+    let half = (PAGE / 64 - 1) / 2;
+    // What fits a page may be a root; half a page is the aim, a single treelet always fits.
     let small = |index: TreeletIndex| {
         let load = Load { roots: 1, ..loads[index] };
-        load.lines(profile) - 1 <= third.max(1 + profile.treelet_bytes() / 64 + 1)
+        load.lines(profile) - 1 <= half.max(1 + profile.treelet_bytes() / 64 + 1)
     };
     let mut pages: Vec<(Load, Vec<TreeletIndex>)> = Vec::new();
     let mut open: VecDeque<usize> = VecDeque::new();

@@ -215,16 +215,8 @@ fn is_degenerate(triangle: &Corners) -> bool {
 
 /// The box of all triangles and a sphere around them: centre and radius, rounded up.
 pub(crate) fn box_and_sphere(triangles: &[Corners]) -> (Kdop, [f32; 3], f32) {
-    let bounds = triangles
-        .par_iter()
-        .fold(
-            || Kdop::EMPTY,
-            |mut bounds, triangle| {
-                triangle.iter().for_each(|corner| bounds.add_point(*corner, 3));
-                bounds
-            },
-        )
-        .reduce(
+    let bounds =
+        triangles.par_chunks(4096).map(|chunk| Kdop::of_points(chunk.iter().flatten().copied())).reduce(
             || Kdop::EMPTY,
             |mut a, b| {
                 a.join(&b, 3);

@@ -86,11 +86,7 @@ impl Cutter<'_> {
         match node {
             Node::Leaf(mut triangles) => {
                 triangles.sort_unstable();
-                let mut kdop = Kdop::EMPTY;
-                for &triangle in &triangles {
-                    let corners = &self.triangles[triangle as usize];
-                    corners.iter().for_each(|corner| kdop.add_point(*corner, self.slabs));
-                }
+                let kdop = Kdop::of_points(triangles.iter().flat_map(|&t| self.triangles[t as usize]));
                 Child { kdop, kind: ChildKind::Leaf(triangles) }
             }
             inner => {

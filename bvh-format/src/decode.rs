@@ -113,10 +113,8 @@ mod tests {
         let children = (0..8)
             .map(|_| {
                 let centre = [random(), random(), random()];
-                let mut child = Kdop::EMPTY;
-                for _ in 0..4 {
-                    child.add_point(centre.map(|c| (c + 0.1 * random()) * scale), 13);
-                }
+                let points = [(); 4].map(|()| centre.map(|c| (c + 0.1 * random()) * scale));
+                let child = Kdop::of_points(points);
                 parent.join(&child, 13);
                 child
             })

@@ -64,18 +64,28 @@ impl Kdop {
     /// The bound of nothing: joins with any other to that other.
     pub const EMPTY: Self = Self { lo: [f32::INFINITY; 13], hi: [f32::NEG_INFINITY; 13] };
 
-    /// Grows the first `slabs` slabs by a point.
-    #[inline]
-    pub fn add_point(&mut self, point: [f32; 3], slabs: usize) {
-        for axis in 0..3 {
-            self.lo[axis] = self.lo[axis].min(point[axis]);
-            self.hi[axis] = self.hi[axis].max(point[axis]);
+    /// The k-DOP of points: the nearest `f32` outside their exact projections.
+    ///
+    /// Projections add at most three `f32`. Sums are taken in `f64` with the error of each addition
+    /// recovered exactly (Knuth's two-sum); where there is one, the sum takes a step of 2^-52 in its
+    /// direction, which is more than the error and never passes an `f32`.
+    pub fn of_points(points: impl IntoIterator<Item = [f32; 3]>) -> Self {
+        let (mut lo, mut hi) = ([f64::INFINITY; 13], [f64::NEG_INFINITY; 13]);
+        for point in points {
+            let [x, y, z] = point.map(f64::from);
+            for slab in 0..13 {
+                let [a, b, c] = FACTORS[slab];
+                let (sum_xy, error_xy) = two_sum(a * x, b * y);
+                let (sum, error_z) = two_sum(sum_xy, c * z);
+                let error = error_xy + error_z;
+                let step = sum.abs() * f64::EPSILON;
+                let below = sum - if error < 0.0 { step } else { 0.0 };
+                let above = sum + if error > 0.0 { step } else { 0.0 };
+                lo[slab] = if below < lo[slab] { below } else { lo[slab] };
+                hi[slab] = if above > hi[slab] { above } else { hi[slab] };
+            }
         }
-        for slab in 3..slabs {
-            let (lo, hi) = project_outward(point, DIRECTIONS[slab]);
-            self.lo[slab] = self.lo[slab].min(lo);
-            self.hi[slab] = self.hi[slab].max(hi);
-        }
+        Self { lo: lo.map(round_down), hi: hi.map(|end| -round_down(-end)) }
     }
 
     /// Grows the first `slabs` slabs by another k-DOP.
@@ -99,26 +109,26 @@ impl Kdop {
     }
 }
 
-/// The projection of `point` on `direction` as the nearest `f32` interval around the exact value.
-///
-/// At most three `f32` are added. The sum is taken in `f64` with the error of each addition
-/// recovered exactly (Knuth's two-sum), so that the rounding to `f32` can go the right way.
-#[inline]
-pub fn project_outward(point: [f32; 3], direction: [i8; 3]) -> (f32, f32) {
-    let [x, y, z] = [0, 1, 2].map(|a| f64::from(point[a]) * f64::from(direction[a]));
-    let (xy, error_xy) = two_sum(x, y);
-    let (sum, error_z) = two_sum(xy, z);
-    // |error| is far below the spacing of `f32` at `sum`, so its sign decides alone.
-    let error = error_xy + error_z;
-    let nearest = sum as f32;
-    let above = (sum - f64::from(nearest)) + error;
-    let lo = if above < 0.0 { nearest.next_down() } else { nearest };
-    let hi = if above > 0.0 { nearest.next_up() } else { nearest };
-    (lo, hi)
+/// The directions as factors.
+const FACTORS: [[f64; 3]; 13] = {
+    let mut factors = [[0.0; 3]; 13];
+    let mut slab = 0;
+    while slab < 13 {
+        let [x, y, z] = DIRECTIONS[slab];
+        factors[slab] = [x as f64, y as f64, z as f64];
+        slab += 1;
+    }
+    factors
+};
+
+/// The nearest `f32` at or below.
+fn round_down(value: f64) -> f32 {
+    let nearest = value as f32;
+    if f64::from(nearest) > value { nearest.next_down() } else { nearest }
 }
 
 /// `a + b` rounded, and the exact error of that rounding.
-#[inline]
+#[inline(always)]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
@@ -146,7 +156,9 @@ mod tests {
         for _ in 0..20_000 {
             let point = [random(), random(), random()];
             for direction in DIRECTIONS {
-                let (lo, hi) = project_outward(point, direction);
+                let kdop = Kdop::of_points([point]);
+                let slab = DIRECTIONS.iter().position(|&d| d == direction).unwrap();
+                let (lo, hi) = (kdop.lo[slab], kdop.hi[slab]);
                 let true_value = exact(point, direction);
                 let scaled = |v: f32| (f64::from(v) * 2f64.powi(66)) as i128;
                 assert!(scaled(lo) <= true_value && true_value <= scaled(hi));

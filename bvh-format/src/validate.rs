@@ -196,7 +196,7 @@ pub fn check_bounds(
                 Child::Treelet(slot) => tight[usize::from(slot)],
                 Child::Remote(link) => below(page.remote(link)),
                 Child::Leaf { packet, triangles } => {
-                    packet_kdop(object, block, usize::from(packet), usize::from(triangles), slabs)
+                    packet_kdop(object, block, usize::from(packet), usize::from(triangles))
                 }
                 Child::Empty => continue,
             };
@@ -233,13 +233,9 @@ pub fn check_bounds(
 }
 
 /// The tight k-DOP of a packet's triangles.
-fn packet_kdop(object: &Object, block: &[u8], packet: usize, triangles: usize, slabs: usize) -> Kdop {
+fn packet_kdop(object: &Object, block: &[u8], packet: usize, triangles: usize) -> Kdop {
     let values = decode_packet(object.triangle_encoding, block, packet);
-    let mut kdop = Kdop::EMPTY;
-    for lane in 0..triangles {
-        values.triangle(lane).iter().for_each(|corner| kdop.add_point(*corner, slabs));
-    }
-    kdop
+    Kdop::of_points((0..triangles).flat_map(|lane| values.triangle(lane)))
 }
 
 /// How much wider decoded bounds are than tight ones.
