@@ -1,4 +1,36 @@
 //! Exact collision and distance queries between `.cbvh` meshes.
+//!
+//! [`Bvh`] opens a file (mapped, from memory, or embedded with [`include_cbvh!`]), [`Pose`] places one
+//! mesh in the frame of another, and a [`Querier`] answers:
+//!
+//! | question | method | answer |
+//! |---|---|---|
+//! | do they touch? | [`Querier::collide`] | `bool`, exact |
+//! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
+//! | how far apart? | [`Querier::distance`] | distance, both closest points, both triangle ids |
+//! | nearer than d? | [`Querier::within`] | `bool` |
+//!
+//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by
+//! AVX-512, AVX2 or portable code; what the filters cannot decide goes to `f64` and exact predicates.
+//! So answers are bit-identical on every backend and in every order of queries.
+//!
+//! ```
+//! use bvh_query::{Bvh, Pose, Querier};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+//! let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+//! let (bytes, _) = bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?;
+//! let triangle = Bvh::from_bytes(bytes)?;
+//!
+//! let mut querier = Querier::new()?;
+//! let above = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, 0.5])?;
+//! assert!(!querier.collide(&triangle, &triangle, &above)?);
+//! assert_eq!(querier.distance(&triangle, &triangle, &above)?.distance, 0.5);
+//! assert!(querier.collide(&triangle, &triangle, &Pose::IDENTITY)?);
+//! # Ok(())
+//! # }
+//! ```
 #![deny(unsafe_code)]
 
 mod bvh;
@@ -17,3 +49,16 @@ pub use error::{OpenError, QueryError};
 pub use isa::{Backend, BackendError};
 pub use pose::{Pose, PoseError};
 pub use query::{Contact, Distance, DistanceOptions, Querier, QueryStats};
+
+/// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
+///
+/// The path is as for `include_bytes!`; with a file that a build script baked, it is
+/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. Nothing is copied, and any alignment will do.
+#[macro_export]
+macro_rules! include_cbvh {
+    ($path:expr $(,)?) => {
+        $crate::Bvh::from_static(::core::include_bytes!($path))
+    };
+}
+
+pub use bvh_format::{FormatError, Rule};

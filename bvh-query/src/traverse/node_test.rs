@@ -177,7 +177,8 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, a
     // underflows, less than the largest gap loses.
     //
     // Where the boxes overlap, the largest gap itself, perhaps negative, tells which pair overlaps
-    // most.
+    // most. Where squares overflow, at gaps beyond 2^63, it has to do as well.
     let apart = I::V::select(zero.lt(sum), sum.sqrt(), largest);
+    let apart = I::V::select(sum.le(isa.splat(f32::MAX)), apart, largest);
     largest.max(apart).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
 }
