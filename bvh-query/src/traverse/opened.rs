@@ -25,6 +25,9 @@ pub(crate) struct Leaf {
 pub(crate) struct ChildRef(u32);
 
 impl ChildRef {
+    /// The object's root: the only child of node 0.
+    pub(crate) const ROOT: Self = Self(0);
+
     #[inline(always)]
     pub(crate) fn new(node: usize, child: usize) -> Self {
         Self((node as u32) << 3 | child as u32)

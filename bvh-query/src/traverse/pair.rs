@@ -100,6 +100,9 @@ struct Entry {
 }
 
 impl Entry {
+    /// The roots, at the least bound of all (that of minus infinity).
+    const ROOTS: Self = Self { key: 0x007f_ffff, a: ChildRef::ROOT, b: ChildRef::ROOT };
+
     #[inline(always)]
     fn new(bound: f32, a: ChildRef, b: ChildRef) -> Self {
         let bits = bound.to_bits();
@@ -135,29 +138,27 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     stack: &mut Stack,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    let Stack { opened_a, opened_b, aligned_b, entries, heap } = stack;
-    entries.clear();
-    heap.clear();
-    opened_a.start(pair.bvh_a, pair.object_a)?;
-    opened_b.start(pair.bvh_b, pair.object_b)?;
-    let node_test = NodeTest::new(&pair, &opened_a.get(0).groups[0], &opened_b.get(0).groups[0]);
+    stack.entries.clear();
+    stack.heap.clear();
+    stack.opened_a.start(pair.bvh_a, pair.object_a)?;
+    stack.opened_b.start(pair.bvh_b, pair.object_b)?;
+    let roots = (&stack.opened_a.get(0).groups[0], &stack.opened_b.get(0).groups[0]);
+    let node_test = NodeTest::new(&pair, roots.0, roots.1);
     let mut witness: Option<Witness> = None;
-    let mut tests = 0;
-    let mut leaves = 0;
+    let (mut tests, mut leaves) = (0, 0);
     let order = visitor.order();
     let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
-    let root = ChildRef::new(0, 0);
-    entries.push(Entry::new(f32::NEG_INFINITY, root, root));
+    stack.entries.push(Entry::ROOTS);
     loop {
-        let next = match (entries.pop(), phase) {
+        let next = match (stack.entries.pop(), phase) {
             (Some(top), _) => top,
             (None, Phase::DepthFirst) => break,
             (None, Phase::Dive) => {
                 // At the end of the dive: a leaf pair, or a node none of whose children is in reach.
                 phase = Phase::BestFirst;
-                Entry::new(f32::NEG_INFINITY, root, root)
+                Entry::ROOTS
             }
-            (None, Phase::BestFirst) => match heap.pop() {
+            (None, Phase::BestFirst) => match stack.heap.pop() {
                 Some(Reverse(least)) => least,
                 None => break,
             },
@@ -169,104 +170,144 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
             }
             continue;
         }
-        let (node_a, node_b) = (opened_a.get(next.a.node()), opened_b.get(next.b.node()));
-        let (child_a, child_b) = (next.a.child(), next.b.child());
-        let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
-        if leaf_a && leaf_b {
-            if let (Some(a), Some(b)) = (node_a.leaf(child_a), node_b.leaf(child_b))
-                && visitor.leaves(isa, a, b)?.is_break()
-            {
+        if let Some((a, b)) = stack.leaf_pair(next) {
+            if visitor.leaves(isa, a, b)?.is_break() {
                 return Ok(tests);
             }
             node_test.update_witness(&mut witness, visitor.witness());
-            if phase == Phase::BestFirst {
-                leaves += 1;
-                if matches!(order, Order::Best { leaves: enough } if leaves >= enough) {
-                    phase = Phase::DepthFirst;
-                    let limit = visitor.limit();
-                    let near =
-                        heap.drain().map(|Reverse(entry)| entry).filter(|entry| entry.bound() <= limit);
-                    entries.extend(near);
-                    entries.sort_unstable_by(|x, y| y.cmp(x));
-                }
+            leaves += u32::from(phase == Phase::BestFirst);
+            if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
+            {
+                phase = Phase::DepthFirst;
+                stack.heap_to_stack(visitor.limit());
             }
             continue;
         }
-        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
-        let open_a = !leaf_a && (leaf_b || extent_b <= MUCH_LARGER * extent_a);
-        let open_b = !leaf_b && (leaf_a || extent_a <= MUCH_LARGER * extent_b);
-        // A node that is not opened takes part as the only child in question of its parent.
-        let (mut number_a, mut only_a) = (next.a.node(), Some(child_a));
-        if open_a || !open_b {
-            (number_a, _) = opened_a.open(isa, pair.bvh_a, pair.object_a, next.a)?;
-            only_a = None;
-        }
-        let (mut number_b, mut only_b) = (next.b.node(), Some(child_b));
-        if open_b {
-            let new;
-            (number_b, new) = opened_b.open(isa, pair.bvh_b, pair.object_b, next.b)?;
-            only_b = None;
-            if aligned_b.len() <= number_b {
-                aligned_b.resize(2 * number_b + 64, [[[[0.0; 4]; 2]; 13]; 2]);
-            }
-            if new {
-                let opened = opened_b.get(number_b);
-                for part in 0..opened.count.div_ceil(4) {
-                    node_test.align(isa, &opened.groups[part], &mut aligned_b[number_b][part]);
-                }
-            }
-        } else if number_b == 0 {
-            // The root, kept for a much larger partner.
-            if aligned_b.is_empty() {
-                aligned_b.resize(64, [[[[0.0; 4]; 2]; 13]; 2]);
-            }
-            node_test.align(isa, &opened_b.get(0).groups[0], &mut aligned_b[0][0]);
-        }
-        let (side_a, side_b) = (opened_a.get(number_a), opened_b.get(number_b));
-        let start = entries.len();
-        let (mut part_a, end_a) = parts(only_a, side_a.count);
-        while part_a < end_a {
-            let (mut part_b, end_b) = parts(only_b, side_b.count);
-            while part_b < end_b {
-                tests += 1;
-                let mut bounds = [0.0; 16];
-                let mut mask = node_test.run(
-                    isa,
-                    W::MEASURE,
-                    (
-                        &side_a.groups[part_a & 1],
-                        &side_b.groups[part_b & 1],
-                        &aligned_b[number_b][part_b & 1],
-                    ),
-                    &witness,
-                    visitor.limit(),
-                    &mut bounds,
-                );
-                mask &= lanes_of_a(only_a, side_a.count, part_a) & lanes_of_b(only_b, side_b.count, part_b);
-                entries.reserve(16);
-                while mask != 0 {
-                    let bit = mask.trailing_zeros() as usize;
-                    mask &= mask - 1;
-                    let a = ChildRef::new(number_a, 4 * part_a + bit / 4);
-                    let b = ChildRef::new(number_b, 4 * part_b + bit % 4);
-                    entries.push(Entry::new(bounds[bit & 15], a, b));
-                }
-                part_b += 1;
-            }
-            part_a += 1;
-        }
+        let sides = stack.open(isa, &pair, &node_test, next)?;
+        let start = stack.entries.len();
+        tests += stack.push_children(isa, W::MEASURE, &node_test, &witness, &sides, visitor.limit());
+        let new = &mut stack.entries[start..];
         match (phase, order) {
-            (Phase::BestFirst, _) => entries.drain(start..).for_each(|entry| heap.push(Reverse(entry))),
-            (_, Order::Tree) => entries[start..].reverse(),
-            (Phase::Dive, _) => {
-                nearest_last(&mut entries[start..]);
-                entries.drain(..entries.len().saturating_sub(1));
+            (Phase::BestFirst, _) => {
+                stack.entries.drain(start..).for_each(|entry| stack.heap.push(Reverse(entry)));
             }
-            (Phase::DepthFirst, _) => nearest_last(&mut entries[start..]),
+            (_, Order::Tree) => new.reverse(),
+            (Phase::Dive, _) => {
+                nearest_last(new);
+                stack.entries.drain(..stack.entries.len().saturating_sub(1));
+            }
+            (Phase::DepthFirst, _) => nearest_last(new),
         }
     }
     visitor.finish(isa)?;
     Ok(tests)
+}
+
+/// Opened nodes of A and B whose children meet. A node that was not opened takes part as the only
+/// child in question of its parent.
+struct Sides {
+    node_a: usize,
+    only_a: Option<usize>,
+    node_b: usize,
+    only_b: Option<usize>,
+}
+
+impl Stack {
+    /// Both leaf packets, if the entry is a pair of them.
+    #[inline(always)]
+    fn leaf_pair(&self, entry: Entry) -> Option<(Leaf, Leaf)> {
+        let a = self.opened_a.get(entry.a.node()).leaf(entry.a.child())?;
+        let b = self.opened_b.get(entry.b.node()).leaf(entry.b.child())?;
+        Some((a, b))
+    }
+
+    /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
+    #[inline(always)]
+    fn open<I: Isa>(
+        &mut self,
+        isa: I,
+        pair: &Pair<'_>,
+        node_test: &NodeTest,
+        entry: Entry,
+    ) -> Result<Sides, QueryError> {
+        let (node_a, node_b) = (self.opened_a.get(entry.a.node()), self.opened_b.get(entry.b.node()));
+        let (child_a, child_b) = (entry.a.child(), entry.b.child());
+        let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
+        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
+        let mut sides = Sides {
+            node_a: entry.a.node(),
+            only_a: Some(child_a),
+            node_b: entry.b.node(),
+            only_b: Some(child_b),
+        };
+        let a_is_small = extent_b > MUCH_LARGER * extent_a;
+        // In a forged file both comparisons may hold: one node is opened in any case.
+        let b_is_small = extent_a > MUCH_LARGER * extent_b && !a_is_small;
+        if !leaf_a && (leaf_b || !a_is_small) {
+            (sides.node_a, _) = self.opened_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            sides.only_a = None;
+        }
+        if !leaf_b && (leaf_a || !b_is_small) {
+            let (number, new) = self.opened_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            (sides.node_b, sides.only_b) = (number, None);
+            if self.aligned_b.len() <= number {
+                self.aligned_b.resize(2 * number + 64, [[[[0.0; 4]; 2]; 13]; 2]);
+            }
+            if new {
+                let opened = self.opened_b.get(number);
+                for part in 0..opened.count.div_ceil(4) {
+                    node_test.align(isa, &opened.groups[part & 1], &mut self.aligned_b[number][part & 1]);
+                }
+            }
+        }
+        Ok(sides)
+    }
+
+    /// Tests all pairs of children and pushes those within the limit. Returns the number of tests.
+    #[inline(always)]
+    fn push_children<I: Isa>(
+        &mut self,
+        isa: I,
+        measure: Measure,
+        node_test: &NodeTest,
+        witness: &Option<Witness>,
+        sides: &Sides,
+        limit: f32,
+    ) -> u64 {
+        let (side_a, side_b) = (self.opened_a.get(sides.node_a), self.opened_b.get(sides.node_b));
+        let aligned = &self.aligned_b[sides.node_b];
+        let mut tests = 0;
+        let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
+        while part_a < end_a {
+            let (mut part_b, end_b) = parts(sides.only_b, side_b.count);
+            while part_b < end_b {
+                let mut bounds = [0.0; 16];
+                let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned[part_b & 1]);
+                let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut bounds);
+                mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
+                mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
+                self.entries.reserve(16);
+                while mask != 0 {
+                    let bit = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
+                    let a = ChildRef::new(sides.node_a, 4 * part_a + bit / 4);
+                    let b = ChildRef::new(sides.node_b, 4 * part_b + bit % 4);
+                    self.entries.push(Entry::new(bounds[bit & 15], a, b));
+                }
+                tests += 1;
+                part_b += 1;
+            }
+            part_a += 1;
+        }
+        tests
+    }
+
+    /// Goes on depth-first with what the heap holds, the least bound on top.
+    fn heap_to_stack(&mut self, limit: f32) {
+        let all = self.heap.drain().map(|Reverse(entry)| entry);
+        self.entries.extend(all.filter(|entry| entry.bound() <= limit));
+        self.entries.sort_unstable_by(|x, y| y.cmp(x));
+    }
 }
 
 /// The groups of four children to test: all, or that of the only child in question.
