@@ -135,7 +135,8 @@ impl Encoder<'_> {
                         let target = self.arena.children[index][child];
                         if target.is_some_and(|t| self.plan.places[t].page as usize == number) {
                             let parent = &decoded[slot];
-                            decoded[next_slot] = decode_child(profile, self.f16_scale, treelet, child, parent);
+                            decoded[next_slot] =
+                                decode_child(profile, self.f16_scale, treelet, child, parent);
                             next_slot += 1;
                             1
                         } else {

@@ -24,10 +24,42 @@ pub enum BakeError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The output is one of the inputs; baking would destroy it.
+    #[error("{}: expected an output other than the inputs, found an input", path.display())]
+    OutputIsInput {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The bake is expected to need more memory than it may use.
+    #[error(
+        "{}: expected a mesh that bakes in at most {budget} bytes of memory, found {} that would take about \
+         {needed}", input.display(), counted(*triangles)
+    )]
+    Memory {
+        /// The first input.
+        input: PathBuf,
+        /// Its triangles and those of the other inputs; 0 if they were not even read.
+        triangles: u64,
+        /// Bytes that a bake is expected to need.
+        needed: u64,
+        /// Bytes that it may use.
+        budget: u64,
+    },
+    /// A build script's function was called outside a build script.
+    #[error("expected the environment variable OUT_DIR of a build script, found none")]
+    NoOutDir,
     /// The mesh outgrows the format or the limits given.
     #[error("the mesh needs more than {0}")]
     Limit(String),
     /// The result failed its own proof: a defect of the baker, never of the input.
     #[error("the baked bytes fail their proof, please report this: {0}")]
     Unproved(FormatError),
+}
+
+fn counted(triangles: u64) -> String {
+    match triangles {
+        0 => "a file".to_owned(),
+        1 => "1 triangle".to_owned(),
+        _ => format!("{triangles} triangles"),
+    }
 }

@@ -4,8 +4,10 @@
 mod auto;
 mod bake;
 mod build;
+pub mod build_rs;
 mod encode;
 mod error;
+mod files;
 pub mod io;
 pub mod mesh;
 mod options;
@@ -14,9 +16,14 @@ mod prepare;
 mod prove;
 mod report;
 mod treelets;
+mod verify;
 
 pub use bake::{Stage, to_bytes, to_bytes_with};
 pub use error::BakeError;
+pub use files::{
+    FileOptions, FileSummary, Outcome, Step, bake_files, estimate_memory, read_meshes, write_atomically,
+};
 pub use options::Options;
 pub use prove::prove_bounds;
 pub use report::BakeReport;
+pub use verify::{VerifyError, VerifyReport, verify};

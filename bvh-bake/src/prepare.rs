@@ -126,8 +126,10 @@ fn place(position: [f64; 3], origin: &[AxisOrigin; 3], step: Option<f64>) -> Pla
         }
         let rounded = offset as f32;
         rounding[axis] = position[axis] - (origin + f64::from(rounded));
-        // A step below the spacing of f32 at the vertex is already met.
-        let snapped = step.map_or(rounded, |step| ((f64::from(rounded) / step).round() * step) as f32);
+        // A step below the spacing of f32 at the vertex is already met; one so small that the
+        // quotient overflows all the more.
+        let snapped = step.map(|step| ((f64::from(rounded) / step).round() * step) as f32);
+        let snapped = snapped.filter(|snapped| snapped.is_finite()).unwrap_or(rounded);
         quantization[axis] = f64::from(snapped) - f64::from(rounded);
         // Equal values must have equal bits.
         placed.vertex[axis] = if snapped == 0.0 { 0.0 } else { snapped };

@@ -110,6 +110,23 @@ impl Layout {
         <[[zerocopy::little_endian::U32; 2]]>::ref_from_bytes(&section[..whole]).unwrap_or(&[])
     }
 
+    /// Checks the section of duplicate ids: its checksum and its order.
+    ///
+    /// # Errors
+    /// Rules 10 and 36.
+    pub fn check_duplicates(&self, bytes: &[u8]) -> Result<(), FormatError> {
+        let section = self.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
+        let Some(section) = section else { return Ok(()) };
+        let at = section.range.start as u64;
+        let data = &bytes[section.range.clone()];
+        require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(data)))?;
+        require(Rule::DuplicateIds, at, 0, data.len() % 8)?;
+        let pairs = self.duplicate_ids(bytes);
+        let ascending = pairs.iter().all(|[kept, dropped]| kept.get() < dropped.get())
+            && pairs.windows(2).all(|w| w[0].map(|v| v.get()) < w[1].map(|v| v.get()));
+        ensure(ascending, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
+    }
+
     /// Checks the place, size and checksum of a page's leaf block. Cost: one pass over its bytes.
     ///
     /// # Errors

@@ -7,7 +7,7 @@
 use crate::checksum::checksum;
 use crate::decode::{NodeSlabs, decode_child};
 use crate::error::{FormatError, ensure, require};
-use crate::header::{SectionKind, hex};
+use crate::header::hex;
 use crate::ids::decode_id;
 use crate::kdop::Kdop;
 use crate::layout::{ContentHasher, Layout};
@@ -39,7 +39,7 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
     for object in &layout.objects {
         validate_object(&layout, bytes, object)?;
     }
-    check_duplicates(&layout, bytes)?;
+    layout.check_duplicates(bytes)?;
     Ok(layout)
 }
 
@@ -153,17 +153,6 @@ pub fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u16, usize)> + '
             _ => None,
         })
     })
-}
-
-fn check_duplicates(layout: &Layout, bytes: &[u8]) -> Result<(), FormatError> {
-    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
-    let Some(section) = section else { return Ok(()) };
-    let at = section.range.start as u64;
-    require(Rule::DuplicateIds, at, 0, section.range.len() % 8)?;
-    let pairs = layout.duplicate_ids(bytes);
-    let ascending = pairs.iter().all(|[kept, dropped]| kept.get() < dropped.get())
-        && pairs.windows(2).all(|w| w[0].map(|v| v.get()) < w[1].map(|v| v.get()));
-    ensure(ascending, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
 }
 
 /// The tight k-DOP of the triangles below every subtree root of a page, found from the stored

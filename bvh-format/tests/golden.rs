@@ -143,16 +143,37 @@ fn objects_alone(edit: impl FnOnce(&mut Change)) -> Vec<u8> {
     file.bytes
 }
 
+/// A cube alone out of `ok-profiles.cbvh`, without its leaves, and a change to its page's treelet.
+fn cube_of_profile(number: usize, at: usize, value: &[u8]) -> Vec<u8> {
+    let all = take_apart(&std::fs::read(testdata().join("ok-profiles.cbvh")).unwrap());
+    let record = &all[0].2[16 + 192 * number..][..192];
+    let mut objects = [&[1, 0, 0, 0][..], &[0; 12], record].concat();
+    // No name, and the first page of the file.
+    put(&mut objects, 16, &[0; 8]);
+    put(&mut objects, 16 + 80, &[0; 4]);
+    let mut page = all[1].2[4096 * number..][..4096].to_vec();
+    put(&mut page, 24, &[0; 8]);
+    put(&mut page, 44, &[0; 4]);
+    let mut file = Change { bytes: put_together(&[(1, 1, objects), (2, 1, page), (3, 1, vec![])]) };
+    file.treelet(at, value);
+    file.seal();
+    file.bytes
+}
+
 /// Pages: refused when one is touched. The cube's page has one root, at line 2.
 fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
     let page = |edit: fn(&mut Change)| sealed(&NODES, edit);
     vec![
         (10, "section", change(&NODES, |f| f.page(4000, &[1]))),
-        (15, "flipped-bit", change(&NODES, |f| {
-            f.page(0, &[1]);
-            seal_sections(&mut f.bytes);
-            seal_header(&mut f.bytes);
-        })),
+        (
+            15,
+            "flipped-bit",
+            change(&NODES, |f| {
+                f.page(0, &[1]);
+                seal_sections(&mut f.bytes);
+                seal_header(&mut f.bytes);
+            }),
+        ),
         (16, "page-number", page(|f| f.page(44, &[1]))),
         (17, "no-roots", page(|f| f.page(58, &[0]))),
         (17, "treelets-beyond", page(|f| f.page(59, &[63]))),
@@ -161,16 +182,27 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
         (20, "root-with-parent", page(|f| f.page(120, &[0; 4]))),
         (21, "unknown-kind", page(|f| f.treelet(28, &[3, 0, 0, 0]))),
         (21, "no-children", page(|f| f.treelet(28, &[0; 4]))),
-        (22, "loop", page(|f| {
-            f.treelet(28, &[1, 0, 0, 0]);
-            f.treelet(60, &[0]);
-        })),
-        (23, "link-not-there", page(|f| {
-            f.treelet(28, &[2, 0, 0, 0]);
-            f.treelet(61, &[0]);
-        })),
+        (
+            22,
+            "loop",
+            page(|f| {
+                f.treelet(28, &[1, 0, 0, 0]);
+                f.treelet(60, &[0]);
+            }),
+        ),
+        (
+            23,
+            "link-not-there",
+            page(|f| {
+                f.treelet(28, &[2, 0, 0, 0]);
+                f.treelet(61, &[0]);
+            }),
+        ),
         (24, "packet-numbers", page(|f| f.treelet(62, &[1, 0]))),
         (25, "reserved", page(|f| f.page(63, &[1]))),
+        (38, "f16-negative", cube_of_profile(2, 1, &[0x80])),
+        (38, "f16-infinite", cube_of_profile(3, 1, &[0x7c])),
+        (38, "f32-nan", cube_of_profile(9, 0, &f32::NAN.to_le_bytes())),
     ]
 }
 
@@ -184,42 +216,62 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
         put(&mut file.bytes, start, &ids);
     };
     vec![
-        (26, "a-line-more", sealed(&LEAVES, |f| {
-            let start = section(&f.bytes, 2).start;
-            let lines = f.bytes[start + 48] + 1;
-            f.page(48, &[lines]);
-            // The section as stated in the table grows by the line.
-            let length = section(&f.bytes, 3).len() as u64 + 64;
-            f.header(64 + 2 * 32 + 16, &length.to_le_bytes());
-        })),
-        (27, "flipped-bit", change(&LEAVES, |f| {
-            f.page(8, &[0; 8]);
-            seal_pages(&mut f.bytes);
-            seal_sections(&mut f.bytes);
-            seal_header(&mut f.bytes);
-        })),
+        (
+            26,
+            "a-line-more",
+            sealed(&LEAVES, |f| {
+                let start = section(&f.bytes, 2).start;
+                let lines = f.bytes[start + 48] + 1;
+                f.page(48, &[lines]);
+                // The section as stated in the table grows by the line.
+                let length = section(&f.bytes, 3).len() as u64 + 64;
+                f.header(64 + 2 * 32 + 16, &length.to_le_bytes());
+            }),
+        ),
+        (
+            27,
+            "flipped-bit",
+            change(&LEAVES, |f| {
+                f.page(8, &[0; 8]);
+                seal_pages(&mut f.bytes);
+                seal_sections(&mut f.bytes);
+                seal_header(&mut f.bytes);
+            }),
+        ),
         (28, "33-bits", block(|f| f.leaves(4, &[33]))),
-        (29, "fewer-vertices", block(|f| {
-            // Pool and array stay where they are: the same bits for one vertex less do not fill a byte less.
-            f.leaves(0, &[1, 0]);
-            f.leaves(4, &[0; 3]);
-            let bits = f.bytes[section(&f.bytes, 3).start + 2];
-            let needed = 32 + (12 * 4 * usize::from(bits)).div_ceil(8) + 8;
-            f.leaves(24, &[32, 0, 0, 0]);
-            f.leaves(32, &[0xff; 24]);
-            f.page(48, &[needed.div_ceil(64) as u8]);
-        })),
-        (30, "infinite", sealed(&LEAVES, |f| {
-            f.leaves(3, &[0]);
-            f.leaves(8, &infinite);
-        })),
+        (
+            29,
+            "fewer-vertices",
+            block(|f| {
+                // Pool and array stay where they are: the same bits for one vertex less do not fill a byte less.
+                f.leaves(0, &[1, 0]);
+                f.leaves(4, &[0; 3]);
+                let bits = f.bytes[section(&f.bytes, 3).start + 2];
+                let needed = 32 + (12 * 4 * usize::from(bits)).div_ceil(8) + 8;
+                f.leaves(24, &[32, 0, 0, 0]);
+                f.leaves(32, &[0xff; 24]);
+                f.page(48, &[needed.div_ceil(64) as u8]);
+            }),
+        ),
+        (
+            30,
+            "infinite",
+            sealed(&LEAVES, |f| {
+                f.leaves(3, &[0]);
+                f.leaves(8, &infinite);
+            }),
+        ),
         (31, "without-section", block(|f| f.page(52, &[1]))),
-        (32, "flipped-bit", change(&IDS, |f| {
-            f.page(16, &[0; 8]);
-            seal_pages(&mut f.bytes);
-            seal_sections(&mut f.bytes);
-            seal_header(&mut f.bytes);
-        })),
+        (
+            32,
+            "flipped-bit",
+            change(&IDS, |f| {
+                f.page(16, &[0; 8]);
+                seal_pages(&mut f.bytes);
+                seal_sections(&mut f.bytes);
+                seal_header(&mut f.bytes);
+            }),
+        ),
         (33, "id-beyond", sealed(&IDS, |f| f.record(104, &[13]))),
         (34, "treelets", block(|f| f.record(72, &[9]))),
         (36, "descending", sealed(&[1, 2, 3, 5], |f| pairs(f, [[3, 14], [0, 12]]))),
@@ -245,8 +297,13 @@ fn good_files_are_valid() {
 fn bad_files_break_the_rule_in_their_name() {
     let bad = [bad_at_open(), bad_pages(), bad_blocks()].concat();
     for (rule, what, bytes) in &bad {
+        let found = validate(bytes);
+        assert_eq!(number_of(found.clone()), *rule, "{what}: {:?}", found.err());
+    }
+    // One file a rule is frozen, to keep the folder small.
+    let mut frozen_rules = BTreeSet::new();
+    for (rule, what, bytes) in bad.iter().filter(|(rule, _, _)| frozen_rules.insert(*rule)) {
         let name = format!("bad-R{rule:02}-{what}.cbvh");
-        assert_eq!(number_of(validate(bytes)), *rule, "{name}: {:?}", validate(bytes).err());
         let path = testdata().join(&name);
         if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
             std::fs::write(&path, bytes).unwrap();
@@ -259,7 +316,7 @@ fn bad_files_break_the_rule_in_their_name() {
         let rule: u32 = name[5..7].parse().unwrap();
         let error = validate(bytes).unwrap_err();
         assert_eq!(error.rule.number(), rule, "{name}: {error}");
-        assert!(error.offset <= bytes.len().max(4096) as u64 && !error.to_string().contains('\n'), "{name}: {error}");
+        assert!(error.offset <= bytes.len() as u64 && !error.to_string().contains('\n'), "{name}: {error}");
     }
     let covered: BTreeSet<u32> = bad.iter().map(|(rule, _, _)| *rule).collect();
     let missing: Vec<u32> = Rule::ALL.iter().map(|r| r.number()).filter(|r| !covered.contains(r)).collect();

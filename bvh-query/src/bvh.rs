@@ -8,7 +8,7 @@ use bvh_format::page::{PAGE, Page, check_page};
 use bvh_format::{FormatError, Layout, Rule, ids};
 use memmap2::Mmap;
 use std::path::Path;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// A bounding volume hierarchy that can be queried. `Send` and `Sync`: share it between threads.
 ///
@@ -19,6 +19,7 @@ pub struct Bvh {
     layout: Layout,
     /// What has been checked of each page.
     checked: Box<[AtomicU8]>,
+    duplicates_checked: AtomicBool,
 }
 
 enum Bytes {
@@ -78,7 +79,7 @@ impl Bvh {
     fn new(bytes: Bytes) -> Result<Self, FormatError> {
         let layout = Layout::read(bytes.get())?;
         let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
-        Ok(Self { bytes, layout, checked })
+        Ok(Self { bytes, layout, checked, duplicates_checked: AtomicBool::new(false) })
     }
 
     /// Where everything is in the file.
@@ -111,11 +112,20 @@ impl Bvh {
         (number < self.objects().len()).then_some(Shape { bvh: self, first: number, end: number + 1 })
     }
 
-    /// The ids of the input's triangles that are exact duplicates of triangle `id`, ascending.
-    pub fn duplicates_of(&self, id: u32) -> impl Iterator<Item = u32> + '_ {
+    /// The ids of the input's triangles that are exact duplicates of triangle `id`, ascending. Cost:
+    /// a binary search, and at the first call a pass over all duplicates to check them.
+    ///
+    /// # Errors
+    /// If the section of duplicates is damaged.
+    pub fn duplicates_of(&self, id: u32) -> Result<impl Iterator<Item = u32> + '_, QueryError> {
+        if !self.duplicates_checked.load(Ordering::Acquire) {
+            self.layout.check_duplicates(self.bytes())?;
+            self.duplicates_checked.store(true, Ordering::Release);
+        }
         let pairs = self.layout.duplicate_ids(self.bytes());
         let start = pairs.partition_point(|[kept, _]| kept.get() < id);
-        pairs[start..].iter().take_while(move |[kept, _]| kept.get() == id).map(|[_, dropped]| dropped.get())
+        let of_id = pairs[start..].iter().take_while(move |[kept, _]| kept.get() == id);
+        Ok(of_id.map(|[_, dropped]| dropped.get()))
     }
 
     /// Checks every page, leaf block and id block now, so that no query has to: the first touch of a

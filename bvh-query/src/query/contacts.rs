@@ -92,8 +92,8 @@ fn report(
     let pair = &scene.pair;
     let id_a = triangle_id(pair.bvh_a, pair.object_a, candidate.place_a())?;
     let id_b = triangle_id(pair.bvh_b, pair.object_b, candidate.place_b())?;
-    for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)) {
-        for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)) {
+    for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)?) {
+        for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)?) {
             let (object_a, object_b) = scene.numbers;
             if visit(Contact { object_a, triangle_a, object_b, triangle_b }).is_break() {
                 return Ok(ControlFlow::Break(candidate));

@@ -1,0 +1,335 @@
+//! The command line.
+
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Exact collision and distance queries between triangle meshes.
+#[derive(Debug, Parser)]
+#[command(name = "cbvh", version, after_help = EXIT_CODES)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 1 usage; 2 the system (missing file, disk full, permission); 3 an input is invalid; 4 a limit \
+was reached. Errors are one line on standard error. CBVH_ISA=scalar|avx2|avx512 forces a backend for queries.";
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Bake meshes into a .cbvh file
+    Bake(BakeArguments),
+    /// Show what is in a .cbvh file
+    Dump(DumpArguments),
+    /// Check a .cbvh file: structure and checksums, the whole file
+    Validate(ValidateArguments),
+    /// Check that a file's triangles are the mesh's and that every bound contains its triangles
+    Verify(VerifyArguments),
+    /// Ask two meshes whether they touch, where, and how far apart they are
+    Query(QueryArguments),
+}
+
+const BAKE_HELP: &str = "\
+Examples:
+  cbvh bake rock.obj -o rock.cbvh
+  cbvh bake part.stl -o part.cbvh --triangles quantized --max-error 0.01
+  cbvh bake arm.obj hand.ply -o robot.cbvh --split-objects --json
+
+Several inputs are baked as one mesh: triangle ids run on from file to file. The output appears whole or not at \
+all. It is left alone if it is up to date: same inputs, same options, same version, undamaged; --force bakes it all \
+the same.
+
+--max-memory: a bake works in memory. If it is expected to need more than SIZE, it is refused with exit code 4 \
+before the work begins; baking in parts to fit a budget is not there yet.";
+
+/// What `bake` takes.
+#[derive(Debug, Args)]
+#[command(after_help = BAKE_HELP)]
+pub(crate) struct BakeArguments {
+    /// Meshes: OBJ, STL, PLY, glTF
+    #[arg(required = true, value_name = "IN")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The file to write
+    #[arg(short, long, value_name = "OUT.cbvh")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) layout: LayoutArguments,
+    /// How far a vertex may move, in mesh units; only with --triangles quantized [default: 1e-5 of the diagonal]
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) max_error: Option<f64>,
+    /// Refuse a bake that is expected to need more memory than this, such as 512MiB or 2GB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
+    /// Threads [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) jobs: Option<u16>,
+    /// One tree for each object of the input, to be queried by name
+    #[arg(long)]
+    pub(crate) split_objects: bool,
+    /// Leave out the original triangle numbers
+    #[arg(long)]
+    pub(crate) no_ids: bool,
+    /// Bake even if the output is up to date
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors (and what --json asks for)
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// How nodes and triangles are written.
+#[derive(Debug, Args)]
+pub(crate) struct LayoutArguments {
+    /// Bounding volumes: auto, dop14-u8, dop6-u8, dop6-f16, dop14-f16, dop14-u4, dop26-u4, dop26-u8, dop14-f16-wide,
+    /// dop26-u8-wide or dop14-f32
+    #[arg(long, value_name = "P", default_value = "auto", value_parser = profile)]
+    pub(crate) profile: Choice<Profile>,
+    /// Triangles: auto, f32 (fastest), packed (the same values in fewer bytes) or quantized (vertices moved a little)
+    #[arg(long, value_name = "T", default_value = "auto", value_parser = triangles)]
+    pub(crate) triangles: Choice<TriangleEncoding>,
+}
+
+/// A named choice, or leave it to the baker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Choice<T> {
+    Auto,
+    Named(T),
+}
+
+impl<T: Copy> Choice<T> {
+    /// As the baker's options have it.
+    pub(crate) fn named(self) -> Option<T> {
+        match self {
+            Self::Auto => None,
+            Self::Named(choice) => Some(choice),
+        }
+    }
+}
+
+const DUMP_HELP: &str = "\
+Examples:
+  cbvh dump rock.cbvh
+  cbvh dump rock.cbvh --page 3
+  cbvh dump rock.cbvh --treelet 0 --json
+
+Treelets are numbered through the whole file, in the order of pages and of slots in a page.";
+
+/// What `dump` takes.
+#[derive(Debug, Args)]
+#[command(after_help = DUMP_HELP)]
+pub(crate) struct DumpArguments {
+    /// The file
+    pub(crate) file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Decode this treelet: links and slabs of each child
+    #[arg(long, value_name = "N", conflicts_with = "page")]
+    pub(crate) treelet: Option<u64>,
+    /// Decode this page: anchors, links to other pages, treelets
+    #[arg(long, value_name = "N")]
+    pub(crate) page: Option<u32>,
+}
+
+const VALIDATE_HELP: &str = "\
+Example:
+  cbvh validate rock.cbvh --json
+
+Exit code 3 if the file is invalid. With --json the object says so too: rule, offset, expected, found.";
+
+/// What `validate` takes.
+#[derive(Debug, Args)]
+#[command(after_help = VALIDATE_HELP)]
+pub(crate) struct ValidateArguments {
+    /// The file
+    pub(crate) file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const VERIFY_HELP: &str = "\
+Example:
+  cbvh verify rock.cbvh rock.obj
+
+Give the same meshes in the same order as to bake. Exit code 3 if anything differs.";
+
+/// What `verify` takes.
+#[derive(Debug, Args)]
+#[command(after_help = VERIFY_HELP)]
+pub(crate) struct VerifyArguments {
+    /// The file
+    pub(crate) file: PathBuf,
+    /// The mesh, or the meshes, it was baked from
+    #[arg(required = true, value_name = "MESH")]
+    pub(crate) meshes: Vec<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const QUERY_HELP: &str = "\
+Examples:
+  cbvh query a.cbvh b.cbvh poses.txt --mode collide
+  cbvh query a.obj b.obj near.txt,far.txt --mode distance --out raw_%s.txt
+  cbvh query a.cbvh b.cbvh --mode distance --pose \"1 0 0 2  0 1 0 0  0 0 1 0\" --witness w.obj
+
+A pose file has 12 numbers a line, the rows of a 3x4 matrix that places B in A's frame; # starts a comment. Each \
+pose file gives one JSON line. --out writes one line a query: 0 or 1, a count, or a distance, then nanoseconds; %s \
+stands for the pose file's name. answers_xxh3 is the same for every --isa and --jobs; it is null if the budget cut \
+the run short, or if --rel-err or --abs-err leave a choice of answers.";
+
+/// What `query` takes.
+#[derive(Debug, Args)]
+#[command(after_help = QUERY_HELP)]
+pub(crate) struct QueryArguments {
+    /// One side: a .cbvh file, or a mesh that is baked in memory first
+    pub(crate) a: PathBuf,
+    /// The other side, placed by the poses
+    pub(crate) b: PathBuf,
+    /// Pose files, separated by commas
+    #[arg(value_name = "POSES[,POSES...]", required_unless_present = "pose", conflicts_with = "pose")]
+    pub(crate) poses: Option<String>,
+    /// What to ask
+    #[arg(long, value_enum, default_value = "collide")]
+    pub(crate) mode: Mode,
+    /// For --mode within: the distance asked about, mesh units
+    #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) within: Option<f64>,
+    /// For --mode distance: the answer may exceed the least distance by this fraction of it
+    #[arg(long, value_name = "R", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) rel_err: Option<f64>,
+    /// For --mode distance: the answer may exceed the least distance by this, mesh units
+    #[arg(long, value_name = "E", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) abs_err: Option<f64>,
+    /// Backend: auto, scalar, avx2 or avx512; auto is the fastest that there is, or what CBVH_ISA says
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    pub(crate) isa: String,
+    /// Threads over the poses
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) jobs: u16,
+    #[command(flatten)]
+    pub(crate) layout: LayoutArguments,
+    /// Only the object of this name, on each side that has one
+    #[arg(long, value_name = "NAME")]
+    pub(crate) object: Option<String>,
+    /// Write raw answers and times here; %s stands for the pose file's name
+    #[arg(long, value_name = "raw_%s.txt", conflicts_with = "pose")]
+    pub(crate) out: Option<String>,
+    /// Stop each pose file after so many seconds
+    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) budget: Option<f64>,
+    /// Queries before the clock starts, from the end of the pose file
+    #[arg(long, value_name = "N", default_value = "3")]
+    pub(crate) warm: usize,
+    /// Ask only the first N poses of each file; 0 asks all
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) limit: usize,
+    /// One pose instead of files, as 12 numbers; the answer is for a person
+    #[arg(long, value_name = "12 NUMBERS", allow_hyphen_values = true)]
+    pub(crate) pose: Option<String>,
+    /// With --pose and --mode distance: write the closest points' segment and both triangles as OBJ
+    #[arg(long, value_name = "OBJ")]
+    pub(crate) witness: Option<PathBuf>,
+}
+
+/// A question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Mode {
+    /// Do they touch?
+    Collide,
+    /// How many pairs of triangles touch?
+    Contacts,
+    /// How far apart are they?
+    Distance,
+    /// Are they at most --within apart?
+    Within,
+}
+
+impl Mode {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Collide => "collide",
+            Self::Contacts => "contacts",
+            Self::Distance => "distance",
+            Self::Within => "within",
+        }
+    }
+}
+
+fn profile(name: &str) -> Result<Choice<Profile>, String> {
+    if name == "auto" {
+        return Ok(Choice::Auto);
+    }
+    let names: Vec<_> = Profile::ALL.into_iter().map(Profile::name).collect();
+    Profile::from_name(name).map(Choice::Named).ok_or_else(|| format!("expected auto, {}", names.join(", ")))
+}
+
+fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
+    if name == "auto" {
+        return Ok(Choice::Auto);
+    }
+    let encoding = TriangleEncoding::ALL.into_iter().find(|encoding| encoding.name() == name);
+    encoding.map(Choice::Named).ok_or_else(|| "expected auto, f32, packed or quantized".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| "expected a number of at least 0".to_owned())
+}
+
+/// Bytes: a number and a unit, 1000s with `kB`, `MB`, `GB`, `TB`, 1024s with `KiB`, `MiB`, `GiB`, `TiB`.
+fn size(text: &str) -> Result<u64, String> {
+    let expected = || "expected a size such as 512MiB, 2GB or 100000000".to_owned();
+    let text = text.trim();
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "k" | "kib" => 1024.0,
+        "m" | "mib" => 1048576.0,
+        "g" | "gib" => 1073741824.0,
+        "t" | "tib" => 1099511627776.0,
+        _ => return Err(expected()),
+    };
+    let bytes = number.parse::<f64>().map_err(|_| expected())? * factor;
+    // Beyond 2^53 bytes no budget is one.
+    if bytes < 9007199254740992.0 { Ok(bytes as u64) } else { Err(expected()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(size("512MiB"), Ok(512 << 20));
+        assert_eq!(size("1.5 GiB"), Ok(3 << 29));
+        assert_eq!(size("2GB"), Ok(2_000_000_000));
+        assert_eq!(size("7"), Ok(7));
+        for wrong in ["", "MiB", "-1", "1XB", "1e3", "1.2.3", "99999999999999999999"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! `cbvh bake`: meshes into a file.
+
+use crate::arguments::{BakeArguments, LayoutArguments};
+use crate::error::Failure;
+use crate::output::{self, hex};
+use crate::resident;
+use bvh_bake::{FileOptions, FileSummary, Options, Outcome, bake_files};
+use bvh_format::header::{MAJOR, MINOR};
+use bvh_format::leaf::TriangleEncoding;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
+    let start = Instant::now();
+    let quantized = arguments.layout.triangles.named() == Some(TriangleEncoding::Quantized);
+    if arguments.max_error.is_some() && !quantized {
+        return Err(Failure::Usage("--max-error goes with --triangles quantized only (see --help)".into()));
+    }
+    if let Some(jobs) = arguments.jobs {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
+        pool.map_err(|error| Failure::System(format!("--jobs {jobs}: cannot start threads: {error}")))?;
+    }
+    let options = Options {
+        max_error: arguments.max_error,
+        split_objects: arguments.split_objects,
+        ids: !arguments.no_ids,
+        ..options(&arguments.layout)
+    };
+    let file_options = FileOptions { force: arguments.force, max_memory: arguments.max_memory };
+    let inputs = names(&arguments.inputs);
+    let spinner = spinner(arguments.quiet);
+    let outcome = bake_files(&arguments.inputs, &arguments.output, &options, &file_options, &mut |step| {
+        spinner.set_message(step.name());
+    });
+    spinner.finish_and_clear();
+    let outcome = outcome.map_err(|error| Failure::from_bake(&inputs, &error))?;
+    let output = arguments.output.display().to_string();
+    let report = Report::new(inputs, output, &outcome, start.elapsed().as_secs_f64());
+    if arguments.json {
+        output::json(&report)
+    } else if arguments.quiet {
+        Ok(())
+    } else {
+        output::text(&report.to_text())
+    }
+}
+
+/// The part of the options that `query` has too.
+pub(crate) fn options(layout: &LayoutArguments) -> Options {
+    Options { profile: layout.profile.named(), triangles: layout.triangles.named(), ..Options::default() }
+}
+
+/// Paths for messages.
+pub(crate) fn names(paths: &[PathBuf]) -> String {
+    let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// Shows the stage on standard error, if that is a terminal.
+fn spinner(quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let spinner = ProgressBar::with_draw_target(None, target);
+    if !spinner.is_hidden() {
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            spinner.set_style(style);
+        }
+        spinner.enable_steady_tick(Duration::from_millis(100));
+    }
+    spinner
+}
+
+/// What `--json` prints. Fields that a skipped bake does not know are null.
+#[derive(Serialize)]
+struct Report {
+    input: String,
+    output: String,
+    format_version: String,
+    profile: &'static str,
+    triangle_encoding: &'static str,
+    reason: String,
+    triangles_in: u64,
+    triangles: u64,
+    degenerate: u64,
+    duplicates: u64,
+    vertices: Option<u64>,
+    objects: u64,
+    file_bytes: u64,
+    node_bytes: u64,
+    triangle_bytes: u64,
+    id_bytes: u64,
+    bytes_per_tri: f64,
+    max_vertex_rounding: f64,
+    max_quantization_error: f64,
+    width_inflation: Option<f64>,
+    volume_inflation: Option<f64>,
+    mean_children: Option<f64>,
+    bake_seconds: Option<f64>,
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
+    content_xxh3: String,
+    skipped: bool,
+}
+
+impl Report {
+    fn new(input: String, output: String, outcome: &Outcome, seconds: f64) -> Self {
+        let version = |(major, minor): (u16, u16)| format!("{major}.{minor}");
+        let peak_rss_bytes = resident::peak_bytes();
+        match outcome {
+            Outcome::Baked(baked) => Self {
+                input,
+                output,
+                format_version: version((MAJOR, MINOR)),
+                profile: baked.profile.name(),
+                triangle_encoding: baked.triangle_encoding.name(),
+                reason: baked.reason.clone(),
+                triangles_in: baked.triangles_in,
+                triangles: baked.triangles,
+                degenerate: baked.degenerate,
+                duplicates: baked.duplicates,
+                vertices: Some(baked.vertices),
+                objects: baked.objects,
+                file_bytes: baked.file_bytes,
+                node_bytes: baked.node_bytes,
+                triangle_bytes: baked.triangle_bytes,
+                id_bytes: baked.id_bytes,
+                bytes_per_tri: baked.bytes_per_tri(),
+                max_vertex_rounding: baked.max_vertex_rounding,
+                max_quantization_error: baked.max_quantization_error,
+                width_inflation: Some(baked.width_inflation),
+                volume_inflation: Some(baked.volume_inflation),
+                mean_children: Some(baked.mean_children),
+                bake_seconds: Some(baked.seconds),
+                seconds,
+                peak_rss_bytes,
+                content_xxh3: hex(baked.content_xxh3),
+                skipped: false,
+            },
+            Outcome::UpToDate(file) => Self {
+                format_version: version(file.version),
+                seconds,
+                peak_rss_bytes,
+                ..Self::of_file(input, output, file)
+            },
+        }
+    }
+
+    fn of_file(input: String, output: String, file: &FileSummary) -> Self {
+        Self {
+            input,
+            output,
+            format_version: String::new(),
+            profile: file.profile.name(),
+            triangle_encoding: file.triangle_encoding.name(),
+            reason: "the output was up to date".into(),
+            triangles_in: file.triangles_in,
+            triangles: file.triangles,
+            degenerate: file.degenerate,
+            duplicates: file.duplicates,
+            vertices: None,
+            objects: file.objects,
+            file_bytes: file.file_bytes,
+            node_bytes: file.node_bytes,
+            triangle_bytes: file.triangle_bytes,
+            id_bytes: file.id_bytes,
+            bytes_per_tri: file.bytes_per_tri(),
+            max_vertex_rounding: file.max_vertex_rounding,
+            max_quantization_error: file.max_quantization_error,
+            width_inflation: None,
+            volume_inflation: None,
+            mean_children: None,
+            bake_seconds: None,
+            seconds: 0.0,
+            peak_rss_bytes: None,
+            content_xxh3: hex(file.content_xxh3),
+            skipped: true,
+        }
+    }
+
+    fn to_text(&self) -> String {
+        if self.skipped {
+            return format!("{}: up to date, content {}\n", self.output, self.content_xxh3);
+        }
+        let mut text = format!("{} -> {}\n", self.input, self.output);
+        let mut line = |label: &str, value: String| text.push_str(&format!("  {label:<12} {value}\n"));
+        let vertices = self.vertices.unwrap_or(0);
+        let left_out = match self.duplicates {
+            0 => String::new(),
+            duplicates => format!(" ({duplicates} exact duplicates left out)"),
+        };
+        line("triangles", format!("{}{left_out}, {} of zero area", self.triangles, self.degenerate));
+        line("vertices", format!("{vertices} in {} {}", self.objects, plural(self.objects, "object")));
+        let because = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
+        line("layout", format!("{}, triangles {}{because}", self.profile, self.triangle_encoding));
+        let each = |bytes: u64| bytes as f64 / self.triangles as f64;
+        line(
+            "bytes",
+            format!(
+                "{}, {:.2} a triangle: nodes {:.2}, triangles {:.2}, ids {:.2}",
+                self.file_bytes,
+                self.bytes_per_tri,
+                each(self.node_bytes),
+                each(self.triangle_bytes),
+                each(self.id_bytes)
+            ),
+        );
+        let moved = self.max_vertex_rounding;
+        line("rounding", format!("vertices moved by at most {moved:e}"));
+        if self.max_quantization_error > 0.0 {
+            line("quantisation", format!("vertices moved by at most {:e}", self.max_quantization_error));
+        }
+        if let (Some(width), Some(volume)) = (self.width_inflation, self.volume_inflation) {
+            line("bounds", format!("{width:.4} times as wide as tight ones, {volume:.4} times the volume"));
+        }
+        line("content", self.content_xxh3.clone());
+        let memory = match self.peak_rss_bytes {
+            Some(bytes) => format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0),
+            None => String::new(),
+        };
+        line("took", format!("{:.2} s{memory}", self.seconds));
+        text
+    }
+}
+
+/// `word`, with an s unless there is one.
+pub(crate) fn plural(count: u64, word: &str) -> String {
+    if count == 1 { word.to_owned() } else { format!("{word}s") }
+}

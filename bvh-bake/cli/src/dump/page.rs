@@ -1,0 +1,309 @@
+//! One page, decoded: its anchors, its links, its treelets. One treelet: its links and slabs.
+
+use super::{checked, object_of};
+use crate::output::hex;
+use bvh_format::decode::{NodeSlabs, decode_child};
+use bvh_format::kdop::Kdop;
+use bvh_format::object::Object;
+use bvh_format::page::{NO_PARENT, Page};
+use bvh_format::treelet::{Child, Links};
+use bvh_format::{FormatError, Rule};
+use bvh_query::Bvh;
+use serde::Serialize;
+
+/// What `dump FILE --page N --json` prints.
+#[derive(Serialize)]
+pub(super) struct PageDump {
+    page: u32,
+    offset: u64,
+    object: usize,
+    profile: &'static str,
+    checksum: String,
+    leaf_checksum: String,
+    id_checksum: String,
+    leaf_line: u64,
+    leaf_lines: u32,
+    id_word: u64,
+    id_words: u32,
+    first_packet: u32,
+    packets: u16,
+    treelet_line: u8,
+    /// Lines of 64 bytes in use, of 64.
+    lines: usize,
+    anchors: Vec<AnchorDump>,
+    remotes: Vec<RootDump>,
+    treelets: Vec<SlotDump>,
+}
+
+/// A subtree root.
+#[derive(Serialize)]
+struct AnchorDump {
+    slot: u8,
+    /// The page and remote link that lead here; none for the object's root.
+    parent_page: Option<u32>,
+    parent_link: Option<u8>,
+    slabs: Vec<[f32; 2]>,
+}
+
+/// Where a remote link leads.
+#[derive(Serialize)]
+struct RootDump {
+    link: u8,
+    page: u32,
+    root: u8,
+}
+
+#[derive(Serialize)]
+struct SlotDump {
+    slot: u8,
+    children: Vec<ChildDump>,
+}
+
+/// A child of a treelet.
+#[derive(Serialize)]
+struct ChildDump {
+    /// `treelet`, `remote` or `leaf`.
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slot: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    root: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    packet: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangles: Option<u8>,
+    /// Only where slabs are asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    slabs: Vec<[f32; 2]>,
+}
+
+impl ChildDump {
+    fn new(page: &Page, child: Child) -> Option<Self> {
+        let none = |kind| Self {
+            kind,
+            slot: None,
+            page: None,
+            root: None,
+            packet: None,
+            triangles: None,
+            slabs: Vec::new(),
+        };
+        match child {
+            Child::Empty => None,
+            Child::Treelet(slot) => Some(Self { slot: Some(slot), ..none("treelet") }),
+            Child::Remote(link) => {
+                let to = page.remote(link);
+                Some(Self { page: Some(to.page()), root: Some(to.root()), ..none("remote") })
+            }
+            Child::Leaf { packet, triangles } => {
+                Some(Self { packet: Some(packet), triangles: Some(triangles), ..none("leaf") })
+            }
+        }
+    }
+
+    fn to_text(&self) -> String {
+        match *self {
+            Self { slot: Some(slot), .. } => format!("slot {slot}"),
+            Self { page: Some(page), root: Some(root), .. } => format!("page {page} root {root}"),
+            Self { packet: Some(packet), triangles: Some(triangles), .. } => {
+                format!("packet {packet} of {triangles}")
+            }
+            _ => "nothing".to_owned(),
+        }
+    }
+}
+
+fn children(page: &Page, slot: u8) -> Vec<ChildDump> {
+    let links = Links::read(page.treelet(slot));
+    (0..links.children()).filter_map(|child| ChildDump::new(page, links.child(child))).collect()
+}
+
+fn slabs_of(kdop: &Kdop, slabs: usize) -> Vec<[f32; 2]> {
+    (0..slabs).map(|slab| [kdop.lo[slab], kdop.hi[slab]]).collect()
+}
+
+fn slabs_text(slabs: &[[f32; 2]]) -> String {
+    let texts: Vec<_> = slabs.iter().map(|[lo, hi]| format!("[{lo:?}, {hi:?}]")).collect();
+    texts.join(" ")
+}
+
+impl PageDump {
+    pub(super) fn new(bvh: &Bvh, number: u32) -> Result<Self, FormatError> {
+        let at = bvh.layout().page_offset(number);
+        let (index, object) = object_of(bvh, number)
+            .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "an object's page", "none"))?;
+        let page = checked(bvh, object, number)?;
+        let header = page.header();
+        let slabs = object.profile.directions().slabs();
+        let anchor = |slot| {
+            let anchor = page.anchor(slot);
+            let top = anchor.parent_page == NO_PARENT;
+            AnchorDump {
+                slot,
+                parent_page: (!top).then_some(anchor.parent_page),
+                parent_link: (!top).then_some(anchor.parent_link),
+                slabs: slabs_of(&anchor.slabs.to_kdop(slabs), slabs),
+            }
+        };
+        let remote = |link| {
+            let to = page.remote(link);
+            RootDump { link, page: to.page(), root: to.root() }
+        };
+        let treelet_lines = usize::from(header.treelets) * object.profile.treelet_bytes() / 64;
+        Ok(Self {
+            page: number,
+            offset: at,
+            object: index,
+            profile: object.profile.name(),
+            checksum: hex(header.checksum.get()),
+            leaf_checksum: hex(header.leaf_checksum.get()),
+            id_checksum: hex(header.id_checksum.get()),
+            leaf_line: header.leaf_line.get(),
+            leaf_lines: header.leaf_lines.get(),
+            id_word: header.id_word.get(),
+            id_words: header.id_words.get(),
+            first_packet: header.first_packet.get(),
+            packets: header.packets.get(),
+            treelet_line: header.treelet_line,
+            lines: usize::from(header.treelet_line) + treelet_lines,
+            anchors: (0..header.roots).map(anchor).collect(),
+            remotes: (0..header.remotes).map(remote).collect(),
+            treelets: (0..header.treelets)
+                .map(|slot| SlotDump { slot, children: children(&page, slot) })
+                .collect(),
+        })
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut text = format!(
+            "page {} at byte {}, object {}, {}, checksum {}\n",
+            self.page, self.offset, self.object, self.profile, self.checksum
+        );
+        text += &format!(
+            "  {} of 64 lines in use: {} anchors, {} remote links, {} treelets from line {}\n",
+            self.lines,
+            self.anchors.len(),
+            self.remotes.len(),
+            self.treelets.len(),
+            self.treelet_line
+        );
+        text += &format!(
+            "  {} packets from {}; leaf lines {} from {}; id words {} from {}\n",
+            self.packets, self.first_packet, self.leaf_lines, self.leaf_line, self.id_words, self.id_word
+        );
+        for anchor in &self.anchors {
+            let parent = match (anchor.parent_page, anchor.parent_link) {
+                (Some(page), Some(link)) => format!("page {page} link {link}"),
+                _ => "none".to_owned(),
+            };
+            text += &format!("  root {} parent {parent}: {}\n", anchor.slot, slabs_text(&anchor.slabs));
+        }
+        for RootDump { link, page, root } in &self.remotes {
+            text += &format!("  link {link} to page {page} root {root}\n");
+        }
+        for treelet in &self.treelets {
+            let children: Vec<_> = treelet.children.iter().map(ChildDump::to_text).collect();
+            text += &format!("  slot {}: {}\n", treelet.slot, children.join(", "));
+        }
+        text
+    }
+}
+
+/// What `dump FILE --treelet N --json` prints.
+#[derive(Serialize)]
+pub(super) struct TreeletDump {
+    treelet: u64,
+    object: usize,
+    profile: &'static str,
+    page: u32,
+    slot: u8,
+    offset: u64,
+    /// The treelet's own slabs, decoded from its anchor down.
+    slabs: Vec<[f32; 2]>,
+    children: Vec<ChildDump>,
+}
+
+impl TreeletDump {
+    /// The treelet of this number in the file, `None` beyond the last.
+    pub(super) fn find(bvh: &Bvh, number: u64) -> Result<Option<Self>, FormatError> {
+        let mut before = 0;
+        for (index, object) in bvh.objects().iter().enumerate() {
+            let first = object.record.first_page.get();
+            for page_number in first..first + object.record.pages.get() {
+                let page = checked(bvh, object, page_number)?;
+                let treelets = u64::from(page.header().treelets);
+                if number < before + treelets {
+                    let slot = (number - before) as u8;
+                    return Ok(Some(Self::new(bvh, index, object, &page, number, slot)));
+                }
+                before += treelets;
+            }
+        }
+        Ok(None)
+    }
+
+    fn new(bvh: &Bvh, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
+        let header = page.header();
+        let slabs = object.profile.directions().slabs();
+        let own = decoded_slots(object, page)[usize::from(slot)];
+        let mut children = children(page, slot);
+        for (child, dump) in children.iter_mut().enumerate() {
+            let node = decode_child(object.profile, object.f16_scale, page.treelet(slot), child, &own);
+            dump.slabs = slabs_of(&node.to_kdop(slabs), slabs);
+        }
+        let page_number = header.page_number.get();
+        let within =
+            usize::from(header.treelet_line) * 64 + usize::from(slot) * object.profile.treelet_bytes();
+        Self {
+            treelet: number,
+            object: index,
+            profile: object.profile.name(),
+            page: page_number,
+            slot,
+            offset: bvh.layout().page_offset(page_number) + within as u64,
+            slabs: slabs_of(&own.to_kdop(slabs), slabs),
+            children,
+        }
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut text = format!(
+            "treelet {}: page {}, slot {}, at byte {}, object {}, {}\n  own    {}\n",
+            self.treelet,
+            self.page,
+            self.slot,
+            self.offset,
+            self.object,
+            self.profile,
+            slabs_text(&self.slabs)
+        );
+        for (number, child) in self.children.iter().enumerate() {
+            text +=
+                &format!("  child {number}: {}\n         {}\n", child.to_text(), slabs_text(&child.slabs));
+        }
+        text
+    }
+}
+
+/// The decoded slabs of every slot of a page.
+fn decoded_slots(object: &Object, page: &Page) -> Vec<NodeSlabs> {
+    let header = page.header();
+    let mut decoded = vec![NodeSlabs::default(); usize::from(header.treelets)];
+    for root in 0..header.roots {
+        decoded[usize::from(root)] = page.anchor_slabs(root);
+    }
+    for slot in 0..header.treelets {
+        let treelet = page.treelet(slot);
+        let links = Links::read(treelet);
+        for child in 0..links.children() {
+            if let Child::Treelet(inner) = links.child(child) {
+                let parent = decoded[usize::from(slot)];
+                decoded[usize::from(inner)] =
+                    decode_child(object.profile, object.f16_scale, treelet, child, &parent);
+            }
+        }
+    }
+    decoded
+}

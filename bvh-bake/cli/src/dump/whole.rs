@@ -1,0 +1,270 @@
+//! A whole file: header, sections, objects and the statistics of their trees.
+
+use super::statistics::{Level, Statistics};
+use crate::output::hex;
+use bvh_format::FormatError;
+use bvh_format::header::SectionKind;
+use bvh_format::object::Object;
+use bvh_query::Bvh;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What `dump FILE --json` prints.
+#[derive(Serialize)]
+pub(super) struct FileDump {
+    file: String,
+    format_version: String,
+    file_bytes: u64,
+    content_xxh3: String,
+    sections: Vec<SectionDump>,
+    /// The lines of the provenance section.
+    provenance: BTreeMap<String, String>,
+    objects: Vec<ObjectDump>,
+    /// Bytes a stored triangle.
+    bytes_per_tri: Split,
+}
+
+#[derive(Serialize)]
+struct SectionDump {
+    kind: &'static str,
+    required: bool,
+    content: bool,
+    offset: u64,
+    bytes: u64,
+    xxh3: String,
+}
+
+/// Where the bytes go, a triangle.
+#[derive(Serialize)]
+struct Split {
+    total: f64,
+    nodes: f64,
+    leaves: f64,
+    ids: f64,
+    other: f64,
+}
+
+#[derive(Serialize)]
+struct ObjectDump {
+    number: usize,
+    name: String,
+    profile: &'static str,
+    triangle_encoding: &'static str,
+    origin: [f64; 3],
+    box_lo: [f32; 3],
+    box_hi: [f32; 3],
+    sphere_centre: [f32; 3],
+    sphere_radius: f32,
+    input_triangles: u64,
+    triangles: u64,
+    degenerate: u64,
+    duplicates: u64,
+    max_vertex_rounding: f64,
+    max_quantization_error: f64,
+    treelets: u64,
+    packets: u64,
+    first_page: u32,
+    pages: u32,
+    /// Treelets on the longest way from the root to a leaf packet.
+    depth: usize,
+    mean_children: f64,
+    mean_triangles_per_packet: f64,
+    /// Mean part of a page's lines that is in use.
+    page_fill: f64,
+    mean_roots_per_page: f64,
+    width_inflation: f64,
+    levels: Vec<LevelDump>,
+}
+
+#[derive(Serialize)]
+struct LevelDump {
+    level: usize,
+    treelets: u64,
+    mean_children: f64,
+    packets: u64,
+    mean_triangles_per_packet: f64,
+    /// Of the treelets' children.
+    width_inflation: f64,
+}
+
+impl FileDump {
+    pub(super) fn new(file: String, bvh: &Bvh) -> Result<Self, FormatError> {
+        let layout = bvh.layout();
+        let objects: Result<Vec<_>, _> = bvh
+            .objects()
+            .iter()
+            .enumerate()
+            .map(|(number, object)| ObjectDump::new(bvh, number, object))
+            .collect();
+        let bytes = |kinds: &[SectionKind]| -> u64 {
+            let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
+            sections.map(|section| section.range.len() as u64).sum()
+        };
+        let total = bvh.bytes().len() as u64;
+        let (nodes, leaves) = (bytes(&[SectionKind::Nodes]), bytes(&[SectionKind::Leaves]));
+        let ids = bytes(&[SectionKind::Ids, SectionKind::Duplicates]);
+        let each = |bytes: u64| bytes as f64 / bvh.all().triangles() as f64;
+        Ok(Self {
+            file,
+            format_version: format!("{}.{}", layout.version.0, layout.version.1),
+            file_bytes: total,
+            content_xxh3: hex(layout.content_checksum),
+            sections: layout
+                .sections
+                .iter()
+                .map(|section| SectionDump {
+                    kind: section.kind.name(),
+                    required: section.kind.required(),
+                    content: section.kind.is_content(),
+                    offset: section.range.start as u64,
+                    bytes: section.range.len() as u64,
+                    xxh3: hex(section.checksum),
+                })
+                .collect(),
+            provenance: provenance(bvh),
+            objects: objects?,
+            bytes_per_tri: Split {
+                total: each(total),
+                nodes: each(nodes),
+                leaves: each(leaves),
+                ids: each(ids),
+                other: each(total.saturating_sub(nodes + leaves + ids)),
+            },
+        })
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut text = format!("{}\n", self.file);
+        text += &format!("  format   {}\n  bytes    {}\n", self.format_version, self.file_bytes);
+        text += &format!("  content  {}\n", self.content_xxh3);
+        for (key, value) in &self.provenance {
+            text += &format!("  {key:<10} {value}\n");
+        }
+        text += "\nsections\n      offset        bytes  xxh3              kind\n";
+        for section in &self.sections {
+            let SectionDump { kind, offset, bytes, xxh3, .. } = section;
+            text += &format!("{offset:>12} {bytes:>12}  {xxh3}  {kind}\n");
+        }
+        let Split { total, nodes, leaves, ids, other } = self.bytes_per_tri;
+        text += &format!(
+            "\nbytes a triangle {total:.2}: nodes {nodes:.2}, leaves {leaves:.2}, ids {ids:.2}, other {other:.2}\n"
+        );
+        self.objects.iter().for_each(|object| text += &object.to_text());
+        text
+    }
+}
+
+/// The provenance lines; what is not of that form is left out.
+fn provenance(bvh: &Bvh) -> BTreeMap<String, String> {
+    let section = bvh.layout().sections.iter().find(|section| section.kind == SectionKind::Provenance);
+    let bytes = section.and_then(|section| bvh.bytes().get(section.range.clone())).unwrap_or(&[]);
+    let text = String::from_utf8_lossy(bytes);
+    let lines = text.lines().filter_map(|line| line.split_once('='));
+    // Control characters would do things to a terminal.
+    let plain = |text: &str| text.chars().filter(|c| !c.is_control()).collect();
+    lines.map(|(key, value)| (plain(key), plain(value))).collect()
+}
+
+impl ObjectDump {
+    fn new(bvh: &Bvh, number: usize, object: &Object) -> Result<Self, FormatError> {
+        let statistics = Statistics::gather(bvh, object)?;
+        let record = &object.record;
+        let whole = statistics.levels.iter().fold(Level::default(), |sum, level| sum.joined(level));
+        let pages = f64::from(record.pages.get());
+        Ok(Self {
+            number,
+            name: object.name.clone(),
+            profile: object.profile.name(),
+            triangle_encoding: object.triangle_encoding.name(),
+            origin: record.origin.map(|value| value.get()),
+            box_lo: record.box_lo.map(|value| value.get()),
+            box_hi: record.box_hi.map(|value| value.get()),
+            sphere_centre: record.sphere_centre.map(|value| value.get()),
+            sphere_radius: record.sphere_radius.get(),
+            input_triangles: record.input_triangles.get(),
+            triangles: record.triangles.get(),
+            degenerate: record.degenerate.get(),
+            duplicates: record.duplicates.get(),
+            max_vertex_rounding: record.max_vertex_rounding.get(),
+            max_quantization_error: record.max_quantization_error.get(),
+            treelets: record.treelets.get(),
+            packets: record.packets.get(),
+            first_page: record.first_page.get(),
+            pages: record.pages.get(),
+            depth: statistics.levels.len(),
+            mean_children: whole.mean_children(),
+            mean_triangles_per_packet: whole.mean_triangles(),
+            page_fill: statistics.lines as f64 / (pages * 64.0),
+            mean_roots_per_page: statistics.roots as f64 / pages,
+            width_inflation: whole.mean_width(),
+            levels: statistics
+                .levels
+                .iter()
+                .enumerate()
+                .map(|(number, level)| LevelDump {
+                    level: number,
+                    treelets: level.treelets,
+                    mean_children: level.mean_children(),
+                    packets: level.packets,
+                    mean_triangles_per_packet: level.mean_triangles(),
+                    width_inflation: level.mean_width(),
+                })
+                .collect(),
+        })
+    }
+
+    fn to_text(&self) -> String {
+        let shown: String = self.name.chars().take(60).collect();
+        let mut text = format!("\nobject {} {shown:?}\n", self.number);
+        let mut line = |label: &str, value: String| text += &format!("  {label:<10} {value}\n");
+        line("layout", format!("{}, triangles {}", self.profile, self.triangle_encoding));
+        line(
+            "triangles",
+            format!(
+                "{} stored of {}, {} of zero area, {} exact duplicates left out",
+                self.triangles, self.input_triangles, self.degenerate, self.duplicates
+            ),
+        );
+        line("origin", format!("{:?}", self.origin));
+        line("box", format!("{:?} to {:?}", self.box_lo, self.box_hi));
+        line("sphere", format!("{:?}, radius {:?}", self.sphere_centre, self.sphere_radius));
+        let (rounded, quantized) = (self.max_vertex_rounding, self.max_quantization_error);
+        line("moved", format!("by rounding at most {rounded:e}, by quantisation at most {quantized:e}"));
+        line(
+            "pages",
+            format!(
+                "{} from {}, {:.1} % full, {:.2} roots each",
+                self.pages,
+                self.first_page,
+                100.0 * self.page_fill,
+                self.mean_roots_per_page
+            ),
+        );
+        line(
+            "tree",
+            format!(
+                "{} treelets, {} levels, {:.3} children each; {} packets of {:.3} triangles; slabs {:.4} times as wide \
+                 as tight ones",
+                self.treelets,
+                self.depth,
+                self.mean_children,
+                self.packets,
+                self.mean_triangles_per_packet,
+                self.width_inflation
+            ),
+        );
+        text += "  level  treelets  children   packets  triangles/packet  width inflation\n";
+        for level in &self.levels {
+            text += &format!(
+                "  {:>5} {:>9} {:>9.3} {:>9} {:>17.3} {:>16.4}\n",
+                level.level,
+                level.treelets,
+                level.mean_children,
+                level.packets,
+                level.mean_triangles_per_packet,
+                level.width_inflation
+            );
+        }
+        text
+    }
+}

@@ -1,0 +1,227 @@
+//! bake, validate, verify and dump on small meshes.
+
+mod common;
+
+use common::{cbvh_in, cube, names, torus};
+use std::fs;
+
+const PROFILES: [&str; 11] = [
+    "auto",
+    "dop14-u8",
+    "dop6-u8",
+    "dop6-f16",
+    "dop14-f16",
+    "dop14-u4",
+    "dop26-u4",
+    "dop26-u8",
+    "dop14-f16-wide",
+    "dop26-u8-wide",
+    "dop14-f32",
+];
+
+#[test]
+fn every_profile_and_encoding_verifies() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("torus.obj"), torus(40, 20)).unwrap();
+    for profile in PROFILES {
+        for triangles in ["auto", "f32", "packed", "quantized"] {
+            let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--profile", profile, "--triangles", triangles];
+            cbvh_in(directory, &[&bake[..], &["--force"]].concat()).done();
+            assert!(cbvh_in(directory, &["validate", "t.cbvh"]).done().out.starts_with("t.cbvh: valid"));
+            let verified = cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done().out;
+            assert!(verified.contains("1600 triangles of torus.obj"), "{verified}");
+            assert!(cbvh_in(directory, &["dump", "t.cbvh"]).done().out.contains("level"));
+            for what in [&["--page", "0"][..], &["--treelet", "0"], &["--treelet", "7", "--json"]] {
+                cbvh_in(directory, &[&["dump", "t.cbvh"][..], what].concat()).done();
+            }
+            cbvh_in(directory, &[&bake[..], &["--force", "--no-ids", "-q"]].concat()).done();
+            cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done();
+        }
+    }
+}
+
+#[test]
+fn the_report_has_the_fields_of_the_contract() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let twice = cube() + "f 1 3 4 2\n";
+    fs::write(directory.join("cube.obj"), twice).unwrap();
+    let baked = cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json", "-q"]).done().json();
+    let size = fs::metadata(directory.join("c.cbvh")).unwrap().len();
+    assert_eq!(baked["input"], "cube.obj");
+    assert_eq!(baked["output"], "c.cbvh");
+    assert_eq!(baked["format_version"], "1.0");
+    assert_eq!((&baked["triangles_in"], &baked["triangles"]), (&14.into(), &12.into()));
+    assert_eq!((&baked["duplicates"], &baked["degenerate"]), (&2.into(), &0.into()));
+    assert_eq!((&baked["vertices"], &baked["objects"]), (&8.into(), &1.into()));
+    assert_eq!(baked["file_bytes"], size);
+    assert_eq!(baked["bytes_per_tri"], size as f64 / 12.0);
+    assert_eq!((&baked["skipped"], &baked["max_vertex_rounding"]), (&false.into(), &0.0.into()));
+    assert_eq!(baked["content_xxh3"].as_str().map(str::len), Some(16));
+    for field in
+        ["node_bytes", "triangle_bytes", "id_bytes", "seconds", "width_inflation", "volume_inflation"]
+    {
+        assert!(baked[field].as_f64().is_some_and(|value| value > 0.0), "{field}: {baked}");
+    }
+    for field in ["profile", "triangle_encoding", "reason"] {
+        assert!(baked[field].is_string(), "{field}: {baked}");
+    }
+    assert!(baked["max_quantization_error"].is_number());
+    assert!(
+        !cfg!(target_os = "linux") || baked["peak_rss_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20)
+    );
+
+    let again = cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json"]).done().json();
+    assert_eq!(again["skipped"], true);
+    for (field, value) in baked.as_object().unwrap() {
+        let told = ["skipped", "reason", "seconds", "peak_rss_bytes"].contains(&field.as_str());
+        let unknown = again[field].is_null();
+        assert!(told || unknown || again[field] == *value, "{field}: {again}");
+    }
+    assert!(cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh"]).done().out.contains("up to date"));
+    assert_eq!(cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "-q"]).done().out, "");
+    assert_eq!(names(directory), ["c.cbvh", "cube.obj"]);
+}
+
+#[test]
+fn a_bake_is_skipped_only_if_nothing_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let input = directory.join("t.obj");
+    fs::write(&input, torus(12, 9)).unwrap();
+    let skipped = |more: &[&str]| {
+        let bake = cbvh_in(directory, &[&["bake", "t.obj", "-o", "t.cbvh", "--json"][..], more].concat());
+        bake.done().json()["skipped"] == true
+    };
+    assert!(!skipped(&[]));
+    assert!(skipped(&[]));
+    assert!(skipped(&["--jobs", "1"]));
+    assert!(!skipped(&["--force"]));
+    for options in [
+        &["--no-ids"][..],
+        &["--profile", "dop6-u8"],
+        &["--triangles", "packed"],
+        &["--triangles", "quantized"],
+        &["--triangles", "quantized", "--max-error", "0.001"],
+        &["--split-objects"],
+        &[],
+    ] {
+        assert!(!skipped(options), "{options:?}");
+        assert!(skipped(options), "{options:?}");
+    }
+    fs::write(&input, torus(12, 9) + "# changed\n").unwrap();
+    assert!(!skipped(&[]));
+    assert!(skipped(&[]));
+    let mut damaged = fs::read(directory.join("t.cbvh")).unwrap();
+    damaged[9000] ^= 1;
+    fs::write(directory.join("t.cbvh"), &damaged).unwrap();
+    assert!(!skipped(&[]));
+    fs::write(directory.join("t.cbvh"), "not a bake").unwrap();
+    assert!(!skipped(&[]));
+    assert_eq!(names(directory), ["t.cbvh", "t.obj"]);
+}
+
+#[test]
+fn content_depends_on_neither_threads_nor_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("a.obj"), torus(90, 60)).unwrap();
+    fs::write(directory.join("b.obj"), torus(90, 60)).unwrap();
+    let content = |input: &str, jobs: &str| {
+        let bake = ["bake", input, "-o", "o.cbvh", "--force", "--json", "--jobs", jobs];
+        cbvh_in(directory, &bake).done().json()["content_xxh3"].clone()
+    };
+    let one = content("a.obj", "1");
+    assert_eq!(one, content("a.obj", "2"));
+    assert_eq!(one, content("a.obj", "5"));
+    assert_eq!(one, content("b.obj", "2"));
+}
+
+#[test]
+fn several_inputs_are_baked_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("torus.obj"), torus(10, 8)).unwrap();
+    let bake = ["bake", "cube.obj", "torus.obj", "-o", "both.cbvh", "--json"];
+    let one = cbvh_in(directory, &bake).done().json();
+    assert_eq!((&one["objects"], &one["triangles"]), (&1.into(), &172.into()));
+    cbvh_in(directory, &["verify", "both.cbvh", "cube.obj", "torus.obj"]).done();
+    cbvh_in(directory, &["verify", "both.cbvh", "torus.obj", "cube.obj"])
+        .failed(3, &["both.cbvh", "triangle"]);
+    let split = cbvh_in(directory, &[&bake[..], &["--split-objects"]].concat()).done().json();
+    assert_eq!((&split["objects"], &split["triangles_in"]), (&2.into(), &172.into()));
+    let verified =
+        cbvh_in(directory, &["verify", "both.cbvh", "cube.obj", "torus.obj", "--json"]).done().json();
+    assert_eq!((&verified["valid"], &verified["objects"]), (&true.into(), &2.into()));
+    let dump = cbvh_in(directory, &["dump", "both.cbvh", "--json"]).done().json();
+    let names: Vec<_> =
+        dump["objects"].as_array().unwrap().iter().map(|object| object["name"].clone()).collect();
+    assert_eq!(names, ["cube", "torus"]);
+}
+
+#[test]
+fn a_dump_adds_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("torus.obj"), torus(60, 30)).unwrap();
+    let baked = cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh", "--json"]).done().json();
+    let dump = cbvh_in(directory, &["dump", "t.cbvh", "--json"]).done().json();
+    assert_eq!(dump["content_xxh3"], baked["content_xxh3"]);
+    assert_eq!(dump["provenance"]["input"], "torus.obj");
+    let object = &dump["objects"][0];
+    let levels = object["levels"].as_array().unwrap();
+    let sum = |field: &str| levels.iter().map(|level| level[field].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(sum("treelets"), object["treelets"]);
+    assert_eq!(sum("packets"), object["packets"]);
+    assert_eq!(levels.len() as u64, object["depth"]);
+    let close = |a: &serde_json::Value, b: &serde_json::Value| {
+        (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9
+    };
+    assert!(close(&object["width_inflation"], &baked["width_inflation"]), "{object}");
+    assert!(close(&object["mean_children"], &baked["mean_children"]));
+    let split = &dump["bytes_per_tri"];
+    let parts: f64 =
+        ["nodes", "leaves", "ids", "other"].iter().map(|part| split[part].as_f64().unwrap()).sum();
+    assert!((parts - split["total"].as_f64().unwrap()).abs() < 1e-9);
+    let treelets = object["treelets"].as_u64().unwrap();
+    let last =
+        cbvh_in(directory, &["dump", "t.cbvh", "--json", "--treelet", &(treelets - 1).to_string()]).done();
+    assert_eq!(last.json()["treelet"], treelets - 1);
+    cbvh_in(directory, &["dump", "t.cbvh", "--treelet", &treelets.to_string()]).failed(1, &["below"]);
+    cbvh_in(directory, &["dump", "t.cbvh", "--page", "100000"]).failed(1, &["below"]);
+}
+
+#[test]
+fn damage_is_told_by_rule() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("torus.obj"), torus(60, 30)).unwrap();
+    cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh"]).done();
+    let whole = fs::read(directory.join("t.cbvh")).unwrap();
+    let file = directory.join("bad.cbvh");
+    for at in [0, 8, 40, 4200, 9000, whole.len() / 2] {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x10;
+        fs::write(&file, &bytes).unwrap();
+        let told =
+            cbvh_in(directory, &["validate", "bad.cbvh", "--json"]).failed(3, &["bad.cbvh: byte ", ": R"]);
+        let json = told.json();
+        assert_eq!((&json["file"], &json["valid"]), (&"bad.cbvh".into(), &false.into()));
+        assert!(json["rule"].is_u64() && json["offset"].is_u64(), "{json}");
+        assert!(json["expected"].is_string() && json["found"].is_string(), "{json}");
+        let told =
+            cbvh_in(directory, &["verify", "bad.cbvh", "torus.obj", "--json"]).failed(3, &["bad.cbvh"]);
+        assert_eq!(told.json()["valid"], false);
+    }
+    for length in [0, 7, 100, 4096, whole.len() - 1] {
+        fs::write(&file, &whole[..length]).unwrap();
+        cbvh_in(directory, &["validate", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
+        cbvh_in(directory, &["dump", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
+    }
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    let told = cbvh_in(directory, &["verify", "t.cbvh", "cube.obj", "--json"]);
+    let json = told.failed(3, &["t.cbvh: triangles of the input: expected 12, found 3600"]).json();
+    assert_eq!((&json["expected"], &json["found"]), (&"12".into(), &"3600".into()));
+}

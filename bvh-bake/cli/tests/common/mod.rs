@@ -1,0 +1,164 @@
+//! Runs the command and makes small meshes.
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// How a run of the command ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    pub(crate) code: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+/// No command on these small files takes longer.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Runs the command in a directory.
+pub(crate) fn cbvh_in(directory: &Path, arguments: &[&str]) -> Ended {
+    run(Command::new(env!("CARGO_BIN_EXE_cbvh"))
+        .args(arguments)
+        .current_dir(directory)
+        .env_remove("CBVH_ISA"))
+}
+
+/// Runs the command with a forced backend.
+pub(crate) fn cbvh_with_isa(directory: &Path, isa: &str, arguments: &[&str]) -> Ended {
+    run(Command::new(env!("CARGO_BIN_EXE_cbvh")).args(arguments).current_dir(directory).env("CBVH_ISA", isa))
+}
+
+fn run(command: &mut Command) -> Ended {
+    // Into files: a full pipe would stop the command.
+    let directory = tempfile::tempdir().unwrap();
+    let paths = ["out", "err"].map(|name| directory.path().join(name));
+    let [out, err] = paths.each_ref().map(|path| std::fs::File::create(path).unwrap());
+    let mut child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn().unwrap();
+    let start = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if start.elapsed() > PATIENCE {
+            child.kill().unwrap();
+            panic!("{command:?} hangs");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let [out, err] = paths.map(|path| std::fs::read_to_string(path).unwrap());
+    Ended { code: status.code().unwrap_or(-1), out, err }
+}
+
+impl Ended {
+    /// The command succeeded and said nothing on standard error.
+    #[track_caller]
+    pub(crate) fn done(self) -> Self {
+        assert_eq!((self.code, self.err.as_str()), (0, ""), "{self:?}");
+        self
+    }
+
+    /// The command failed with this code and one line that has all these words.
+    #[track_caller]
+    pub(crate) fn failed(self, code: i32, words: &[&str]) -> Self {
+        assert_eq!(self.code, code, "{self:?}");
+        assert_eq!(self.err.lines().count(), 1, "{self:?}");
+        assert!(self.err.starts_with("cbvh: ") && self.err.ends_with('\n'), "{self:?}");
+        assert!(words.iter().all(|word| self.err.contains(word)), "{words:?} in {self:?}");
+        self
+    }
+
+    /// Standard output as JSON objects, one a line.
+    #[track_caller]
+    pub(crate) fn json_lines(&self) -> Vec<Value> {
+        self.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    /// Standard output as one JSON object.
+    #[track_caller]
+    pub(crate) fn json(&self) -> Value {
+        let lines = self.json_lines();
+        assert_eq!(lines.len(), 1, "{}", self.out);
+        lines.into_iter().next().unwrap()
+    }
+}
+
+/// Names of all files in a directory, sorted.
+pub(crate) fn names(directory: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(directory).unwrap();
+    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// The cube of side 2 around the origin.
+pub(crate) fn cube() -> String {
+    let mut text = String::from("o cube\n");
+    for corner in 0..8 {
+        let at = |bit: u32| if corner >> bit & 1 == 1 { 1 } else { -1 };
+        text += &format!("v {} {} {}\n", at(0), at(1), at(2));
+    }
+    text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+}
+
+/// A torus around z of 2 * n * m triangles: radii 2 and 0.5, with dents.
+pub(crate) fn torus(n: usize, m: usize) -> String {
+    let mut text = String::from("o torus\n");
+    for i in 0..n {
+        for j in 0..m {
+            let (u, v) = ([i, j].map(|k| k as f64 * std::f64::consts::TAU)).into();
+            let (u, v): (f64, f64) = (u / n as f64, v / m as f64);
+            let tube = 0.5 + 0.05 * (7.0 * u + 3.0 * v).sin();
+            let ring = 2.0 + tube * v.cos();
+            text += &format!("v {:?} {:?} {:?}\n", ring * u.cos(), ring * u.sin(), tube * v.sin());
+        }
+    }
+    for i in 0..n {
+        for j in 0..m {
+            let at = |i: usize, j: usize| i % n * m + j % m + 1;
+            text += &format!("f {} {} {}\n", at(i, j), at(i + 1, j), at(i + 1, j + 1));
+            text += &format!("f {} {} {}\n", at(i, j), at(i + 1, j + 1), at(i, j + 1));
+        }
+    }
+    text
+}
+
+/// Poses that turn about z by 0.1 rad a line and move along x.
+pub(crate) fn poses(count: usize, from: f64, to: f64) -> String {
+    let mut text = String::from("# x y z turned\n\n");
+    for i in 0..count {
+        let (sin, cos) = (0.1 * i as f64).sin_cos();
+        let x = from + (to - from) * i as f64 / count as f64;
+        text += &format!("{cos:?} {:?} 0 {x:?} {sin:?} {cos:?} 0 0.25 0 0 1 -0.125 # {i}\n", -sin);
+    }
+    text
+}
+
+/// A folder of test material beside the repository, if it is there.
+pub(crate) fn shared(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
+    folder.is_dir().then_some(folder)
+}
+
+/// Tells that a test has been left out.
+#[allow(clippy::print_stderr, reason = "a test that does nothing must say so")]
+pub(crate) fn skip(why: &str) {
+    eprintln!("skipped: {why}");
+}
+
+/// Backends that this CPU has.
+pub(crate) fn backends(directory: &Path) -> Vec<&'static str> {
+    std::fs::write(directory.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let there = |isa: &&str| {
+        let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
+        let asked = cbvh_in(directory, &["query", "one.obj", "one.obj", "--isa", isa, "--pose", pose]);
+        if asked.code != 0 {
+            asked.failed(1, &["this CPU lacks", isa]);
+            skip(&format!("this CPU lacks {isa}"));
+            return false;
+        }
+        true
+    };
+    ["scalar", "avx2", "avx512"].into_iter().filter(there).collect()
+}

@@ -1,0 +1,183 @@
+//! What goes wrong ends with the right code, one line, and nothing left behind.
+
+mod common;
+
+use common::{cbvh_in, cbvh_with_isa, cube, names};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+fn with_cube() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cube.obj"), cube()).unwrap();
+    folder
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let here = Path::new(".");
+    assert!(cbvh_in(here, &["--version"]).done().out.starts_with("cbvh "));
+    let help = cbvh_in(here, &["--help"]).done().out;
+    for command in ["bake", "dump", "validate", "verify", "query"] {
+        assert!(help.contains(command));
+        assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
+    }
+}
+
+#[test]
+fn wrong_usage_is_1() {
+    let folder = with_cube();
+    let directory = folder.path();
+    let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
+    fs::write(directory.join("p.txt"), format!("{pose}\n")).unwrap();
+    let cases: &[&[&str]] = &[
+        &[],
+        &["frobnicate"],
+        &["bake"],
+        &["bake", "cube.obj"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--profile", "dop18"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--triangles", "f64"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--max-error", "1"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--triangles", "packed", "--max-error", "1"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--triangles", "quantized", "--max-error", "-1"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--triangles", "quantized", "--max-error", "nan"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--max-memory", "lots"],
+        &["bake", "cube.obj", "-o", "o.cbvh", "--jobs", "0"],
+        &["bake", "cube.obj", "-o", "cube.obj"],
+        &["bake", "cube.obj", "-o", "./cube.obj", "--force"],
+        &["dump", "cube.cbvh", "--page", "x"],
+        &["query", "cube.obj", "cube.obj"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--pose", pose],
+        &["query", "cube.obj", "cube.obj", "--pose", "1 2 3"],
+        &["query", "cube.obj", "cube.obj", "--pose", "2 0 0 0 0 1 0 0 0 0 1 0"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "touch"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "within"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--within", "1"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "within", "--within", "-1"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "collide", "--rel-err", "0.1"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--isa", "neon"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--object", "sphere"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--witness", "w.obj"],
+        &["query", "cube.obj", "cube.obj", "--pose", pose, "--witness", "w.obj"],
+        &["query", "cube.obj", "cube.obj", "p.txt,p.txt", "--out", "raw.txt"],
+        &["query", "cube.obj", "cube.obj", ","],
+    ];
+    for case in cases {
+        let ended = cbvh_in(directory, case).failed(1, &[]);
+        assert_eq!(ended.out, "", "{case:?}");
+    }
+    cbvh_with_isa(directory, "mmx", &["query", "cube.obj", "cube.obj", "p.txt"]).failed(1, &["mmx"]);
+    assert_eq!(names(directory), ["cube.obj", "p.txt"]);
+    assert_eq!(fs::read_to_string(directory.join("cube.obj")).unwrap(), cube());
+}
+
+#[test]
+fn what_the_system_refuses_is_2() {
+    let folder = with_cube();
+    let directory = folder.path();
+    fs::create_dir(directory.join("folder")).unwrap();
+    let io = |arguments: &[&str], name: &str| {
+        cbvh_in(directory, arguments).failed(2, &[name]);
+    };
+    io(&["bake", "missing.obj", "-o", "o.cbvh"], "missing.obj");
+    io(&["bake", "folder", "-o", "o.cbvh"], "folder");
+    io(&["bake", "cube.obj", "-o", "missing/o.cbvh"], "missing/o.cbvh");
+    io(&["bake", "cube.obj", "-o", "folder"], "folder");
+    io(&["bake", "cube.obj", "-o", "cube.obj/o.cbvh"], "cube.obj/o.cbvh");
+    for command in ["dump", "validate"] {
+        io(&[command, "missing.cbvh"], "missing.cbvh");
+        io(&[command, "folder"], "folder");
+    }
+    io(&["verify", "missing.cbvh", "cube.obj"], "missing.cbvh");
+    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh"]).done();
+    io(&["verify", "cube.cbvh", "missing.obj"], "missing.obj");
+    io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "p.txt");
+    fs::write(directory.join("p.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "missing.cbvh");
+    io(&["query", "cube.cbvh", "missing.obj", "p.txt"], "missing.obj");
+    io(&["query", "cube.cbvh", "cube.cbvh", "p.txt", "--out", "missing/raw.txt"], "missing/raw.txt");
+    assert_eq!(names(directory), ["cube.cbvh", "cube.obj", "folder", "p.txt"]);
+    assert!(names(&directory.join("folder")).is_empty());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn devices_are_no_outputs() {
+    let folder = with_cube();
+    cbvh_in(folder.path(), &["bake", "cube.obj", "-o", "/dev/null"])
+        .failed(2, &["/dev/null", "special file"]);
+    assert!(!Path::new("/dev/null").is_file());
+}
+
+#[test]
+fn invalid_input_is_3() {
+    let folder = with_cube();
+    let directory = folder.path();
+    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
+    write("empty.stl", "");
+    write("mesh.xyz", "what is this\n");
+    cbvh_in(directory, &["bake", "bad.obj", "-o", "o.cbvh"])
+        .failed(3, &["bad.obj: line 3: expected", "found 3"]);
+    cbvh_in(directory, &["bake", "cube.obj", "bad.obj", "-o", "o.cbvh"]).failed(3, &["bad.obj: line 3"]);
+    cbvh_in(directory, &["bake", "empty.stl", "-o", "o.cbvh"]).failed(3, &["empty.stl"]);
+    cbvh_in(directory, &["bake", "mesh.xyz", "-o", "o.cbvh"]).failed(3, &["mesh.xyz", ".xyz"]);
+    cbvh_in(directory, &["validate", "cube.obj"]).failed(3, &["cube.obj: byte 0: R01"]);
+    cbvh_in(directory, &["query", "bad.obj", "cube.obj", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"])
+        .failed(3, &["bad.obj: line 3"]);
+    let good = "1 0 0 0 0 1 0 0 0 0 1 0";
+    for (text, line, word) in [
+        (format!("{good}\n1 2 3\n"), 2, "found 3"),
+        (format!("# ok\n\n{good} 13 14\n1 0 0 0 0 1 0 0 0 0 1 # 0\n"), 4, "found 11"),
+        ("1 0 0 0 0 1 0 0 0 0 1.1 0\n".to_owned(), 1, "rigid"),
+        ("1 0 0 0 0 1 0 0 0 0 -1 0\n".to_owned(), 1, "reflection"),
+        ("1 0 0 nan 0 1 0 0 0 0 1 0\n".to_owned(), 1, "finite"),
+        ("1 0 0 zero 0 1 0 0 0 0 1 0\n".to_owned(), 1, "zero"),
+    ] {
+        write("p.txt", &text);
+        let place = format!("p.txt: line {line}: expected");
+        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"]).failed(3, &[&place, word]);
+    }
+    assert_eq!(names(directory), ["bad.obj", "cube.obj", "empty.stl", "mesh.xyz", "p.txt"]);
+}
+
+#[test]
+fn limits_are_4() {
+    let folder = with_cube();
+    let directory = folder.path();
+    let bake = ["bake", "cube.obj", "-o", "o.cbvh", "--max-memory"];
+    for size in ["1", "10kB", "8MiB"] {
+        cbvh_in(directory, &[&bake[..], &[size]].concat()).failed(4, &["cube.obj", "memory"]);
+    }
+    assert_eq!(names(directory), ["cube.obj"]);
+    cbvh_in(directory, &[&bake[..], &["512MiB"]].concat()).done();
+}
+
+#[test]
+fn an_old_output_survives_a_failure() {
+    let folder = with_cube();
+    let directory = folder.path();
+    cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).done();
+    let before = fs::read(directory.join("o.cbvh")).unwrap();
+    fs::write(directory.join("cube.obj"), "v 0 0 0\nf 1 1 2\n").unwrap();
+    cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).failed(3, &["cube.obj: line 2"]);
+    assert_eq!(fs::read(directory.join("o.cbvh")).unwrap(), before);
+    assert_eq!(names(directory), ["cube.obj", "o.cbvh"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let folder = with_cube();
+    cbvh_in(folder.path(), &["bake", "cube.obj", "-o", "o.cbvh"]).done();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_cbvh"))
+        .args(["dump", "o.cbvh"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
+}

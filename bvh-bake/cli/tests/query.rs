@@ -1,0 +1,238 @@
+//! query on small meshes: the protocol, and the same answers however they are found.
+
+mod common;
+
+use common::{backends, cbvh_in, cbvh_with_isa, cube, names, poses, torus};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn world() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
+    fs::write(directory.join("near.txt"), poses(60, 0.0, 6.0)).unwrap();
+    fs::write(directory.join("far.x.txt"), poses(7, 9.0, 12.0)).unwrap();
+    for mesh in ["cube", "torus"] {
+        let (input, output) = (format!("{mesh}.obj"), format!("{mesh}.cbvh"));
+        cbvh_in(directory, &["bake", &input, "-o", &output, "-q"]).done();
+    }
+    folder
+}
+
+fn ask(directory: &Path, more: &[&str]) -> Vec<Value> {
+    let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt,far.x.txt"];
+    cbvh_in(directory, &[&query[..], more].concat()).done().json_lines()
+}
+
+#[test]
+fn lines_have_the_fields_of_the_contract() {
+    let folder = world();
+    let lines = ask(folder.path(), &["--mode", "distance"]);
+    assert_eq!(lines.len(), 2);
+    let [near, far] = &lines[..] else { panic!("{lines:?}") };
+    assert_eq!((&near["poses"], &far["poses"]), (&"near".into(), &"far.x".into()));
+    assert_eq!((&near["peer"], &near["mode"]), (&"cbvh".into(), &"distance".into()));
+    assert_eq!((&near["tris_a"], &near["tris_b"]), (&2304.into(), &12.into()));
+    assert_eq!((&near["queries"], &near["requested"], &far["queries"]), (&60.into(), &60.into(), &7.into()));
+    assert_eq!(far["positives"], 0);
+    for field in [
+        "build_a_s",
+        "build_b_s",
+        "total_s",
+        "query_sum_s",
+        "ns_median",
+        "ns_mean",
+        "ns_p10",
+        "ns_p90",
+        "ns_max",
+        "positives",
+        "sum",
+        "node_tests",
+        "triangle_tests",
+        "file_bytes_per_tri",
+    ] {
+        assert!(near[field].as_f64().is_some_and(|value| value >= 0.0), "{field}: {near}");
+    }
+    assert!(["version", "isa", "profile"].iter().all(|field| near[field].is_string()));
+    assert_eq!(near["answers_xxh3"].as_str().map(str::len), Some(16));
+    assert!(near["ns_p10"].as_u64() <= near["ns_median"].as_u64());
+    assert!(near["ns_median"].as_u64() <= near["ns_p90"].as_u64());
+    assert!(near["ns_p90"].as_u64() <= near["ns_max"].as_u64());
+}
+
+#[test]
+fn raw_lines_are_values_and_nanoseconds() {
+    let folder = world();
+    let directory = folder.path();
+    let mut sums = Vec::new();
+    for (mode, more) in
+        [("collide", &[][..]), ("contacts", &[]), ("distance", &[]), ("within", &["--within", "0.5"])]
+    {
+        let lines = ask(directory, &[&["--mode", mode, "--out", "raw_%s.txt"], more].concat());
+        let raw = fs::read_to_string(directory.join("raw_near.txt")).unwrap();
+        let values: Vec<f64> = raw
+            .lines()
+            .map(|line| {
+                let (value, nanoseconds) = line.split_once(' ').unwrap();
+                nanoseconds.parse::<u64>().unwrap();
+                assert!(mode == "distance" || value.parse::<u64>().is_ok(), "{line}");
+                value.parse().unwrap()
+            })
+            .collect();
+        assert_eq!(values.len(), 60);
+        assert!(
+            ["collide", "within"].iter().all(|m| *m != mode) || values.iter().all(|v| *v == 0.0 || *v == 1.0)
+        );
+        assert!(values.iter().any(|v| *v > 0.0) && values.contains(&0.0), "{mode}: {values:?}");
+        assert!((values.iter().sum::<f64>() - lines[0]["sum"].as_f64().unwrap()).abs() < 1e-9);
+        sums.push((values, lines[0]["positives"].as_u64().unwrap()));
+    }
+    let [(collide, hits), (contacts, with), (distance, touching), (within, _)] = &sums[..] else { panic!() };
+    assert_eq!((hits, hits), (with, touching));
+    for i in 0..60 {
+        assert_eq!(collide[i] > 0.0, contacts[i] > 0.0);
+        assert_eq!(collide[i] > 0.0, distance[i] == 0.0);
+        assert_eq!(within[i] > 0.0, distance[i] <= 0.5);
+    }
+    assert!(names(directory).contains(&"raw_far.x.txt".to_owned()));
+}
+
+#[test]
+fn answers_do_not_depend_on_how_they_are_found() {
+    let folder = world();
+    let directory = folder.path();
+    let backends = backends(directory);
+    for mode in ["collide", "contacts", "distance", "within"] {
+        let within: &[&str] = if mode == "within" { &["--within", "0.25"] } else { &[] };
+        let hashes = |more: &[&str]| -> Vec<Value> {
+            let lines = ask(directory, &[&["--mode", mode], within, more].concat());
+            lines.iter().map(|line| line["answers_xxh3"].clone()).collect()
+        };
+        let expected = hashes(&[]);
+        assert!(expected.iter().all(Value::is_string));
+        assert_eq!(hashes(&["--jobs", "2"]), expected);
+        assert_eq!(hashes(&["--jobs", "7", "--warm", "0"]), expected);
+        for isa in &backends {
+            assert_eq!(hashes(&["--isa", isa]), expected, "{isa}");
+            let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt", "--mode", mode];
+            let forced = cbvh_with_isa(directory, isa, &[&query[..], within].concat()).done().json();
+            assert_eq!((&forced["isa"], &forced["answers_xxh3"]), (&(*isa).into(), &expected[0]));
+        }
+        // Meshes baked in memory, with any profile that does not move vertices.
+        for profile in ["auto", "dop6-u8", "dop26-u4"] {
+            let query = ["query", "torus.obj", "cube.obj", "near.txt", "--mode", mode, "--profile", profile];
+            let baked = cbvh_in(directory, &[&query[..], within].concat()).done().json();
+            assert_eq!(baked["answers_xxh3"], expected[0], "{profile}");
+        }
+    }
+}
+
+#[test]
+fn limits_and_budgets_cut_runs_short() {
+    let folder = world();
+    let directory = folder.path();
+    let limited = ask(directory, &["--limit", "5"]);
+    assert_eq!((&limited[0]["queries"], &limited[0]["requested"]), (&5.into(), &5.into()));
+    assert!(limited[0]["answers_xxh3"].is_string());
+    for jobs in ["1", "2"] {
+        let cut = ask(directory, &["--budget", "0", "--out", "cut_%s.txt", "--jobs", jobs]);
+        assert_eq!(cut[0]["requested"], 60);
+        let answered = cut[0]["queries"].as_u64().unwrap();
+        assert!((1..60).contains(&answered) && cut[0]["answers_xxh3"].is_null(), "{cut:?}");
+        let raw = fs::read_to_string(directory.join("cut_near.txt")).unwrap();
+        assert_eq!(raw.lines().count() as u64, answered);
+    }
+    fs::write(directory.join("none.txt"), "# no pose\n\n").unwrap();
+    let none =
+        cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "none.txt", "--jobs", "3"]).done().json();
+    assert_eq!((&none["queries"], &none["ns_median"]), (&0.into(), &0.into()));
+    let exact = ask(directory, &["--mode", "distance"])[1]["sum"].as_f64().unwrap();
+    let rough = &ask(directory, &["--mode", "distance", "--rel-err", "0.5", "--abs-err", "0.1"])[1];
+    let sum = rough["sum"].as_f64().unwrap();
+    assert!(rough["answers_xxh3"].is_null() && sum >= exact && sum <= 1.5 * exact + 0.7, "{exact} {rough}");
+}
+
+#[test]
+fn an_object_can_be_named() {
+    let folder = world();
+    let directory = folder.path();
+    // Numbers of the second object's vertices follow the first one's.
+    let shifted: String = torus(48, 24)
+        .lines()
+        .map(|line| match line.strip_prefix("f ") {
+            Some(face) => {
+                let numbers = face.split(' ').map(|n| (n.parse::<usize>().unwrap() + 8).to_string());
+                format!("f {}\n", numbers.collect::<Vec<_>>().join(" "))
+            }
+            None => format!("{line}\n"),
+        })
+        .collect();
+    fs::write(directory.join("both.obj"), cube() + &shifted).unwrap();
+    cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
+    let ask = |a: &str, more: &[&str]| {
+        let query = ["query", a, "cube.cbvh", "near.txt", "--mode", "contacts"];
+        cbvh_in(directory, &[&query[..], more].concat()).done().json()
+    };
+    let torus = ask("torus.cbvh", &[]);
+    for file in ["both.cbvh", "both.obj"] {
+        let named = ask(file, &["--object", "torus"]);
+        assert_eq!(named["answers_xxh3"], torus["answers_xxh3"], "{file}");
+        assert_eq!(named["tris_a"], 2304);
+        assert_eq!(ask(file, &[])["tris_a"], 2316);
+    }
+    assert_eq!(ask("both.cbvh", &["--object", "cube"])["tris_a"], 12);
+}
+
+#[test]
+fn one_pose_is_answered_for_a_person() {
+    let folder = world();
+    let directory = folder.path();
+    let ask = |pose: &str, more: &[&str]| {
+        let query = ["query", "cube.cbvh", "cube.obj", "--pose", pose];
+        cbvh_in(directory, &[&query[..], more].concat()).done().out
+    };
+    let apart = "1 0 0 5  0 1 0 0  0 0 1 0";
+    let touching = "1,0,0,2,0,1,0,0,0,0,1,0";
+    assert_eq!(ask(apart, &[]), "the meshes do not touch\n");
+    assert_eq!(ask(touching, &[]), "the meshes touch\n");
+    assert!(ask(touching, &["--mode", "contacts"]).contains("pairs of triangles in contact"));
+    assert!(ask(apart, &["--mode", "within", "--within", "3"]).contains("at most 3"));
+    assert!(ask(apart, &["--mode", "within", "--within", "2.9"]).contains("more than 2.9"));
+    assert!(ask(touching, &["--mode", "distance"]).starts_with("distance 0.0 (the meshes touch)"));
+    let text = ask(apart, &["--mode", "distance", "--witness", "w.obj"]);
+    assert!(
+        text.starts_with("distance 3.0\n") && text.contains("on A 1.0") && text.contains("on B 4.0"),
+        "{text}"
+    );
+    let witness = fs::read_to_string(directory.join("w.obj")).unwrap();
+    let vertices: Vec<Vec<f64>> = witness
+        .lines()
+        .filter_map(|line| line.strip_prefix("v "))
+        .map(|line| line.split(' ').map(|number| number.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(vertices.len(), 8);
+    // Which of the triangles at that distance is not said here; each has a corner on the near face.
+    let near = |range: std::ops::Range<usize>, x: f64| vertices[range].iter().any(|vertex| vertex[0] == x);
+    assert!(near(0..3, 1.0) && near(3..6, 4.0), "{witness}");
+    assert_eq!((vertices[6][0], vertices[7][0]), (1.0, 4.0));
+    assert_eq!(vertices[6][1..], vertices[7][1..]);
+    assert!(
+        witness.contains("\nf 1 2 3\n") && witness.contains("\nf 4 5 6\n") && witness.ends_with("l 7 8\n")
+    );
+}
+
+#[test]
+fn a_damaged_file_is_named() {
+    let folder = world();
+    let directory = folder.path();
+    let mut bytes = fs::read(directory.join("torus.cbvh")).unwrap();
+    let page = 2 * 4096 + 100;
+    bytes[page] ^= 1;
+    fs::write(directory.join("bad.cbvh"), &bytes).unwrap();
+    for jobs in ["1", "2"] {
+        let query = ["query", "cube.cbvh", "bad.cbvh", "near.txt", "--jobs", jobs];
+        cbvh_in(directory, &query).failed(3, &["bad.cbvh: byte ", "R15"]);
+    }
+}

@@ -1,0 +1,38 @@
+//! Baking from a build script.
+
+use crate::error::BakeError;
+use crate::files::{FileOptions, bake_files};
+use crate::options::Options;
+use std::path::{Path, PathBuf};
+
+/// Bakes a mesh file into the directory of a build script's outputs, with default options, and tells
+/// Cargo to run the script again when the mesh changes. Returns the path of the baked file.
+///
+/// In `build.rs`:
+///
+/// ```no_run
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     bvh_bake::build_rs::bake("assets/rock.obj", "rock.cbvh")?;
+///     Ok(())
+/// }
+/// ```
+///
+/// and in the program `include_bytes!(concat!(env!("OUT_DIR"), "/rock.cbvh"))`. Of a glTF file only
+/// the file itself is watched, not the buffers that it names.
+///
+/// # Errors
+/// [`BakeError::NoOutDir`] outside a build script; else as [`bake_files`].
+pub fn bake(input: impl AsRef<Path>, output_name: impl AsRef<Path>) -> Result<PathBuf, BakeError> {
+    let input = input.as_ref();
+    tell_cargo(&format!("rerun-if-changed={}", input.display()));
+    let directory = std::env::var_os("OUT_DIR").ok_or(BakeError::NoOutDir)?;
+    let output = Path::new(&directory).join(output_name);
+    let options = Options::default();
+    bake_files(&[input.to_owned()], &output, &options, &FileOptions::default(), &mut |_| ())?;
+    Ok(output)
+}
+
+#[allow(clippy::print_stdout, reason = "a build script speaks to Cargo by printing lines")]
+fn tell_cargo(line: &str) {
+    println!("cargo:{line}");
+}

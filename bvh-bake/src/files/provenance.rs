@@ -1,0 +1,79 @@
+//! The provenance text of a file: where its mesh came from, and whether a bake would give it again.
+
+use super::summary::FileSummary;
+use crate::options::Options;
+use bvh_format::Layout;
+use bvh_format::checksum::checksum;
+use bvh_format::header::{MAJOR, MINOR, SectionKind};
+use std::path::{Path, PathBuf};
+
+/// Raised whenever a bake of the same mesh with the same options gives other bytes, so that files of
+/// an earlier revision do not count as up to date.
+const REVISION: u32 = 1;
+
+/// The lines `key=value` of the provenance section.
+pub(super) struct Provenance {
+    /// Names of the input files, for people.
+    input: String,
+    /// What a bake's result depends on, as lines.
+    stamp: Vec<(&'static str, String)>,
+}
+
+impl Provenance {
+    pub(super) fn new(inputs: &[PathBuf], options: &Options) -> Self {
+        // Directories say more of the machine than of the mesh.
+        let name = |path: &PathBuf| path.file_name().map(|name| plain(&name.to_string_lossy()));
+        let names: Vec<String> = inputs.iter().filter_map(name).collect();
+        let generator = format!("cbvh {}, revision {REVISION}", env!("CARGO_PKG_VERSION"));
+        let stamp = vec![("generator", generator), ("options", options.stamp())];
+        Self { input: names.join(", "), stamp }
+    }
+
+    /// Notes the checksums of the inputs' bytes, and of the meshes of those whose bytes do not tell all.
+    pub(super) fn checksums(&mut self, files: &[u64], meshes: &[u64]) {
+        self.stamp.push(("input_xxh3", format!("{:016x}", joined(files))));
+        if !meshes.is_empty() {
+            self.stamp.push(("mesh_xxh3", format!("{:016x}", joined(meshes))));
+        }
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut text = format!("input={}\n", self.input);
+        self.stamp.iter().for_each(|(key, value)| text.push_str(&format!("{key}={value}\n")));
+        text
+    }
+
+    /// True if a provenance text has all lines of the stamp and no other checksum.
+    fn matches(&self, text: &str) -> bool {
+        let found = |key: &str| {
+            text.lines().filter_map(|line| line.split_once('=')).find(|(k, _)| *k == key).map(|(_, v)| v)
+        };
+        self.stamp.iter().all(|(key, value)| found(key) == Some(value))
+            && (found("mesh_xxh3").is_none() || self.stamp.iter().any(|(key, _)| *key == "mesh_xxh3"))
+    }
+}
+
+/// One input's checksum is its own; of several, that of their checksums in order.
+fn joined(checksums: &[u64]) -> u64 {
+    match checksums {
+        [one] => *one,
+        several => checksum(&several.iter().flat_map(|sum| sum.to_le_bytes()).collect::<Vec<_>>()),
+    }
+}
+
+/// Text without control characters: a line stays a line.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
+}
+
+/// What an existing output says of itself, if a bake with this provenance would give the same content.
+pub(super) fn up_to_date(output: &Path, provenance: &Provenance) -> Option<FileSummary> {
+    let bytes = std::fs::read(output).ok()?;
+    let layout = Layout::read(&bytes).ok()?;
+    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance)?;
+    let text = std::str::from_utf8(&bytes[section.range.clone()]).ok()?;
+    let same = layout.version == (MAJOR, MINOR) && provenance.matches(text);
+    // A damaged file is baked again. The bytes are in memory, so this costs little.
+    let whole = || layout.sections.iter().all(|s| checksum(&bytes[s.range.clone()]) == s.checksum);
+    (same && whole()).then(|| FileSummary::new(&layout, bytes.len() as u64))
+}

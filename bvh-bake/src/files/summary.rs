@@ -1,0 +1,75 @@
+//! What a file says of itself, as a bake's report would say it.
+
+use bvh_format::Layout;
+use bvh_format::header::SectionKind;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+
+/// Counts and sizes of an existing file: the part of a [`crate::BakeReport`] that is stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileSummary {
+    /// Major and minor version of the format.
+    pub version: (u16, u16),
+    /// Profile of the first object.
+    pub profile: Profile,
+    /// Triangle encoding of the first object.
+    pub triangle_encoding: TriangleEncoding,
+    /// Triangles of the input.
+    pub triangles_in: u64,
+    /// Triangles stored.
+    pub triangles: u64,
+    /// Zero-area triangles among those stored.
+    pub degenerate: u64,
+    /// Exact duplicates left out.
+    pub duplicates: u64,
+    /// Objects in the file.
+    pub objects: u64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Bytes of the pages of treelets.
+    pub node_bytes: u64,
+    /// Bytes of the leaf blocks.
+    pub triangle_bytes: u64,
+    /// Bytes of the id blocks and duplicate pairs.
+    pub id_bytes: u64,
+    /// Largest move of a vertex by rounding to f32, mesh units.
+    pub max_vertex_rounding: f64,
+    /// Largest move of a vertex by quantisation, mesh units.
+    pub max_quantization_error: f64,
+    /// The content checksum.
+    pub content_xxh3: u64,
+}
+
+impl FileSummary {
+    /// Gathers the numbers from the header and the object table.
+    pub fn new(layout: &Layout, file_bytes: u64) -> Self {
+        let records = || layout.objects.iter().map(|object| &object.record);
+        let bytes = |kinds: &[SectionKind]| {
+            let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
+            sections.map(|section| section.range.len() as u64).sum()
+        };
+        let first = layout.objects.first();
+        Self {
+            version: layout.version,
+            profile: first.map_or(Profile::Dop14U8, |object| object.profile),
+            triangle_encoding: first.map_or(TriangleEncoding::F32, |object| object.triangle_encoding),
+            triangles_in: records().map(|record| record.input_triangles.get()).max().unwrap_or(0),
+            triangles: records().map(|record| record.triangles.get()).fold(0, u64::saturating_add),
+            degenerate: records().map(|record| record.degenerate.get()).fold(0, u64::saturating_add),
+            duplicates: records().map(|record| record.duplicates.get()).fold(0, u64::saturating_add),
+            objects: layout.objects.len() as u64,
+            file_bytes,
+            node_bytes: bytes(&[SectionKind::Nodes]),
+            triangle_bytes: bytes(&[SectionKind::Leaves]),
+            id_bytes: bytes(&[SectionKind::Ids, SectionKind::Duplicates]),
+            max_vertex_rounding: records().map(|r| r.max_vertex_rounding.get()).fold(0.0, f64::max),
+            max_quantization_error: records().map(|r| r.max_quantization_error.get()).fold(0.0, f64::max),
+            content_xxh3: layout.content_checksum,
+        }
+    }
+
+    /// Bytes of the whole file a stored triangle.
+    pub fn bytes_per_tri(&self) -> f64 {
+        self.file_bytes as f64 / self.triangles as f64
+    }
+}

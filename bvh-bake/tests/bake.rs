@@ -1,0 +1,382 @@
+//! What a bake promises: bounds that hold and are proved, the same bytes always, and how far vertices move.
+
+use bvh_bake::io;
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{BakeReport, Options, prove_bounds, to_bytes, to_bytes_with};
+use bvh_format::checksum::checksum;
+use bvh_format::ids::decode_id;
+use bvh_format::leaf::{TriangleEncoding, decode_packet};
+use bvh_format::page::{PAGE, Page};
+use bvh_format::profile::{Encoding, Profile};
+use bvh_format::treelet::Links;
+use bvh_format::validate::{packets, validate};
+use bvh_format::{Layout, Rule};
+use std::path::Path;
+
+type Triangle = [[f64; 3]; 3];
+
+fn mesh(triangles: &[Triangle]) -> Mesh {
+    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh::from_triangles(triangles.iter().flatten().copied().collect(), indices)
+}
+
+/// Numbers from -1 to 1.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Small triangles anywhere, their coordinates `f32` numbers.
+fn soup(count: usize, seed: u64) -> Vec<Triangle> {
+    let mut random = random(seed);
+    let mut point = |scale: f64| [(); 3].map(|()| f64::from((random() * scale) as f32));
+    let mut triangle = || {
+        let (centre, corners) = (point(1.0), [(); 3].map(|()| point(0.1)));
+        corners.map(|corner| [0, 1, 2].map(|k| f64::from((centre[k] + corner[k]) as f32)))
+    };
+    (0..count).map(|_| triangle()).collect()
+}
+
+/// The file's triangles with their ids (without ids, in the order of the leaves), by the reference decoder.
+fn stored(bytes: &[u8]) -> Vec<(u32, Triangle)> {
+    let layout = Layout::read(bytes).unwrap();
+    let mut triangles = Vec::new();
+    for object in &layout.objects {
+        let origin = object.record.origin.map(|o| o.get());
+        let first = object.record.first_page.get();
+        for page in first..first + object.record.pages.get() {
+            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile);
+            let (block, ids) =
+                (layout.leaf_block(bytes, page.header()), layout.id_block(bytes, page.header()));
+            for (packet, count) in packets(&page) {
+                let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                for lane in 0..count {
+                    let corner = |v: [f32; 3]| [0, 1, 2].map(|k| origin[k] + f64::from(v[k]));
+                    let id = decode_id(ids, usize::from(packet), lane);
+                    triangles.push((id, values.triangle(lane).map(corner)));
+                }
+            }
+        }
+    }
+    triangles.sort_by_key(|&(id, _)| id);
+    triangles
+}
+
+fn options(profile: Profile, encoding: TriangleEncoding) -> Options {
+    Options { profile: Some(profile), triangles: Some(encoding), ..Options::default() }
+}
+
+/// Bakes in every profile and encoding; `to_bytes` proves each. Returns the reports with their options.
+fn bake_all(mesh: &Mesh) -> Vec<(Options, Vec<u8>, BakeReport)> {
+    let all = Profile::ALL.into_iter().flat_map(|profile| TriangleEncoding::ALL.map(|e| options(profile, e)));
+    all.map(|options| {
+        let (bytes, report) = to_bytes(mesh, &options).unwrap_or_else(|e| panic!("{}: {e}", options.stamp()));
+        let layout = validate(&bytes).unwrap();
+        let inflation = prove_bounds(&layout, &bytes).unwrap();
+        assert_eq!(inflation.mean_width(), report.width_inflation);
+        assert!(report.width_inflation >= 1.0 && report.volume_inflation >= 1.0, "{report:?}");
+        assert_eq!(report.file_bytes, bytes.len() as u64);
+        assert_eq!(report.triangles + report.duplicates, mesh.triangle_count());
+        (options, bytes, report)
+    })
+    .collect()
+}
+
+#[test]
+fn packed_is_f32_bit_for_bit() {
+    let [tenth, tiny, large, least] = [0.1f32, 1e-30, 1e30, -1e-45].map(f64::from);
+    let odd = vec![[[tenth; 3], [tiny, 0.0, large], [least; 3]]];
+    for triangles in [soup(700, 1), soup(3, 2), odd] {
+        for bakes in bake_all(&mesh(&triangles)).chunks(3) {
+            let [plain, packed, _] = bakes else { unreachable!() };
+            let expected: Vec<_> = (0..).zip(triangles.iter().copied()).collect();
+            assert_eq!(stored(&plain.1), expected, "{}", plain.0.stamp());
+            assert_eq!(stored(&packed.1), expected, "{}", packed.0.stamp());
+        }
+    }
+}
+
+#[test]
+fn few_equal_collinear_and_point_triangles() {
+    for count in 1..=9 {
+        bake_all(&mesh(&soup(count, count as u64)));
+    }
+    let one = soup(1, 3)[0];
+    for (_, bytes, report) in bake_all(&mesh(&vec![one; 500])) {
+        assert_eq!((report.triangles, report.duplicates), (1, 499));
+        assert_eq!(stored(&bytes), [(0, stored(&bytes)[0].1)]);
+    }
+    // Corners at 2^0 to 2^100 on a line: every triangle is a segment, and the last spans almost all.
+    let row: Vec<Triangle> =
+        (0..100).map(|i| [0, 1, 1].map(|step| [2f64.powi(i + step), 0.0, 2f64.powi(i + step)])).collect();
+    for (_, _, report) in bake_all(&mesh(&row)) {
+        assert_eq!(report.degenerate, report.triangles);
+    }
+    let points: Vec<Triangle> = soup(300, 4).into_iter().map(|[a, _, _]| [a; 3]).collect();
+    for (_, _, report) in bake_all(&mesh(&points)) {
+        assert_eq!(report.degenerate, report.triangles);
+    }
+    let same: Vec<Triangle> = vec![[[2f64.powi(120); 3]; 3], [[-(2f64.powi(120)); 3]; 3]];
+    bake_all(&mesh(&same));
+}
+
+#[test]
+fn meshes_of_every_scale() {
+    for exponent in [-149, -140, -126, -100, -60, 60, 100, 119] {
+        let scale = 2f64.powi(exponent);
+        let scaled = soup(60, 5).into_iter().map(|t| t.map(|p| p.map(|x| f64::from((x * scale) as f32))));
+        bake_all(&mesh(&scaled.collect::<Vec<_>>()));
+    }
+}
+
+#[test]
+fn the_bytes_depend_on_mesh_and_options_alone() {
+    for encoding in TriangleEncoding::ALL {
+        for profile in [Profile::Dop14U8, Profile::Dop6U8, Profile::Dop26U4] {
+            let (mesh, options) = (mesh(&soup(20_000, 6)), options(profile, encoding));
+            let bake = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| to_bytes(&mesh, &options).unwrap().0)
+            };
+            let first = bake(1);
+            for threads in [1, 2, 4] {
+                assert!(bake(threads) == first, "{} on {threads} threads", options.stamp());
+            }
+        }
+    }
+}
+
+#[test]
+fn provenance_is_no_part_of_the_content() {
+    let mesh = mesh(&soup(50, 7));
+    let (plain, report) = to_bytes(&mesh, &Options::default()).unwrap();
+    let text = "generator=a test\ninput=nowhere\n";
+    let mut stages = Vec::new();
+    let (told, told_report) =
+        to_bytes_with(&mesh, &Options::default(), text, &mut |stage| stages.push(stage)).unwrap();
+    assert_eq!(report.content_xxh3, told_report.content_xxh3);
+    assert_eq!(validate(&plain).unwrap().content_checksum, validate(&told).unwrap().content_checksum);
+    assert!(plain.len() < told.len() && stages.len() == 4, "{stages:?}");
+}
+
+/// The other side of "every bake is proved": a slab drawn in by one step is found out.
+#[test]
+fn a_tightened_slab_fails_the_proof() {
+    for profile in Profile::ALL {
+        let (bytes, _) = to_bytes(&mesh(&soup(200, 8)), &options(profile, TriangleEncoding::F32)).unwrap();
+        let layout = validate(&bytes).unwrap();
+        let at = layout.page_offset(0) as usize;
+        let line = usize::from(bytes[at + 61]);
+        let mut refused = 0;
+        let places = places_of_codes(profile);
+        for &place in &places {
+            let mut changed = bytes.clone();
+            let code = &mut changed[at + 64 * line + place..];
+            match profile.encoding() {
+                // Lower end in the low nibble, upper end in the high one: each one step inward.
+                Encoding::U4 if code[0] & 15 == 15 => continue,
+                Encoding::U4 => code[0] += 1,
+                Encoding::U8 if code[0] == 255 => continue,
+                Encoding::U8 => code[0] += 1,
+                // To the next exponent: inward by at least the residual itself.
+                Encoding::F16 => code[1] += 4,
+                Encoding::F32 => {
+                    let end = f32::from_le_bytes([code[0], code[1], code[2], code[3]]);
+                    let inward = if place < 128 { end.next_up() } else { end.next_down() };
+                    code[..4].copy_from_slice(&inward.to_le_bytes());
+                }
+            }
+            repair_page(&mut changed[at..at + PAGE]);
+            let error = prove_bounds(&Layout::read(&changed).unwrap(), &changed).err();
+            refused += usize::from(error.is_some());
+            assert!(error.is_none_or(|error| error.rule == Rule::BoundContains));
+        }
+        // Codes are the tightest that hold, but f16 steps may be below the rounding of f32 and the upper
+        // end of a u4 code is not touched.
+        assert!(refused * 10 >= places.len() * 9, "{}: {refused} of {}", profile.name(), places.len());
+    }
+}
+
+/// Offsets in the first treelet of the codes of child 0 in slabs 0 to 2.
+fn places_of_codes(profile: Profile) -> Vec<usize> {
+    // The table of places in the specification: row stride, hi.
+    let (row, hi) = match profile {
+        Profile::Dop14U8 => (4, 32),
+        Profile::Dop6U8 => (4, 16),
+        Profile::Dop6F16 => (8, 32),
+        Profile::Dop14F16 => (4, 32),
+        Profile::Dop14U4 | Profile::Dop26U4 => (4, 0),
+        Profile::Dop26U8 => (2, 32),
+        Profile::Dop14F16Wide => (8, 64),
+        Profile::Dop26U8Wide => (4, 64),
+        Profile::Dop14F32 => (16, 128),
+    };
+    let ends: &[usize] = if hi == 0 { &[0] } else { &[0, hi] };
+    ends.iter().flat_map(|end| (0..3).map(move |slab| end + row * slab)).collect()
+}
+
+fn repair_page(page: &mut [u8]) {
+    let sum = checksum(&page[8..]);
+    page[..8].copy_from_slice(&sum.to_le_bytes());
+}
+
+/// The slabs of roots are proved too.
+#[test]
+fn a_tightened_anchor_fails_the_proof() {
+    for profile in Profile::ALL {
+        let (mut bytes, _) =
+            to_bytes(&mesh(&soup(200, 9)), &options(profile, TriangleEncoding::Packed)).unwrap();
+        let at = validate(&bytes).unwrap().page_offset(0) as usize;
+        let lo = f32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + 64 + i]));
+        bytes[at + 64..at + 68].copy_from_slice(&lo.next_up().to_le_bytes());
+        repair_page(&mut bytes[at..at + PAGE]);
+        let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes).unwrap_err();
+        assert_eq!(error.rule, Rule::BoundContains, "{}", profile.name());
+    }
+}
+
+#[test]
+fn quantized_vertices_move_by_at_most_the_stated_error() {
+    let triangles = soup(500, 10);
+    for max_error in [None, Some(1e-2), Some(1e-4), Some(1e-9), Some(0.7)] {
+        let options = Options { max_error, ..options(Profile::Dop14U8, TriangleEncoding::Quantized) };
+        let (bytes, report) = to_bytes(&mesh(&triangles), &options).unwrap();
+        let diagonal = 2.2 * 3f64.sqrt();
+        let allowed = max_error.unwrap_or(1e-5 * diagonal);
+        assert!(report.max_quantization_error <= allowed, "{} > {allowed}", report.max_quantization_error);
+        let record = &validate(&bytes).unwrap().objects[0].record.clone();
+        assert_eq!(record.max_quantization_error.get(), report.max_quantization_error);
+        let mut moved = 0.0f64;
+        for (id, stored) in stored(&bytes) {
+            for (input, stored) in triangles[id as usize].iter().zip(stored) {
+                moved = moved.max((0..3).map(|k| (input[k] - stored[k]).powi(2)).sum::<f64>().sqrt());
+            }
+        }
+        // Of triangles that become equal one is stored; its corners moved no farther.
+        assert!(moved <= report.max_quantization_error * (1.0 + 1e-14), "{moved} > {report:?}");
+        if report.duplicates == 0 {
+            assert!(moved >= report.max_quantization_error * (1.0 - 1e-14), "{moved} < {report:?}");
+        }
+        let packed = to_bytes(&mesh(&triangles), &self::options(Profile::Dop14U8, TriangleEncoding::Packed));
+        if max_error.is_none_or(|error| error > 1e-6) {
+            assert!(report.triangle_bytes < packed.unwrap().1.triangle_bytes, "{max_error:?}");
+        }
+    }
+}
+
+#[test]
+fn numbers_beyond_f32_get_an_origin_and_the_rounding_is_measured() {
+    for offset in [1e5, 1e7, -3e9, 1e15, 0.1, 1e300f64.powf(0.1)] {
+        let far: Vec<Triangle> = soup(200, 11)
+            .into_iter()
+            .map(|t| t.map(|p| [p[0] + offset, p[1] - 2.0 * offset, p[2]]))
+            .collect();
+        for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
+            let (bytes, report) = to_bytes(&mesh(&far), &options(Profile::Dop14U8, encoding)).unwrap();
+            let mut moved = 0.0f64;
+            for (id, stored) in stored(&bytes) {
+                for (input, stored) in far[id as usize].iter().zip(stored) {
+                    let distance = (0..3).map(|k| (input[k] - stored[k]).powi(2)).sum::<f64>().sqrt();
+                    moved = moved.max(distance);
+                }
+            }
+            assert!(moved <= report.max_vertex_rounding * (1.0 + 1e-14), "{offset}: {moved}, {report:?}");
+            assert!(moved >= report.max_vertex_rounding * (1.0 - 1e-14) || report.duplicates > 0, "{offset}");
+            let ulp = 2.0 * offset.abs() * f64::EPSILON;
+            assert!(report.max_vertex_rounding <= 1e-6 + 4.0 * ulp, "{offset}: {report:?}");
+            // The third axis is of f32 numbers: its origin is 0.
+            assert_eq!(validate(&bytes).unwrap().objects[0].record.origin[2].get(), 0.0);
+        }
+    }
+    let exact = to_bytes(&mesh(&soup(100, 12)), &Options::default()).unwrap();
+    assert_eq!(exact.1.max_vertex_rounding, 0.0);
+    assert_eq!(validate(&exact.0).unwrap().objects[0].record.origin.map(|o| o.get()), [0.0; 3]);
+}
+
+#[test]
+fn duplicates_are_found_in_any_order_of_corners() {
+    let mut triangles = soup(100, 13);
+    let mut expected = Vec::new();
+    for (kept, order) in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]].iter().enumerate()
+    {
+        expected.push([kept as u32, triangles.len() as u32]);
+        triangles.push(order.map(|corner| triangles[kept][corner]));
+    }
+    // Once more the first: the pairs of a kept triangle ascend.
+    expected.insert(1, [0, triangles.len() as u32]);
+    triangles.push(triangles[0]);
+    // Equal corners but another triangle: two corners fall together.
+    triangles.push([triangles[0][0], triangles[0][0], triangles[0][1]]);
+    triangles.push([triangles[0][0], triangles[0][1], triangles[0][1]]);
+    for ids in [true, false] {
+        let (bytes, report) = to_bytes(&mesh(&triangles), &Options { ids, ..Options::default() }).unwrap();
+        assert_eq!((report.duplicates, report.triangles), (7, 102));
+        let layout = validate(&bytes).unwrap();
+        let pairs: Vec<_> = layout.duplicate_ids(&bytes).iter().map(|pair| pair.map(|id| id.get())).collect();
+        assert_eq!(pairs, if ids { expected.clone() } else { vec![] });
+        assert_eq!((layout.has_ids(), report.id_bytes > 0), (ids, ids));
+        let record = &layout.objects[0].record;
+        assert_eq!(
+            (record.triangles.get(), record.input_triangles.get(), record.duplicates.get()),
+            (102, 109, 7)
+        );
+        let kept: Vec<u32> = stored(&bytes).iter().map(|&(id, _)| id).collect();
+        if ids {
+            let dropped: Vec<u32> = expected.iter().map(|pair| pair[1]).collect();
+            assert_eq!(kept, (0..109).filter(|id| !dropped.contains(id)).collect::<Vec<_>>());
+        }
+    }
+}
+
+#[test]
+fn objects_are_merged_unless_split_and_keep_names_and_ids() {
+    let mut input = mesh(&soup(40, 14));
+    for (number, name) in ["second", "", "empty"].into_iter().enumerate() {
+        let mut object = mesh(&soup(30 * (2 - number), 15)).objects.remove(0);
+        let first = input.triangle_count() as u32;
+        object.triangle_ids.iter_mut().for_each(|id| *id += first);
+        object.name = name.to_owned();
+        input.objects.push(object);
+    }
+    let (one, _) = to_bytes(&input, &Options::default()).unwrap();
+    let (split, report) = to_bytes(&input, &Options { split_objects: true, ..Options::default() }).unwrap();
+    let names = |bytes: &[u8]| -> Vec<_> {
+        let names = validate(bytes).unwrap().objects.into_iter();
+        names.map(|object| (object.name, object.record.triangles.get())).collect()
+    };
+    // 30 triangles of the third are the first of the second, but of another object.
+    assert_eq!(names(&one), [(String::new(), 100)]);
+    let expected = [("", 40), ("second", 60), ("", 30)].map(|(name, count)| (name.to_owned(), count));
+    assert_eq!((names(&split), report.objects), (expected.to_vec(), 3));
+    assert_eq!(stored(&split).iter().map(|&(id, _)| id).collect::<Vec<_>>(), (0..130).collect::<Vec<_>>());
+    let empty = Mesh { objects: vec![input.objects[3].clone()] };
+    assert!(to_bytes(&empty, &Options::default()).is_err());
+}
+
+#[test]
+fn every_page_holds_leaves_of_at_most_four_and_children_of_at_most_its_width() {
+    for (options, bytes, report) in bake_all(&mesh(&soup(3000, 16))) {
+        let layout = Layout::read(&bytes).unwrap();
+        let (profile, pages) = (layout.objects[0].profile, layout.page_count());
+        assert_eq!((Some(profile), report.profile), (options.profile, profile));
+        let mut children = 0;
+        for number in 0..pages {
+            let page = Page::new(layout.page_bytes(&bytes, number).unwrap(), profile);
+            let slots = 0..page.header().treelets;
+            children += slots.map(|slot| Links::read(page.treelet(slot)).children()).sum::<usize>();
+        }
+        let treelets = layout.objects[0].record.treelets.get();
+        assert_eq!(report.mean_children, children as f64 / treelets as f64);
+    }
+}
+
+#[test]
+fn the_meshes_of_testdata_bake() {
+    for name in ["fclenv.obj", "fclrob.obj"] {
+        let mesh = io::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)).unwrap();
+        bake_all(&mesh);
+    }
+}

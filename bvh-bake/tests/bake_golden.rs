@@ -1,0 +1,106 @@
+//! The frozen files `testdata/ok-*.cbvh`, made again in memory and compared byte for byte.
+//!
+//! With `CBVH_BLESS=1` missing files are written; none is ever overwritten. A baker that makes other bytes
+//! on purpose leaves the frozen files as they are: they stay readable for ever. Raise `GENERATION` then and
+//! bless; `bvh-format/tests/golden.rs` goes on testing the files of all generations.
+
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{Options, to_bytes, to_bytes_with};
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::object::{ObjectRecord, write_objects};
+use bvh_format::profile::Profile;
+use bvh_format::{Layout, validate::validate};
+use std::path::PathBuf;
+
+#[path = "../../bvh-format/tests/common/seal.rs"]
+#[allow(dead_code, reason = "the other tests of the folder use the rest")]
+mod seal;
+
+/// What ends the names of the files that today's baker makes.
+const GENERATION: &str = "";
+
+/// The cube from -1 to 1 around a point, 12 triangles.
+fn cube(centre: [f64; 3]) -> Mesh {
+    let corner = |i: usize| [0, 1, 2].map(|axis| centre[axis] + if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    Mesh::from_triangles((0..8).map(corner).collect(), faces.into_iter().flat_map(halves).collect())
+}
+
+/// The least that a file can hold: one object, no ids.
+fn plain() -> Vec<u8> {
+    let options = Options {
+        profile: Some(Profile::Dop14U8),
+        triangles: Some(TriangleEncoding::F32),
+        ids: false,
+        ..Options::default()
+    };
+    to_bytes(&cube([0.0; 3]), &options).unwrap().0
+}
+
+/// All sections: packed triangles around an origin, ids, duplicates, a zero-area triangle, provenance.
+fn everything() -> Vec<u8> {
+    let mut mesh = cube([1e6 + 0.1, -2e6 - 0.3, 0.0]);
+    mesh.objects[0].name = "cube".to_owned();
+    let object = &mut mesh.objects[0];
+    object.triangles.extend([[2, 3, 0], [0, 0, 7], [3, 0, 2]]);
+    object.triangle_ids.extend([12, 13, 14]);
+    let options = Options {
+        profile: Some(Profile::Dop14U8),
+        triangles: Some(TriangleEncoding::Packed),
+        ..Options::default()
+    };
+    to_bytes_with(&mesh, &options, "generator=a test\ninput=a cube\n", &mut |_| ()).unwrap().0
+}
+
+/// Several objects: a cube in each profile, triangle encodings in turn, each of one page. The baker gives all
+/// objects of a file the same options, so files of one object are joined here.
+fn profiles() -> Vec<u8> {
+    let (mut records, mut nodes, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, profile) in Profile::ALL.into_iter().enumerate() {
+        let options = Options {
+            profile: Some(profile),
+            triangles: Some(TriangleEncoding::ALL[number % 3]),
+            max_error: Some(1e-3),
+            ids: false,
+            ..Options::default()
+        };
+        let file = to_bytes(&cube([3.0 * number as f64, 0.0, 0.0]), &options).unwrap().0;
+        let sections = seal::take_apart(&file);
+        let record = Layout::read(&file).unwrap().objects[0].record;
+        assert_eq!(record.pages.get(), 1);
+        let mut page = sections[1].2.clone();
+        seal::put(&mut page, 24, &(leaves.len() as u64 / 64).to_le_bytes());
+        seal::put(&mut page, 44, &(number as u32).to_le_bytes());
+        records
+            .push((profile.name().to_owned(), ObjectRecord { first_page: (number as u32).into(), ..record }));
+        nodes.extend(page);
+        leaves.extend_from_slice(&sections[2].2);
+    }
+    seal::put_together(&[(1, 1, write_objects(&records)), (2, 1, nodes), (3, 1, leaves)])
+}
+
+fn check(name: &str, bytes: Vec<u8>) {
+    validate(&bytes).unwrap();
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata");
+    let path = folder.join(format!("ok-{name}{GENERATION}.cbvh"));
+    if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
+        std::fs::write(&path, &bytes).unwrap();
+    }
+    let frozen = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e} (CBVH_BLESS=1?)", path.display()));
+    let differs = (0..).zip(frozen.iter().zip(&bytes)).find(|(_, (a, b))| a != b).map(|(at, _)| at);
+    assert!(
+        frozen == bytes,
+        "{}: {} bytes, now {}, first other at {differs:?}",
+        path.display(),
+        frozen.len(),
+        bytes.len()
+    );
+}
+
+#[test]
+fn the_baker_still_makes_the_frozen_files() {
+    check("plain", plain());
+    check("everything", everything());
+    check("profiles", profiles());
+}

@@ -1,0 +1,186 @@
+//! What the tests share: meshes, poses, baked files and what is stored in them.
+
+#![allow(dead_code, reason = "every test file uses a part of it")]
+
+pub(crate) mod exact;
+pub(crate) mod nearest;
+#[path = "../../../bvh-format/tests/common/seal.rs"]
+pub(crate) mod seal;
+pub(crate) mod shapes;
+pub(crate) mod truth;
+
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{Options, to_bytes};
+use bvh_format::ids::decode_id;
+use bvh_format::leaf::{TriangleEncoding, decode_packet};
+use bvh_format::page::Page;
+use bvh_format::profile::Profile;
+use bvh_format::validate::packets;
+use bvh_query::{Backend, Bvh, Pose, Querier};
+use std::path::PathBuf;
+
+/// Three corners, mesh units.
+pub(crate) type Triangle = [[f64; 3]; 3];
+
+/// Xorshift64*: the same numbers everywhere.
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    /// From 0 to `count` - 1.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        ((u128::from(self.next()) * count as u128) >> 64) as usize
+    }
+
+    /// From -1 to 1.
+    pub(crate) fn signed(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub(crate) fn point(&mut self) -> [f64; 3] {
+        [(); 3].map(|()| self.signed())
+    }
+
+    /// A random turn, and a translation of at most `reach` along each axis.
+    pub(crate) fn pose(&mut self, reach: f64) -> Pose {
+        let quaternion = loop {
+            let q = [(); 4].map(|()| self.signed());
+            let squared: f64 = q.iter().map(|x| x * x).sum();
+            if (0.1..1.0).contains(&squared) {
+                break q.map(|x| x / squared.sqrt());
+            }
+        };
+        Pose::new(rotation(quaternion), self.point().map(|x| x * reach)).unwrap()
+    }
+}
+
+/// The rows of the rotation of a unit quaternion (x, y, z, w).
+pub(crate) fn rotation([x, y, z, w]: [f64; 4]) -> [[f64; 3]; 3] {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+pub(crate) fn translation(x: f64, y: f64, z: f64) -> Pose {
+    Pose::new(*Pose::IDENTITY.rotation(), [x, y, z]).unwrap()
+}
+
+/// A mesh of one object, its ids in the order given.
+pub(crate) fn mesh(triangles: &[Triangle]) -> Mesh {
+    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh::from_triangles(triangles.iter().flatten().copied().collect(), indices)
+}
+
+pub(crate) fn options(profile: Profile, encoding: TriangleEncoding) -> Options {
+    Options { profile: Some(profile), triangles: Some(encoding), ..Options::default() }
+}
+
+pub(crate) fn bake(mesh: &Mesh, options: &Options) -> Bvh {
+    Bvh::from_bytes(to_bytes(mesh, options).unwrap().0).unwrap()
+}
+
+/// A triangle that queries are about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stored {
+    /// Number of the object in the file.
+    pub(crate) object: u32,
+    /// Id; without ids, the place in the order of the leaves.
+    pub(crate) id: u32,
+    /// Origin plus v.
+    pub(crate) corners: Triangle,
+}
+
+/// The triangles of a file by the reference decoder, duplicates that were left out included.
+pub(crate) fn stored(bvh: &Bvh) -> Vec<Stored> {
+    let (layout, bytes) = (bvh.layout(), bvh.bytes());
+    let mut triangles = Vec::new();
+    for (number, object) in bvh.objects().iter().enumerate() {
+        let origin = object.record.origin.map(|o| o.get());
+        let first = object.record.first_page.get();
+        for page in first..first + object.record.pages.get() {
+            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile);
+            let block = layout.leaf_block(bytes, page.header());
+            let ids = layout.id_block(bytes, page.header());
+            for (packet, count) in packets(&page) {
+                let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                for lane in 0..count {
+                    let corner = |v: [f32; 3]| [0, 1, 2].map(|a| origin[a] + f64::from(v[a]));
+                    let corners = values.triangle(lane).map(corner);
+                    let place = 4 * (page.header().first_packet.get() + u32::from(packet)) + lane as u32;
+                    let has_ids = layout.has_ids();
+                    let id = if has_ids { decode_id(ids, usize::from(packet), lane) } else { place };
+                    let object = number as u32;
+                    triangles.push(Stored { object, id, corners });
+                    let duplicates = bvh.duplicates_of(id).unwrap();
+                    triangles.extend(duplicates.map(|id| Stored { object, id, corners }));
+                }
+            }
+        }
+    }
+    triangles.sort_by_key(|stored| (stored.object, stored.id));
+    triangles
+}
+
+/// The corners of the stored triangles, in the order of (object, id).
+pub(crate) fn corners(stored: &[Stored]) -> Vec<Triangle> {
+    stored.iter().map(|stored| stored.corners).collect()
+}
+
+/// The triangles of B where queries have them.
+pub(crate) fn placed(triangles: &[Triangle], pose: &Pose) -> Vec<Triangle> {
+    triangles.iter().map(|triangle| triangle.map(|corner| pose.place(corner))).collect()
+}
+
+/// The diagonal of the box of both meshes.
+pub(crate) fn size(a: &[Triangle], b: &[Triangle]) -> f64 {
+    let side = |axis: usize| {
+        let values = || a.iter().chain(b).flatten().map(move |corner| corner[axis]);
+        values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+    };
+    let sides = [side(0), side(1), side(2)];
+    let longest = sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    longest * sides.iter().map(|side| (side / longest).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The backends of this CPU; says which it lacks.
+pub(crate) fn backends() -> Vec<Backend> {
+    let (here, missing): (Vec<_>, Vec<_>) = Backend::ALL.into_iter().partition(|b| b.is_available());
+    missing.iter().for_each(|backend| note(&format!("skipped: this CPU has no {backend}")));
+    here
+}
+
+pub(crate) fn queriers() -> Vec<Querier> {
+    backends().into_iter().map(Querier::with_backend).collect()
+}
+
+#[allow(clippy::print_stderr, reason = "what was not tested has to be said")]
+pub(crate) fn note(line: &str) {
+    eprintln!("{line}");
+}
+
+/// A file of `shared/`, the folder beside the repository that not everyone has; says if it is not there.
+pub(crate) fn shared(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    note(&format!("skipped: there is no {}", path.display()));
+    None
+}
+
+/// A mesh of `shared/meshes`.
+pub(crate) fn shared_mesh(name: &str) -> Option<Mesh> {
+    Some(bvh_bake::io::read(&shared(&format!("meshes/{name}"))?).unwrap())
+}

@@ -1,0 +1,213 @@
+//! Brute force over all pairs of triangles, in f64: which are near, and how far is the nearest.
+//!
+//! Blocks of neighbouring triangles in boxes keep larger meshes bearable; a block pair is left out only if its
+//! boxes are too far apart. Nothing is shared with the library.
+
+use super::Triangle;
+
+type Point = [f64; 3];
+
+fn subtract(p: Point, q: Point) -> Point {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+fn dot(p: Point, q: Point) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+fn cross(p: Point, q: Point) -> Point {
+    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+}
+
+fn along(p: Point, t: f64, direction: Point) -> Point {
+    [0, 1, 2].map(|k| p[k] + t * direction[k])
+}
+
+/// From 0 to 1; NaN is 0.
+fn clamp(t: f64) -> f64 {
+    t.clamp(0.0, 1.0).max(0.0)
+}
+
+/// The squared distance from a point to a segment.
+fn point_segment(p: Point, a: Point, b: Point) -> f64 {
+    let edge = subtract(b, a);
+    let gap = subtract(p, along(a, clamp(dot(subtract(p, a), edge) / dot(edge, edge)), edge));
+    dot(gap, gap)
+}
+
+/// The squared distance of two segments where both ends of the shortest line between are inside; elsewhere
+/// something larger.
+fn inner_segments(a: Point, b: Point, c: Point, d: Point) -> f64 {
+    let (u, v, w) = (subtract(b, a), subtract(d, c), subtract(a, c));
+    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+    let s = clamp((uv * dot(v, w) - vv * dot(u, w)) / (uu * vv - uv * uv));
+    let t = clamp(dot(v, subtract(along(a, s, u), c)) / vv);
+    let s = clamp(dot(u, subtract(along(c, t, v), a)) / uu);
+    let gap = subtract(along(a, s, u), along(c, t, v));
+    dot(gap, gap)
+}
+
+/// The squared distance from a point to the plane of a triangle if it is over or under it; else infinite.
+fn point_face(p: Point, [a, b, c]: Triangle) -> f64 {
+    let normal = cross(subtract(b, a), subtract(c, a));
+    let inside = |a: Point, b: Point| dot(cross(subtract(b, a), subtract(p, a)), normal) >= 0.0;
+    let length = dot(normal, normal).sqrt();
+    if length > 0.0 && inside(a, b) && inside(b, c) && inside(c, a) {
+        (dot(subtract(p, a), normal) / length).powi(2)
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Distance of two triangles that do not meet: the least over corners and faces, and over pairs of edges.
+/// Scaled by a power of two, so that squares stay in range. Slivers cost digits; the exact oracle has the
+/// last word.
+pub(crate) fn distance(a: &Triangle, b: &Triangle) -> f64 {
+    let largest = a.iter().chain(b).flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+    let scale = f64::from_bits(largest.to_bits() & 0x7ff << 52);
+    let [a, b] = [a, b].map(|t| t.map(|p| p.map(|x| x / scale)));
+    let mut least = f64::INFINITY;
+    for i in 0..3 {
+        least = least.min(point_face(a[i], b)).min(point_face(b[i], a));
+        for j in 0..3 {
+            let (next_i, next_j) = ((i + 1) % 3, (j + 1) % 3);
+            least = least.min(point_segment(a[i], b[j], b[next_j]));
+            least = least.min(point_segment(b[j], a[i], a[next_i]));
+            least = least.min(inner_segments(a[i], a[next_i], b[j], b[next_j]));
+        }
+    }
+    least.sqrt() * scale
+}
+
+/// How far a point is from a triangle.
+pub(crate) fn point_triangle(p: Point, triangle: &Triangle) -> f64 {
+    distance(&[p; 3], triangle)
+}
+
+/// Whether a gap along one of the common directions shows that the triangles do not meet, by far more than
+/// f64 rounds. Spares the exact oracle the easy cases.
+fn certainly_apart(a: &Triangle, b: &Triangle) -> bool {
+    let [p, q] = [a, b].map(|t| t.map(|corner| subtract(corner, a[0])));
+    let edges = |t: Triangle| [subtract(t[1], t[0]), subtract(t[2], t[1]), subtract(t[0], t[2])];
+    let (edges_p, edges_q) = (edges(p), edges(q));
+    let reach = p.iter().chain(&q).flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let apart = |axis: Point| {
+        let ends = |t: Triangle| {
+            let heights = t.map(|corner| dot(axis, corner));
+            (heights.into_iter().fold(f64::MAX, f64::min), heights.into_iter().fold(f64::MIN, f64::max))
+        };
+        let (p, q) = (ends(p), ends(q));
+        let margin = 1e-12 * reach * axis.iter().map(|x| x.abs()).sum::<f64>();
+        q.0 - p.1 > margin || p.0 - q.1 > margin
+    };
+    apart(cross(edges_p[0], edges_p[1]))
+        || apart(cross(edges_q[0], edges_q[1]))
+        || edges_p.iter().any(|&e| edges_q.iter().any(|&f| apart(cross(e, f))))
+}
+
+#[derive(Clone, Copy)]
+struct Bounds {
+    lo: Point,
+    hi: Point,
+}
+
+impl Bounds {
+    fn of<'a>(triangles: impl Iterator<Item = &'a Triangle>) -> Self {
+        let empty = Self { lo: [f64::MAX; 3], hi: [f64::MIN; 3] };
+        triangles.flatten().fold(empty, |bounds, corner| Self {
+            lo: [0, 1, 2].map(|axis| bounds.lo[axis].min(corner[axis])),
+            hi: [0, 1, 2].map(|axis| bounds.hi[axis].max(corner[axis])),
+        })
+    }
+
+    /// At most the distance of what is inside, by more than it may be rounded.
+    fn gap(&self, other: &Self) -> f64 {
+        let gap = [0, 1, 2].map(|k| (self.lo[k] - other.hi[k]).max(other.lo[k] - self.hi[k]).max(0.0));
+        let largest = gap.into_iter().fold(0.0, f64::max);
+        if largest == 0.0 {
+            0.0
+        } else {
+            largest * gap.map(|g| (g / largest).powi(2)).iter().sum::<f64>().sqrt() * (1.0 - 1e-12)
+        }
+    }
+}
+
+/// Triangles in blocks of neighbours, each with its box.
+pub(crate) struct Blocks<'a> {
+    triangles: &'a [Triangle],
+    blocks: Vec<(Bounds, Vec<(usize, Bounds)>)>,
+}
+
+impl<'a> Blocks<'a> {
+    pub(crate) fn new(triangles: &'a [Triangle]) -> Self {
+        let most = ((triangles.len() as f64).sqrt() as usize / 4).max(4);
+        let mut blocks = Vec::new();
+        let all = triangles.iter().enumerate().map(|(i, t)| (i, Bounds::of(std::iter::once(t)))).collect();
+        let mut open: Vec<Vec<(usize, Bounds)>> = vec![all];
+        while let Some(mut block) = open.pop() {
+            let bounds = Bounds::of(block.iter().map(|&(i, _)| &triangles[i]));
+            if block.len() <= most {
+                blocks.push((bounds, block));
+                continue;
+            }
+            let sides = [0, 1, 2].map(|k| bounds.hi[k] - bounds.lo[k]);
+            let axis = (0..3).max_by(|&i, &j| sides[i].total_cmp(&sides[j])).unwrap();
+            let middle = block.len() / 2;
+            let centre = |bounds: &Bounds| bounds.lo[axis] / 2.0 + bounds.hi[axis] / 2.0;
+            block.select_nth_unstable_by(middle, |p, q| centre(&p.1).total_cmp(&centre(&q.1)));
+            open.push(block.split_off(middle));
+            open.push(block);
+        }
+        Self { triangles, blocks }
+    }
+
+    /// Calls `visit` with the numbers of all pairs whose boxes are at most as far apart as `reach`, which each
+    /// call may lower.
+    pub(crate) fn pairs(&self, other: &Self, mut reach: f64, mut visit: impl FnMut(usize, usize) -> f64) {
+        for (bounds_a, block_a) in &self.blocks {
+            for (bounds_b, block_b) in &other.blocks {
+                if bounds_a.gap(bounds_b) > reach {
+                    continue;
+                }
+                for (a, box_a) in block_a {
+                    for (b, box_b) in block_b {
+                        if box_a.gap(box_b) <= reach {
+                            reach = reach.min(visit(*a, *b));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The pairs that meet, ascending.
+    pub(crate) fn contacts(&self, other: &Self) -> Vec<(usize, usize)> {
+        let mut contacts = Vec::new();
+        self.pairs(other, 0.0, |a, b| {
+            let (triangle_a, triangle_b) = (&self.triangles[a], &other.triangles[b]);
+            if !certainly_apart(triangle_a, triangle_b) && super::exact::intersect(triangle_a, triangle_b) {
+                contacts.push((a, b));
+            }
+            0.0
+        });
+        contacts.sort_unstable();
+        contacts
+    }
+
+    /// The pairs of triangles nearest to each other, and all that are hardly farther (by `slack`), nearest
+    /// first, if they are nearer than `reach`.
+    pub(crate) fn nearest(&self, other: &Self, reach: f64, slack: f64) -> Vec<(f64, usize, usize)> {
+        let (mut found, mut best) = (Vec::new(), reach);
+        self.pairs(other, reach + slack, |a, b| {
+            let distance = distance(&self.triangles[a], &other.triangles[b]);
+            best = best.min(distance);
+            if distance <= best + slack {
+                found.push((distance, a, b));
+            }
+            best + slack
+        });
+        found.retain(|&(distance, _, _)| distance <= best + slack);
+        found.sort_by(|p, q| p.0.total_cmp(&q.0));
+        found
+    }
+}

@@ -1,0 +1,125 @@
+//! The right answers for two meshes in a pose, by brute force, and the comparison with what is answered.
+
+use super::nearest::{Blocks, point_triangle};
+use super::{Stored, Triangle, corners, exact, placed, size};
+use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
+
+/// How far a distance may be off, as a fraction of the size.
+const TOLERANCE: f64 = 1e-12;
+
+pub(crate) struct Truth {
+    a: Vec<Stored>,
+    b: Vec<Stored>,
+    corners_a: Vec<Triangle>,
+    corners_b: Vec<Triangle>,
+    contacts: Vec<Contact>,
+    /// Pairs that may be the nearest.
+    nearest: Vec<(f64, usize, usize)>,
+    tolerance: f64,
+}
+
+impl Truth {
+    pub(crate) fn new(a: &[Stored], b: &[Stored], pose: &Pose) -> Self {
+        Self::within(a, b, pose, f64::INFINITY)
+    }
+
+    /// As `new`, looking no farther than `reach` for the nearest pair: it is for large meshes, whose answer
+    /// is checked to be no larger than the truth by looking for something nearer.
+    pub(crate) fn within(a: &[Stored], b: &[Stored], pose: &Pose, reach: f64) -> Self {
+        let (corners_a, corners_b) = (corners(a), placed(&corners(b), pose));
+        let (blocks_a, blocks_b) = (Blocks::new(&corners_a), Blocks::new(&corners_b));
+        let contact = |(i, j): (usize, usize)| Contact {
+            object_a: a[i].object,
+            triangle_a: a[i].id,
+            object_b: b[j].object,
+            triangle_b: b[j].id,
+        };
+        let contacts: Vec<_> = blocks_a.contacts(&blocks_b).into_iter().map(contact).collect();
+        let size = size(&corners_a, &corners_b);
+        let mut nearest = Vec::new();
+        if contacts.is_empty() {
+            nearest = blocks_a.nearest(&blocks_b, reach, 1e-9 * size);
+        }
+        let tolerance = TOLERANCE * size;
+        Self { a: a.to_vec(), b: b.to_vec(), corners_a, corners_b, contacts, nearest, tolerance }
+    }
+
+    /// Asks everything on all backends; returns the distance, which they agree on.
+    pub(crate) fn check(&self, a: &Bvh, b: &Bvh, pose: &Pose, queriers: &mut [Querier]) -> Distance {
+        let first = queriers[0].distance(a, b, pose).unwrap();
+        self.check_distance(&first);
+        for querier in queriers {
+            let touching = !self.contacts.is_empty();
+            assert_eq!(querier.collide(a, b, pose).unwrap(), touching, "{}", querier.backend());
+            assert_eq!(querier.contacts(a, b, pose).unwrap(), self.contacts, "{}", querier.backend());
+            let answer = querier.distance(a, b, pose).unwrap();
+            assert_eq!(answer, first, "{}", querier.backend());
+            let fresh = Querier::with_backend(querier.backend()).distance(a, b, pose).unwrap();
+            assert_eq!(answer, fresh, "{}", querier.backend());
+            let d = answer.distance;
+            for (limit, expected) in [
+                (0.0, touching),
+                (-1.0, false),
+                (f64::NAN, false),
+                (f64::INFINITY, true),
+                (f64::MIN_POSITIVE, d <= f64::MIN_POSITIVE),
+                (d, true),
+                (d.next_up(), true),
+                (d.next_down(), false),
+                (d * (1.0 + 1e-9), true),
+                (d * (1.0 - 1e-9), touching),
+                (d * 3.0, true),
+                (d * 0.5, touching),
+            ] {
+                let within = querier.within(a, b, pose, limit).unwrap();
+                assert_eq!(within, expected, "{} within {limit}, distance {d}", querier.backend());
+            }
+            for (rel_err, abs_err) in [(0.2, 0.0), (0.0, 0.1 * d), (0.05, 0.01 * d)] {
+                let options = DistanceOptions { rel_err, abs_err };
+                let rough = querier.distance_with(a, b, pose, &options).unwrap();
+                let allowed = d * (1.0 + rel_err) + abs_err + self.tolerance;
+                assert!((d..=allowed).contains(&rough.distance), "{rough:?}, least {d}, {options:?}");
+                assert!(rough.lower <= first.upper, "{rough:?}, least {d}, {options:?}");
+                let proved = rough.lower * (1.0 + rel_err) + abs_err + self.tolerance;
+                assert!(rough.distance <= proved, "{rough:?}, {options:?}");
+            }
+        }
+        first
+    }
+
+    pub(crate) fn check_distance(&self, answer: &Distance) {
+        let find = |all: &[Stored], object: u32, id: u32| {
+            let place = all.binary_search_by_key(&(object, id), |stored| (stored.object, stored.id));
+            place.unwrap_or_else(|_| panic!("no triangle {id} in object {object}"))
+        };
+        let i = find(&self.a, answer.object_a, answer.triangle_a);
+        let j = find(&self.b, answer.object_b, answer.triangle_b);
+        let (a, b) = (&self.corners_a[i], &self.corners_b[j]);
+        let d = answer.distance;
+        let &Distance { object_a, triangle_a, object_b, triangle_b, .. } = answer;
+        let named = Contact { object_a, triangle_a, object_b, triangle_b };
+        assert_eq!(d == 0.0, self.contacts.contains(&named), "{named:?} at {d}");
+        assert_eq!(d == 0.0, !self.contacts.is_empty(), "{named:?} at {d}");
+        let pair = exact::distance(a, b);
+        assert!(pair.is(d, self.tolerance), "{d} is not the distance of {named:?}");
+        assert!(answer.lower <= d && d <= answer.upper, "{answer:?}");
+        assert!(pair.compare(answer.lower).is_ge() && pair.compare(answer.upper).is_le(), "{answer:?}");
+        assert!(d == 0.0 || !self.nearest.is_empty(), "nothing is as near as {d}");
+        for &(nearest, i, j) in self.nearest.iter().take(3) {
+            let exact = exact::distance(&self.corners_a[i], &self.corners_b[j]);
+            assert!(exact.compare(d - self.tolerance).is_ge(), "{d}, but pair {i}, {j} is {nearest} apart");
+            assert!(exact.compare(answer.lower).is_ge(), "{answer:?}, but pair {i}, {j} is {nearest} apart");
+        }
+        let gap = [0, 1, 2].map(|k| answer.point_a[k] - answer.point_b[k]);
+        let largest = gap.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let length = largest * gap.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt();
+        // The points of meshes far from the origin are rounded to where f64 is coarser.
+        let magnitude = answer.point_a.iter().chain(&answer.point_b).fold(0.0, |m: f64, x| m.max(x.abs()));
+        let rounding = 4.0 * f64::EPSILON * magnitude;
+        assert!((length - d).abs() <= self.tolerance + rounding, "{answer:?}: the points are {length} apart");
+        for (point, triangle) in [(answer.point_a, a), (answer.point_b, b)] {
+            let off = point_triangle(point, triangle);
+            assert!(off <= self.tolerance + rounding, "{answer:?}: a point is {off} off its triangle");
+        }
+    }
+}

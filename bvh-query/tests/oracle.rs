@@ -1,0 +1,305 @@
+//! Every answer against brute force over all pairs of triangles with exact predicates, for all profiles,
+//! triangle encodings and backends.
+
+mod common;
+
+use bvh_bake::Options;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+use bvh_query::{Bvh, Distance, Pose, Querier};
+use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
+use common::truth::Truth;
+use common::{Random, Triangle, bake, mesh, options, queriers, rotation, shared_mesh, stored, translation};
+use std::ops::ControlFlow;
+
+/// A mesh in files of each profile, lossless encodings in turn.
+fn files(triangles: &[Triangle], encodings: &[TriangleEncoding]) -> Vec<Bvh> {
+    let mesh = mesh(triangles);
+    let all = Profile::ALL.into_iter().flat_map(|profile| encodings.iter().map(move |&e| (profile, e)));
+    all.map(|(profile, encoding)| bake(&mesh, &options(profile, encoding))).collect()
+}
+
+const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding::Packed];
+
+/// Asks every file of A against the same and another one of B, on every backend: all must be right, and the
+/// same but for the pair of triangles that is named when meshes touch.
+fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose], queriers: &mut [Querier]) {
+    let (stored_a, stored_b) = (stored(&a[0]), stored(&b[0]));
+    for pose in poses {
+        let truth = Truth::new(&stored_a, &stored_b, pose);
+        let mut apart: Option<Distance> = None;
+        for i in 0..a.len().max(b.len()) {
+            for other in [i, 7 * i + 3] {
+                let (a, b) = (&a[i % a.len()], &b[other % b.len()]);
+                let answer = truth.check(a, b, pose, queriers);
+                if answer.distance > 0.0 {
+                    assert_eq!(*apart.get_or_insert(answer), answer, "file {i} against {other}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn baking_keeps_every_triangle() {
+    for triangles in [dirty(&sphere(2), 1), soup(200, 2), comb(64), dirty(&plate(8), 3)] {
+        for file in files(&triangles, &LOSSLESS) {
+            let stored = stored(&file);
+            assert_eq!(stored.len(), triangles.len());
+            for (id, (input, stored)) in triangles.iter().zip(&stored).enumerate() {
+                // A duplicate is given the corners of the one that stands for it.
+                let sorted = |mut t: Triangle| {
+                    t.sort_by(|p, q| p.partial_cmp(q).unwrap());
+                    t
+                };
+                assert_eq!((id as u32, sorted(*input)), (stored.id, sorted(stored.corners)));
+            }
+        }
+    }
+}
+
+#[test]
+fn random_poses() {
+    let meshes = [
+        ("sphere", dirty(&sphere(2), 1)),
+        ("torus", torus(12, 8)),
+        ("soup", dirty(&soup(90, 4), 5)),
+        ("comb", comb(64)),
+        ("plate", dirty(&plate(8), 6)),
+        ("terrain", terrain(10, 7)),
+        ("cube", cube()),
+    ];
+    let files: Vec<_> = meshes.iter().map(|(_, triangles)| files(triangles, &LOSSLESS)).collect();
+    let mut queriers = queriers();
+    let mut random = Random::new(11);
+    for (a, b) in [(0, 1), (1, 3), (2, 2), (3, 4), (4, 0), (5, 2), (6, 5), (3, 3), (1, 1), (6, 2)] {
+        // From deep inside to a few sizes away.
+        let poses: Vec<_> = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random.pose(reach)).to_vec();
+        check(&files[a], &files[b], &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn in_place_turned_and_far() {
+    let half_turns = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let mut poses = vec![Pose::IDENTITY, translation(1e4, -2e4, 3e4), translation(0.0, 0.0, 1e30)];
+    poses.extend(half_turns.map(|q| Pose::new(rotation(q), [0.0; 3]).unwrap()));
+    let third = Pose::new([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], [0.25, 0.0, 0.0]);
+    poses.push(third.unwrap());
+    let mut queriers = queriers();
+    for triangles in [dirty(&cube(), 2), plate(4), dirty(&sphere(1), 3), comb(24), soup(40, 9)] {
+        let files = files(&triangles, &LOSSLESS);
+        check(&files, &files, &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn touching_in_a_face_an_edge_a_corner_and_just_not() {
+    let cube = files(&cube(), &LOSSLESS);
+    let mut poses = Vec::new();
+    for x in [2.0, -2.0] {
+        poses.extend([translation(x, 0.0, 0.0), translation(x, 2.0, 0.0), translation(x, -2.0, 2.0)]);
+        // One rounding unit away; half of one inside.
+        let (out, inside) = (x * (1.0 + f64::EPSILON), x * (1.0 - f64::EPSILON / 2.0));
+        poses.extend([
+            translation(0.5, out, 0.25),
+            translation(out, out, out),
+            translation(inside, 0.5, 0.0),
+        ]);
+    }
+    let turned = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+    poses.push(Pose::new(turned, [2.4, 0.0, 0.0]).unwrap());
+    poses.push(Pose::new(turned, [0.0, 0.0, 2.0]).unwrap());
+    let mut queriers = queriers();
+    check(&cube, &cube, &poses, &mut queriers);
+    // A corner of the octahedron on faces, edges and corners of the plate, above and below.
+    let plate = files(&dirty(&plate(4), 1), &LOSSLESS);
+    let octahedron = files(&dirty(&sphere(0), 2), &LOSSLESS);
+    let above = |x: f64, y: f64| [1.0, 1.0 + 1e-15, 1.0 - 1e-15, -1.0].map(|z| translation(x, y, z));
+    let poses: Vec<_> = [above(0.1, 0.2), above(0.5, 0.125), above(0.5, -0.5), above(1.0, 1.0)].concat();
+    check(&plate, &octahedron, &poses, &mut queriers);
+}
+
+#[test]
+fn nested_surfaces_do_not_collide() {
+    let outer = files(&sphere(2), &LOSSLESS);
+    let inner = files(&moved(&sphere(1), 0.25, [0.125, 0.25, 0.0]), &LOSSLESS);
+    let mut queriers = queriers();
+    let mut random = Random::new(3);
+    let poses: Vec<_> = (0..4).map(|_| random.pose(0.2)).collect();
+    for pose in &poses {
+        assert!(!queriers[0].collide(&outer[0], &inner[0], pose).unwrap());
+        assert!(queriers[0].distance(&outer[0], &inner[0], pose).unwrap().distance > 0.1);
+    }
+    check(&outer, &inner, &poses, &mut queriers);
+    check(&inner, &outer, &poses[..1], &mut queriers);
+}
+
+#[test]
+fn a_few_triangles() {
+    let mut queriers = queriers();
+    let mut random = Random::new(8);
+    for count in 1..=5 {
+        let (a, b) = (soup(count, 20 + count as u64), soup(6 - count, 30 + count as u64));
+        let poses: Vec<_> = [0.2, 0.6, 2.0].map(|reach| random.pose(reach)).to_vec();
+        check(&files(&a, &LOSSLESS), &files(&b, &LOSSLESS), &poses, &mut queriers);
+    }
+    // Points and segments alone.
+    let point = vec![[[0.5, 0.25, 0.0]; 3]];
+    let segments = vec![[[0.0; 3], [1.0, 0.5, 0.0], [0.0; 3]], [[0.0; 3], [2.0, 2.0, 2.0], [1.0; 3]]];
+    let poses = [Pose::IDENTITY, translation(0.5, 0.25, 0.0), translation(-0.5, 0.0, 1e-7)];
+    for (a, b) in [(&point, &point), (&point, &segments), (&segments, &segments), (&segments, &cube())] {
+        check(&files(a, &LOSSLESS), &files(b, &LOSSLESS), &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn tiny_and_huge_meshes() {
+    let mut queriers = queriers();
+    for scale in [1e-20, 1e-37, 1e15, 1e35] {
+        let a = files(&moved(&dirty(&sphere(1), 1), scale, [0.0; 3]), &LOSSLESS);
+        let b = files(&moved(&soup(40, 2), scale, [0.0; 3]), &LOSSLESS);
+        let mut random = Random::new(5);
+        let poses: Vec<_> = [0.5, 1.0, 2.0, 3.0].map(|reach| random.pose(reach * scale)).to_vec();
+        check(&a, &b, &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn far_from_the_origin_in_f64() {
+    let mut queriers = queriers();
+    let offset = [1e7, -3e7, 2e7];
+    let far = |triangles: Vec<Triangle>| -> Vec<Triangle> {
+        let point = |p: [f64; 3]| [0, 1, 2].map(|axis| p[axis] + offset[axis] + 0.1);
+        triangles.into_iter().map(|t| t.map(point)).collect()
+    };
+    let (a, b) = (files(&far(dirty(&sphere(1), 1)), &LOSSLESS), files(&far(soup(40, 3)), &LOSSLESS));
+    assert_ne!(a[0].objects()[0].record.origin[0].get(), 0.0);
+    let near = files(&soup(40, 3), &LOSSLESS);
+    let mut random = Random::new(6);
+    let poses: Vec<_> =
+        [0.5, 1.5, 4.0].map(|reach| translation(random.signed() * reach, 0.0, reach)).to_vec();
+    check(&a, &b, &poses, &mut queriers);
+    // Turned about its own place: the translation brings it back.
+    let turned: Vec<_> = [0.5, 1.0, 3.0]
+        .map(|reach| {
+            let pose = random.pose(reach);
+            let back = pose.place(offset);
+            let translation = [0, 1, 2].map(|k| offset[k] - back[k] + 2.0 * pose.translation()[k]);
+            Pose::new(*pose.rotation(), translation).unwrap()
+        })
+        .to_vec();
+    check(&a, &b, &turned, &mut queriers);
+    check(&a, &near, &[Pose::IDENTITY, translation(offset[0], offset[1], offset[2])], &mut queriers);
+    check(&near, &a, &[Pose::IDENTITY, translation(-offset[0], -offset[1], -offset[2])], &mut queriers);
+}
+
+#[test]
+fn quantized_files_are_about_the_moved_triangles() {
+    let mut queriers = queriers();
+    let mut random = Random::new(12);
+    let quantized = |triangles: &[Triangle]| files(triangles, &[TriangleEncoding::Quantized]);
+    let (a, b) = (quantized(&dirty(&sphere(2), 1)), quantized(&soup(60, 3)));
+    let poses: Vec<_> = [0.3, 1.5, 3.0].map(|reach| random.pose(reach)).to_vec();
+    check(&a, &b, &poses, &mut queriers);
+    check(&a, &files(&torus(8, 6), &LOSSLESS), &poses, &mut queriers);
+    check(&b, &b, &[Pose::IDENTITY], &mut queriers);
+}
+
+#[test]
+fn several_objects_answer_as_one() {
+    let mut split = mesh(&dirty(&sphere(1), 1));
+    let names = ["", "soup", "torus"];
+    for (name, triangles) in
+        names[1..].iter().zip([dirty(&soup(30, 2), 3), moved(&torus(6, 4), 1.5, [0.5; 3])])
+    {
+        let mut object = mesh(&triangles).objects.remove(0);
+        let first = split.triangle_count() as u32;
+        object.triangle_ids.iter_mut().for_each(|id| *id += first);
+        object.name = (*name).to_owned();
+        split.objects.push(object);
+    }
+    let other = files(&terrain(6, 4), &LOSSLESS);
+    let mut queriers = queriers();
+    let mut random = Random::new(13);
+    let poses: Vec<_> = [0.5, 2.0, 4.0, 4.0].map(|reach| random.pose(reach)).to_vec();
+    let mut all = Vec::new();
+    for profile in Profile::ALL {
+        let one = bake(&split, &options(profile, TriangleEncoding::F32));
+        let several =
+            bake(&split, &Options { split_objects: true, ..options(profile, TriangleEncoding::Packed) });
+        assert_eq!((one.objects().len(), several.objects().len()), (1, 3));
+        for pose in &poses {
+            let querier = &mut queriers[0];
+            let pairs = |contacts: Vec<bvh_query::Contact>| -> Vec<_> {
+                let mut pairs: Vec<_> = contacts.iter().map(|c| (c.triangle_a, c.triangle_b)).collect();
+                pairs.sort_unstable();
+                pairs
+            };
+            let (as_one, as_several) = (
+                querier.contacts(&one, &other[0], pose).unwrap(),
+                querier.contacts(&several, &other[0], pose).unwrap(),
+            );
+            assert_eq!(pairs(as_one), pairs(as_several));
+            let distance = querier.distance(&several, &other[0], pose).unwrap().distance;
+            assert_eq!(querier.distance(&one, &other[0], pose).unwrap().distance, distance);
+            // One object alone is at least as far away as all, and one of them just as far.
+            let alone =
+                |number| querier.distance(several.object(number).unwrap(), &other[0], pose).unwrap().distance;
+            assert_eq!([0, 1, 2].map(alone).into_iter().fold(f64::INFINITY, f64::min), distance);
+        }
+        assert_eq!(several.find("torus"), Some(2));
+        all.push(several);
+    }
+    check(&all, &other, &poses, &mut queriers);
+    check(&all, &all, &[Pose::IDENTITY, poses[3]], &mut queriers);
+}
+
+#[test]
+fn real_meshes() {
+    let mut queriers = queriers();
+    let mut random = Random::new(14);
+    for (a, b, reach) in [("fclenv", "fclrob", 3000.0), ("piano", "fclrob", 4000.0), ("piano", "piano", 60.0)]
+    {
+        let [a, b] = [a, b].map(|name| shared_mesh(&format!("{name}.obj")));
+        let (Some(a), Some(b)) = (a, b) else { return };
+        let bakes = |mesh| -> Vec<_> {
+            let choose = |i: usize| options(Profile::ALL[i], LOSSLESS[i % 2]);
+            (0..10).map(|i| bake(mesh, &choose(i))).collect()
+        };
+        let poses: Vec<_> = (0..4).map(|_| random.pose(reach)).collect();
+        check(&bakes(&a), &bakes(&b), &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn without_ids_places_name_triangles() {
+    let mut queriers = queriers();
+    let mut random = Random::new(15);
+    for profile in Profile::ALL {
+        let file = |triangles: &[Triangle]| {
+            bake(&mesh(triangles), &Options { ids: false, ..options(profile, TriangleEncoding::F32) })
+        };
+        let (a, b) = (file(&dirty(&sphere(1), 1)), file(&torus(8, 4)));
+        let poses = [0.5, 3.0].map(|reach| random.pose(reach));
+        check(&[a], &[b], &poses, &mut queriers);
+    }
+}
+
+#[test]
+fn a_visit_of_contacts_ends_when_told() {
+    let file = bake(&mesh(&soup(80, 1)), &Options::default());
+    for querier in &mut queriers() {
+        let all = querier.contacts(&file, &file, &Pose::IDENTITY).unwrap();
+        assert!(all.len() > 80);
+        for most in [1, 2, 50] {
+            let mut seen = Vec::new();
+            let calls = querier.visit_contacts(&file, &file, &Pose::IDENTITY, |contact| {
+                seen.push(contact);
+                if seen.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            });
+            assert_eq!((calls, seen.len()), (Ok(most as u64), most));
+            assert!(seen.iter().all(|contact| all.binary_search(contact).is_ok()));
+        }
+    }
+}
