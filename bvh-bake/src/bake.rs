@@ -255,11 +255,12 @@ fn diagonal(object: &mesh::Object) -> f64 {
 /// of f16's range.
 fn f16_exponent(bounds: &bvh_format::kdop::Kdop) -> i32 {
     let widest = (0..3).map(|a| f64::from(bounds.hi[a]) - f64::from(bounds.lo[a])).sum::<f64>();
-    if widest > 0.0 {
-        (widest.log2().ceil() as i32 - 14).clamp(*F16_EXPONENTS.start(), *F16_EXPONENTS.end())
-    } else {
-        0
+    if widest == 0.0 {
+        return 0;
     }
+    // The power of two at or above, from the bits: a logarithm may differ between platforms.
+    let exponent = ((widest.to_bits() - 1) >> 52) as i32 - 1022;
+    (exponent - 14).clamp(*F16_EXPONENTS.start(), *F16_EXPONENTS.end())
 }
 
 /// Lays the sections out page by page and writes the header.

@@ -157,12 +157,8 @@ fn rounded_up(length: f64) -> f64 {
 /// of three axes is sqrt(3) / 2 steps.
 fn grid_step(error: f64) -> f64 {
     let limit = error * 2.0 / 3f64.sqrt();
-    let mut step = 2f64.powi(limit.log2().floor() as i32);
-    // The logarithm is rounded; the comparison is not.
-    while step > limit {
-        step /= 2.0;
-    }
-    step
+    // Its leading bit; a logarithm may differ from one platform's library to the next.
+    f64::from_bits(limit.to_bits() & 0x7ff << 52).max(f64::MIN_POSITIVE)
 }
 
 /// Indices of the triangles kept, and the pairs (kept id, dropped id). Triangles are equal if their

@@ -2,9 +2,10 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::mapped;
-use bvh_format::leaf::{Packet, decode_packet};
+use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet};
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
+use bvh_format::treelet::Links;
 use bvh_format::{FormatError, Layout, Rule, ids};
 use memmap2::Mmap;
 use std::path::Path;
@@ -213,6 +214,18 @@ impl Bvh {
         let page = self.page(object, page)?;
         let block = self.leaf_block(object, &page)?;
         Ok(decode_packet(object.triangle_encoding, block, usize::from(packet)))
+    }
+
+    /// The bytes of a treelet's leaf packets, where they stand together.
+    #[inline(always)]
+    pub(crate) fn packets_ahead(&self, object: &Object, page: &Page, links: &Links) -> &[u8] {
+        if object.triangle_encoding != TriangleEncoding::F32 {
+            return &[];
+        }
+        let block = self.layout.leaf_block(self.bytes.get(), page.header());
+        let start = usize::from(links.first_leaf) * F32_PACKET_BYTES;
+        let end = start + links.leaves().count_ones() as usize * F32_PACKET_BYTES;
+        block.get(start..end).unwrap_or(&[])
     }
 
     /// The id of a triangle: its number in the input, or without ids its place in the order of the

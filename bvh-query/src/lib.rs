@@ -50,6 +50,11 @@ pub use isa::{Backend, BackendError};
 pub use pose::{Pose, PoseError};
 pub use query::{Contact, Distance, DistanceOptions, Querier, QueryStats};
 
+/// The examples of the README, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
 /// The path is as for `include_bytes!`; with a file that a build script baked, it is

@@ -86,6 +86,9 @@ pub(crate) trait Isa: Copy {
     fn load4(self, from: &[f32; 4]) -> Self::H;
     fn store4(self, value: Self::H, to: &mut [f32; 4]);
 
+    /// Asks for bytes that will soon be read.
+    fn prefetch(self, bytes: &[u8]);
+
     /// Runs a task with the features of the backend enabled.
     fn run<T: Task>(self, task: T) -> T::Output;
 }

@@ -39,9 +39,11 @@ pub struct DistanceOptions {
 pub struct Distance {
     /// The distance in mesh units; 0 if and only if the meshes touch.
     pub distance: f64,
-    /// The least distance is certainly at least this.
+    /// The two triangles named here are certainly at least this far apart, and with an allowed error
+    /// no two triangles of the meshes are nearer. Exact arithmetic, not this, decides whether the
+    /// meshes touch.
     pub lower: f64,
-    /// The least distance is certainly at most this.
+    /// The two triangles, and so the meshes, are certainly at most this far apart.
     pub upper: f64,
     /// The closest point on A, in A's frame.
     pub point_a: [f64; 3],

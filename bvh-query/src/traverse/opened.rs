@@ -192,6 +192,7 @@ fn decode_node<I: Isa>(
         decode_group(isa, coding, (treelet, part), (slabs, column), &mut to.groups[part]);
     }
     to.links = Links::read(treelet);
+    isa.prefetch(bvh.packets_ahead(object, &page, &to.links));
     to.page = page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];

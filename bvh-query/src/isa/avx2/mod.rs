@@ -279,6 +279,12 @@ impl Isa for Avx2 {
     fn store4(self, value: X, to: &mut [f32; 4]) {
         with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
     }
+    #[inline(always)]
+    fn prefetch(self, bytes: &[u8]) {
+        for line in bytes.chunks(64) {
+            with_features!(_mm_prefetch::<_MM_HINT_T0>(line.as_ptr().cast()));
+        }
+    }
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
         unsafe { run_with_features(self, task) }

@@ -157,6 +157,10 @@ impl Isa for Scalar {
     fn store4(self, value: Array<4>, to: &mut [f32; 4]) {
         *to = value.0;
     }
+    #[inline(always)]
+    fn prefetch(self, _bytes: &[u8]) {
+        // Portable code has no way to ask.
+    }
     fn run<T: Task>(self, task: T) -> T::Output {
         task.run(self)
     }
