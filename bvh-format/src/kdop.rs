@@ -110,7 +110,7 @@ impl Kdop {
 }
 
 /// The directions as factors.
-const FACTORS: [[f64; 3]; 13] = {
+pub const FACTORS: [[f64; 3]; 13] = {
     let mut factors = [[0.0; 3]; 13];
     let mut slab = 0;
     while slab < 13 {

@@ -21,6 +21,7 @@ pub struct Form {
 
 impl Form {
     /// The form of the lower end along the same direction: the other end of each slab.
+    #[inline(always)]
     pub fn mirrored(self) -> Self {
         Self { rows: self.rows.map(|row| row ^ 16), ..self }
     }
@@ -36,7 +37,7 @@ const CUBE_DIAGONALS: [(u8, f64); 8] =
     [(3, 1.0), (6, 1.0), (5, 1.0), (4, -1.0), (4, 1.0), (5, -1.0), (6, -1.0), (3, -1.0)];
 
 /// The form of the upper end along `d` over the directions of a set.
-#[inline]
+#[inline(always)]
 pub fn upper_form(d: [f64; 3], set: DirectionSet) -> Form {
     let m = [d[0].abs(), d[1].abs(), d[2].abs()];
     let order = usize::from(m[0] < m[1]) | usize::from(m[1] < m[2]) << 1 | usize::from(m[0] < m[2]) << 2;

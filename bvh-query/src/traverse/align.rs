@@ -3,14 +3,15 @@
 //! Along a direction `d` of A, seen from B as `d' = R^T d`, the ends of a node of B follow from three of
 //! its slabs: see `bvh_format::support`.
 //!
-//! Rounding: with u = 2^-24, |end_j| <= M_j, three rounded coefficients, three products and three
-//! sums, the computed end is within 8u (sum |c_j| M_j + |t|) of the exact one, where t is the offset
-//! of the pose along d. The pose itself, and the placed vertices it defines, are rounded in f64:
-//! that adds at most 2^-48 of the magnitudes involved. Both go into the offsets, outward, once a
-//! query; a node test costs nothing for it.
+//! Rounding: with u = 2^-24, all ends at most M in magnitude, three rounded coefficients, three
+//! products and three sums, the computed end is within 8u (M sum |c_j| + |t|) of the exact one, where
+//! t is the offset of the pose along d; rounding the offset itself to f32 adds u of it. The pose
+//! itself, and the placed vertices it defines, are rounded in f64: that adds at most 2^-48 of the
+//! magnitudes involved. All go into the offsets, outward, once a query; a node test costs nothing for
+//! it.
 
 use crate::pose::Pose;
-use bvh_format::kdop::{DIRECTIONS, DirectionSet};
+use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::object::Object;
 use bvh_format::support::{Form, upper_form};
 
@@ -46,26 +47,30 @@ pub(crate) struct Placement {
 
 impl Placement {
     pub(crate) fn new(pose: &Pose, a: &Object, b: &Object) -> Self {
-        let origin = |object: &Object| object.record.origin.map(|o| o.get());
-        let (origin_a, origin_b) = (origin(a), origin(b));
-        let placed = pose.place(origin_b);
-        let reach = |object: &Object| {
-            let record = &object.record;
-            (0..3).fold(0.0f64, |m, i| {
-                m.max(record.box_lo[i].get().abs().max(record.box_hi[i].get().abs()).into())
-            })
-        };
-        let sum = |v: [f64; 3]| v.iter().map(|c| c.abs()).sum::<f64>();
-        let magnitude = sum(origin_a) + sum(origin_b) + sum(pose.translation()) + 3.0 * (reach(a) + reach(b));
+        let (record_a, record_b) = (&a.record, &b.record);
+        let mut origin = [[0.0; 3]; 2];
+        let mut magnitude = 0.0;
+        for axis in 0..3 {
+            origin[0][axis] = record_a.origin[axis].get();
+            origin[1][axis] = record_b.origin[axis].get();
+            magnitude += origin[0][axis].abs() + origin[1][axis].abs() + pose.translation()[axis].abs();
+            // Three times the largest coordinate, and more: the sum over the axes of both ends.
+            for record in [record_a, record_b] {
+                let (lo, hi) = (record.box_lo[axis].get(), record.box_hi[axis].get());
+                magnitude += 3.0 * f64::from(lo.abs() + hi.abs());
+            }
+        }
+        let placed = pose.place(origin[1]);
+        let [x, y, z] = origin[0];
         Self {
             rotation: *pose.rotation(),
-            translation: [0, 1, 2].map(|i| placed[i] - origin_a[i]),
+            translation: [placed[0] - x, placed[1] - y, placed[2] - z],
             error: magnitude * POSE_ERROR,
         }
     }
 
     /// A direction of A's frame as B sees it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn seen_from_b(&self, d: [f64; 3]) -> [f64; 3] {
         let r = &self.rotation;
         let along = |i: usize| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2];
@@ -74,45 +79,35 @@ impl Placement {
 }
 
 impl Alignment {
-    /// Prepares a pose. `reach_b` bounds the slab ends of B's nodes by row.
-    pub(crate) fn new(
-        placement: &Placement,
-        set_a: DirectionSet,
-        set_b: DirectionSet,
-        reach_b: &[f32; 16],
-    ) -> Self {
+    /// Prepares a pose. `reach_b` bounds the slab ends of B's nodes.
+    #[inline(always)]
+    pub(crate) fn new(placement: &Placement, set_a: DirectionSet, set_b: DirectionSet, reach_b: f32) -> Self {
         let mut axes = [Axis::default(); 13];
-        for (axis, direction) in axes.iter_mut().zip(DIRECTIONS).take(set_a.slabs()) {
-            let direction = direction.map(f64::from);
+        let t = placement.translation;
+        for slab in 0..set_a.slabs() {
+            let direction = FACTORS[slab];
             let hi = upper_form(placement.seen_from_b(direction), set_b);
             let lo = hi.mirrored();
-            let t = placement.translation;
             let offset = t[0] * direction[0] + t[1] * direction[1] + t[2] * direction[2];
             let error = form_error(&hi, reach_b, offset) + 3.0 * placement.error;
-            *axis =
-                Axis { lo, hi, offset_lo: round_down(offset - error), offset_hi: round_up(offset + error) };
+            let (offset_lo, offset_hi) = ((offset - error) as f32, (offset + error) as f32);
+            axes[slab] = Axis { lo, hi, offset_lo, offset_hi };
         }
         Self { axes }
     }
 }
 
-/// Bound on the error of evaluating a form plus an offset in f32.
-#[inline]
-pub(crate) fn form_error(form: &Form, reach: &[f32; 16], offset: f64) -> f64 {
-    let mut sum = offset.abs();
-    for j in 0..3 {
-        sum += f64::from(form.coefficients[j].abs()) * f64::from(reach[usize::from(form.rows[j] & 15)]);
-    }
-    8.0 * U * sum
+/// Bound on the error of evaluating a form plus an offset in f32, the rounding of the offset less or
+/// more this error included: 8u of the terms, and 2u of the offset and of all this.
+#[inline(always)]
+pub(crate) fn form_error(form: &Form, reach: f32, offset: f64) -> f64 {
+    let [x, y, z] = form.coefficients;
+    let terms = f64::from(reach) * f64::from(x.abs() + y.abs() + z.abs());
+    10.0 * U * (terms + offset.abs())
 }
 
 /// The nearest f32 at or above.
 pub(crate) fn round_up(value: f64) -> f32 {
     let nearest = value as f32;
     if f64::from(nearest) < value { nearest.next_up() } else { nearest }
-}
-
-/// The nearest f32 at or below.
-pub(crate) fn round_down(value: f64) -> f32 {
-    -round_up(-value)
 }

@@ -1,7 +1,7 @@
 //! The node test: 16 pairs of nodes at a time along A's directions.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{Alignment, Placement, form_error, round_down};
+use crate::traverse::align::{Alignment, Placement, form_error};
 use crate::traverse::opened::Aligned;
 use crate::traverse::pair::{Measure, Pair};
 use bvh_format::decode::Group;
@@ -16,13 +16,12 @@ const INVERSE_LENGTHS: [f32; 13] = {
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
 };
 
-/// Bounds on the slab ends of all nodes, by row: those of the root.
-fn reach(root: &Group, set: DirectionSet) -> [f32; 16] {
-    let mut reach = [0.0; 16];
+/// A bound on the slab ends of all nodes: that of the root's.
+fn reach(root: &Group, set: DirectionSet) -> f32 {
+    let rows = root.rows();
+    let mut reach = 0.0f32;
     for slab in 0..set.slabs() {
-        let rows = root.rows();
-        let (lo, hi) = (rows[row(slab)][0], rows[16 + row(slab)][0]);
-        reach[row(slab)] = lo.abs().max(hi.abs());
+        reach = reach.max(rows[row(slab)][0].abs()).max(rows[16 + row(slab)][0].abs());
     }
     reach
 }
@@ -44,15 +43,16 @@ pub(crate) struct NodeTest {
     placement: Placement,
     set_a: DirectionSet,
     set_b: DirectionSet,
-    reach_a: [f32; 16],
-    reach_b: [f32; 16],
+    reach_a: f32,
+    reach_b: f32,
 }
 
 impl NodeTest {
+    #[inline(always)]
     pub(crate) fn new(pair: &Pair<'_>, root_a: &Group, root_b: &Group) -> Self {
         let (set_a, set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
         let (reach_a, reach_b) = (reach(root_a, set_a), reach(root_b, set_b));
-        let alignment = Alignment::new(pair.placement, set_a, set_b, &reach_b);
+        let alignment = Alignment::new(pair.placement, set_a, set_b, reach_b);
         Self { alignment, placement: *pair.placement, set_a, set_b, reach_a, reach_b }
     }
 
@@ -73,10 +73,10 @@ impl NodeTest {
         let form_b = upper_form(self.placement.seen_from_b(d), self.set_b).mirrored();
         let t = self.placement.translation;
         let offset = d[0] * t[0] + d[1] * t[1] + d[2] * t[2];
-        let error = form_error(&form_a, &self.reach_a, 0.0)
-            + form_error(&form_b, &self.reach_b, offset)
+        let error = form_error(&form_a, self.reach_a, 0.0)
+            + form_error(&form_b, self.reach_b, offset)
             + 3.0 * self.placement.error;
-        Witness { direction, form_a, form_b, offset: round_down(offset - error) }
+        Witness { direction, form_a, form_b, offset: (offset - error) as f32 }
     }
 
     /// B's slab ends along A's directions, outward.
