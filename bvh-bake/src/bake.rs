@@ -8,7 +8,7 @@ use crate::mesh::{self, Mesh};
 use crate::options::Options;
 use crate::pages;
 use crate::prepare::{Prepared, box_and_sphere, prepare};
-use crate::prove::prove_bounds;
+use crate::prove::{prove_bounds, validate_in_parallel};
 use crate::report::BakeReport;
 use crate::treelets::Cutter;
 use bvh_format::checksum::checksum;
@@ -18,7 +18,6 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord, write_objects};
 use bvh_format::page::{MAX_PAGES, PAGE};
 use bvh_format::profile::Profile;
-use bvh_format::validate::validate;
 use std::time::Instant;
 use zerocopy::FromZeros;
 
@@ -97,7 +96,7 @@ pub fn to_bytes_with(
 }
 
 fn prove(bytes: &[u8], report: &mut BakeReport) -> Result<(), BakeError> {
-    let layout = validate(bytes).map_err(BakeError::Unproved)?;
+    let layout = validate_in_parallel(bytes).map_err(BakeError::Unproved)?;
     let inflation = prove_bounds(&layout, bytes).map_err(BakeError::Unproved)?;
     report.content_xxh3 = layout.content_checksum;
     report.width_inflation = inflation.mean_width();

@@ -24,6 +24,6 @@ pub use files::{
     FileOptions, FileSummary, Outcome, Step, bake_files, estimate_memory, read_meshes, write_atomically,
 };
 pub use options::Options;
-pub use prove::prove_bounds;
+pub use prove::{prove_bounds, validate_in_parallel};
 pub use report::BakeReport;
 pub use verify::{VerifyError, VerifyReport, verify};

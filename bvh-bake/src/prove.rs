@@ -6,9 +6,28 @@
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
-use bvh_format::validate::{Inflation, check_bounds};
+use bvh_format::validate::{
+    Inflation, check_bounds, validate_counts, validate_links, validate_page, validate_sections,
+};
 use bvh_format::{FormatError, Layout, Rule};
 use rayon::prelude::*;
+
+/// `bvh_format::validate::validate` with the pages checked in parallel.
+///
+/// # Errors
+/// A rule that does not hold; of several, any.
+pub fn validate_in_parallel(bytes: &[u8]) -> Result<Layout, FormatError> {
+    let layout = validate_sections(bytes)?;
+    for object in &layout.objects {
+        let pages = object.pages().into_par_iter();
+        let counts: Result<Vec<_>, FormatError> =
+            pages.clone().map(|number| validate_page(&layout, bytes, object, number)).collect();
+        let counts = counts?;
+        pages.map(|number| validate_links(&layout, bytes, object, number)).collect::<Result<(), _>>()?;
+        validate_counts(&layout, object, &counts)?;
+    }
+    Ok(layout)
+}
 
 /// Checks the bounds of a file whose structure has been validated; returns how loose they are.
 ///

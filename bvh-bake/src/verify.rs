@@ -8,14 +8,14 @@ mod by_id;
 mod by_value;
 
 use crate::mesh::{InputError, Mesh, Object as MeshObject};
-use crate::prove::prove_bounds;
+use crate::prove::{prove_bounds, validate_in_parallel};
 use bvh_format::FormatError;
 use bvh_format::Layout;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::object::Object;
 use bvh_format::page::Page;
-use bvh_format::validate::{Inflation, packets, validate};
+use bvh_format::validate::{Inflation, packets};
 
 /// What a successful verification found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ impl VerifyError {
 /// The first thing found that does not hold.
 pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
     mesh.check()?;
-    let layout = validate(bytes)?;
+    let layout = validate_in_parallel(bytes)?;
     let inflation = prove_bounds(&layout, bytes)?;
     let sources = match_objects(&layout, mesh)?;
     for (object, source) in layout.objects.iter().zip(&sources) {

@@ -84,6 +84,14 @@ pub struct Object {
     pub record: ObjectRecord,
 }
 
+impl Object {
+    /// The numbers of its pages.
+    pub fn pages(&self) -> std::ops::Range<u32> {
+        let first = self.record.first_page.get();
+        first..first + self.record.pages.get()
+    }
+}
+
 /// Writes the object section.
 pub fn write_objects(objects: &[(String, ObjectRecord)]) -> Vec<u8> {
     let names: usize = objects.iter().map(|(name, _)| name.len()).sum();

@@ -157,6 +157,11 @@ impl<'a> Page<'a> {
         zerocopy::transmute_ref!(head)
     }
 
+    /// All its bytes.
+    pub fn bytes(&self) -> &'a [u8; PAGE] {
+        self.bytes
+    }
+
     /// The profile that its treelets are read with.
     #[inline]
     pub fn profile(&self) -> Profile {

@@ -1,6 +1,6 @@
 //! Checks a whole file by the rules, page by page; and whether its bounds contain its triangles.
 //!
-//! `validate` looks at structure and checksums. `Bounds` is the proof of the geometry: going through
+//! `validate` looks at structure and checksums. `check_bounds` is the proof of the geometry: going through
 //! the pages from the last to the first it finds the tight k-DOP of every subtree from the stored
 //! triangles and compares it with what a query decodes.
 
@@ -13,17 +13,34 @@ use crate::kdop::Kdop;
 use crate::layout::{ContentHasher, Layout};
 use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
-use crate::page::{PAGE, Page, RootRef, check_crossing, check_page};
+use crate::page::{Page, RootRef, check_crossing, check_page};
 use crate::rule::Rule;
 use crate::treelet::{Child, Links};
 
 /// Checks structure and checksums of the whole file.
 ///
-/// Cost: two passes over the bytes, no memory beyond the object table.
+/// Cost: two passes over the bytes and 40 bytes of memory a page. Its parts are public for those who
+/// check pages in parallel.
 ///
 /// # Errors
-/// The first rule that does not hold; bounds (rule 35) are `Bounds`' business.
+/// The first rule that does not hold; bounds (rule 35) are `check_bounds`' business.
 pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
+    let layout = validate_sections(bytes)?;
+    for object in &layout.objects {
+        let pages = object.pages();
+        let checked = pages.clone().map(|number| validate_page(&layout, bytes, object, number));
+        let counts = checked.collect::<Result<Vec<_>, _>>()?;
+        pages.clone().try_for_each(|number| validate_links(&layout, bytes, object, number))?;
+        validate_counts(&layout, object, &counts)?;
+    }
+    Ok(layout)
+}
+
+/// Checks the header, the tables, the checksums of whole sections and the duplicate ids.
+///
+/// # Errors
+/// The first of rules 1 to 14 and 36 that does not hold.
+pub fn validate_sections(bytes: &[u8]) -> Result<Layout, FormatError> {
     let layout = Layout::read(bytes)?;
     let mut content = ContentHasher::default();
     for section in &layout.sections {
@@ -36,57 +53,96 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
         }
     }
     require(Rule::SectionChecksum, 24, hex(layout.content_checksum), hex(content.finish()))?;
-    for object in &layout.objects {
-        validate_object(&layout, bytes, object)?;
-    }
     layout.check_duplicates(bytes)?;
     Ok(layout)
 }
 
-fn validate_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<(), FormatError> {
-    let record = &object.record;
-    let first = record.first_page.get();
-    let (mut treelets, mut packets, mut triangles) = (0u64, 0u64, 0u64);
-    let (mut roots, mut remotes) = (0u64, 0u64);
-    for number in first..first + record.pages.get() {
-        let page = checked_page(layout, bytes, number, object)?;
-        let header = page.header();
-        let at = layout.page_offset(number);
-        require(Rule::Counts, at + 40, packets, u64::from(header.first_packet.get()))?;
-        treelets += u64::from(header.treelets);
-        roots += u64::from(header.roots);
-        remotes += u64::from(header.remotes);
-        packets += u64::from(header.packets.get());
-        triangles += check_leaves(layout, bytes, object, &page)?;
-        for link in 0..header.remotes {
-            let to = page.remote(link);
-            let target = checked_page(layout, bytes, to.page(), object)?;
-            check_crossing(&target, to, number, link, layout.page_offset(to.page()))?;
-        }
+/// What a page has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    first_packet: u64,
+    treelets: u64,
+    packets: u64,
+    triangles: u64,
+    roots: u64,
+    remotes: u64,
+}
+
+/// Checks a page and its blocks value by value, all but where its links lead.
+///
+/// # Errors
+/// The first of rules 15 to 33, 37 and 38 that does not hold.
+pub fn validate_page(
+    layout: &Layout,
+    bytes: &[u8],
+    object: &Object,
+    number: u32,
+) -> Result<Counts, FormatError> {
+    let page = page_of(layout, bytes, object, number)?;
+    check_page(page.bytes(), number, object, layout.page_offset(number))?;
+    let header = page.header();
+    Ok(Counts {
+        first_packet: header.first_packet.get().into(),
+        treelets: header.treelets.into(),
+        packets: header.packets.get().into(),
+        triangles: check_leaves(layout, bytes, object, &page)?,
+        roots: header.roots.into(),
+        remotes: header.remotes.into(),
+    })
+}
+
+/// Checks where the links of a page lead, after all pages have been checked.
+///
+/// # Errors
+/// Rule 20.
+pub fn validate_links(layout: &Layout, bytes: &[u8], object: &Object, number: u32) -> Result<(), FormatError> {
+    let page = page_of(layout, bytes, object, number)?;
+    for link in 0..page.header().remotes {
+        let to = page.remote(link);
+        let target = page_of(layout, bytes, object, to.page())?;
+        check_crossing(&target, to, number, link, layout.page_offset(to.page()))?;
     }
-    let at = layout.page_offset(first);
+    Ok(())
+}
+
+/// Checks the sums of what an object's pages have, in their order, after their links.
+///
+/// # Errors
+/// Rule 34.
+pub fn validate_counts(layout: &Layout, object: &Object, pages: &[Counts]) -> Result<(), FormatError> {
+    let mut sum = Counts::default();
+    for (number, counts) in object.pages().zip(pages) {
+        let at = layout.page_offset(number);
+        require(Rule::Counts, at + 40, sum.packets, counts.first_packet)?;
+        sum.treelets += counts.treelets;
+        sum.packets += counts.packets;
+        sum.triangles += counts.triangles;
+        sum.roots += counts.roots;
+        sum.remotes += counts.remotes;
+    }
+    let record = &object.record;
+    let at = layout.page_offset(record.first_page.get());
     // Each link has been followed to a root that names it back: no two share a root, so that equal
     // numbers leave no root without a way to it.
-    require(Rule::Counts, at, remotes + 1, roots)?;
-    let found = [treelets, packets, triangles];
+    require(Rule::Counts, at, sum.remotes + 1, sum.roots)?;
+    let found = [sum.treelets, sum.packets, sum.triangles];
     let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
     ensure(found == stated, Rule::Counts, at, || {
         (format!("treelets, packets, triangles {stated:?}"), format!("{found:?}"))
     })
 }
 
-fn checked_page<'a>(
+/// A page, not checked.
+fn page_of<'a>(
     layout: &Layout,
     bytes: &'a [u8],
-    number: u32,
     object: &Object,
+    number: u32,
 ) -> Result<Page<'a>, FormatError> {
     let at = layout.page_offset(number);
-    let page: &[u8; PAGE] = layout
-        .page_bytes(bytes, number)
-        .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section"))?;
-    check_page(page, number, object, at)?;
-    Ok(Page::new(page, object.profile))
+    let page = layout.page_bytes(bytes, number);
+    let missing = || FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section");
+    Ok(Page::new(page.ok_or_else(missing)?, object.profile))
 }
 
 /// Checks a page's leaf and id blocks value by value; returns the number of its triangles.
