@@ -49,16 +49,29 @@ struct Aabb {
 impl Aabb {
     const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
 
+    #[inline(always)]
     fn join(&mut self, lo: &[f32; 3], hi: &[f32; 3]) {
         for axis in 0..3 {
-            self.lo[axis] = self.lo[axis].min(lo[axis]);
-            self.hi[axis] = self.hi[axis].max(hi[axis]);
+            self.lo[axis] = lesser(self.lo[axis], lo[axis]);
+            self.hi[axis] = greater(self.hi[axis], hi[axis]);
         }
     }
 
     fn extents(&self) -> [f64; 3] {
         [0, 1, 2].map(|a| f64::from(self.hi[a]) - f64::from(self.lo[a]))
     }
+}
+
+/// `min` without its care for NaN, which there is none of here: one instruction instead of three.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// `max` likewise.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// A binary tree over the triangles.
@@ -283,7 +296,7 @@ fn bounds_of(references: &[Reference]) -> Bounds {
         bounds.join(&reference.lo, &reference.hi);
         for axis in 0..3 {
             let centre = reference.centre(axis);
-            centres[axis] = [centres[axis][0].min(centre), centres[axis][1].max(centre)];
+            centres[axis] = [lesser(centres[axis][0], centre), greater(centres[axis][1], centre)];
         }
         (bounds, centres)
     };

@@ -92,8 +92,10 @@ impl Kdop {
     #[inline]
     pub fn join(&mut self, other: &Self, slabs: usize) {
         for slab in 0..slabs {
-            self.lo[slab] = self.lo[slab].min(other.lo[slab]);
-            self.hi[slab] = self.hi[slab].max(other.hi[slab]);
+            // Not `min` and `max`: there is no NaN to care for.
+            let (lo, hi) = (other.lo[slab], other.hi[slab]);
+            self.lo[slab] = if lo < self.lo[slab] { lo } else { self.lo[slab] };
+            self.hi[slab] = if hi > self.hi[slab] { hi } else { self.hi[slab] };
         }
     }
 
