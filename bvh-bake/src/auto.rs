@@ -10,10 +10,10 @@
 
 use crate::options::Options;
 use crate::prepare::Corners;
-use bvh_format::decode::{Group, NodeSlabs};
 use bvh_format::kdop::{DIRECTIONS, DirectionSet, Kdop};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
+use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::support::upper_form;
 
 /// A choice and why.

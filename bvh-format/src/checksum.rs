@@ -22,3 +22,8 @@ impl Hasher {
         self.0.digest()
     }
 }
+
+/// A checksum as people compare them.
+pub(crate) fn hex(sum: u64) -> String {
+    format!("{sum:016x}")
+}

@@ -1,75 +1,9 @@
 //! The scalar reference decoder of treelets: normative, and the oracle of every vector backend.
 
-use crate::kdop::Kdop;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
-use crate::treelet::{read_codes, read_ends, row};
-use bytemuck::{Pod, Zeroable};
-
-/// The decoded slabs of one node in row order (slab `s` in row `s`, from 7 on in row `s + 1`).
-/// Rows beyond the profile's directions hold nothing of meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NodeSlabs {
-    /// Lower ends by row.
-    pub lo: [f32; 16],
-    /// Upper ends by row.
-    pub hi: [f32; 16],
-}
-
-impl NodeSlabs {
-    /// From a k-DOP.
-    pub fn from_kdop(kdop: &Kdop, slabs: usize) -> Self {
-        let mut node = Self::default();
-        for slab in 0..slabs {
-            node.lo[row(slab)] = kdop.lo[slab];
-            node.hi[row(slab)] = kdop.hi[slab];
-        }
-        node
-    }
-
-    /// To a k-DOP of the first `slabs` slabs; the rest is that of nothing.
-    pub fn to_kdop(&self, slabs: usize) -> Kdop {
-        let mut kdop = Kdop::EMPTY;
-        for slab in 0..slabs {
-            kdop.lo[slab] = self.lo[row(slab)];
-            kdop.hi[slab] = self.hi[row(slab)];
-        }
-        kdop
-    }
-}
-
-/// The decoded slabs of four children in register order: element `4 * r + c` of register `q` is row
-/// `4 * q + r` of child `c`. Elements of absent children and of rows beyond the profile's
-/// directions hold nothing of meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C, align(64))]
-pub struct Group {
-    /// Lower ends.
-    pub lo: [[f32; 16]; 4],
-    /// Upper ends.
-    pub hi: [[f32; 16]; 4],
-}
-
-impl Group {
-    /// All zero.
-    pub const ZERO: Self = Self { lo: [[0.0; 16]; 4], hi: [[0.0; 16]; 4] };
-
-    /// The rows one by one, four children each: lower ends in rows 0 to 15, upper ends in 16 to 31.
-    #[inline(always)]
-    pub fn rows(&self) -> &[[f32; 4]; 32] {
-        bytemuck::cast_ref(self)
-    }
-
-    /// A group of one child, the first.
-    pub fn of_one(node: &NodeSlabs) -> Self {
-        let mut group = Self::ZERO;
-        for row in 0..16 {
-            group.lo[row / 4][4 * (row % 4)] = node.lo[row];
-            group.hi[row / 4][4 * (row % 4)] = node.hi[row];
-        }
-        group
-    }
-}
+use crate::slabs::{NodeSlabs, row};
+use crate::treelet::{read_codes, read_ends};
 
 /// Decodes one child of a treelet under its parent's decoded slabs.
 pub fn decode_child(
@@ -99,6 +33,7 @@ pub fn decode_child(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kdop::Kdop;
     use crate::treelet::encode_slabs;
 
     /// A random point cloud's k-DOP, nested in the parent cloud's.

@@ -1,6 +1,6 @@
 //! The header page: magic, version, lengths and the section table. Byte for byte as in the specification.
 
-use crate::checksum::checksum;
+use crate::checksum::{checksum, hex};
 use crate::error::{FormatError, ensure, require};
 use crate::page::PAGE;
 use crate::rule::Rule;
@@ -210,9 +210,4 @@ fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Sect
         ensure(there, Rule::SectionOnce, at, || (format!("a section {}", kind.name()), "none".into()))?;
     }
     Ok(sections)
-}
-
-/// A checksum as people compare them.
-pub(crate) fn hex(sum: u64) -> String {
-    format!("{sum:016x}")
 }

@@ -1,8 +1,9 @@
 //! From the bytes of a file to its sections, objects, pages and blocks, without copying any.
 
+use crate::checksum::hex;
 use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
-use crate::header::{Section, SectionKind, hex, read_header};
+use crate::header::{Section, SectionKind, read_header};
 use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};

@@ -27,6 +27,7 @@ pub mod page;
 pub mod profile;
 pub mod quantize;
 mod rule;
+pub mod slabs;
 pub mod support;
 pub mod treelet;
 pub mod validate;

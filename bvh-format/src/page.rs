@@ -13,15 +13,16 @@
 //! demands it, and with it no slot, packet or link is reached twice.
 
 use crate::checksum::checksum;
-use crate::decode::NodeSlabs;
+use crate::checksum::hex;
 use crate::error::{FormatError, ensure, require};
-use crate::header::hex;
 use crate::kdop::Kdop;
 use crate::object::Object;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;
-use crate::treelet::{Links, read_codes, read_ends, row};
+use crate::slabs::NodeSlabs;
+use crate::slabs::row;
+use crate::treelet::{Links, read_codes, read_ends};
 use zerocopy::byteorder::little_endian::{U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 

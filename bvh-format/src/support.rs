@@ -8,7 +8,7 @@
 //! 1998, where the three faces at the extreme vertex are used.
 
 use crate::kdop::DirectionSet;
-use crate::treelet::row;
+use crate::slabs::row;
 
 /// A linear form over the slab ends of a node: three ends by row, three coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -16,10 +16,10 @@
 //! 4 + n - 1 for a leaf packet of n triangles (1 to 4). Children of one kind are numbered
 //! consecutively from the first, in the order of the children.
 
-use crate::decode::{Group, NodeSlabs};
 use crate::kdop::Kdop;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{encode_max_outward, encode_min_outward, residual_unit};
+use crate::slabs::{Group, NodeSlabs, row};
 
 /// One child of a treelet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,12 +123,6 @@ impl Links {
             _ => Child::Empty,
         }
     }
-}
-
-/// The row that holds slab `slab`: a hole after slab 6 keeps the first 7 in two registers.
-#[inline]
-pub const fn row(slab: usize) -> usize {
-    if slab < 7 { slab } else { slab + 1 }
 }
 
 /// Where the two codes of a child's slab stand in a treelet.

@@ -5,9 +5,9 @@
 //! triangles and compares it with what a query decodes.
 
 use crate::checksum::checksum;
-use crate::decode::{NodeSlabs, decode_child};
+use crate::checksum::hex;
+use crate::decode::decode_child;
 use crate::error::{FormatError, ensure, require};
-use crate::header::hex;
 use crate::ids::decode_id;
 use crate::kdop::Kdop;
 use crate::layout::{ContentHasher, Layout};
@@ -15,6 +15,7 @@ use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
 use crate::page::{Page, RootRef, check_crossing, check_page};
 use crate::rule::Rule;
+use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, Links};
 
 /// Checks structure and checksums of the whole file.
@@ -95,7 +96,12 @@ pub fn validate_page(
 ///
 /// # Errors
 /// Rule 20.
-pub fn validate_links(layout: &Layout, bytes: &[u8], object: &Object, number: u32) -> Result<(), FormatError> {
+pub fn validate_links(
+    layout: &Layout,
+    bytes: &[u8],
+    object: &Object,
+    number: u32,
+) -> Result<(), FormatError> {
     let page = page_of(layout, bytes, object, number)?;
     for link in 0..page.header().remotes {
         let to = page.remote(link);

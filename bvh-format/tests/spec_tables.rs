@@ -5,7 +5,7 @@
 
 use bvh_format::Rule;
 use bvh_format::checksum::checksum;
-use bvh_format::decode::{NodeSlabs, decode_child};
+use bvh_format::decode::decode_child;
 use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind};
 use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
@@ -14,6 +14,7 @@ use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
 use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, write_anchor};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
+use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{self, Child, Links};
 use std::any::type_name_of_val;
 use std::mem::offset_of;
@@ -189,7 +190,8 @@ fn lists() {
     assert_eq!(rows("profiles", 8), profiles);
 
     let numbered = (0..).zip(DIRECTIONS);
-    let directions = numbered.map(|(slab, [x, y, z])| format!("{slab}|{}|{x}|{y}|{z}", treelet::row(slab)));
+    let directions =
+        numbered.map(|(slab, [x, y, z])| format!("{slab}|{}|{x}|{y}|{z}", bvh_format::slabs::row(slab)));
     assert_eq!(rows("directions", 5), directions.collect::<Vec<_>>());
 
     let rules = Rule::ALL.iter().map(|rule| format!("R{:02}|{}", rule.number(), rule.text()));
@@ -264,7 +266,8 @@ fn places_of_codes() {
         let before = decode(&zero);
         for place in 0..width * slabs * 2 {
             let (child, slab, end) = (place / 2 / slabs, place / 2 % slabs, place % 2);
-            let at = block * (child / 4) + row_stride * treelet::row(slab) + child_stride * (child % 4);
+            let at =
+                block * (child / 4) + row_stride * bvh_format::slabs::row(slab) + child_stride * (child % 4);
             let mut treelet = zero.clone();
             treelet[at + end * hi..][..bytes].copy_from_slice(code[end]);
             let after = decode(&treelet);

@@ -2,9 +2,11 @@
 
 use super::{Backend, Isa, Task};
 use crate::traverse::decode::decode_group;
-use bvh_format::decode::{Group, NodeSlabs, decode_child};
+use bvh_format::decode::decode_child;
 use bvh_format::profile::Profile;
-use bvh_format::treelet::{child_slabs, row};
+use bvh_format::slabs::row;
+use bvh_format::slabs::{Group, NodeSlabs};
+use bvh_format::treelet::child_slabs;
 
 struct Decode<'a> {
     profile: Profile,

@@ -1,9 +1,9 @@
 //! Decodes treelets in vector registers, to the bits of `bvh_format::decode`.
 
 use crate::isa::{Isa, Lanes};
-use bvh_format::decode::Group;
 use bvh_format::profile::Profile;
 use bvh_format::quantize::{STEP_U4, STEP_U8};
+use bvh_format::slabs::Group;
 
 /// The predictor-corrector over `$quads` registers of lower and of upper ends. `$unit` is the unit of
 /// the codes, given the parent's ends; `$codes` the codes of register `$q`. A macro, because a

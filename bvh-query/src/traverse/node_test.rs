@@ -4,10 +4,10 @@ use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{Alignment, Placement, form_error};
 use crate::traverse::opened::Aligned;
 use crate::traverse::pair::{Measure, Pair};
-use bvh_format::decode::Group;
 use bvh_format::kdop::DirectionSet;
+use bvh_format::slabs::Group;
+use bvh_format::slabs::row;
 use bvh_format::support::{Form, upper_form};
-use bvh_format::treelet::row;
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
 const INVERSE_LENGTHS: [f32; 13] = {

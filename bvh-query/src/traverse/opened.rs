@@ -7,9 +7,9 @@ use crate::bvh::Bvh;
 use crate::error::QueryError;
 use crate::isa::{Isa, Lanes};
 use crate::traverse::decode::decode_group;
-use bvh_format::decode::{Group, NodeSlabs};
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
+use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::{Child, Links};
 
 /// A leaf packet: its page, its number there and how many triangles it has.

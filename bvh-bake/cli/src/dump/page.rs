@@ -2,10 +2,11 @@
 
 use super::{checked, object_of};
 use crate::output::hex;
-use bvh_format::decode::{NodeSlabs, decode_child};
+use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page};
+use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
 use bvh_query::Bvh;

@@ -4,11 +4,12 @@
 //! the tight bounds of what is below each subtree root.
 
 use super::checked;
-use bvh_format::decode::{NodeSlabs, decode_child};
+use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::decode_packet;
 use bvh_format::object::Object;
 use bvh_format::page::Page;
+use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
 use bvh_query::Bvh;

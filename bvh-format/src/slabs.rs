@@ -1,0 +1,75 @@
+//! Decoded slabs: of one node, and of four children at once in the order of vector registers.
+
+use crate::kdop::Kdop;
+use bytemuck::{Pod, Zeroable};
+
+/// The row that holds slab `slab`: a hole after slab 6 keeps the first 7 in two registers.
+#[inline]
+pub const fn row(slab: usize) -> usize {
+    if slab < 7 { slab } else { slab + 1 }
+}
+
+/// The decoded slabs of one node in row order (slab `s` in row `s`, from 7 on in row `s + 1`).
+/// Rows beyond the profile's directions hold nothing of meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NodeSlabs {
+    /// Lower ends by row.
+    pub lo: [f32; 16],
+    /// Upper ends by row.
+    pub hi: [f32; 16],
+}
+
+impl NodeSlabs {
+    /// From a k-DOP.
+    pub fn from_kdop(kdop: &Kdop, slabs: usize) -> Self {
+        let mut node = Self::default();
+        for slab in 0..slabs {
+            node.lo[row(slab)] = kdop.lo[slab];
+            node.hi[row(slab)] = kdop.hi[slab];
+        }
+        node
+    }
+
+    /// To a k-DOP of the first `slabs` slabs; the rest is that of nothing.
+    pub fn to_kdop(&self, slabs: usize) -> Kdop {
+        let mut kdop = Kdop::EMPTY;
+        for slab in 0..slabs {
+            kdop.lo[slab] = self.lo[row(slab)];
+            kdop.hi[slab] = self.hi[row(slab)];
+        }
+        kdop
+    }
+}
+
+/// The decoded slabs of four children in register order: element `4 * r + c` of register `q` is row
+/// `4 * q + r` of child `c`. Elements of absent children and of rows beyond the profile's
+/// directions hold nothing of meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Group {
+    /// Lower ends.
+    pub lo: [[f32; 16]; 4],
+    /// Upper ends.
+    pub hi: [[f32; 16]; 4],
+}
+
+impl Group {
+    /// All zero.
+    pub const ZERO: Self = Self { lo: [[0.0; 16]; 4], hi: [[0.0; 16]; 4] };
+
+    /// The rows one by one, four children each: lower ends in rows 0 to 15, upper ends in 16 to 31.
+    #[inline(always)]
+    pub fn rows(&self) -> &[[f32; 4]; 32] {
+        bytemuck::cast_ref(self)
+    }
+
+    /// A group of one child, the first.
+    pub fn of_one(node: &NodeSlabs) -> Self {
+        let mut group = Self::ZERO;
+        for row in 0..16 {
+            group.lo[row / 4][4 * (row % 4)] = node.lo[row];
+            group.hi[row / 4][4 * (row % 4)] = node.hi[row];
+        }
+        group
+    }
+}
