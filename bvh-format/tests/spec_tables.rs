@@ -15,7 +15,7 @@ use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, write_anc
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
-use bvh_format::treelet::{self, Child, Links};
+use bvh_format::treelet::{Child, Links};
 use std::any::type_name_of_val;
 use std::mem::offset_of;
 use zerocopy::FromZeros;
