@@ -34,7 +34,7 @@ const SMALL: [(Profile, f64); 3] =
 /// of a scanned surface (123 to 87) and of CAD parts (683 to 510).
 const U4_TESTS: f64 = 1.4;
 /// Bytes of nodes and plain triangles beyond which reading the file costs more than unpacking it.
-/// Warm, packed triangles take 1.2 to 1.4 times the time of plain ones, also where caches do not hold
+/// Warm, packed triangles take 1.3 to 1.6 times the time of plain ones, also where caches do not hold
 /// them: a packet's vertices stand on as many lines as a plain packet.
 const LARGE_BYTES: u64 = 256 << 20;
 /// Bytes a triangle of nodes and plain lanes.
