@@ -294,11 +294,14 @@ fn assemble(
     let mut table = Vec::new();
     let mut length = PAGE;
     for (kind, data) in &parts {
-        if kind.is_content() {
-            content.begin(*kind, data.len() as u64);
-            content.update(data);
-        }
-        table.push(Section { kind: *kind, range: length..length + data.len(), checksum: checksum(data) });
+        let add_to_content = || {
+            if kind.is_content() {
+                content.begin(*kind, data.len() as u64);
+                content.update(data);
+            }
+        };
+        let (sum, ()) = rayon::join(|| checksum(data), add_to_content);
+        table.push(Section { kind: *kind, range: length..length + data.len(), checksum: sum });
         length = (length + data.len()).next_multiple_of(PAGE);
     }
     let mut bytes = Vec::with_capacity(length);

@@ -71,7 +71,10 @@ impl Encoder<'_> {
             treelets += u64::from(header.treelets);
         }
         parts.par_iter_mut().for_each(seal);
-        for part in &parts {
+        sections.nodes.reserve_exact(parts.len() * PAGE);
+        sections.leaves.reserve_exact(line * LINE - sections.leaves.len());
+        sections.ids.reserve_exact(word * WORD - sections.ids.len());
+        for part in parts {
             sections.nodes.extend_from_slice(&part.page);
             sections.leaves.extend_from_slice(&part.leaf_block);
             sections.ids.extend_from_slice(&part.id_block);

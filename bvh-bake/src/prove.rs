@@ -17,16 +17,23 @@ use rayon::prelude::*;
 /// # Errors
 /// A rule that does not hold; of several, any.
 pub fn validate_in_parallel(bytes: &[u8]) -> Result<Layout, FormatError> {
-    let layout = validate_sections(bytes)?;
+    let layout = Layout::read(bytes)?;
+    let (sections, pages) = rayon::join(|| validate_sections(bytes), || validate_pages(&layout, bytes));
+    sections?;
+    pages?;
+    Ok(layout)
+}
+
+fn validate_pages(layout: &Layout, bytes: &[u8]) -> Result<(), FormatError> {
     for object in &layout.objects {
         let pages = object.pages().into_par_iter();
         let counts: Result<Vec<_>, FormatError> =
-            pages.clone().map(|number| validate_page(&layout, bytes, object, number)).collect();
+            pages.clone().map(|number| validate_page(layout, bytes, object, number)).collect();
         let counts = counts?;
-        pages.map(|number| validate_links(&layout, bytes, object, number)).collect::<Result<(), _>>()?;
-        validate_counts(&layout, object, &counts)?;
+        pages.map(|number| validate_links(layout, bytes, object, number)).collect::<Result<(), _>>()?;
+        validate_counts(layout, object, &counts)?;
     }
-    Ok(layout)
+    Ok(())
 }
 
 /// Checks the bounds of a file whose structure has been validated; returns how loose they are.
