@@ -67,20 +67,24 @@ impl Kdop {
     /// The k-DOP of points: the nearest `f32` outside their exact projections.
     ///
     /// Projections add at most three `f32`. Sums are taken in `f64` with the error of each addition
-    /// recovered exactly (Knuth's two-sum); where there is one, the sum takes a step of 2^-52 in its
-    /// direction, which is more than the error and never passes an `f32`.
+    /// recovered exactly (Knuth's two-sum). Where no sum can have an error, as nearly everywhere, none is
+    /// looked for.
     pub fn of_points(points: impl IntoIterator<Item = [f32; 3]>) -> Self {
         let (mut lo, mut hi) = ([f64::INFINITY; 13], [f64::NEG_INFINITY; 13]);
         for point in points {
             let [x, y, z] = point.map(f64::from);
+            if sums_are_exact(point) {
+                let sums = projections([x, y, z]);
+                for slab in 0..13 {
+                    let sum = sums[slab];
+                    lo[slab] = if sum < lo[slab] { sum } else { lo[slab] };
+                    hi[slab] = if sum > hi[slab] { sum } else { hi[slab] };
+                }
+                continue;
+            }
             for slab in 0..13 {
                 let [a, b, c] = FACTORS[slab];
-                let (sum_xy, error_xy) = two_sum(a * x, b * y);
-                let (sum, error_z) = two_sum(sum_xy, c * z);
-                let error = error_xy + error_z;
-                let step = sum.abs() * f64::EPSILON;
-                let below = sum - if error < 0.0 { step } else { 0.0 };
-                let above = sum + if error > 0.0 { step } else { 0.0 };
+                let (below, above) = sum_of_three(a * x, b * y, c * z);
                 lo[slab] = if below < lo[slab] { below } else { lo[slab] };
                 hi[slab] = if above > hi[slab] { above } else { hi[slab] };
             }
@@ -123,10 +127,48 @@ pub const FACTORS: [[f64; 3]; 13] = {
     factors
 };
 
+/// True if sums and differences of a point's coordinates are surely exact in `f64`: the coordinates that are
+/// not 0 are less than 2^28 apart in magnitude. Sums of three then have no more than the 53 bits from two
+/// above the largest to the last of the smallest.
+#[inline(always)]
+fn sums_are_exact(point: [f32; 3]) -> bool {
+    let magnitudes = point.map(|value| value.to_bits() & 0x7fff_ffff);
+    let largest = magnitudes.map(|bits| bits >> 23);
+    // 0 wraps to more than any; a power of two counts as half of itself.
+    let smallest = magnitudes.map(|bits| bits.wrapping_sub(1) >> 23);
+    let [largest, smallest] =
+        [largest.into_iter().max(), smallest.into_iter().min()].map(Option::unwrap_or_default);
+    largest <= smallest + 27
+}
+
+/// The projections of a point onto all directions, each exact if all sums are.
+#[inline(always)]
+fn projections([x, y, z]: [f64; 3]) -> [f64; 13] {
+    let (sum, difference) = (x + y, x - y);
+    let (a, b, c, d) = (sum + z, sum - z, difference + z, z - difference);
+    [x, y, z, a, b, c, d, sum, x + z, y + z, difference, x - z, y - z]
+}
+
 /// The nearest `f32` at or below.
 fn round_down(value: f64) -> f32 {
     let nearest = value as f32;
     if f64::from(nearest) > value { nearest.next_down() } else { nearest }
+}
+
+/// The nearest `f64` at or below and at or above `a + b + c`, for `f32` values.
+fn sum_of_three(a: f64, b: f64, c: f64) -> (f64, f64) {
+    let (sum_ab, error_ab) = two_sum(a, b);
+    let (sum, error_c) = two_sum(sum_ab, c);
+    // The errors may count for more than the sum, where c cancels a + b.
+    let (error, error_of_error) = two_sum(error_ab, error_c);
+    let (sum, rest) = two_sum(sum, error);
+    // `rest` is half of the spacing of `sum` at most. There is an error of the error only if `error_c` is not 0;
+    // then c has cancelled less than half of the sum (Sterbenz), `error` is below 2^-51 of it, and the error of
+    // that far below half of the spacing. So the next number is beyond all that is left.
+    let rest = rest + error_of_error;
+    let below = if rest < 0.0 { sum.next_down() } else { sum };
+    let above = if rest > 0.0 { sum.next_up() } else { sum };
+    (below, above)
 }
 
 /// `a + b` rounded, and the exact error of that rounding.
@@ -155,8 +197,16 @@ mod tests {
             let exponent = -((state >> 59) as i32);
             (((state >> 20) as u32 & 0xff_ffff) as f32 - 8388608.0) * 2f32.powi(exponent - 24)
         };
-        for _ in 0..20_000 {
-            let point = [random(), random(), random()];
+        let mut points: Vec<[f32; 3]> = (0..20_000).map(|_| [random(), random(), random()]).collect();
+        // One coordinate cancels another; the third is below the last bit of either, or of their sum.
+        for _ in 0..5_000 {
+            let (x, tiny) = (random(), (random() * 32.0).round() * 2f32.powi(-62));
+            let nearly = if random() > 0.0 { x } else { x.next_up() };
+            let sum = random() + x;
+            points.extend([[x, tiny, -nearly], [tiny, x, -nearly], [x, -nearly, tiny], [x - sum, tiny, sum]]);
+        }
+        points.push([1.0, 2f32.powi(-60), -1.0]);
+        for point in points {
             for direction in DIRECTIONS {
                 let kdop = Kdop::of_points([point]);
                 let slab = DIRECTIONS.iter().position(|&d| d == direction).unwrap();
@@ -165,6 +215,39 @@ mod tests {
                 let scaled = |v: f32| (f64::from(v) * 2f64.powi(66)) as i128;
                 assert!(scaled(lo) <= true_value && true_value <= scaled(hi));
                 assert!(hi == lo || hi == lo.next_up(), "not tight: {point:?} {direction:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn projections_are_those_of_the_directions() {
+        let point = [3.0, 50.0, 700.0];
+        let along = FACTORS.map(|factor| (0..3).map(|axis| factor[axis] * point[axis]).sum::<f64>());
+        assert_eq!(projections(point), along);
+    }
+
+    #[test]
+    fn sums_said_to_be_exact_are() {
+        let odd = |exponent: i32| ((1 << 24) - 1) as f32 * 2f32.powi(exponent);
+        let subnormal = f32::from_bits(3);
+        for (point, exact) in [
+            ([odd(0), odd(27), odd(27)], true),
+            ([odd(0), -odd(28), odd(27)], false),
+            ([0.0, odd(100), -0.0], true),
+            ([0.0, 0.0, 0.0], true),
+            ([subnormal, f32::MIN_POSITIVE, 0.0], true),
+            ([subnormal, 1.0, 0.0], false),
+        ] {
+            assert_eq!(sums_are_exact(point), exact, "{point:?}");
+            if exact {
+                let [x, y, z] = point.map(f64::from);
+                let errors = [x, -x].map(|x| {
+                    [y, -y].map(|y| {
+                        let (sum, error) = two_sum(x, y);
+                        [error, two_sum(sum, z).1, two_sum(x, z).1, two_sum(y, z).1]
+                    })
+                });
+                assert!(errors.as_flattened().as_flattened().iter().all(|&error| error == 0.0), "{point:?}");
             }
         }
     }
