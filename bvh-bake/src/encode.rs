@@ -1,6 +1,7 @@
 //! Writes the planned pages of an object: anchors, remote links, treelets, leaf and id blocks.
 
-use crate::pages::{Arena, PagePlan, Place, Plan};
+use crate::arena::Arena;
+use crate::pages::{PagePlan, Place, Plan};
 use crate::prepare::{Corners, Prepared};
 use crate::treelets::ChildKind;
 use bvh_format::checksum::checksum;
@@ -28,12 +29,20 @@ pub(crate) struct Encoder<'a> {
     pub(crate) first_page: u32,
 }
 
-/// Node, leaf and id sections while they grow, object by object.
+/// A page with its blocks.
+pub(crate) struct PageParts {
+    pub(crate) page: Vec<u8>,
+    header: PageHeader,
+    pub(crate) leaf_block: Vec<u8>,
+    pub(crate) id_block: Vec<u8>,
+}
+
+/// Where the blocks of the next page go, as pages follow each other through all objects of a file.
 #[derive(Default)]
-pub(crate) struct Sections {
-    pub(crate) nodes: Vec<u8>,
-    pub(crate) leaves: Vec<u8>,
-    pub(crate) ids: Vec<u8>,
+pub(crate) struct Ends {
+    pub(crate) pages: usize,
+    pub(crate) leaf_lines: usize,
+    pub(crate) id_words: usize,
 }
 
 /// What the object's record says of its pages.
@@ -42,44 +51,28 @@ pub(crate) struct Totals {
     pub(crate) treelets: u64,
 }
 
-/// A page with its blocks, before their places in the file are known.
-struct PageParts {
-    page: Vec<u8>,
-    header: PageHeader,
-    leaf_block: Vec<u8>,
-    id_block: Vec<u8>,
-}
-
 impl Encoder<'_> {
-    /// Encodes all pages and appends them to the sections.
-    pub(crate) fn encode(&self, sections: &mut Sections) -> Totals {
+    /// Encodes all pages, the first at `ends`, which is moved on behind the last.
+    pub(crate) fn encode(&self, ends: &mut Ends) -> (Vec<PageParts>, Totals) {
         let parents = self.parents();
         let mut parts: Vec<PageParts> = (0..self.plan.pages.len())
             .into_par_iter()
             .map(|page| self.page(&self.plan.pages[page], page, &parents[page]))
             .collect();
-        let (mut packets, mut treelets) = (0u64, 0u64);
-        let (mut line, mut word) = (sections.leaves.len() / LINE, sections.ids.len() / WORD);
+        let mut totals = Totals { packets: 0, treelets: 0 };
         for part in &mut parts {
             let header = &mut part.header;
-            header.leaf_line = (line as u64).into();
-            header.id_word = (if part.id_block.is_empty() { 0 } else { word } as u64).into();
-            header.first_packet = (packets as u32).into();
-            line += part.leaf_block.len() / LINE;
-            word += part.id_block.len() / WORD;
-            packets += u64::from(header.packets.get());
-            treelets += u64::from(header.treelets);
+            header.leaf_line = (ends.leaf_lines as u64).into();
+            header.id_word = (if part.id_block.is_empty() { 0 } else { ends.id_words } as u64).into();
+            header.first_packet = (totals.packets as u32).into();
+            ends.leaf_lines += part.leaf_block.len() / LINE;
+            ends.id_words += part.id_block.len() / WORD;
+            totals.packets += u64::from(header.packets.get());
+            totals.treelets += u64::from(header.treelets);
         }
+        ends.pages += parts.len();
         parts.par_iter_mut().for_each(seal);
-        sections.nodes.reserve_exact(parts.len() * PAGE);
-        sections.leaves.reserve_exact(line * LINE - sections.leaves.len());
-        sections.ids.reserve_exact(word * WORD - sections.ids.len());
-        for part in parts {
-            sections.nodes.extend_from_slice(&part.page);
-            sections.leaves.extend_from_slice(&part.leaf_block);
-            sections.ids.extend_from_slice(&part.id_block);
-        }
-        Totals { packets, treelets }
+        (parts, totals)
     }
 
     /// For each page, the page and remote link that lead to each of its roots.
@@ -87,7 +80,7 @@ impl Encoder<'_> {
         let mut parents: Vec<_> = self.plan.pages.iter().map(|page| vec![None; page.roots]).collect();
         for (number, page) in self.plan.pages.iter().enumerate() {
             for (link, &target) in page.remotes.iter().enumerate() {
-                let Place { page, slot } = self.plan.places[target];
+                let Place { page, slot } = self.plan.places[target as usize];
                 parents[page as usize][usize::from(slot)] =
                     Some((self.first_page + number as u32, link as u8));
             }
@@ -101,14 +94,14 @@ impl Encoder<'_> {
         let mut page = vec![0; PAGE];
         let mut decoded = vec![NodeSlabs::default(); plan.slots.len()];
         for (root, parent) in parents.iter().enumerate() {
-            let kdop = self.arena.treelets[plan.slots[root]].kdop(slabs);
+            let kdop = self.arena.treelets[plan.slots[root] as usize].kdop(slabs);
             decoded[root] = NodeSlabs::from_kdop(&kdop, slabs);
             let at = 64 + root * profile.anchor_bytes();
             write_anchor(profile, &kdop, *parent, &mut page[at..]);
         }
         let table = 64 + plan.roots * profile.anchor_bytes();
         for (link, &target) in plan.remotes.iter().enumerate() {
-            let place = self.plan.places[target];
+            let place = self.plan.places[target as usize];
             let root = RootRef::new(self.first_page + place.page, place.slot);
             page[table + 4 * link..table + 4 * link + 4].copy_from_slice(&root.0.to_le_bytes());
         }
@@ -119,7 +112,7 @@ impl Encoder<'_> {
             let size = profile.treelet_bytes();
             let at = first_line * 64 + slot * size;
             let treelet = &mut page[at..at + size];
-            let children = &self.arena.treelets[index].children;
+            let children = &self.arena.treelets[index as usize].children;
             let mut links = Links {
                 kinds: 0,
                 first_treelet: next_slot as u8,
@@ -130,14 +123,16 @@ impl Encoder<'_> {
             encode_slabs(profile, self.f16_scale, &decoded[slot], &kdops, treelet);
             for (child, slot_of_child) in children.iter().enumerate() {
                 let kind = match &slot_of_child.kind {
-                    ChildKind::Leaf(triangles) => {
+                    ChildKind::Leaf(packet) => {
+                        let triangles = packet.numbers();
                         packets.push(self.packet(triangles));
                         ids.push(triangles.iter().map(|&t| self.prepared.ids[t as usize]).collect());
                         3 + triangles.len() as u32
                     }
-                    ChildKind::Treelet(_) => {
-                        let target = self.arena.children[index][child];
-                        if target.is_some_and(|t| self.plan.places[t].page as usize == number) {
+                    ChildKind::Treelet(_) | ChildKind::Brick(_) => {
+                        let target = self.arena.child(index, child);
+                        let here = |t| self.plan.places[t as usize].page as usize == number;
+                        if target.is_some_and(here) {
                             let parent = &decoded[slot];
                             decoded[next_slot] =
                                 decode_child(profile, self.f16_scale, treelet, child, parent);

@@ -21,6 +21,7 @@ use atomic::Temporary;
 use bvh_format::checksum::{Hasher, checksum};
 use provenance::Provenance;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// How to go about files; how to bake is said by [`Options`].
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -63,9 +64,9 @@ pub enum Outcome {
 }
 
 /// Bytes of memory a triangle at the peak of a bake, less the input files' bytes. Measured as peak resident
-/// size on x86-64 Linux, 2026-11-21: 177 to 324 over profiles and encodings on a sphere of 5.0 million
-/// triangles, up to 395 where no two triangles share a vertex.
-const BYTES_A_TRIANGLE: u64 = 400;
+/// size on x86-64 Linux, 2026-11-21: 158 to 223 over profiles and encodings on a sphere of 5.0 million
+/// triangles, 203 to 263 where no two triangles share a vertex.
+const BYTES_A_TRIANGLE: u64 = 300;
 /// Bytes that any bake needs: the program, its threads and what is allocated page by page.
 const BYTES_AT_LEAST: u64 = 8 << 20;
 
@@ -122,6 +123,7 @@ pub fn bake_files(
         return Ok(Outcome::UpToDate(summary));
     }
     let mut mesh = sources.into_mesh()?;
+    let parsed = Instant::now();
     within(mesh.triangle_count())?;
     // Fails before the work, where the output cannot be written.
     drop(Temporary::beside(output)?);
@@ -129,10 +131,11 @@ pub fn bake_files(
         mesh = mesh.merged();
     }
     let mut stage = |stage| progress(Step::Bake(stage));
-    let (bytes, report) = to_bytes_with(&mesh, options, &provenance.to_text(), &mut stage)?;
+    let (bytes, mut report) = to_bytes_with(&mesh, options, &provenance.to_text(), &mut stage)?;
     drop(mesh);
     progress(Step::Write);
     write_atomically(output, &bytes)?;
+    report.seconds = parsed.elapsed().as_secs_f64();
     Ok(Outcome::Baked(Box::new(report)))
 }
 

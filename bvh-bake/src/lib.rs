@@ -1,6 +1,8 @@
 //! Bakes triangle meshes into `.cbvh` files.
 #![forbid(unsafe_code)]
 
+mod arena;
+mod assemble;
 mod auto;
 mod bake;
 mod build;

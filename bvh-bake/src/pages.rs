@@ -5,24 +5,19 @@
 //! in their places, is the tree of the next level. Half a page keeps both losses small: anchors (one
 //! line a subtree) and room that no subtree fits. Pages of the last level, the root's, come first
 //! in the file, so that children are always in later pages than their parents.
+//!
+//! Each brick is planned by itself, up to a rest of half a page at most. The rests and the tree above the bricks
+//! are planned last, and come first in the file; bricks follow one after the other.
 
-use crate::treelets::{ChildKind, Treelet};
+use crate::arena::{Arena, TreeletIndex};
 use bvh_format::page::{PAGE, fits};
 use bvh_format::profile::Profile;
+use rayon::prelude::*;
 use std::collections::VecDeque;
+use std::ops::Range;
 
 /// Pages that are filled side by side; more fill better and scatter neighbours.
 const OPEN_PAGES: usize = 24;
-
-/// A treelet by number in the arena, in depth-first order: children have higher numbers.
-pub(crate) type TreeletIndex = usize;
-
-/// The tree as an arena.
-pub(crate) struct Arena {
-    pub(crate) treelets: Vec<Treelet>,
-    /// Per treelet and child the child treelet, if it is one.
-    pub(crate) children: Vec<[Option<TreeletIndex>; 8]>,
-}
 
 /// A page: its subtree roots and all its treelets by slot.
 pub(crate) struct PagePlan {
@@ -46,35 +41,12 @@ pub(crate) struct Plan {
     pub(crate) places: Vec<Place>,
 }
 
-/// Flattens the tree, depth-first.
-pub(crate) fn flatten(root: Treelet) -> Arena {
-    let mut arena = Arena { treelets: Vec::new(), children: Vec::new() };
-    // (treelet, parent and child it hangs from); a stack, since trees may be deep.
-    let mut stack = vec![(root, None)];
-    while let Some((mut treelet, from)) = stack.pop() {
-        let index = arena.treelets.len();
-        if let Some((parent, child)) = from {
-            let links: &mut [Option<TreeletIndex>; 8] = &mut arena.children[parent];
-            links[child] = Some(index);
-        }
-        for (child, slot) in treelet.children.iter_mut().enumerate().rev() {
-            if let ChildKind::Treelet(inner) = &mut slot.kind {
-                let inner = std::mem::replace(inner.as_mut(), Treelet { children: Vec::new() });
-                stack.push((inner, Some((index, child))));
-            }
-        }
-        arena.treelets.push(treelet);
-        arena.children.push([None; 8]);
-    }
-    arena
-}
-
 /// Room that a subtree takes in a page.
 #[derive(Clone, Copy, Default)]
 struct Load {
-    roots: usize,
-    remotes: usize,
-    treelets: usize,
+    roots: u32,
+    remotes: u32,
+    treelets: u32,
 }
 
 impl Load {
@@ -87,108 +59,171 @@ impl Load {
     }
 
     fn fits(self, profile: Profile) -> bool {
-        fits(profile, self.roots, self.remotes, self.treelets)
+        fits(profile, self.roots as usize, self.remotes as usize, self.treelets as usize)
     }
 
     fn lines(self, profile: Profile) -> usize {
-        bvh_format::page::treelet_line(profile, self.roots, self.remotes)
-            + self.treelets * (profile.treelet_bytes() / 64)
+        bvh_format::page::treelet_line(profile, self.roots as usize, self.remotes as usize)
+            + self.treelets as usize * (profile.treelet_bytes() / 64)
     }
 }
 
-/// Plans the pages of an object.
-pub(crate) fn plan(arena: &Arena, profile: Profile) -> Plan {
+/// Plans the pages of an object. Each of `bricks` is a run of treelets below its first.
+pub(crate) fn plan(arena: &Arena, bricks: &[Range<usize>], profile: Profile) -> Plan {
     let count = arena.treelets.len();
-    let mut taken = vec![false; count];
-    let mut levels = Vec::new();
-    while !taken[0] {
-        levels.push(plan_level(arena, profile, &mut taken));
-    }
-    let pages: Vec<PagePlan> = levels.into_iter().rev().flatten().collect();
-    let mut places = vec![Place::default(); count];
-    for (page, plan) in pages.iter().enumerate() {
-        for (slot, &treelet) in plan.slots.iter().enumerate() {
-            places[treelet] = Place { page: page as u32, slot: slot as u8 };
-        }
-    }
-    Plan { pages, places }
-}
-
-/// Takes one level of subtrees off the tree.
-fn plan_level(arena: &Arena, profile: Profile, taken: &mut [bool]) -> Vec<PagePlan> {
-    let loads = loads(arena, taken);
-    let half = (PAGE / 64 - 1) / 2;
-    // What fits a page may be a root; half a page is the aim, a single treelet always fits.
-    let small = |index: TreeletIndex| {
-        let load = Load { roots: 1, ..loads[index] };
-        load.lines(profile) - 1 <= half.max(1 + profile.treelet_bytes() / 64 + 1)
+    let mut whole = Region::new(arena, profile, 0..count);
+    let mut pages = Vec::new();
+    let plan_brick = |brick: &Range<usize>| {
+        let mut region = Region::new(arena, profile, brick.clone());
+        (region.plan(Until::HalfAPage), region.taken)
     };
-    let mut pages: Vec<(Load, Vec<TreeletIndex>)> = Vec::new();
-    let mut open: VecDeque<usize> = VecDeque::new();
-    let mut stack = vec![0];
-    let mut roots = Vec::new();
-    let all_in_one = Load { roots: 1, ..loads[0] }.fits(profile);
-    while let Some(index) = stack.pop() {
-        let alone = index == 0 && all_in_one;
-        if !alone && !small(index) {
-            stack.extend(arena.children[index].iter().rev().flatten().filter(|&&child| !taken[child]));
-            continue;
+    let planned: Vec<_> = bricks.par_iter().map(plan_brick).collect();
+    for (brick, (brick_pages, taken)) in bricks.iter().zip(planned) {
+        pages.extend(brick_pages);
+        whole.taken[brick.clone()].copy_from_slice(&taken);
+    }
+    let mut all = whole.plan(Until::Nothing);
+    all.extend(pages);
+    let mut places = vec![Place::default(); count];
+    for (page, plan) in all.iter().enumerate() {
+        for (slot, &treelet) in plan.slots.iter().enumerate() {
+            places[treelet as usize] = Place { page: page as u32, slot: slot as u8 };
         }
-        let load = Load { roots: 1, ..loads[index] };
-        // The fullest open page that has room.
-        let room = open.iter().copied().filter(|&page| pages[page].0.with(load).fits(profile));
-        let page = room.max_by_key(|&page| (pages[page].0.lines(profile), std::cmp::Reverse(page)));
-        let page = page.unwrap_or_else(|| {
-            pages.push((Load::default(), Vec::new()));
-            open.push_back(pages.len() - 1);
-            if open.len() > OPEN_PAGES {
-                open.pop_front();
+    }
+    Plan { pages: all, places }
+}
+
+/// How much of a region may be left.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Until {
+    HalfAPage,
+    Nothing,
+}
+
+/// A run of treelets below its first, of which the lower ones are gradually put into pages.
+struct Region<'a> {
+    arena: &'a Arena,
+    profile: Profile,
+    treelets: Range<usize>,
+    /// Which of the treelets are in a page.
+    taken: Vec<bool>,
+    /// Room that is left for each of the others and what is below it.
+    loads: Vec<Load>,
+}
+
+impl<'a> Region<'a> {
+    fn new(arena: &'a Arena, profile: Profile, treelets: Range<usize>) -> Self {
+        let (taken, loads) = (vec![false; treelets.len()], vec![Load::default(); treelets.len()]);
+        Self { arena, profile, treelets, taken, loads }
+    }
+
+    fn root(&self) -> TreeletIndex {
+        self.treelets.start as u32
+    }
+
+    fn is_taken(&self, index: TreeletIndex) -> bool {
+        self.taken[index as usize - self.treelets.start]
+    }
+
+    fn load(&self, index: TreeletIndex) -> Load {
+        Load { roots: 1, ..self.loads[index as usize - self.treelets.start] }
+    }
+
+    /// Treelets among a treelet's children that are in no page yet.
+    fn left_below(&self, index: TreeletIndex) -> impl DoubleEndedIterator<Item = TreeletIndex> {
+        self.arena.children(index).filter(|&child| !self.is_taken(child))
+    }
+
+    /// Plans level by level; returns pages in the order of the file.
+    fn plan(&mut self, until: Until) -> Vec<PagePlan> {
+        let mut levels = Vec::new();
+        while !self.is_taken(self.root()) {
+            self.update_loads();
+            if until == Until::HalfAPage && self.is_small(self.root()) {
+                break;
             }
-            pages.len() - 1
-        });
-        pages[page].0 = pages[page].0.with(load);
-        pages[page].1.push(index);
-        roots.push(index);
+            levels.push(self.plan_level());
+        }
+        levels.into_iter().rev().flatten().collect()
     }
-    let plans = pages.into_iter().map(|(_, roots)| plan_page(arena, taken, roots)).collect();
-    roots.iter().for_each(|&root| take(arena, taken, root));
-    plans
-}
 
-/// Per treelet the room of the subtree below it, in what is left of the tree.
-fn loads(arena: &Arena, taken: &[bool]) -> Vec<Load> {
-    let mut loads = vec![Load::default(); arena.treelets.len()];
-    for index in (0..loads.len()).rev().filter(|&index| !taken[index]) {
-        let mut load = Load { treelets: 1, ..Load::default() };
-        for &child in arena.children[index].iter().flatten() {
-            if taken[child] {
-                load.remotes += 1;
-            } else {
-                load = load.with(loads[child]);
+    /// True if a treelet and what is left below it take half a page at most; a single one always does.
+    fn is_small(&self, index: TreeletIndex) -> bool {
+        let half = (PAGE / 64 - 1) / 2;
+        self.load(index).lines(self.profile) - 1 <= half.max(1 + self.profile.treelet_bytes() / 64 + 1)
+    }
+
+    /// Takes one level of subtrees off the tree.
+    fn plan_level(&mut self) -> Vec<PagePlan> {
+        let profile = self.profile;
+        let mut pages: Vec<(Load, Vec<TreeletIndex>)> = Vec::new();
+        let mut open: VecDeque<usize> = VecDeque::new();
+        let mut stack = vec![self.root()];
+        let mut roots = Vec::new();
+        let all_in_one = self.load(self.root()).fits(profile);
+        while let Some(index) = stack.pop() {
+            let alone = index == self.root() && all_in_one;
+            if !alone && !self.is_small(index) {
+                stack.extend(self.left_below(index).rev());
+                continue;
             }
+            let load = self.load(index);
+            // The fullest open page that has room.
+            let room = open.iter().copied().filter(|&page| pages[page].0.with(load).fits(profile));
+            let page = room.max_by_key(|&page| (pages[page].0.lines(profile), std::cmp::Reverse(page)));
+            let page = page.unwrap_or_else(|| {
+                pages.push((Load::default(), Vec::new()));
+                open.push_back(pages.len() - 1);
+                if open.len() > OPEN_PAGES {
+                    open.pop_front();
+                }
+                pages.len() - 1
+            });
+            pages[page].0 = pages[page].0.with(load);
+            pages[page].1.push(index);
+            roots.push(index);
         }
-        loads[index] = load;
+        let plans = pages.into_iter().map(|(_, roots)| self.plan_page(roots)).collect();
+        roots.into_iter().for_each(|root| self.take(root));
+        plans
     }
-    loads
-}
 
-/// Numbers a page's treelets breadth-first and collects its remote links in the same order.
-fn plan_page(arena: &Arena, taken: &[bool], roots: Vec<TreeletIndex>) -> PagePlan {
-    let mut plan = PagePlan { roots: roots.len(), slots: roots, remotes: Vec::new() };
-    let mut next = 0;
-    while next < plan.slots.len() {
-        for &child in arena.children[plan.slots[next]].iter().flatten() {
-            if taken[child] { plan.remotes.push(child) } else { plan.slots.push(child) }
+    /// Sums up the room of what is left, from the leaves up.
+    fn update_loads(&mut self) {
+        for index in self.treelets.clone().rev() {
+            if self.taken[index - self.treelets.start] {
+                continue;
+            }
+            let mut load = Load { treelets: 1, ..Load::default() };
+            for child in self.arena.children(index as u32) {
+                if self.is_taken(child) {
+                    load.remotes += 1;
+                } else {
+                    load = load.with(self.loads[child as usize - self.treelets.start]);
+                }
+            }
+            self.loads[index - self.treelets.start] = load;
         }
-        next += 1;
     }
-    plan
-}
 
-fn take(arena: &Arena, taken: &mut [bool], root: TreeletIndex) {
-    let mut stack = vec![root];
-    while let Some(index) = stack.pop() {
-        taken[index] = true;
-        stack.extend(arena.children[index].iter().flatten().filter(|&&child| !taken[child]));
+    /// Numbers a page's treelets breadth-first and collects its remote links in the same order.
+    fn plan_page(&self, roots: Vec<TreeletIndex>) -> PagePlan {
+        let mut plan = PagePlan { roots: roots.len(), slots: roots, remotes: Vec::new() };
+        let mut next = 0;
+        while next < plan.slots.len() {
+            for child in self.arena.children(plan.slots[next]) {
+                if self.is_taken(child) { plan.remotes.push(child) } else { plan.slots.push(child) }
+            }
+            next += 1;
+        }
+        plan
+    }
+
+    fn take(&mut self, root: TreeletIndex) {
+        let mut stack = vec![root];
+        while let Some(index) = stack.pop() {
+            stack.extend(self.left_below(index));
+            self.taken[index as usize - self.treelets.start] = true;
+        }
     }
 }

@@ -44,7 +44,7 @@ pub struct BakeReport {
     pub mean_children: f64,
     /// The content checksum.
     pub content_xxh3: u64,
-    /// Seconds from the parsed mesh to the finished bytes.
+    /// Seconds from the parsed mesh to the finished bytes, or to the closed file where one is written.
     pub seconds: f64,
 }
 

@@ -2,12 +2,16 @@
 //!
 //! A treelet starts at a binary node and opens, of its children so far, the one that traversals
 //! enter most (the largest), until it has W. A subtree whose packets fit one treelet is left closed:
-//! opened, its packets would end up under a treelet that is not full.
+//! opened, its packets would end up under a treelet that is not full. So it goes with bricks, the leaves of the
+//! tree above them.
 
-use crate::build::Node;
+use crate::build::{Node, PacketTriangles};
 use crate::prepare::Corners;
 use bvh_format::kdop::Kdop;
 use rayon::prelude::*;
+
+/// Below this many leaves, threads cost more than they bring.
+const PARALLEL: usize = 2048;
 
 /// A treelet over its children.
 pub(crate) struct Treelet {
@@ -21,9 +25,10 @@ pub(crate) struct Child {
 }
 
 pub(crate) enum ChildKind {
-    /// Triangles of a packet, by number, ascending.
-    Leaf(Vec<u32>),
+    Leaf(PacketTriangles),
     Treelet(Box<Treelet>),
+    /// The first treelet of a brick, by the brick's number.
+    Brick(u32),
 }
 
 impl Treelet {
@@ -35,18 +40,25 @@ impl Treelet {
     }
 }
 
-/// What stays the same all over the tree.
-pub(crate) struct Cutter<'a> {
-    pub(crate) triangles: &'a [Corners],
+/// What stays the same all over a tree.
+pub(crate) struct Cutter<F> {
+    /// Children in a full treelet.
     pub(crate) width: usize,
+    /// The slabs that the profile stores.
     pub(crate) slabs: usize,
+    /// Makes a child of a leaf.
+    pub(crate) leaf: F,
 }
 
-impl Cutter<'_> {
+impl<F> Cutter<F> {
     /// The treelet that starts at `node`, with all below it.
-    pub(crate) fn cut(&self, node: Node) -> Treelet {
-        let packets = node.packets();
-        let mut open = vec![node];
+    pub(crate) fn cut<L: Send>(&self, node: Node<L>) -> Treelet
+    where
+        F: Fn(L) -> Child + Sync,
+    {
+        let leaves = node.leaves();
+        let mut open = Vec::with_capacity(self.width);
+        open.push(node);
         while open.len() < self.width {
             let Some(at) = self.next_to_open(&open) else { break };
             // The children take the place of their parent, so that the order of the tree is kept.
@@ -55,7 +67,7 @@ impl Cutter<'_> {
                 open.insert(at, inner.left);
             }
         }
-        let children = if packets > 2048 {
+        let children = if leaves > PARALLEL {
             open.into_par_iter().map(|node| self.child(node)).collect()
         } else {
             open.into_iter().map(|node| self.child(node)).collect()
@@ -64,14 +76,14 @@ impl Cutter<'_> {
     }
 
     /// The largest node that may be opened. At the start that is the treelet's own root.
-    fn next_to_open(&self, open: &[Node]) -> Option<usize> {
+    fn next_to_open<L>(&self, open: &[Node<L>]) -> Option<usize> {
         let alone = open.len() == 1;
-        // Within a treelet of nothing but packets every inner node is opened.
-        let bottom: usize = open.iter().map(Node::packets).sum();
+        // Within a treelet of nothing but leaves every inner node is opened.
+        let bottom: usize = open.iter().map(Node::leaves).sum();
         let all_fit = bottom <= self.width;
-        let may = |node: &Node| match node {
+        let may = |node: &Node<L>| match node {
             Node::Leaf(_) => false,
-            Node::Inner(inner) => alone || all_fit || inner.packets > self.width,
+            Node::Inner(inner) => alone || all_fit || inner.leaves > self.width,
         };
         let mut best: Option<usize> = None;
         for (index, node) in open.iter().enumerate().filter(|(_, node)| may(node)) {
@@ -82,17 +94,22 @@ impl Cutter<'_> {
         best
     }
 
-    fn child(&self, node: Node) -> Child {
+    fn child<L: Send>(&self, node: Node<L>) -> Child
+    where
+        F: Fn(L) -> Child + Sync,
+    {
         match node {
-            Node::Leaf(mut triangles) => {
-                triangles.sort_unstable();
-                let kdop = Kdop::of_points(triangles.iter().flat_map(|&t| self.triangles[t as usize]));
-                Child { kdop, kind: ChildKind::Leaf(triangles) }
-            }
+            Node::Leaf(leaf) => (self.leaf)(leaf),
             inner => {
                 let treelet = self.cut(inner);
                 Child { kdop: treelet.kdop(self.slabs), kind: ChildKind::Treelet(Box::new(treelet)) }
             }
         }
     }
+}
+
+/// The child that is a leaf packet.
+pub(crate) fn packet(triangles: &[Corners], packet: PacketTriangles) -> Child {
+    let corners = packet.numbers().iter().flat_map(|&triangle| triangles[triangle as usize]);
+    Child { kdop: Kdop::of_points(corners), kind: ChildKind::Leaf(packet) }
 }

@@ -150,6 +150,30 @@ fn the_bytes_depend_on_mesh_and_options_alone() {
 }
 
 #[test]
+fn several_bricks_are_baked_to_the_same_bytes_by_any_number_of_threads() {
+    // A wavy sheet of 2 * 400 * 400 triangles: two bricks at least.
+    let at = |i: usize, j: usize| {
+        let (x, y) = (i as f64 / 400.0, j as f64 / 400.0);
+        [x, y, 0.05 * (20.0 * x).sin() * (17.0 * y).cos()].map(|v| f64::from(v as f32))
+    };
+    let squares = (0..400).flat_map(|i| (0..400).map(move |j| (i, j)));
+    let triangles: Vec<Triangle> = squares
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+            [[a, b, c], [c, b, d]]
+        })
+        .collect();
+    let mesh = mesh(&triangles);
+    let bake = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| to_bytes(&mesh, &options(Profile::Dop14U8, TriangleEncoding::Packed)).unwrap().0)
+    };
+    let bytes = bake(1);
+    assert!(bytes == bake(2) && bytes == bake(5));
+    assert_eq!(stored(&bytes).len(), triangles.len());
+}
+
+#[test]
 fn provenance_is_no_part_of_the_content() {
     let mesh = mesh(&soup(50, 7));
     let (plain, report) = to_bytes(&mesh, &Options::default()).unwrap();

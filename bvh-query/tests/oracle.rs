@@ -166,6 +166,18 @@ fn tiny_and_huge_meshes() {
 }
 
 #[test]
+fn a_mesh_of_several_bricks() {
+    // 320,000 triangles, more than the baker takes into one tree.
+    let large = terrain(400, 21);
+    let small = sphere(0);
+    let [large, small] = [large, small].map(|triangles| vec![bake(&mesh(&triangles), &Options::default())]);
+    let mut queriers = queriers();
+    let mut random = Random::new(22);
+    let poses: Vec<_> = [0.5, 1.5, 3.0].map(|reach| random.pose(reach)).to_vec();
+    check(&large, &small, &poses, &mut queriers);
+}
+
+#[test]
 fn far_from_the_origin_in_f64() {
     let mut queriers = queriers();
     let offset = [1e7, -3e7, 2e7];

@@ -1,0 +1,138 @@
+//! Boxes and references to triangles in eight lanes, which compilers join in two vector instructions.
+
+use crate::prepare::Corners;
+use bytemuck::{Pod, Zeroable};
+
+/// A box: the lower ends and the negated upper ends of three axes, each with a spare lane, so that boxes are
+/// joined by the lesser of all lanes.
+#[derive(Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Aabb([f32; 8]);
+
+impl Aabb {
+    pub(super) const EMPTY: Self = Self([f32::INFINITY; 8]);
+
+    pub(super) fn of_point(point: [f32; 4]) -> Self {
+        let [x, y, z, w] = point;
+        Self([x, y, z, w, -x, -y, -z, -w])
+    }
+
+    #[inline(always)]
+    pub(super) fn join(&mut self, other: &Self) {
+        for lane in 0..8 {
+            // `min` without its care for NaN, which there is none of here.
+            let (mine, its) = (self.0[lane], other.0[lane]);
+            self.0[lane] = if its < mine { its } else { mine };
+        }
+    }
+
+    pub(super) fn lo(&self, axis: usize) -> f32 {
+        self.0[axis]
+    }
+
+    /// The extent along an axis; coordinates of at most 2^120 do not overflow, nor do twice as large ones.
+    #[inline(always)]
+    pub(super) fn extent(&self, axis: usize) -> f32 {
+        -(self.0[axis] + self.0[axis + 4])
+    }
+
+    /// The axis of the largest extent, the first of equals.
+    pub(super) fn longest(&self) -> usize {
+        (1..3).fold(0, |best, axis| if self.extent(axis) > self.extent(best) { axis } else { best })
+    }
+
+    /// Half of the surface.
+    pub(super) fn half_surface(&self) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.extent(axis)));
+        x * y + y * z + z * x
+    }
+}
+
+/// A triangle's box and number.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub(super) struct Reference {
+    lo: [f32; 3],
+    pub(super) triangle: u32,
+    negated_hi: [f32; 3],
+    spare: u32,
+}
+
+impl Reference {
+    pub(super) fn new(triangle: u32, corners: &Corners) -> Self {
+        let end = |lesser: fn(f32, f32) -> f32, axis: usize| {
+            lesser(lesser(corners[0][axis], corners[1][axis]), corners[2][axis])
+        };
+        let lo = [0, 1, 2].map(|axis| end(f32::min, axis));
+        let negated_hi = [0, 1, 2].map(|axis| -end(f32::max, axis));
+        Self { lo, triangle, negated_hi, spare: 0 }
+    }
+
+    #[inline(always)]
+    pub(super) fn aabb(&self) -> Aabb {
+        // Masked rather than put together from six numbers: one load and one instruction.
+        let lanes: &[u32; 8] = bytemuck::cast_ref(self);
+        const AXES: [u32; 8] = [!0, !0, !0, 0, !0, !0, !0, 0];
+        Aabb(std::array::from_fn(|lane| f32::from_bits(lanes[lane] & AXES[lane])))
+    }
+}
+
+impl Aabb {
+    /// Twice the centre, and a spare lane.
+    #[inline(always)]
+    pub(super) fn centre(&self) -> [f32; 4] {
+        std::array::from_fn(|axis| self.0[axis] - self.0[axis + 4])
+    }
+}
+
+/// Puts centres into a number of bins along each axis, of which the first and the last are half as wide.
+#[derive(Clone, Copy)]
+pub(super) struct Binning<const BINS: usize> {
+    from: [f32; 4],
+    scale: [f32; 4],
+}
+
+impl<const BINS: usize> Binning<BINS> {
+    /// For centres within the given box.
+    pub(super) fn new(centres: &Aabb) -> Self {
+        let scale = |axis: usize| {
+            let extent = centres.extent(axis);
+            if axis < 3 && extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 }
+        };
+        let from = std::array::from_fn(|axis| if axis < 3 { centres.lo(axis) } else { 0.0 });
+        Self { from, scale: std::array::from_fn(scale) }
+    }
+
+    /// The bins of a centre, each less than `BINS`, which is a power of two.
+    #[inline(always)]
+    pub(super) fn bins(&self, centre: [f32; 4]) -> [usize; 4] {
+        // Adding 2^23 leaves the nearest whole number in the last bits. A scale that overflowed, as tiny extents
+        // make it, puts all into one bin.
+        std::array::from_fn(|axis| {
+            let bin = (centre[axis] - self.from[axis]) * self.scale[axis] + 8388608.0;
+            bin.to_bits() as usize & (BINS - 1)
+        })
+    }
+}
+
+/// The cost of a side of a split: its weight times the product over the axes of its extent plus half of the
+/// parent's largest extent. That product is the volume in which the centre of a box of the parent's size, the
+/// likely partner in a pair traversal, would overlap it.
+#[derive(Clone, Copy)]
+pub(super) struct Cost {
+    /// One over the parent's largest extent: factors are then from 1/2 to 3/2, and `f32` is wide enough.
+    scale: f32,
+}
+
+impl Cost {
+    pub(super) fn within(parent: &Aabb) -> Self {
+        let largest = parent.extent(parent.longest());
+        Self { scale: (1.0 / largest).min(f32::MAX) }
+    }
+
+    #[inline(always)]
+    pub(super) fn of(self, bounds: &Aabb, weight: f32) -> f32 {
+        let factor = |axis: usize| bounds.extent(axis) * self.scale + 0.5;
+        weight * (factor(0) * factor(1) * factor(2))
+    }
+}

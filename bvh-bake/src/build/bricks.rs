@@ -1,0 +1,304 @@
+//! Divides an object into bricks, parts of at most 2^18 triangles, and builds the tree above them.
+//!
+//! Trees are built within a brick and above the bricks, never across: what a part of the file looks like depends
+//! on the triangles of its brick and on few figures of the rest. A baker can thus take one brick at a time,
+//! whatever the size of the mesh, and get the same bytes.
+//!
+//! The centres of all boxes are counted into a grid of 64 cells along each axis of the box around them, each
+//! cell with the box of its triangles. Planes between cells then split it, by the cost of all other splits,
+//! until a part has no more than 2^18 triangles. A single cell that has more is divided by a grid of its own.
+//! Two passes over the triangles thus do for any mesh that is not crowded into a few spots.
+
+use super::boxes::{Aabb, Binning, Cost, Reference};
+use super::{Builder, Inner, Node};
+use rayon::prelude::*;
+
+/// Cells of the grid along an axis.
+const CELLS: usize = 64;
+/// Beyond this many splits of one grid they halve the number of triangles, which bounds the tree's depth.
+const MAX_COSTED_DEPTH: usize = 32;
+
+/// A brick, by number.
+pub(super) type BrickIndex = u32;
+
+/// A cell of the grid that has triangles.
+#[derive(Clone, Copy)]
+struct Cell {
+    at: [u8; 3],
+    count: u32,
+    bounds: Aabb,
+}
+
+/// Divides references, adding to the bricks found so far; returns the tree above those added.
+pub(super) fn divide(
+    references: Vec<Reference>,
+    builder: &Builder,
+    bricks: &mut Vec<Vec<Reference>>,
+) -> Node<BrickIndex> {
+    if references.len() <= builder.brick {
+        bricks.push(references);
+        return Node::Leaf(bricks.len() as u32 - 1);
+    }
+    let grid = Grid::of(&references);
+    let mut cells = grid.cells();
+    if let [cell] = cells[..] {
+        // Equal centres, or too close to tell apart: halves in the order of the input.
+        let mut left = references;
+        let right = left.split_off(left.len() / 2);
+        let [left, right] = [left, right].map(|side| divide(side, builder, bricks));
+        return join(left, right, &cell.bounds);
+    }
+    let mut parts = Parts { of_cell: vec![0; CELLS * CELLS * CELLS], counts: Vec::new() };
+    let tree = split(&mut cells, builder, &mut parts, 0);
+    let parts = parts.distribute(&grid, &references);
+    drop(references);
+    let mut parts = parts.into_iter();
+    // In the order in which the parts were numbered.
+    tree.replace_leaves(&mut |_| divide(parts.next().unwrap_or_default(), builder, bricks))
+}
+
+fn join<L>(left: Node<L>, right: Node<L>, bounds: &Aabb) -> Node<L> {
+    let leaves = left.leaves() + right.leaves();
+    Node::Inner(Box::new(Inner { left, right, leaves, size: bounds.half_surface() }))
+}
+
+/// Counts and boxes of all cells.
+struct Grid {
+    binning: Binning<CELLS>,
+    counts: Vec<u32>,
+    bounds: Vec<Aabb>,
+}
+
+impl Grid {
+    fn of(references: &[Reference]) -> Self {
+        let centres = |chunk: &[Reference]| {
+            chunk.iter().fold(Aabb::EMPTY, |mut centres, reference| {
+                centres.join(&Aabb::of_point(reference.aabb().centre()));
+                centres
+            })
+        };
+        let joined = |mut a: Aabb, b: Aabb| {
+            a.join(&b);
+            a
+        };
+        let chunks = references.par_chunks(chunk_of(references));
+        let binning = Binning::new(&chunks.clone().map(centres).reduce(|| Aabb::EMPTY, joined));
+        let count = |chunk: &[Reference]| {
+            let size = CELLS * CELLS * CELLS;
+            let mut grid = Self { binning, counts: vec![0; size], bounds: vec![Aabb::EMPTY; size] };
+            for reference in chunk {
+                let bounds = reference.aabb();
+                let cell = grid.cell(bounds.centre());
+                grid.counts[cell] += 1;
+                grid.bounds[cell].join(&bounds);
+            }
+            grid
+        };
+        let merge = |mut a: Self, b: Self| {
+            a.counts.iter_mut().zip(&b.counts).for_each(|(a, b)| *a += b);
+            a.bounds.iter_mut().zip(&b.bounds).for_each(|(a, b)| a.join(b));
+            a
+        };
+        let empty = || Self { binning, counts: Vec::new(), bounds: Vec::new() };
+        chunks.map(count).reduce_with(merge).unwrap_or_else(empty)
+    }
+
+    fn cell(&self, centre: [f32; 4]) -> usize {
+        let [x, y, z, _] = self.binning.bins(centre);
+        (x * CELLS + y) * CELLS + z
+    }
+
+    /// The cells that have triangles.
+    fn cells(&self) -> Vec<Cell> {
+        let used = (0..self.counts.len()).filter(|&cell| self.counts[cell] > 0);
+        used.map(|cell| Cell {
+            at: [cell / (CELLS * CELLS), cell / CELLS % CELLS, cell % CELLS].map(|at| at as u8),
+            count: self.counts[cell],
+            bounds: self.bounds[cell],
+        })
+        .collect()
+    }
+}
+
+/// One chunk for each thread; results do not depend on it.
+fn chunk_of(references: &[Reference]) -> usize {
+    references.len().div_ceil(rayon::current_num_threads()).max(1)
+}
+
+/// Which cells make which part, parts numbered from the left of the tree.
+struct Parts {
+    of_cell: Vec<u32>,
+    counts: Vec<usize>,
+}
+
+impl Parts {
+    fn add(&mut self, cells: &[Cell]) -> Node<BrickIndex> {
+        let number = self.counts.len() as u32;
+        for cell in cells {
+            let [x, y, z] = cell.at.map(usize::from);
+            self.of_cell[(x * CELLS + y) * CELLS + z] = number;
+        }
+        self.counts.push(cells.iter().map(|cell| cell.count as usize).sum());
+        Node::Leaf(number)
+    }
+
+    /// The references of each part, in the order of the input.
+    fn distribute(&self, grid: &Grid, references: &[Reference]) -> Vec<Vec<Reference>> {
+        let chunks = references.par_chunks(chunk_of(references)).map(|chunk| {
+            let mut parts = vec![Vec::new(); self.counts.len()];
+            for reference in chunk {
+                let part = self.of_cell[grid.cell(reference.aabb().centre())];
+                parts[part as usize].push(*reference);
+            }
+            parts
+        });
+        let chunks: Vec<Vec<Vec<Reference>>> = chunks.collect();
+        let gather = |part: usize| {
+            let mut all = Vec::with_capacity(self.counts[part]);
+            chunks.iter().for_each(|chunk| all.extend_from_slice(&chunk[part]));
+            all
+        };
+        (0..self.counts.len()).into_par_iter().map(gather).collect()
+    }
+}
+
+/// Splits cells until each part is a brick or a single cell.
+fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize) -> Node<BrickIndex> {
+    let count: usize = cells.iter().map(|cell| cell.count as usize).sum();
+    if count <= builder.brick || cells.len() == 1 {
+        return parts.add(cells);
+    }
+    let mut bounds = Aabb::EMPTY;
+    cells.iter().for_each(|cell| bounds.join(&cell.bounds));
+    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds, builder) } else { None };
+    let middle = match plane {
+        Some((axis, plane)) => {
+            // Stable, though cells have no order that matters: their places are unique.
+            cells.sort_by_key(|cell| cell.at[axis] >= plane);
+            cells.partition_point(|cell| cell.at[axis] < plane)
+        }
+        None => {
+            cells.sort_unstable_by_key(|cell| cell.at);
+            let mut left = 0;
+            let before = cells.iter().take_while(|cell| {
+                left += cell.count as usize;
+                left <= count / 2
+            });
+            before.count().clamp(1, cells.len() - 1)
+        }
+    };
+    let (left, right) = cells.split_at_mut(middle);
+    let left = split(left, builder, parts, depth + 1);
+    let right = split(right, builder, parts, depth + 1);
+    join(left, right, &bounds)
+}
+
+/// The axis and first cell of the right side of the cheapest split that leaves something on both sides.
+fn best_plane(cells: &[Cell], parent: &Aabb, builder: &Builder) -> Option<(usize, u8)> {
+    let mut bins = [[(0usize, Aabb::EMPTY); CELLS]; 3];
+    for cell in cells {
+        for axis in 0..3 {
+            let (count, bounds) = &mut bins[axis][usize::from(cell.at[axis])];
+            *count += cell.count as usize;
+            bounds.join(&cell.bounds);
+        }
+    }
+    let cost = Cost::within(parent);
+    let best =
+        (0..3).filter_map(|axis| builder.best_of(&bins[axis], cost).map(|(c, plane)| (c, axis, plane)));
+    let least = best.reduce(|best, other| if other.0 < best.0 { other } else { best });
+    least.map(|(_, axis, plane)| (axis, plane as u8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepare::Corners;
+
+    const BUILDER: Builder = Builder { treelet: 16, brick: 100 };
+
+    fn small(at: [f32; 3], size: f32) -> Corners {
+        let [x, y, z] = at;
+        [[x, y, z], [x + size, y, z], [x, y + size, z + size]]
+    }
+
+    fn spiral(count: u32, scale: f32) -> Vec<Corners> {
+        let at = |i: u32| {
+            let angle = f64::from(i) * 0.1;
+            let radius = scale * i as f32 / count as f32;
+            [radius * angle.cos() as f32, radius * angle.sin() as f32, radius]
+        };
+        (0..count).map(|i| small(at(i), scale * 1e-3)).collect()
+    }
+
+    fn divided(triangles: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Node<BrickIndex>) {
+        let references = triangles.iter().zip(0..).map(|(corners, i)| Reference::new(i, corners)).collect();
+        let mut bricks = Vec::new();
+        let top = divide(references, builder, &mut bricks);
+        (bricks.iter().map(|brick| brick.iter().map(|r| r.triangle).collect()).collect(), top)
+    }
+
+    fn leaves(node: &Node<BrickIndex>, found: &mut Vec<BrickIndex>) {
+        match node {
+            Node::Leaf(brick) => found.push(*brick),
+            Node::Inner(inner) => {
+                assert_eq!(inner.leaves, inner.left.leaves() + inner.right.leaves());
+                leaves(&inner.left, found);
+                leaves(&inner.right, found);
+            }
+        }
+    }
+
+    /// Every triangle is in one brick, bricks are small, keep the order and are numbered from the left.
+    fn check(triangles: &[Corners]) -> usize {
+        let (bricks, top) = divided(triangles, &BUILDER);
+        let mut all = bricks.concat();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..triangles.len() as u32));
+        assert!(bricks.iter().all(|brick| !brick.is_empty() && brick.len() <= BUILDER.brick));
+        assert!(bricks.iter().all(|brick| brick.is_sorted()));
+        let mut found = Vec::new();
+        leaves(&top, &mut found);
+        assert!(found.into_iter().eq(0..bricks.len() as u32));
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert_eq!(pool.install(|| divided(triangles, &BUILDER)).0, bricks, "{threads} threads");
+        }
+        bricks.len()
+    }
+
+    #[test]
+    fn meshes_of_all_kinds_are_divided() {
+        assert_eq!(check(&spiral(100, 1.0)), 1);
+        let bricks = check(&spiral(5000, 1.0));
+        assert!((50..200).contains(&bricks), "{bricks}");
+        check(&spiral(5000, 1e-40));
+        check(&spiral(5000, 1e36));
+        // All in one place: no plane tells them apart.
+        assert_eq!(check(&vec![small([1.0, 2.0, 3.0], 1.0); 1000]), 16);
+        // Crowds in crowds: most triangles are in a single cell of a grid, several times over.
+        let crowds = (0..8).flat_map(|level| spiral(300, 300f32.powi(-level)));
+        check(&crowds.collect::<Vec<_>>());
+        // Along a line, and along one with a far end.
+        let mut line: Vec<Corners> = (0..3000).map(|i| small([i as f32, 0.0, 0.0], 0.5)).collect();
+        check(&line);
+        line.push(small([1e30, 0.0, 0.0], 1.0));
+        check(&line);
+    }
+
+    #[test]
+    fn neighbours_share_bricks() {
+        let grid: Vec<Corners> =
+            (0..1600).map(|i| small([(i % 40) as f32, (i / 40) as f32, 0.0], 0.1)).collect();
+        let (bricks, _) = divided(&grid, &BUILDER);
+        let area = |brick: &Vec<u32>| {
+            let extent = |of: fn(u32) -> u32| {
+                let values = brick.iter().map(|&i| of(i));
+                values.clone().max().unwrap() - values.min().unwrap() + 1
+            };
+            extent(|i| i % 40) * extent(|i| i / 40)
+        };
+        let total: u32 = bricks.iter().map(area).sum();
+        assert_eq!(total, 1600, "bricks overlap");
+    }
+}
