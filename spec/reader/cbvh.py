@@ -1,0 +1,475 @@
+"""Decodes a .cbvh file: bytes in, structures and numbers out, as spec/format.md states them.
+
+Nothing is judged here. `rules.py` checks, in the order of the specification, and calls what is here only once the
+checks before it have made it safe. Numbers in comments are sections of the specification. Arithmetic that it calls
+f32 is done on numpy arrays of float32, each operation rounded by itself; numpy fuses none.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from xxh3 import xxh3_64
+
+# 1.1
+PAGE, LINE, WORD = 4096, 64, 8
+MAJOR = 1
+MAX_SECTIONS = 64
+NO_PARENT = 0xFFFFFFFF
+PACKET = 4
+F32_PACKET_BYTES = 144
+PACKED_HEAD_BYTES = 32
+ID_HEAD_BYTES = 8
+STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
+
+MAGIC = bytes.fromhex("89636276680d0a1a")
+
+# 2: structures without padding, little-endian
+HEADER = np.dtype(
+    [
+        ("magic", "u1", 8),
+        ("major", "<u2"),
+        ("minor", "<u2"),
+        ("sections", "<u4"),
+        ("file_length", "<u8"),
+        ("content_checksum", "<u8"),
+        ("header_checksum", "<u8"),
+        ("reserved", "u1", 24),
+    ]
+)
+SECTION_ENTRY = np.dtype(
+    [("kind", "<u4"), ("required", "<u4"), ("offset", "<u8"), ("length", "<u8"), ("checksum", "<u8")]
+)
+OBJECT_HEAD = np.dtype([("objects", "<u4"), ("names_length", "<u4"), ("reserved", "u1", 8)])
+OBJECT_RECORD = np.dtype(
+    [
+        ("name_offset", "<u4"),
+        ("name_length", "<u4"),
+        ("origin", "<f8", 3),
+        ("box_lo", "<f4", 3),
+        ("box_hi", "<f4", 3),
+        ("triangles", "<u8"),
+        ("packets", "<u8"),
+        ("treelets", "<u8"),
+        ("first_page", "<u4"),
+        ("pages", "<u4"),
+        ("max_vertex_rounding", "<f8"),
+        ("max_quantization_error", "<f8"),
+        ("input_triangles", "<u8"),
+        ("degenerate", "<u8"),
+        ("duplicates", "<u8"),
+        ("f16_exponent", "<i4"),
+        ("profile", "u1"),
+        ("triangle_encoding", "u1"),
+        ("reserved", "u1", 2),
+        ("sphere_centre", "<f4", 3),
+        ("sphere_radius", "<f4"),
+        ("reserved_end", "u1", 40),
+    ]
+)
+PAGE_HEADER = np.dtype(
+    [
+        ("checksum", "<u8"),
+        ("leaf_checksum", "<u8"),
+        ("id_checksum", "<u8"),
+        ("leaf_line", "<u8"),
+        ("id_word", "<u8"),
+        ("first_packet", "<u4"),
+        ("page_number", "<u4"),
+        ("leaf_lines", "<u4"),
+        ("id_words", "<u4"),
+        ("packets", "<u2"),
+        ("roots", "u1"),
+        ("treelets", "u1"),
+        ("remotes", "u1"),
+        ("treelet_line", "u1"),
+        ("profile", "u1"),
+        ("reserved", "u1"),
+    ]
+)
+PACKED_HEAD = np.dtype(
+    [
+        ("vertices", "<u2"),
+        ("index_bits", "u1"),
+        ("fixed", "u1"),
+        ("bits", "u1", 3),
+        ("reserved", "u1"),
+        ("base", "<i4", 3),
+        ("exponent", "i1", 3),
+        ("reserved_2", "u1"),
+        ("indices_at", "<u4"),
+        ("reserved_3", "u1", 4),
+    ]
+)
+ID_HEAD = np.dtype([("base", "<u4"), ("bits", "u1"), ("reserved", "u1", 3)])
+LINKS = np.dtype([("first_treelet", "u1"), ("first_remote", "u1"), ("first_leaf", "<u2")])
+
+# 2.1
+OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE = range(1, 7)
+NEEDED = (OBJECTS, NODES, LEAVES)
+CONTENT = (OBJECTS, NODES, LEAVES, IDS, DUPLICATES)
+
+# 4
+DIRECTIONS = np.array(
+    [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0, 0, 1],
+        [1, 1, 1],
+        [1, 1, -1],
+        [1, -1, 1],
+        [-1, 1, 1],
+        [1, 1, 0],
+        [1, 0, 1],
+        [0, 1, 1],
+        [1, -1, 0],
+        [1, 0, -1],
+        [0, 1, -1],
+    ]
+)
+
+# 5 and 7.1
+Profile = namedtuple(
+    "Profile",
+    "name slabs encoding width treelet_bytes anchor_bytes code_bytes block row child hi kinds_at links_at",
+)
+PROFILES = [
+    Profile("dop14-u8", 7, "u8", 4, 64, 64, 1, 0, 4, 1, 32, 28, 60),
+    Profile("dop6-u8", 3, "u8", 8, 64, 64, 1, 32, 4, 1, 16, 28, 60),
+    Profile("dop6-f16", 3, "f16", 4, 64, 64, 2, 0, 8, 2, 32, 28, 60),
+    Profile("dop14-f16", 7, "f16", 2, 64, 64, 2, 0, 4, 2, 32, 28, 60),
+    Profile("dop14-u4", 7, "u4", 8, 64, 64, 1, 32, 4, 1, 0, 28, 60),
+    Profile("dop26-u4", 13, "u4", 4, 64, 128, 1, 0, 4, 1, 0, 28, 60),
+    Profile("dop26-u8", 13, "u8", 2, 64, 128, 1, 0, 2, 1, 32, 28, 60),
+    Profile("dop14-f16-wide", 7, "f16", 4, 128, 64, 2, 0, 8, 2, 64, 60, 124),
+    Profile("dop26-u8-wide", 13, "u8", 4, 128, 128, 1, 0, 4, 1, 64, 60, 124),
+    Profile("dop14-f32", 7, "f32", 4, 256, 64, 4, 0, 16, 4, 128, 124, 252),
+]
+ENCODINGS = ["f32", "packed", "quantized"]
+
+# 7.2: kinds of children; 4 to 7 are packets of 1 to 4 triangles
+TREELET, REMOTE, LEAF = 1, 2, 4
+
+
+def ceil_div(a, b):
+    return -(-a // b)
+
+
+def row_of(slab):
+    return slab if slab < 7 else slab + 1
+
+
+def places_of_codes(profile):
+    """Offsets in a treelet of the codes of lower ends, for each child and slab; upper ends are `hi` further."""
+    child = np.arange(profile.width)[:, None]
+    row = np.array([row_of(slab) for slab in range(profile.slabs)])
+    return profile.block * (child // 4) + profile.row * row + profile.child * (child % 4)
+
+
+def bit_values(data, at, first_bit, stride, width, count):
+    """`count` values of `width` bits, `stride` bits apart, in the little-endian number that begins at `at` (1.4)."""
+    if width == 0 or count == 0:
+        return np.zeros(count, np.uint64)
+    bits = first_bit + stride * np.arange(count, dtype=np.uint64)
+    end = at + int(bits[-1]) // 8 + 8
+    words = np.ndarray(end - at - 7, "<u8", bytes(data[at:end]).ljust(end - at, b"\0"), strides=(1,))
+    return words[(bits >> np.uint64(3)).astype(np.intp)] >> (bits & np.uint64(7)) & np.uint64((1 << width) - 1)
+
+
+class Record:
+    """One structure: its fields as attributes, and where in the file each of them stands."""
+
+    def __init__(self, dtype, data, at):
+        self.dtype, self.at = dtype, at
+        row = np.frombuffer(data, dtype, 1, at)[0]
+        for name in dtype.names:
+            value = row[name]
+            setattr(self, name, value if value.ndim else value.item())
+
+    def place(self, field):
+        return self.at + self.dtype.fields[field][1]
+
+
+class File:
+    """What a file holds. The caller (`rules.open_file`) says when it is safe to read what."""
+
+    def __init__(self, data):
+        self.data = data
+        self.sections = {}  # entries of known kinds
+        self.objects = []
+
+    def read_header(self):
+        self.header = Record(HEADER, self.data, 0)
+        page = bytearray(self.data[:PAGE])
+        page[32:40] = bytes(8)
+        self.header_checksum = xxh3_64(page)
+
+    def read_entries(self):
+        self.entries = [
+            Record(SECTION_ENTRY, self.data, LINE + SECTION_ENTRY.itemsize * i) for i in range(self.header.sections)
+        ]
+
+    def bytes_of(self, kind):
+        entry = self.sections.get(kind)
+        return self.data[entry.offset : entry.offset + entry.length] if entry else b""
+
+    def content_checksum(self):
+        parts = []
+        for entry in self.entries:
+            if entry.kind in CONTENT:
+                parts += [entry.kind.to_bytes(4, "little"), entry.length.to_bytes(8, "little")]
+                parts += [self.bytes_of(entry.kind)]
+        return xxh3_64(b"".join(parts))
+
+    def duplicates(self):
+        """Pairs of ids: the triangle that is stored, and its duplicate that is not (13)."""
+        return np.frombuffer(self.bytes_of(DUPLICATES), "<u4").reshape(-1, 2)
+
+    def provenance(self):
+        """Keys and values (14)."""
+        lines = self.bytes_of(PROVENANCE).decode("utf-8", "replace").split("\n")
+        return dict(line.split("=", 1) for line in lines if "=" in line)
+
+
+class Object(Record):
+    """One mesh and its tree (3)."""
+
+    def __init__(self, file, number):
+        head = file.sections[OBJECTS].offset
+        super().__init__(OBJECT_RECORD, file.data, head + OBJECT_HEAD.itemsize + OBJECT_RECORD.itemsize * number)
+        self.file, self.number = file, number
+        count = Record(OBJECT_HEAD, file.data, head).objects
+        self.name_at = head + OBJECT_HEAD.itemsize + OBJECT_RECORD.itemsize * count + self.name_offset
+        self.name_bytes = file.data[self.name_at : self.name_at + self.name_length]
+        self.pages_read = []
+
+    @property
+    def layout(self):
+        return PROFILES[self.profile]
+
+    def page_numbers(self):
+        return range(self.first_page, self.first_page + self.pages)
+
+    def lanes_of(self, decode):
+        """What `decode` gives for the pages, joined: one row for each triangle stored."""
+        rows = [decode(page)[page.lanes_used()] for page in self.pages_read]
+        return np.concatenate(rows)
+
+    def triangles_f32(self):
+        """All triangles around the origin: [triangle, corner, axis], in the order of places."""
+        return self.lanes_of(Page.triangles)
+
+    def ids(self):
+        return self.lanes_of(Page.ids)
+
+
+class Page(Record):
+    """4096 bytes of the node section, with the leaf and id blocks that it names (6)."""
+
+    def __init__(self, owner, number):
+        self.owner, self.number, self.layout = owner, number, owner.layout
+        self.data = owner.file.data
+        super().__init__(PAGE_HEADER, self.data, owner.file.sections[NODES].offset + PAGE * number)
+
+    # Anchors and links (6.1, 6.2)
+
+    def anchor_at(self, root):
+        return self.at + LINE + root * self.layout.anchor_bytes
+
+    def anchor(self, root):
+        """Lower and upper ends of all slabs, in f32."""
+        slabs = self.layout.slabs
+        ends = np.frombuffer(self.data, "<f4", 2 * slabs, self.anchor_at(root))
+        return ends[:slabs], ends[slabs:]
+
+    def parent_at(self, root):
+        return self.anchor_at(root) + self.layout.anchor_bytes - 8
+
+    def parent(self, root):
+        """Page and number of the remote link that leads to the root."""
+        at = self.parent_at(root)
+        return int.from_bytes(self.data[at : at + 4], "little"), self.data[at + 4]
+
+    def remote_at(self, link):
+        return self.anchor_at(self.roots) + 4 * link
+
+    def remote(self, link):
+        """Page and root that a remote link leads to."""
+        at = self.remote_at(link)
+        reference = int.from_bytes(self.data[at : at + 4], "little")
+        return reference >> 6, reference & 63
+
+    # Treelets (7)
+
+    def treelet_at(self, slot):
+        return self.at + LINE * self.treelet_line + slot * self.layout.treelet_bytes
+
+    def treelet_bytes(self):
+        size = self.layout.treelet_bytes
+        return np.frombuffer(self.data, "u1", self.treelets * size, self.treelet_at(0)).reshape(-1, size)
+
+    def kinds(self, slot):
+        """All eight nibbles, whatever the treelet's width."""
+        at = self.treelet_at(slot) + self.layout.kinds_at
+        word = int.from_bytes(self.data[at : at + 4], "little")
+        return [word >> 4 * child & 15 for child in range(8)]
+
+    def children(self, slot):
+        """How many nibbles count: up to the highest that is not 0."""
+        return max((child + 1 for child, kind in enumerate(self.kinds(slot)) if kind), default=0)
+
+    def links(self, slot):
+        return Record(LINKS, self.data, self.treelet_at(slot) + self.layout.links_at)
+
+    def targets(self, slot):
+        """For each child its kind, and the number of the slot, remote link or packet that it leads to."""
+        links = self.links(slot)
+        following = {TREELET: links.first_treelet, REMOTE: links.first_remote, LEAF: links.first_leaf}
+        found = []
+        for kind in self.kinds(slot)[: self.children(slot)]:
+            sort = min(kind, LEAF)
+            found.append((kind, following[sort]))
+            following[sort] += 1
+        return found
+
+    def lanes_used(self):
+        """True for the lanes of each packet that hold triangles: [packet, lane]."""
+        counts = [kind - 3 for slot in range(self.treelets) for kind in self.kinds(slot) if kind >= LEAF]
+        return np.arange(PACKET) < np.array(counts, int).reshape(-1, 1)
+
+    def codes(self):
+        """Codes of lower and upper ends as they are stored: [slot, child, slab] each."""
+        profile = self.layout
+        places, size = places_of_codes(profile), profile.code_bytes
+        stored = np.ascontiguousarray(self.treelet_bytes()).view({1: "u1", 2: "<u2", 4: "<f4"}[size])
+        lo, hi = stored[:, places // size], stored[:, (places + profile.hi) // size]
+        return (lo & 15, hi >> 4) if profile.encoding == "u4" else (lo, hi)
+
+    def decode(self):
+        """Slabs of the treelets [slot, slab], and of their children [slot, child, slab], lower and upper (8)."""
+        profile = self.layout
+        code_lo, code_hi = self.codes()
+        own_lo = np.empty((self.treelets, profile.slabs), np.float32)
+        own_hi = np.empty_like(own_lo)
+        lo, hi = np.empty_like(code_lo, np.float32), np.empty_like(code_hi, np.float32)
+        for root in range(self.roots):
+            own_lo[root], own_hi[root] = self.anchor(root)
+        for slot in range(self.treelets):
+            lo[slot], hi[slot] = decode_slabs(
+                profile, self.owner.f16_exponent, own_lo[slot], own_hi[slot], code_lo[slot], code_hi[slot]
+            )
+            for child, (kind, target) in enumerate(self.targets(slot)):
+                if kind == TREELET:
+                    own_lo[target], own_hi[target] = lo[slot, child], hi[slot, child]
+        return own_lo, own_hi, lo, hi
+
+    # Leaf block (10, 11)
+
+    def is_packed(self):
+        return self.owner.triangle_encoding != 0
+
+    def leaf_block_at(self):
+        return self.owner.file.sections[LEAVES].offset + LINE * self.leaf_line
+
+    def leaf_block(self):
+        """The whole lines of the block; no bytes if it leaves the section."""
+        entry = self.owner.file.sections[LEAVES]
+        inside = LINE * (self.leaf_line + self.leaf_lines) <= entry.length
+        at = self.leaf_block_at()
+        return self.data[at : at + LINE * self.leaf_lines] if inside else b""
+
+    def packed_head(self):
+        return Record(PACKED_HEAD, self.data, self.leaf_block_at())
+
+    def indices_at(self, head):
+        """Where the index array has to start, counted from the block (11.2)."""
+        return PACKED_HEAD_BYTES + ceil_div(head.vertices * int(head.bits.sum(dtype=int)), 8)
+
+    def leaf_bytes_needed(self):
+        if not self.is_packed():
+            return F32_PACKET_BYTES * self.packets
+        head = self.packed_head()
+        return self.indices_at(head) + ceil_div(12 * self.packets * head.index_bits, 8) + 8
+
+    def packed_indices(self, head):
+        """Pool indices in the order of the array: [packet, corner, lane]."""
+        at = self.leaf_block_at() + head.indices_at
+        values = bit_values(self.data, at, 0, head.index_bits, head.index_bits, 12 * self.packets)
+        return values.astype(np.intp).reshape(-1, 3, PACKET)
+
+    def packed_numbers(self, head):
+        """n of each vertex and axis, as i32 (11.2)."""
+        at = self.leaf_block_at() + PACKED_HEAD_BYTES
+        first_bit, stride = 0, int(head.bits.sum(dtype=int))
+        numbers = np.empty((head.vertices, 3), np.int32)
+        for axis, width in enumerate(head.bits.tolist()):
+            offsets = bit_values(self.data, at, first_bit, stride, width, head.vertices).astype(np.uint32)
+            numbers[:, axis] = (offsets + head.base[axis].astype(np.uint32)).view(np.int32)
+            first_bit += width
+        return numbers
+
+    def packed_pool(self, head):
+        """The block's vertices [vertex, axis], in f32."""
+        numbers = self.packed_numbers(head)
+        pool = np.empty(numbers.shape, np.float32)
+        for axis, exponent in enumerate(head.exponent.tolist()):
+            n = numbers[:, axis]
+            if head.fixed >> axis & 1:
+                power = np.float32(0) if exponent < -126 else np.ldexp(np.float32(1), exponent)
+                with np.errstate(over="ignore"):  # R30 finds what overflows
+                    pool[:, axis] = n.astype(np.float32) * power
+            else:
+                pool[:, axis] = np.where(n >= 0, n, n ^ np.int32(0x7FFFFFFF)).view(np.float32)
+        return pool
+
+    def triangles(self):
+        """All lanes of all packets, around the origin: [packet, lane, corner, axis], in f32."""
+        if self.packets == 0:
+            return np.empty((0, PACKET, 3, 3), np.float32)
+        if self.is_packed():
+            head = self.packed_head()
+            indices = self.packed_indices(head).transpose(0, 2, 1)
+            return self.packed_pool(head).take(indices, axis=0, mode="clip")  # safe before R29 is checked, too
+        rows = np.frombuffer(self.data, "<f4", 36 * self.packets, self.leaf_block_at())
+        return rows.reshape(-1, 3, 3, PACKET).transpose(0, 3, 1, 2)
+
+    # Id block (12)
+
+    def id_block_at(self):
+        entry = self.owner.file.sections.get(IDS)
+        return entry.offset + WORD * self.id_word if entry else None
+
+    def id_head(self):
+        return Record(ID_HEAD, self.data, self.id_block_at())
+
+    def id_bytes_needed(self, head):
+        return ID_HEAD_BYTES + ceil_div(PACKET * self.packets * head.bits, 8) + 8
+
+    def ids(self):
+        """All lanes of all packets: [packet, lane]. Without an id section they are all 0."""
+        if self.id_words == 0:
+            return np.zeros((self.packets, PACKET), np.uint32)
+        head = self.id_head()
+        at = self.id_block_at() + ID_HEAD_BYTES
+        values = bit_values(self.data, at, 0, head.bits, head.bits, PACKET * self.packets)
+        return (values + np.uint64(head.base)).astype(np.uint32).reshape(-1, PACKET)
+
+
+def round_up_to_16_bits(t):
+    """`up` of section 8: f32 numbers to 16 significant bits, away from zero."""
+    bits = np.asarray(t, np.float32).view(np.uint32)
+    return (bits + np.uint32(0xFF) & np.uint32(0xFFFFFF00)).view(np.float32)
+
+
+def decode_slabs(profile, f16_exponent, own_lo, own_hi, code_lo, code_hi):
+    """Children's slabs [child, slab] from their codes and the slabs [slab] of their treelet (8)."""
+    if profile.encoding == "f32":
+        return code_lo, code_hi
+    with np.errstate(all="ignore"):  # a damaged treelet may decode to anything
+        if profile.encoding == "f16":
+            unit = np.ldexp(np.float32(1), f16_exponent)
+            a, b = (code.view(np.float16).astype(np.float32) for code in (code_lo, code_hi))
+        else:
+            unit = round_up_to_16_bits((own_hi - own_lo) * (STEP_U8 if profile.encoding == "u8" else STEP_U4))
+            a, b = code_lo.astype(np.float32), code_hi.astype(np.float32)
+        return own_lo + a * unit, own_hi - b * unit

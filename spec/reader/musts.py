@@ -1,0 +1,237 @@
+"""What spec/format.md asks of writers without a rule: readers accept files that lack it, bakers must not make them.
+
+`lapses` yields one line for each lapse of a validated file. Numbers in brackets are sections of the specification.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+import cbvh
+from cbvh import LEAF, LINE, PACKET, PAGE, WORD
+from query import minus, outer
+
+
+def lapses(file):
+    yield from of_header_page(file)
+    yield from of_sections(file)
+    yield from of_object_table(file)
+    lines = words = 0
+    for one in file.objects:
+        yield from of_object(one)
+        for page in one.pages_read:
+            yield from of_page(page)
+            yield from of_slabs(page)
+            yield from of_leaf_block(page, lines)
+            yield from of_id_block(page, words)
+            lines += page.leaf_lines
+            words += page.id_words
+    if file.sections[cbvh.LEAVES].length != LINE * lines:
+        yield "(10) the leaf section is longer than its blocks"
+    if cbvh.IDS in file.sections and file.sections[cbvh.IDS].length != WORD * words:
+        yield "(12) the id section is longer than its blocks"
+    yield from of_ids(file)
+    yield from of_provenance(file)
+
+
+def of_header_page(file):
+    table_end = LINE + cbvh.SECTION_ENTRY.itemsize * len(file.entries)
+    if file.header.reserved.any() or any(file.data[table_end:PAGE]):
+        yield "(1.2) reserved bytes of the header page"
+
+
+def of_sections(file):
+    end, kinds = PAGE, [entry.kind for entry in file.entries]
+    for entry in file.entries:
+        start = PAGE * cbvh.ceil_div(end, PAGE)
+        if entry.offset != start or any(file.data[end:start]):
+            yield f"(2) section {entry.kind}: expected at byte {start} after zeros, found at {entry.offset}"
+        if entry.required != (entry.kind in cbvh.NEEDED):
+            yield f"(2.1) section {entry.kind}: required is {entry.required}"
+        end = entry.offset + entry.length
+    if len(file.data) != PAGE * cbvh.ceil_div(end, PAGE) or any(file.data[end:]):
+        yield "(2) something other than zeros to the next page follows the last section"
+    if kinds != sorted(kinds):
+        yield f"(2.1) order of kinds {kinds}"
+    if cbvh.DUPLICATES in kinds and (cbvh.IDS not in kinds or not file.sections[cbvh.DUPLICATES].length):
+        yield "(13) duplicates that are empty or without ids"
+
+
+def of_object_table(file):
+    head = cbvh.Record(cbvh.OBJECT_HEAD, file.data, file.sections[cbvh.OBJECTS].offset)
+    end = 0
+    for one in file.objects:
+        if one.name_offset != end:
+            yield f"(3) object {one.number}: name at {one.name_offset}, expected at {end}"
+        end += one.name_length
+        if one.reserved.any() or one.reserved_end.any():
+            yield f"(1.2) object {one.number}: reserved bytes"
+    if end != head.names_length or head.reserved.any():
+        yield "(3) bytes behind the names, or reserved bytes of the head"
+
+
+def of_object(one):
+    corners = one.triangles_f32()
+    vertices = corners.reshape(-1, 3)
+    where = f"object {one.number}"
+    if not np.array_equal(one.box_lo, vertices.min(0)) or not np.array_equal(one.box_hi, vertices.max(0)):
+        yield f"(3) {where}: box {one.box_lo} to {one.box_hi}, vertices {vertices.min(0)} to {vertices.max(0)}"
+    numbers = np.concatenate([vertices.ravel(), one.origin, one.box_lo, one.box_hi])
+    if ((numbers == 0) & np.signbit(numbers)).any():
+        yield f"(15.1) {where}: -0"
+    if not sphere_holds(one, vertices):
+        yield f"(3) {where}: vertices outside the sphere"
+    found = sum(is_flat(triangle) for triangle in corners[maybe_flat(corners)])
+    if found != one.degenerate:
+        yield f"(15.3) {where}: degenerate is {one.degenerate}, found {found}"
+    if one.triangle_encoding != 2 and one.max_quantization_error != 0:
+        yield f"(15.2) {where}: max_quantization_error {one.max_quantization_error}"
+
+
+def sphere_holds(one, vertices):
+    """Exactly, for the vertices that f64 finds within a millionth of the farthest."""
+    squares = ((vertices.astype(np.float64) - one.sphere_centre) ** 2).sum(1)
+    centre, radius = [Fraction(float(c)) for c in one.sphere_centre], Fraction(one.sphere_radius)
+    far = np.unique(vertices[squares >= squares.max() * (1 - 1e-6)], axis=0)
+    return all(sum((Fraction(float(v[a])) - centre[a]) ** 2 for a in range(3)) <= radius**2 for v in far)
+
+
+def maybe_flat(corners):
+    """True for triangles whose normal f64 does not find to be other than 0 beyond doubt.
+
+    Differences of f32 are rounded once, products once, and a coordinate of the normal is one more difference: 4
+    roundings of the magnitudes; 8 cover the rounding of these. An underflow leaves doubt as well.
+    """
+    u, v = ((corners[:, i].astype(np.float64) - corners[:, 0]) for i in (1, 2))
+    sizes = np.abs(u[:, [1, 2, 0]] * v[:, [2, 0, 1]]) + np.abs(u[:, [2, 0, 1]] * v[:, [1, 2, 0]])
+    return (np.abs(np.cross(u, v)) <= 8 * 2.0**-53 * sizes + 2.0**-1060).all(axis=1)
+
+
+def is_flat(triangle):
+    p, q, r = (tuple(Fraction(float(value)) for value in corner) for corner in triangle)
+    return outer(minus(q, p), minus(r, p)) == (0, 0, 0)
+
+
+def of_page(page):
+    """Bytes of the page that no table gives a meaning are zero; fields without use are as 6, 7.2 and 10 say."""
+    layout, where = page.layout, f"page {page.number}"
+    used = np.zeros(PAGE, bool)
+    used[:LINE] = True
+    for root in range(page.roots):
+        at = page.anchor_at(root) - page.at
+        used[at : at + 8 * layout.slabs] = True
+        used[page.parent_at(root) - page.at :][:5] = True
+    used[page.remote_at(0) - page.at :][: 4 * page.remotes] = True
+    places = cbvh.places_of_codes(layout)
+    for slot in range(page.treelets):
+        at = page.treelet_at(slot) - page.at
+        present = places[: page.children(slot)].ravel()
+        for byte in range(layout.code_bytes):
+            used[at + present + byte] = True
+            used[at + present + layout.hi + byte] = True
+        used[at + layout.kinds_at :][:4] = True
+        used[at + layout.links_at :][:4] = True
+    if np.frombuffer(page.data, "u1", PAGE, page.at)[~used].any():
+        yield f"(1.2) {where}: bytes without meaning"
+    counters = {cbvh.TREELET: page.roots, cbvh.REMOTE: 0, LEAF: 0}
+    for slot in range(page.treelets):
+        links = page.links(slot)
+        if (links.first_treelet, links.first_remote, links.first_leaf) != tuple(counters.values()):
+            yield f"(7.2) {where}, slot {slot}: a link without children is not the counter"
+        for kind, _ in page.targets(slot):
+            counters[min(kind, LEAF)] += 1
+    if page.id_words == 0 and (page.id_word or page.id_checksum):
+        yield f"(6) {where}: id fields without ids"
+    if page.packets == 0 and page.leaf_lines:
+        yield f"(10) {where}: leaf lines without packets"
+
+
+def of_slabs(page):
+    """(8) decoded slabs are ordered, below 2^122, and those of residuals within the treelet's."""
+    own_lo, own_hi, lo, hi = page.decode()
+    for slot in range(page.treelets):
+        present = page.children(slot)
+        child_lo, child_hi = lo[slot, :present], hi[slot, :present]
+        good = (child_lo <= child_hi) & (-(2.0**122) < child_lo) & (child_hi < 2.0**122)
+        if page.layout.encoding != "f32":
+            good &= (own_lo[slot] <= child_lo) & (child_hi <= own_hi[slot])
+        if not good.all():
+            yield f"(8) page {page.number}, slot {slot}: slabs out of order or of their treelet's"
+
+
+def of_leaf_block(page, lines):
+    if page.packets == 0:
+        return
+    where = f"(11) page {page.number}"
+    if page.leaf_line != lines:
+        yield f"(10) page {page.number}: leaf block at line {page.leaf_line}, expected {lines}"
+    lanes, used = page.triangles(), page.lanes_used()
+    last = used.sum(axis=1) - 1
+    repeated = lanes[np.arange(page.packets), last][:, None]
+    if (lanes.view(np.uint32) != repeated.view(np.uint32))[~used].any():
+        yield f"(10) page {page.number}: lanes beyond the last triangle do not repeat it"
+    block = page.leaf_block()
+    if not page.is_packed():
+        if any(block[page.leaf_bytes_needed() :]):
+            yield f"{where}: the end of the block is not zero"
+        return
+    head = page.packed_head()
+    if head.reserved or head.reserved_2 or head.reserved_3.any() or head.fixed > 7:
+        yield f"{where}: reserved bytes or bits of the head"
+    pool_bits = head.vertices * int(head.bits.sum(dtype=int))
+    index_bits = 12 * page.packets * head.index_bits
+    pool = int.from_bytes(block[cbvh.PACKED_HEAD_BYTES : head.indices_at], "little")
+    rest = int.from_bytes(block[head.indices_at :], "little")
+    if pool >> pool_bits or rest >> index_bits:
+        yield f"{where}: bits behind an array are not zero"
+    for axis in range(3):
+        exponent, fixed = int(head.exponent[axis]), head.fixed >> axis & 1
+        if (exponent < -126) if fixed else exponent:
+            yield f"{where}: exponent {exponent} of axis {axis}"
+        if fixed:
+            numbers = page.packed_numbers(head)[:, axis].astype(np.float64)
+            exact = numbers * 2.0**exponent == page.packed_pool(head)[:, axis]
+            if not exact.all() or (np.abs(numbers) > 2.0**30).any():
+                yield f"{where}: fixed-point coordinates of axis {axis} are rounded, or too large"
+
+
+def of_id_block(page, words):
+    if page.id_words == 0:
+        return
+    where, head = f"page {page.number}", page.id_head()
+    if page.id_word != words:
+        yield f"(12) {where}: id block at word {page.id_word}, expected {words}"
+    at = page.id_block_at() + cbvh.ID_HEAD_BYTES
+    array = int.from_bytes(page.data[at : page.id_block_at() + WORD * page.id_words], "little")
+    if head.reserved.any() or array >> PACKET * page.packets * head.bits:
+        yield f"(12) {where}: reserved bytes, or bits behind the array"
+    if (page.ids()[~page.lanes_used()] != head.base).any():
+        yield f"(12) {where}: values of lanes beyond the triangles"
+
+
+def of_ids(file):
+    if cbvh.IDS not in file.sections:
+        return
+    ids = np.concatenate([one.ids() for one in file.objects])
+    kept, dropped = file.duplicates().T
+    if len(np.unique(np.concatenate([ids, dropped]))) != len(ids) + len(dropped):
+        yield "(12, 13) ids occur twice"
+    if not np.isin(kept, ids).all():
+        yield "(13) the first id of a pair is not stored"
+    if len(dropped) != sum(one.duplicates for one in file.objects):
+        yield f"(13) {len(dropped)} duplicates listed, the records state others"
+    inputs = {one.input_triangles for one in file.objects}
+    if len(inputs) > 1 or (dropped >= min(inputs)).any():
+        yield "(12, 13) an id beyond the input, or objects of different inputs"
+
+
+def of_provenance(file):
+    text = file.bytes_of(cbvh.PROVENANCE)
+    try:
+        lines = text.decode("utf-8").split("\n")
+    except UnicodeDecodeError:
+        yield "(14) provenance is not UTF-8"
+        return
+    keys = [line.split("=", 1)[0] for line in lines[:-1]]
+    if lines[-1] or len(set(keys)) != len(keys) or any("=" not in line for line in lines[:-1]):
+        yield "(14) provenance: lines without end or key, or a key twice"

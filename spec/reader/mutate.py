@@ -1,0 +1,172 @@
+"""Damages files and compares the verdict of this reader with that of `cbvh validate`.
+
+    python3 mutate.py CBVH COUNT SEED FILE...
+
+CBVH is the command's path, the files are valid. Most mutants are sealed: their checksums are made right again, so that
+the rules behind them have their turn; some are sealed in part, some not. Prints the rules broken and how often, and
+every mutant on which the two differ (which is kept); exit code 1 if there is one.
+"""
+
+import collections
+import json
+import os
+import random
+import subprocess
+import sys
+
+import numpy as np
+
+import cbvh
+import rules
+from xxh3 import xxh3_64
+
+LEAF_SUMS, ID_SUMS, PAGE_SUMS, ALL = 1, 2, 4, 7  # what `seal` seals besides sections and header
+EXTREMES = (0, 1, 0x7F800000, 0x7FC00000, 0x80000000, (1 << 64) - 1)
+
+
+def places(data):
+    """Bytes of a valid file worth damaging, by what stands there: each sort is drawn equally often."""
+    file = rules.validate(data)
+    sorts = collections.defaultdict(list)
+    sorts["table"] += range(cbvh.LINE + 32 * len(file.entries) + 32)
+    sorts["bytes in use"] += np.flatnonzero(np.frombuffer(data, "u1")).tolist()
+    sorts["anywhere"] += range(len(data))
+    for kind, entry in file.sections.items():
+        if kind in (cbvh.OBJECTS, cbvh.DUPLICATES):
+            sorts[kind] += range(entry.offset, entry.offset + entry.length)
+    for one in file.objects:
+        for page in one.pages_read:
+            sorts["page header"] += range(page.at, page.at + cbvh.LINE)
+            sorts["anchors"] += range(page.anchor_at(0), page.anchor_at(page.roots))
+            sorts["remotes"] += range(page.remote_at(0), page.remote_at(page.remotes))
+            for root in range(page.roots):
+                sorts["parents"] += range(page.parent_at(root), page.parent_at(root) + 5)
+            for slot in range(page.treelets):
+                at = page.treelet_at(slot)
+                sorts["treelets"] += range(at, page.treelet_at(slot + 1))
+                for offset in (one.layout.kinds_at, one.layout.links_at):
+                    sorts["links"] += range(at + offset, at + offset + 4)
+            if page.packets:
+                sorts["leaf heads"] += range(page.leaf_block_at(), page.leaf_block_at() + 40)
+            if page.id_words:
+                sorts["id heads"] += range(page.id_block_at(), page.id_block_at() + 16)
+    return [sort for sort in sorts.values() if sort]
+
+
+def mutant(chance, data, sorts):
+    """A copy with one to three changes, seldom of another length."""
+    data = bytearray(data)
+    for _ in range(chance.choice((1, 1, 1, 2, 3))):
+        at = chance.choice(chance.choice(sorts))
+        size = chance.choice((1, 2, 4, 8))
+        at -= at % size
+        old = int.from_bytes(data[at : at + size], "little")
+        new = chance.choice(
+            (
+                old ^ 1 << chance.randrange(8 * size),
+                old ^ 1 << chance.randrange(8 * size),
+                old + chance.choice((-64, -1, 1, 2, 64, 4096)),
+                chance.choice(EXTREMES),
+                chance.getrandbits(8 * size),
+            )
+        )
+        data[at : at + size] = (new % (1 << 8 * size)).to_bytes(8, "little")[: len(data[at : at + size])]
+    if chance.random() < 0.02:
+        del data[chance.randrange(len(data)) :]
+    if chance.random() < 0.02:
+        data += bytes(chance.choice((1, 4096)))
+    return data
+
+
+def seal(data, sums=ALL):
+    """Makes checksums right, as far as the damaged numbers lead to bytes of the file."""
+    if len(data) < cbvh.PAGE:
+        return
+
+    def number(at, size=8):
+        return int.from_bytes(data[at : at + size], "little")
+
+    def store(at, checksum):
+        data[at : at + 8] = checksum.to_bytes(8, "little")
+
+    def part(section, first, count, unit):
+        start, length = section
+        return data[start + unit * first :][: unit * count] if unit * (first + count) <= length else b""
+
+    entries = []
+    for i in range(min(number(12, 4), cbvh.MAX_SECTIONS)):
+        at = cbvh.LINE + 32 * i
+        if number(at + 8) + number(at + 16) <= len(data):
+            entries.append((at, number(at, 4), (number(at + 8), number(at + 16))))
+    found = {kind: section for _, kind, section in reversed(entries)}
+    start, length = found.get(cbvh.NODES, (0, 0))
+    for at in range(start, start + length - cbvh.PAGE + 1, cbvh.PAGE):
+        if sums & LEAF_SUMS and cbvh.LEAVES in found:
+            store(at + 8, xxh3_64(part(found[cbvh.LEAVES], number(at + 24), number(at + 48, 4), cbvh.LINE)))
+        if sums & ID_SUMS and cbvh.IDS in found and number(at + 52, 4):
+            store(at + 16, xxh3_64(part(found[cbvh.IDS], number(at + 32), number(at + 52, 4), cbvh.WORD)))
+        if sums & PAGE_SUMS:
+            store(at, xxh3_64(data[at + 8 : at + cbvh.PAGE]))
+    content = b""
+    for at, kind, (start, length) in entries:
+        store(at + 24, xxh3_64(data[start : start + length]))
+        if kind in cbvh.CONTENT:
+            content += kind.to_bytes(4, "little") + length.to_bytes(8, "little") + data[start : start + length]
+    store(24, xxh3_64(content))
+    store(32, 0)
+    store(32, xxh3_64(data[: cbvh.PAGE]))
+
+
+def verdict(data):
+    """The rule broken, 0 for none."""
+    try:
+        rules.validate(bytes(data))
+    except rules.Broken as broken:
+        return broken.rule
+    return 0
+
+
+def verdict_of_command(command, path):
+    run = subprocess.run([command, "validate", path, "--json"], capture_output=True, text=True)
+    if run.returncode not in (0, 3):
+        return f"exit code {run.returncode}: {run.stderr}"
+    found = json.loads(run.stdout)
+    return 0 if found["valid"] else found["rule"]
+
+
+def compare(command, count, seed, paths, folder):
+    """How often each rule was broken, and (file, mutant, this verdict, that verdict) of those that differ."""
+    chance = random.Random(seed)
+    originals = []
+    for path in paths:
+        with open(path, "rb") as stream:
+            data = stream.read()
+        originals.append((path, data, places(data)))
+    broken, different = collections.Counter(), []
+    for number in range(count):
+        path, data, sorts = chance.choice(originals)
+        data = mutant(chance, data, sorts)
+        sealing = chance.random()
+        if sealing < 0.9:
+            seal(data, ALL if sealing < 0.75 else chance.randrange(ALL))
+        mutant_path = os.path.join(folder, f"mutant-{seed}-{number}.cbvh")
+        with open(mutant_path, "wb") as stream:
+            stream.write(data)
+        ours, theirs = verdict(data), verdict_of_command(command, mutant_path)
+        broken[theirs] += 1
+        if ours == theirs:
+            os.remove(mutant_path)
+        else:
+            different.append((path, mutant_path, ours, theirs))
+    return broken, different
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 5:
+        sys.exit(__doc__)
+    counts, found = compare(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:], ".")
+    verdicts = {f"R{rule:>02}" if rule else "none": count for rule, count in counts.items()}
+    print(", ".join(f"{rule}: {verdicts[rule]}" for rule in sorted(verdicts)))
+    for original, kept, ours, theirs in found:
+        print(f"{kept}, of {original}: this reader says {ours}, cbvh {theirs}")
+    sys.exit(1 if found else 0)

@@ -1,0 +1,457 @@
+"""The rules R01 to R38 of spec/format.md, section 16, in the order in which a reader reports them.
+
+Each function is one of the moments of 16.1. The first rule found broken ends it with `Broken`, which names the rule,
+the byte of the file, what was expected and what was found. What stands after a check relies on it.
+"""
+
+import numpy as np
+
+import cbvh
+from cbvh import DUPLICATES, IDS, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TREELET
+from xxh3 import xxh3_64
+
+MAX_COORDINATE = 2.0**120  # R12, R30
+MAX_SLAB = 2.0**122  # R19, R38
+LARGEST_F16 = 0x7BFF
+
+
+class Broken(Exception):
+    """A rule that a file breaks."""
+
+    def __init__(self, rule, at, expected, found):
+        super().__init__(f"R{rule:02} at byte {at}: expected {expected}, found {found}")
+        self.rule, self.at, self.expected, self.found = rule, at, expected, found
+
+
+def need(holds, rule, at, expected, found):
+    if not holds:
+        raise Broken(rule, at, expected, found)
+
+
+def need_checksum(rule, at, stated, data):
+    actual = xxh3_64(data)
+    need(stated == actual, rule, at, f"checksum {stated:016x}", f"{actual:016x}")
+
+
+def is_within(values, limit):
+    """No NaN, and at most `limit` in magnitude."""
+    return bool((np.abs(values) <= limit).all())
+
+
+# Open
+
+
+def open_file(data):
+    need(data[:8] == cbvh.MAGIC, 1, 0, cbvh.MAGIC.hex(" "), data[:8].hex(" "))
+    need(len(data) >= PAGE, 3, len(data), f"at least {PAGE} bytes", len(data))
+    file = cbvh.File(data)
+    file.read_header()
+    header = file.header
+    need(header.major == cbvh.MAJOR, 2, header.place("major"), cbvh.MAJOR, header.major)
+    need(
+        header.header_checksum == file.header_checksum,
+        4,
+        header.place("header_checksum"),
+        f"checksum {header.header_checksum:016x}",
+        f"{file.header_checksum:016x}",
+    )
+    need(header.file_length == len(data), 5, header.place("file_length"), f"{header.file_length} bytes", len(data))
+    need(
+        header.sections <= cbvh.MAX_SECTIONS,
+        6,
+        header.place("sections"),
+        f"at most {cbvh.MAX_SECTIONS}",
+        header.sections,
+    )
+    file.read_entries()
+    check_entries(file)
+    check_section_checksum(file, file.sections[OBJECTS])
+    nodes = file.sections[NODES]
+    need(nodes.length % PAGE == 0, 13, nodes.place("length"), f"a multiple of {PAGE}", nodes.length)
+    need(nodes.length // PAGE <= 1 << 26, 13, nodes.place("length"), "at most 2^26 pages", nodes.length // PAGE)
+    check_objects(file)
+    return file
+
+
+def check_entries(file):
+    end = PAGE
+    for entry in file.entries:
+        need(
+            entry.offset % PAGE == 0 and entry.offset >= end,
+            7,
+            entry.place("offset"),
+            f"a multiple of {PAGE}, at least {end}",
+            entry.offset,
+        )
+        end = entry.offset + entry.length
+        need(end <= file.header.file_length, 7, entry.place("length"), "an end within the file", end)
+        if OBJECTS <= entry.kind <= cbvh.PROVENANCE:
+            need(entry.kind not in file.sections, 9, entry.place("kind"), "each kind once", f"a second {entry.kind}")
+            file.sections[entry.kind] = entry
+        else:
+            need(entry.required == 0, 8, entry.place("kind"), "a known kind", entry.kind)
+    for kind in NEEDED:
+        need(kind in file.sections, 9, file.header.place("sections"), f"a section of kind {kind}", "none")
+
+
+def check_section_checksum(file, entry):
+    need_checksum(10, entry.place("checksum"), entry.checksum, file.bytes_of(entry.kind))
+
+
+def check_objects(file):
+    entry = file.sections[OBJECTS]
+    need(entry.length >= cbvh.OBJECT_HEAD.itemsize, 11, entry.place("length"), "a head", f"{entry.length} bytes")
+    head = cbvh.Record(cbvh.OBJECT_HEAD, file.data, entry.offset)
+    need(head.objects >= 1, 11, head.place("objects"), "at least 1", 0)
+    length = cbvh.OBJECT_HEAD.itemsize + cbvh.OBJECT_RECORD.itemsize * head.objects + head.names_length
+    need(entry.length == length, 11, entry.place("length"), length, entry.length)
+    first_page = 0
+    for number in range(head.objects):
+        one = cbvh.Object(file, number)
+        check_numbers(one)
+        need(one.first_page == first_page, 13, one.place("first_page"), first_page, one.first_page)
+        need(one.pages >= 1, 13, one.place("pages"), "at least 1", 0)
+        first_page += one.pages
+        end = one.name_offset + one.name_length
+        need(end <= head.names_length, 11, one.place("name_offset"), f"an end up to {head.names_length}", end)
+        try:
+            one.name = one.name_bytes.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise Broken(11, one.name_at + error.start, "UTF-8", one.name_bytes.hex(" ")) from None
+        need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 9", one.profile)
+        need(
+            one.triangle_encoding < len(cbvh.ENCODINGS),
+            14,
+            one.place("triangle_encoding"),
+            "0 to 2",
+            one.triangle_encoding,
+        )
+        file.objects.append(one)
+    nodes = file.sections[NODES]
+    need(first_page * PAGE == nodes.length, 13, nodes.place("length"), first_page * PAGE, nodes.length)
+
+
+def check_numbers(one):
+    """R12 of an object record."""
+
+    def need_field(field, holds, expected):
+        need(holds, 12, one.place(field), expected, getattr(one, field))
+
+    for field in ("origin", "box_lo", "box_hi", "sphere_centre"):
+        need_field(field, is_within(getattr(one, field), MAX_COORDINATE), "at most 2^120 in magnitude")
+    need_field("box_lo", bool((one.box_lo <= one.box_hi).all()), "at most box_hi")
+    need_field("max_vertex_rounding", 0 <= one.max_vertex_rounding <= MAX_COORDINATE, "0 to 2^120")
+    need_field("max_quantization_error", 0 <= one.max_quantization_error <= MAX_COORDINATE, "0 to 2^120")
+    need_field("sphere_radius", 0 <= one.sphere_radius < np.inf, "finite and at least 0")
+    need_field("f16_exponent", -125 <= one.f16_exponent <= 112, "-125 to 112")
+    need_field("triangles", 1 <= one.triangles <= PACKET * one.packets, "1 to 4 for each packet")
+    need_field("packets", one.packets < 1 << 30, "below 2^30")
+    need_field("input_triangles", one.input_triangles < 1 << 32, "below 2^32")
+
+
+# Touch
+
+
+def touch(one, number):
+    """A page of an object, once its own bytes are checked."""
+    at = one.file.sections[NODES].offset + PAGE * number
+    page = cbvh.Page(one, number)
+    need_checksum(15, at, page.checksum, page.data[at + 8 : at + PAGE])
+    need(page.page_number == number, 16, page.place("page_number"), number, page.page_number)
+    need(page.profile == one.profile, 18, page.place("profile"), one.profile, page.profile)
+    need(1 <= page.roots <= page.treelets, 17, page.place("roots"), f"1 to {page.treelets}", page.roots)
+    need(page.roots <= 63, 17, page.place("roots"), "at most 63", page.roots)
+    line = 1 + page.roots * page.layout.anchor_bytes // cbvh.LINE + cbvh.ceil_div(page.remotes, 16)
+    need(page.treelet_line == line, 17, page.place("treelet_line"), line, page.treelet_line)
+    end = line + page.treelets * page.layout.treelet_bytes // cbvh.LINE
+    need(end <= PAGE // cbvh.LINE, 17, page.place("treelets"), "an end within 64 lines", end)
+    need(page.reserved == 0, 25, page.place("reserved"), 0, page.reserved)
+    for root in range(page.roots):
+        check_anchor(page, root)
+    check_codes(page)
+    check_numbering(page)
+    last = one.first_page + one.pages
+    for link in range(page.remotes):
+        target, _ = page.remote(link)
+        need(number < target < last, 23, page.remote_at(link), f"a page from {number + 1} to {last - 1}", target)
+    return page
+
+
+def check_anchor(page, root):
+    lo, hi = page.anchor(root)
+    bad = ~((-MAX_SLAB <= lo) & (lo <= hi) & (hi <= MAX_SLAB))
+    if bad.any():
+        slab = int(bad.argmax())
+        raise Broken(19, page.anchor_at(root) + 4 * slab, "finite and ordered ends", f"{lo[slab]} and {hi[slab]}")
+    parent_page, parent_link = page.parent(root)
+    if page.number == page.owner.first_page and root == 0:
+        holds, expected = (parent_page, parent_link) == (cbvh.NO_PARENT, 0), "no parent"
+    else:
+        holds, expected = page.owner.first_page <= parent_page < page.number, "an earlier page of the object"
+    need(holds, 20, page.parent_at(root), expected, f"page {parent_page}, link {parent_link}")
+
+
+def check_codes(page):
+    encoding = page.layout.encoding
+    if encoding not in ("f16", "f32"):
+        return
+    places, (code_lo, code_hi) = cbvh.places_of_codes(page.layout), page.codes()
+    for slot in range(page.treelets):
+        present = min(page.children(slot), page.layout.width)
+        for codes, further in ((code_lo[slot, :present], 0), (code_hi[slot, :present], page.layout.hi)):
+            good = codes <= LARGEST_F16 if encoding == "f16" else np.abs(codes) <= MAX_SLAB
+            if not good.all():
+                child, slab = np.argwhere(~good)[0]
+                at = page.treelet_at(slot) + int(places[child, slab]) + further
+                raise Broken(38, at, "a finite code, and for f16 none that is negative", codes[child, slab])
+
+
+def check_numbering(page):
+    counters = {TREELET: page.roots, REMOTE: 0, LEAF: 0}
+    rules = {TREELET: (22, "first_treelet"), REMOTE: (23, "first_remote"), LEAF: (24, "first_leaf")}
+    for slot in range(page.treelets):
+        kinds = page.kinds(slot)
+        count = page.children(slot)
+        at = page.treelet_at(slot) + page.layout.kinds_at
+        need(1 <= count <= page.layout.width, 21, at, f"1 to {page.layout.width} children", count)
+        for kind in kinds[:count]:
+            need(kind in (1, 2, 4, 5, 6, 7), 21, at, "a kind of child", kind)
+        links = page.links(slot)
+        for sort, (rule, field) in rules.items():
+            of_sort = sum(min(kind, LEAF) == sort for kind in kinds[:count])
+            if of_sort:
+                first = getattr(links, field)
+                need(first == counters[sort], rule, links.place(field), counters[sort], first)
+                need(sort != TREELET or first > slot, rule, links.place(field), f"more than {slot}", first)
+            counters[sort] += of_sort
+    for sort, field in ((TREELET, "treelets"), (REMOTE, "remotes"), (LEAF, "packets")):
+        stated = getattr(page, field)
+        need(stated == counters[sort], rules[sort][0], page.place(field), counters[sort], stated)
+
+
+# Cross
+
+
+def cross(page, link, pages):
+    """What a remote link leads to names it. `pages` are those of the object, all touched."""
+    target, root = page.remote(link)
+    other = pages[target - page.owner.first_page]
+    need(root < other.roots, 20, page.remote_at(link), f"a root below {other.roots}", root)
+    parent = other.parent(root)
+    need(parent == (page.number, link), 20, other.parent_at(root), f"page {page.number}, link {link}", parent)
+
+
+# Block
+
+
+def check_leaf_block(page):
+    section = page.owner.file.sections[LEAVES]
+
+    def check_place():
+        end = cbvh.LINE * (page.leaf_line + page.leaf_lines) if page.leaf_lines else 0
+        need(end <= section.length, 26, page.place("leaf_line"), f"an end within {section.length} bytes", end)
+        lines = cbvh.ceil_div(page.leaf_bytes_needed(), cbvh.LINE)
+        need(page.leaf_lines == lines, 26, page.place("leaf_lines"), lines, page.leaf_lines)
+
+    if not page.is_packed():
+        check_place()
+    block = page.leaf_block()
+    need_checksum(27, page.place("leaf_checksum"), page.leaf_checksum, block)
+    if page.is_packed() and page.packets:
+        need(len(block) >= cbvh.PACKED_HEAD_BYTES, 28, page.place("leaf_lines"), "a head", f"{len(block)} bytes")
+        head = page.packed_head()
+        need(bool((head.bits <= 32).all()), 28, head.place("bits"), "at most 32", head.bits)
+        need(head.index_bits <= 16, 28, head.place("index_bits"), "at most 16", head.index_bits)
+        need(head.vertices >= 1, 28, head.place("vertices"), "at least 1", 0)
+        indices_at = page.indices_at(head)
+        need(head.indices_at == indices_at, 28, head.place("indices_at"), indices_at, head.indices_at)
+        check_place()
+
+
+def check_id_block(page):
+    section = page.owner.file.sections.get(IDS)
+    if section is None or page.packets == 0:
+        need(page.id_words == 0, 31, page.place("id_words"), 0, page.id_words)
+        return
+    end = cbvh.WORD * (page.id_word + page.id_words)
+    need(end <= section.length, 31, page.place("id_word"), f"an end within {section.length} bytes", end)
+    need(page.id_words >= 1, 31, page.place("id_words"), "a head", 0)
+    head = page.id_head()
+    need(head.bits <= 32, 31, head.place("bits"), "at most 32", head.bits)
+    words = cbvh.ceil_div(page.id_bytes_needed(head), cbvh.WORD)
+    need(page.id_words == words, 31, page.place("id_words"), words, page.id_words)
+    at = page.id_block_at()
+    need_checksum(32, page.place("id_checksum"), page.id_checksum, page.data[at : at + cbvh.WORD * words])
+
+
+# Validate
+
+
+def validate(data):
+    """The file, if every rule but R35 holds."""
+    file = open_file(data)
+    for entry in file.entries:
+        if entry.kind in file.sections:
+            check_section_checksum(file, entry)
+    stated, actual = file.header.content_checksum, file.content_checksum()
+    need(stated == actual, 10, file.header.place("content_checksum"), f"content {stated:016x}", f"{actual:016x}")
+    check_duplicates(file)
+    for one in file.objects:
+        validate_object(one)
+    return file
+
+
+def validate_object(one):
+    for number in one.page_numbers():
+        page = touch(one, number)
+        check_leaf_block(page)
+        check_id_block(page)
+        check_packets(page)
+        one.pages_read.append(page)
+    for page in one.pages_read:
+        for link in range(page.remotes):
+            cross(page, link, one.pages_read)
+    check_counts(one)
+
+
+def check_packets(page):
+    """Indices, coordinates and ids of a page: R29; R30 and R37 value by value; R33; packet by packet."""
+    bad_index = np.zeros((page.packets, 12), bool)
+    if page.is_packed() and page.packets:
+        head = page.packed_head()
+        indices = page.packed_indices(head).reshape(-1, 12)
+        bad_index = indices >= head.vertices
+    values = page.triangles().transpose(0, 2, 3, 1)  # packet, corner, axis, lane: the order of the block
+    origin = np.broadcast_to(page.owner.origin[:, None], values.shape)
+    too_large = ~(np.abs(values) <= MAX_COORDINATE)
+    with np.errstate(invalid="ignore"):  # infinities are too large in any case
+        bad_value = too_large | (error_of_sum(origin, values.astype(np.float64)) != 0)
+    ids = page.ids()
+    bad_id = (ids >= page.owner.input_triangles) & page.lanes_used() & (page.id_words > 0)
+
+    bad = bad_index.any(axis=1) | bad_value.any(axis=(1, 2, 3)) | bad_id.any(axis=1)
+    if not bad.any():
+        return
+    packet = int(bad.argmax())
+    block = page.leaf_block_at()
+    if bad_index[packet].any():
+        place = int(bad_index[packet].argmax())
+        at = block + head.indices_at + (12 * packet + place) * head.index_bits // 8
+        raise Broken(29, at, f"an index below {head.vertices}", indices[packet, place])
+    if bad_value[packet].any():
+        place = (packet, *np.argwhere(bad_value[packet])[0])
+        need(not too_large[place], 30, block, "a finite coordinate of at most 2^120", values[place])
+        raise Broken(37, block, f"{origin[place]} + a coordinate to be an f64 number", values[place])
+    found = ids[packet][bad_id[packet]][0]
+    raise Broken(33, page.id_block_at(), f"an id below {page.owner.input_triangles}", found)
+
+
+def check_counts(one):
+    """R34: the sums over an object's pages."""
+    packets = 0
+    for page in one.pages_read:
+        need(page.first_packet == packets, 34, page.place("first_packet"), packets, page.first_packet)
+        packets += page.packets
+    roots, remotes = (sum(getattr(page, field) for page in one.pages_read) for field in ("roots", "remotes"))
+    need(roots == remotes + 1, 34, one.place("pages"), f"{remotes + 1} roots", roots)
+    treelets = sum(page.treelets for page in one.pages_read)
+    triangles = sum(int(page.lanes_used().sum()) for page in one.pages_read)
+    for field, total in (("treelets", treelets), ("packets", packets), ("triangles", triangles)):
+        need(getattr(one, field) == total, 34, one.place(field), total, getattr(one, field))
+
+
+def error_of_sum(a, b):
+    """What the rounded sum of f64 numbers lacks to the exact one: Knuth's two-sum, exact short of overflow."""
+    total = a + b
+    part = total - a
+    return (a - (total - part)) + (b - part)
+
+
+def check_duplicates(file):
+    entry = file.sections.get(DUPLICATES)
+    if entry is None:
+        return
+    need(entry.length % 8 == 0, 36, entry.place("length"), "a multiple of 8", entry.length)
+    before = (-1, -1)
+    for number, pair in enumerate(map(tuple, file.duplicates().tolist())):
+        at = entry.offset + 8 * number
+        need(pair[0] < pair[1], 36, at, "the first id below the second", pair)
+        need(before < pair, 36, at, f"a pair after {before}", pair)
+        before = pair
+
+
+# Verify
+
+
+def verify(file):
+    """R35 of a validated file: every decoded slab contains the triangles below it, in exact arithmetic."""
+    for one in file.objects:
+        below = {}  # by page and root: what the projections of the triangles reach
+        for page in reversed(one.pages_read):
+            verify_page(page, below)
+        reach_lo, reach_hi = below[one.first_page, 0]
+        if not ((one.box_lo <= reach_lo[:3]) & (reach_hi[:3] <= one.box_hi)).all():
+            raise Broken(35, one.place("box_lo"), f"a box around {reach_lo[:3]} to {reach_hi[:3]}", one.box_lo)
+
+
+def verify_page(page, below):
+    _, _, lo, hi = page.decode()
+    packet_lo, packet_hi = reach_of_packets(page)
+    own = {}
+    for slot in reversed(range(page.treelets)):
+        reaches = []
+        for child, (kind, target) in enumerate(page.targets(slot)):
+            if kind == TREELET:
+                reach = own[target]
+            elif kind == REMOTE:
+                reach = below[page.remote(target)]
+            else:
+                reach = packet_lo[target], packet_hi[target]
+            need_contained(page.treelet_at(slot), f"child {child}", lo[slot, child], hi[slot, child], *reach)
+            reaches.append(reach)
+        own[slot] = np.min([lo for lo, _ in reaches], axis=0), np.max([hi for _, hi in reaches], axis=0)
+    for root in range(page.roots):
+        need_contained(page.anchor_at(root), "anchor", *page.anchor(root), *own[root])
+        below[page.number, root] = own[root]
+
+
+def need_contained(at, what, lo, hi, reach_lo, reach_hi):
+    good = (lo <= reach_lo) & (reach_hi <= hi)  # false for NaN
+    if not good.all():
+        slab = int((~good).argmax())
+        found = f"[{lo[slab]}, {hi[slab]}]"
+        raise Broken(35, at, f"slab {slab} of {what} around [{reach_lo[slab]}, {reach_hi[slab]}]", found)
+
+
+def reach_of_packets(page):
+    """Least and greatest projection of each packet on each direction of the profile, rounded outward to f64.
+
+    An f32 end, being an f64 number too, is at most the exact projection just if it is at most the projection
+    rounded down. So the comparison with what is returned here is exact.
+    """
+    corners = page.triangles().astype(np.float64)
+    directions = cbvh.DIRECTIONS[: page.layout.slabs]
+    lows, highs = [], []
+    for direction in directions:
+        x, y, z = (corners[..., axis] * float(direction[axis]) for axis in range(3))
+        low, high = exact_sum_outward(x, y, z)
+        lows.append(low.min(axis=(1, 2)))
+        highs.append(high.max(axis=(1, 2)))
+    return np.stack(lows, axis=1), np.stack(highs, axis=1)
+
+
+def exact_sum_outward(x, y, z):
+    """x + y + z, rounded down and rounded up to f64.
+
+    Two-sums give the sum as three numbers of which each is the rounding of itself and those after it, so the sign
+    of what the first one lacks is that of the first of the others that is not 0.
+    """
+    s, e = x + y, error_of_sum(x, y)
+    total, f = s + z, error_of_sum(s, z)
+    rest, tail = e + f, error_of_sum(e, f)
+    first, second = total + rest, error_of_sum(total, rest)
+    second, third = second + tail, error_of_sum(second, tail)
+    lack = np.where(second != 0, second, third)
+    down = np.where(lack < 0, np.nextafter(first, -np.inf), first)
+    up = np.where(lack > 0, np.nextafter(first, np.inf), first)
+    return down, up

@@ -1,0 +1,329 @@
+"""The reader and the command `cbvh` agree: on baked files, on what is in them, on damage, and on queries.
+
+    CBVH=target/release/cbvh python3 -m unittest discover -s spec/reader
+
+Skipped without the variable. CBVH_MUTANTS says how many damaged files to compare (1000 if unset). Larger meshes come
+from a folder `shared` beside the repository; where that is missing, their tests are skipped and say so.
+"""
+
+import itertools
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+import cbvh
+import musts
+import mutate
+import query
+import rules
+
+COMMAND = os.environ.get("CBVH")
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+TESTDATA = os.path.join(ROOT, "testdata")
+SHARED = os.path.join(ROOT, "..", "shared")
+ROBOT, ROOM = (os.path.join(TESTDATA, name) for name in ("fclrob.obj", "fclenv.obj"))
+IDENTITY = np.eye(3, 4)
+
+
+def read_obj(path):
+    """Corners of the triangles, [triangle, corner, axis] in f64. Triangles only."""
+    vertices, faces = [], []
+    with open(path, encoding="utf-8") as stream:
+        for words in map(str.split, stream):
+            if words[:1] == ["v"]:
+                vertices.append([float(word) for word in words[1:4]])
+            if words[:1] == ["f"]:
+                faces.append([int(word.split("/")[0]) - 1 for word in words[1:]])
+    return np.array(vertices)[np.array(faces)]
+
+
+def write_obj(path, parts):
+    """`parts`: pairs of a name and triangles as `read_obj` returns them."""
+    with open(path, "w", encoding="utf-8") as stream:
+        count = 0
+        for name, triangles in parts:
+            print("o", name, file=stream)
+            for vertex in triangles.reshape(-1, 3).tolist():
+                print("v", *map(repr, vertex), file=stream)
+            for first in range(count + 1, count + 3 * len(triangles), 3):
+                print("f", first, first + 1, first + 2, file=stream)
+            count += 3 * len(triangles)
+
+
+def run(*arguments):
+    found = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True)
+    if found.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, arguments))}: exit code {found.returncode}: {found.stderr}")
+    return found.stdout
+
+
+def load(path):
+    with open(path, "rb") as stream:
+        file = rules.validate(stream.read())
+    rules.verify(file)
+    return file
+
+
+def distances(points, others):
+    return np.sqrt(((points - others) ** 2).sum(-1))
+
+
+def same_f32(numbers, expected):
+    """Numbers in the shortest decimal form that gives the f32 back."""
+    return np.array(numbers, np.float64).astype(np.float32).tobytes() == np.ascontiguousarray(expected).tobytes()
+
+
+@unittest.skipUnless(COMMAND, "CBVH does not name the command")
+class AgainstCbvh(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.chance = random.Random(7)
+
+    def bake(self, mesh, profile="auto", triangles="auto", *options):
+        name = f"{os.path.basename(mesh)}-{profile}-{triangles}{''.join(options)}.cbvh"
+        path = os.path.join(self.folder, name)
+        run("bake", mesh, "-o", path, "--profile", profile, "--triangles", triangles, "--jobs", 1, "-q", *options)
+        return path
+
+    def shared(self, *names):
+        path = os.path.join(SHARED, *names)
+        if not os.path.exists(path):
+            reason = f"there is no {os.path.join('shared', *names)} beside the repository"
+            print(f"skipped: {reason}", file=sys.stderr)
+            self.skipTest(reason)
+        return path
+
+    def check_bake(self, path, mesh):
+        """Rules, musts, decoded triangles against the mesh's, and what `dump` and `validate` say."""
+        file = load(path)
+        self.assertEqual(list(musts.lapses(file)), [], path)
+        self.check_triangles(file, read_obj(mesh))
+        self.check_facts(file, path)
+        self.check_decoding(file, path)
+
+    def check_triangles(self, file, expected):
+        """Each triangle by its id: corners in the order of the input, moved no further than the record says."""
+        ids = np.concatenate([one.ids() for one in file.objects])
+        kept, dropped = file.duplicates().T
+        self.assertEqual(sorted([*ids, *dropped]), list(range(len(expected))))
+        self.assertEqual(query.weights(file).sum(), len(expected))
+        for one in file.objects:
+            corners, given = one.triangles_f32(), expected[one.ids()]
+            self.assertEqual(one.input_triangles, len(expected))
+            limit = one.max_vertex_rounding + one.max_quantization_error
+            stored = corners.astype(np.float64) + one.origin
+            moved = distances(stored, given).max()
+            # Differences are exact here, and the stated bounds above by more than squares and root are rounded.
+            self.assertLessEqual(moved, limit)
+            # Duplicates, moved, have the corners of the triangle that is kept, in some order.
+            places = {triangle: place for place, triangle in enumerate(one.ids().tolist())}
+            here = np.isin(kept, one.ids())
+            originals = stored[[places[triangle] for triangle in kept[here].tolist()]]
+            left_out = expected[dropped[here]]
+            orders = [distances(originals, left_out[:, order]).max(1) for order in itertools.permutations(range(3))]
+            self.assertLessEqual(np.min(orders, axis=0).max(initial=0), limit)
+            if cbvh.ENCODINGS[one.triangle_encoding] == "quantized":
+                continue
+            self.assertLessEqual(one.max_vertex_rounding, moved * (1 + 2.0**-47))
+            if not one.origin.any():
+                self.assertEqual((given.astype(np.float32) + np.float32(0)).tobytes(), corners.tobytes())
+
+    def check_facts(self, file, path):
+        validated, dumped = (json.loads(run(verb, path, "--json")) for verb in ("validate", "dump"))
+        self.assertEqual(validated["valid"], True)
+        self.assertEqual(validated["content_xxh3"], f"{file.content_checksum():016x}")
+        for field in ("pages", "treelets", "triangles"):
+            self.assertEqual(validated[field], sum(getattr(one, field) for one in file.objects))
+        self.assertEqual(dumped["provenance"], file.provenance())
+        for entry, section in zip(file.entries, dumped["sections"], strict=True):
+            self.assertEqual((section["offset"], section["bytes"]), (entry.offset, entry.length))
+            self.assertEqual(section["xxh3"], f"{entry.checksum:016x}")
+        for one, facts in zip(file.objects, dumped["objects"], strict=True):
+            self.assertEqual(facts["name"], one.name)
+            self.assertEqual(facts["profile"], one.layout.name)
+            self.assertEqual(facts["triangle_encoding"], cbvh.ENCODINGS[one.triangle_encoding])
+            self.assertEqual(facts["origin"], one.origin.tolist())
+            for field in ("box_lo", "box_hi", "sphere_centre", "sphere_radius"):
+                self.assertTrue(same_f32(facts[field], np.float32(getattr(one, field))), field)
+            for field in (
+                *("input_triangles", "triangles", "degenerate", "duplicates", "treelets", "packets", "first_page"),
+                *("pages", "max_vertex_rounding", "max_quantization_error"),
+            ):
+                self.assertEqual(facts[field], getattr(one, field), field)
+
+    def check_decoding(self, file, path):
+        """The bits of decoded slabs, and links, of a few treelets drawn at random."""
+        places = [(page, slot) for one in file.objects for page in one.pages_read for slot in range(page.treelets)]
+        for number in self.chance.sample(range(len(places)), min(4, len(places))):
+            page, slot = places[number]
+            dumped = json.loads(run("dump", path, "--treelet", number, "--json"))
+            self.assertEqual(
+                (dumped["page"], dumped["slot"], dumped["offset"]), (page.number, slot, page.treelet_at(slot))
+            )
+            own_lo, own_hi, lo, hi = page.decode()
+            slabs = [(own_lo[slot], own_hi[slot], dumped["slabs"])]
+            for child, found in enumerate(dumped["children"]):
+                slabs.append((lo[slot, child], hi[slot, child], found["slabs"]))
+                kind, target = page.targets(slot)[child]
+                if kind == cbvh.TREELET:
+                    self.assertEqual((found["kind"], found["slot"]), ("treelet", target))
+                elif kind >= cbvh.LEAF:
+                    self.assertEqual((found["packet"], found["triangles"]), (target, kind - 3))
+            self.assertEqual(len(dumped["children"]), page.children(slot))
+            for low, high, found in slabs:
+                ends = list(zip(*found))
+                self.assertTrue(same_f32(ends[0], low) and same_f32(ends[1], high), (path, number))
+
+    def answers(self, mode, path_a, path_b, poses):
+        """What `cbvh query` says, as text."""
+        pose_file = os.path.join(self.folder, "poses.txt")
+        with open(pose_file, "w", encoding="utf-8") as stream:
+            for pose in poses:
+                print(*(repr(value) for value in pose.ravel().tolist()), file=stream)
+        raw = os.path.join(self.folder, "raw_%s.txt")
+        run("query", path_a, path_b, pose_file, "--mode", mode, "--out", raw, "--warm", 0)
+        with open(raw % "poses", encoding="utf-8") as stream:
+            return [line.split()[0] for line in stream if not line.startswith("#")]
+
+    def check_queries(self, path_a, path_b, poses):
+        file_a, file_b = load(path_a), load(path_b)
+        a, b = query.corners(file_a), query.corners(file_b)
+        weights_a, weights_b = query.weights(file_a), query.weights(file_b)
+        modes = ("collide", "contacts", "distance")
+        for pose, *found in zip(poses, *(self.answers(mode, path_a, path_b, poses) for mode in modes), strict=True):
+            placed = query.place(b, pose)
+            of_a, of_b = query.contacts(a, placed)
+            self.assertEqual(int(found[0]), int(len(of_a) > 0))
+            self.assertEqual(int(found[1]), (weights_a[of_a] * weights_b[of_b]).sum())
+            # Both are f64 on the same points: a few roundings of coordinates apart.
+            size = max(np.abs(a).max(), np.abs(placed).max())
+            self.assertAlmostEqual(float(found[2]), query.least_distance(a, placed), delta=1e-12 * size)
+
+    def test_every_profile_and_encoding(self):
+        profiles = [profile.name for profile in cbvh.PROFILES]
+        for mesh, profile, triangles in itertools.product((ROBOT, ROOM), profiles, cbvh.ENCODINGS):
+            with self.subTest(mesh=os.path.basename(mesh), profile=profile, triangles=triangles):
+                self.check_bake(self.bake(mesh, profile, triangles), mesh)
+
+    def test_objects_origins_duplicates_and_degenerates(self):
+        robot = read_obj(ROBOT)
+        near, far = robot * 1e-3 + [1e6 + 0.1, -2e6 + 0.3, 0], robot * 1e-2 + [5e7 + 1 / 3, 0, 0]
+        flat = np.array([[[0, 0, 0], [1, 2, 3], [0, 0, 0]], [[4, 4, 4]] * 3, [[-1, -1, -1], [0, 0, 0], [3, 3, 3]]])
+        mesh = os.path.join(self.folder, "parts.obj")
+        parts = [("über", near), ("", np.concatenate([robot, robot[5:60, ::-1], flat, robot[:9]])), ("far", far[:40])]
+        write_obj(mesh, parts)
+        for profile, triangles in itertools.product(("dop14-u8", "dop6-f16", "dop14-f32"), cbvh.ENCODINGS):
+            path = self.bake(mesh, profile, triangles, "--split-objects")
+            self.check_bake(path, mesh)
+            objects = load(path).objects
+            self.assertEqual(len(objects), 3)
+            self.assertEqual(sum(one.duplicates for one in objects), 55 + 9)
+            self.assertGreaterEqual(sum(one.degenerate for one in objects), len(flat))
+            self.assertTrue(objects[0].origin[:2].all())
+            self.check_bake(self.bake(mesh, profile, triangles), mesh)
+        self.check_queries(path, self.bake(ROBOT), [IDENTITY, np.eye(3, 4) * [1, 1, 1, 0] + np.eye(3, 4, 3) * 80])
+
+    def test_without_ids(self):
+        path = self.bake(ROBOT, "dop26-u8-wide", "packed", "--no-ids")
+        file = load(path)
+        self.assertEqual(list(musts.lapses(file)), [])
+        self.assertNotIn(cbvh.IDS, file.sections)
+        self.check_facts(file, path)
+
+    # `Kdop::of_points` widens a sum that was rounded by a step relative to the sum, which is less than the error of a
+    # partial sum once the third coordinate cancels the first, and `verify` projects in the same way. The mark goes
+    # when that is mended.
+    @unittest.expectedFailure
+    def test_bounds_of_coordinates_that_cancel(self):
+        """1 + 2^-60 - 1: the upper end along (1, 1, 1) must not be 0."""
+        mesh = os.path.join(self.folder, "cancel.obj")
+        write_obj(mesh, [("cancel", np.array([[[1, 2.0**-60, -1], [-1, 0, -1], [0, -1, -1]]]))])
+        self.check_bake(self.bake(mesh, "dop14-u8", "f32"), mesh)
+
+    def test_larger_meshes(self):
+        for name in ("piano", "apartment"):
+            mesh = self.shared("meshes", name + ".obj")
+            for profile, triangles in (("dop26-u8-wide", "packed"), ("dop14-u8", "quantized")):
+                self.check_bake(self.bake(mesh, profile, triangles), mesh)
+
+    def test_queries_near_contact(self):
+        """Poses of the robot at its distance from a point of the room: apart, touching by roundings, and inside."""
+        paths = self.bake(ROOM, "dop26-u4", "packed"), self.bake(ROBOT, "dop6-f16", "f32")
+        room = query.corners(load(paths[0])).reshape(-1, 3)
+        robot = query.corners(load(paths[1])).reshape(-1, 3)
+        poses = []
+        for _ in range(12):
+            rotation = random_rotation(self.chance)
+            # Corner on corner, then away from it by nothing, an ulp or so, or more.
+            goal = room[self.chance.randrange(len(room))]
+            moved = rotation @ robot[self.chance.randrange(len(robot))]
+            step = self.chance.choice((0, 1e-12, 1e-3, 30, 300))
+            poses.append(np.column_stack([rotation, goal - moved + step * rotation[0]]))
+        self.check_queries(*paths, poses)
+
+    def test_queries_on_a_grid(self):
+        """Small integers: most contacts are touching, many triangles are segments, points or coplanar."""
+        paths = []
+        for name in "ab":
+            triangles = np.array([[self.chance.randrange(5) for _ in range(9)] for _ in range(50)], float).reshape(
+                -1, 3, 3
+            )
+            triangles[:5, 1] = triangles[:5, 0]
+            triangles[:2, 2] = triangles[:2, 0]
+            triangles[5:10, 2] = 2 * triangles[5:10, 1] - triangles[5:10, 0]
+            for triangle in triangles[10:25]:
+                triangle[:, self.chance.randrange(3)] = self.chance.randrange(5)
+            mesh = os.path.join(self.folder, name + ".obj")
+            write_obj(mesh, [(name, triangles)])
+            paths.append(self.bake(mesh))
+        turns = [np.array(rows, float) for rows in itertools.permutations(np.eye(3).tolist())]
+        turns = [turn * np.linalg.det(turn) for turn in turns]
+        poses = []
+        for _ in range(40):
+            translation = [self.chance.choice((-5, -4, -2, -1, 0, 1, 2, 4, 5, 0.5)) for _ in range(3)]
+            poses.append(np.column_stack([self.chance.choice(turns), translation]))
+        self.check_queries(*paths, poses)
+
+    def test_queries_of_known_poses(self):
+        paths = self.bake(ROOM), self.bake(ROBOT)
+        for preset in ("d0sep", "d0pen", "overlap", "d1"):
+            with open(self.shared("poses", f"fcl_{preset}.txt"), encoding="utf-8") as stream:
+                self.check_queries(*paths, query.read_poses(stream.read())[:8])
+
+    def test_damaged_files(self):
+        meshes = [os.path.join(TESTDATA, name) for name in ("ok-everything.cbvh", "ok-plain.cbvh", "ok-profiles.cbvh")]
+        for profile, triangles in (
+            ("dop14-u8", "f32"),
+            ("dop6-f16", "packed"),
+            ("dop14-f32", "quantized"),
+            ("dop26-u4", "f32"),
+        ):
+            meshes += [self.bake(mesh, profile, triangles) for mesh in (ROBOT, ROOM)]
+        count = int(os.environ.get("CBVH_MUTANTS", "1000"))
+        broken, different = mutate.compare(COMMAND, count, 3, meshes, self.folder)
+        self.assertEqual(different, [])
+        self.assertGreater(len(broken), min(count // 20, 20))
+
+
+def random_rotation(chance):
+    w, x, y, z = np.random.default_rng(chance.randrange(1 << 32)).standard_normal(4)
+    w, x, y, z = np.array([w, x, y, z]) / np.sqrt(w * w + x * x + y * y + z * z)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+if __name__ == "__main__":
+    unittest.main()
