@@ -1,0 +1,109 @@
+//! The oracles at speed: boxes and balls settle what they certainly can, integers the rest.
+
+use super::ball::Ball;
+use super::dyadic::Integers;
+use super::meet::meet;
+use super::number::{Corners, Number, dot};
+use super::separation::{directions, gaps};
+
+pub(crate) type Triangle = [[f64; 3]; 3];
+
+/// A triangle and its box.
+#[derive(Clone, Copy)]
+pub(crate) struct Boxed {
+    pub(crate) corners: Triangle,
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Boxed {
+    pub(crate) fn new(corners: Triangle) -> Self {
+        let end = |pick: fn(f64, f64) -> f64| {
+            [0, 1, 2].map(|k| pick(corners[0][k], pick(corners[1][k], corners[2][k])))
+        };
+        Self { corners, low: end(f64::min), high: end(f64::max) }
+    }
+
+    /// Whether the boxes share a point: comparisons are exact.
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
+    }
+
+    /// No larger than the distance of the boxes. Each gap is rounded by a factor of at most 1 + u, u = 2^-53,
+    /// and the square, two sums and the root by four more; squares that underflow only lessen it.
+    pub(crate) fn gap(&self, other: &Self) -> f64 {
+        let along = |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
+        let [x, y, z] = [along(0), along(1), along(2)];
+        (x * x + y * y + z * z).sqrt() * (1.0 - 8.0 * f64::EPSILON)
+    }
+
+    /// The longest side of the box around both.
+    pub(crate) fn span(&self, other: &Self) -> f64 {
+        let side = |k: usize| self.high[k].max(other.high[k]) - self.low[k].min(other.low[k]);
+        side(0).max(side(1)).max(side(2))
+    }
+}
+
+/// Both triangles, and the power of two by which they are multiplied, so that the largest coordinate is from 1
+/// to 2 and products stay in range.
+fn balls(a: &Triangle, b: &Triangle) -> (Corners<Ball>, Corners<Ball>, f64) {
+    let largest = a.iter().chain(b).flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let exponent = (largest.to_bits() >> 52).clamp(23, 2023);
+    let scale = f64::from_bits((2046 - exponent) << 52);
+    let ball = |x: f64| Ball::scaled(x, scale);
+    (a.map(|p| p.map(ball)), b.map(|p| p.map(ball)), scale)
+}
+
+/// How many pairs were decided by what.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Decided {
+    pub(crate) by_boxes: u64,
+    pub(crate) by_balls: u64,
+    pub(crate) by_integers: u64,
+}
+
+/// Whether two closed triangles share a point.
+pub(crate) fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
+    if !a.overlaps(b) {
+        decided.by_boxes += 1;
+        return false;
+    }
+    let (of_a, of_b, _) = balls(&a.corners, &b.corners);
+    if let Some(answer) = meet(&of_a, &of_b) {
+        decided.by_balls += 1;
+        return answer;
+    }
+    decided.by_integers += 1;
+    let integers = Integers::new(&a.corners, &b.corners);
+    match integers.narrow() {
+        Some((a, b)) => meet(&a, &b).unwrap(),
+        None => meet(&integers.a, &integers.b).unwrap(),
+    }
+}
+
+/// Whether a slab wider than `limit` certainly separates the triangles.
+///
+/// Any direction will do, so that of a ball is taken to be its middle.
+pub(crate) fn certainly_farther(a: &Boxed, b: &Boxed, limit: f64) -> bool {
+    if a.gap(b) > limit {
+        return true;
+    }
+    let (a, b, scale) = balls(&a.corners, &b.corners);
+    let limit = Ball::scaled(limit, scale);
+    let gaps = gaps(&a, &b);
+    let found = directions(&a, &b, |direction| {
+        let direction = direction.map(|x| Ball::exactly(x.middle()));
+        let (mut above, mut below) = (f64::INFINITY, f64::INFINITY);
+        for gap in &gaps {
+            let height = dot(&direction, gap);
+            above = above.min(height.least());
+            below = below.min(-height.most());
+        }
+        // The width beyond the limit: above * above > limit * limit * |direction|^2, with above > 0.
+        let width = Ball::exactly(above.max(below));
+        let square = limit.times(&limit).times(&dot(&direction, &direction));
+        let wider = width.times(&width).minus(&square).sign();
+        Some(width.middle() > 0.0 && wider.is_some_and(|sign| sign.is_gt()))
+    });
+    found == Some(true)
+}

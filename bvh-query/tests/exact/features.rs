@@ -1,0 +1,81 @@
+//! The oracle of distance from above: the least over pairs of features of the triangles.
+//!
+//! Each candidate is the distance of two points that are in the triangles, so it is never too small; that it is
+//! never too large, `separation` proves.
+
+use super::meet::meet;
+use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
+
+/// A squared length: numerator and positive denominator.
+pub(crate) type Fraction<N> = (N, N);
+
+/// Whether the first is smaller.
+pub(crate) fn is_less<N: Number>(p: &Fraction<N>, q: &Fraction<N>) -> Option<bool> {
+    Some(p.0.times(&q.1).minus(&q.0.times(&p.1)).sign()?.is_lt())
+}
+
+/// The squared distance of two closed triangles; `zero` and `one` are what they say.
+pub(crate) fn squared_distance<N: Number>(
+    a: &Corners<N>,
+    b: &Corners<N>,
+    [zero, one]: &[N; 2],
+) -> Option<Fraction<N>> {
+    if meet(a, b)? {
+        return Some((zero.clone(), one.clone()));
+    }
+    let mut candidates = Vec::with_capacity(64);
+    for (corner_a, corner_b) in a.iter().flat_map(|p| b.iter().map(move |q| (p, q))) {
+        let gap = subtract(corner_a, corner_b);
+        candidates.push((dot(&gap, &gap), one.clone()));
+    }
+    for (points, t) in [(a, b), (b, a)] {
+        let edges = edges(t);
+        let normal = cross(&edges[0], &edges[1]);
+        for point in points {
+            let gaps = [0, 1, 2].map(|i: usize| subtract(point, &t[i]));
+            let mut inside = !is_zero(&normal)?;
+            for (gap, edge) in gaps.iter().zip(&edges) {
+                candidates.extend(off_edge(gap, edge)?);
+                inside = inside && dot(&normal, &cross(edge, gap)).sign()?.is_ge();
+            }
+            if inside {
+                let height = dot(&normal, &gaps[0]);
+                candidates.push((height.times(&height), dot(&normal, &normal)));
+            }
+        }
+    }
+    for (corner_a, edge_a) in a.iter().zip(&edges(a)) {
+        for (corner_b, edge_b) in b.iter().zip(&edges(b)) {
+            candidates.extend(between_edges(&subtract(corner_b, corner_a), edge_a, edge_b)?);
+        }
+    }
+    let mut least = candidates.swap_remove(0);
+    for candidate in candidates {
+        if is_less(&candidate, &least)? {
+            least = candidate;
+        }
+    }
+    Some(least)
+}
+
+/// From a point, `gap` away from the start of an edge, straight to the edge, if that is between its ends.
+fn off_edge<N: Number>(gap: &Vector<N>, edge: &Vector<N>) -> Option<Option<Fraction<N>>> {
+    let (along, whole) = (dot(gap, edge), dot(edge, edge));
+    let between = along.sign()?.is_gt() && along.minus(&whole).sign()?.is_lt();
+    let square = || dot(gap, gap).times(&whole).minus(&along.times(&along));
+    Some(between.then(|| (square(), whole.clone())))
+}
+
+/// Straight from one edge to another, `gap` from start to start, if that is between their ends.
+fn between_edges<N: Number>(gap: &Vector<N>, u: &Vector<N>, v: &Vector<N>) -> Option<Option<Fraction<N>>> {
+    let normal = cross(u, v);
+    let whole = dot(&normal, &normal);
+    // If gap = x u - y v + z normal, these are x and y, times whole.
+    for part in [dot(&cross(gap, v), &normal), dot(&cross(gap, u), &normal)] {
+        if part.sign()?.is_le() || part.minus(&whole).sign()?.is_ge() {
+            return Some(None);
+        }
+    }
+    let height = dot(&normal, gap);
+    Some(Some((height.times(&height), whole)))
+}

@@ -1,0 +1,90 @@
+//! The oracle of contact: do two closed triangles share a point?
+//!
+//! What two triangles share is convex; if it is not empty it has an extreme point, and that lies on an edge of one
+//! or the other. So they meet exactly if an edge of one meets the other. `None` where a sign is not certain.
+
+use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
+use std::cmp::Ordering::{Equal, Greater, Less};
+
+pub(crate) fn meet<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Option<bool> {
+    for (one, other) in [(a, b), (b, a)] {
+        for i in 0..3 {
+            if edge_meets(&one[i], &one[(i + 1) % 3], other)? {
+                return Some(true);
+            }
+        }
+    }
+    Some(false)
+}
+
+fn edge_meets<N: Number>(p: &Vector<N>, q: &Vector<N>, t: &Corners<N>) -> Option<bool> {
+    let [first, second, third] = edges(t);
+    let normal = cross(&first, &second);
+    let flat = is_zero(&normal)?;
+    if !flat {
+        let height = |point: &Vector<N>| dot(&normal, &subtract(point, &t[0])).sign();
+        match (height(p)?, height(q)?) {
+            (Greater, Greater) | (Less, Less) => return Some(false),
+            // In the plane: inside, or else across an edge.
+            (Equal, Equal) => {
+                let mut inside = true;
+                for (edge, corner) in [&first, &second, &third].into_iter().zip(t) {
+                    inside &= dot(&normal, &cross(edge, &subtract(p, corner))).sign()?.is_ge();
+                }
+                if inside {
+                    return Some(true);
+                }
+            }
+            // One point of it is in the plane: inside, if its line passes all edges on the same side.
+            _ => {
+                let along = subtract(q, p);
+                let mut sides = [Equal; 3];
+                for i in 0..3 {
+                    let (from, to) = (subtract(&t[i], p), subtract(&t[(i + 1) % 3], p));
+                    sides[i] = dot(&along, &cross(&from, &to)).sign()?;
+                }
+                return Some(!(sides.contains(&Less) && sides.contains(&Greater)));
+            }
+        }
+    }
+    // In its plane, or without area, a triangle is met if one of its edges is.
+    for i in 0..3 {
+        if edges_meet([p, q], [&t[i], &t[(i + 1) % 3]])? {
+            return Some(true);
+        }
+    }
+    Some(false)
+}
+
+/// Two closed segments, each of which may be a point.
+fn edges_meet<N: Number>([p, q]: [&Vector<N>; 2], [r, s]: [&Vector<N>; 2]) -> Option<bool> {
+    let (u, v, w) = (subtract(q, p), subtract(s, r), subtract(r, p));
+    let normal = cross(&u, &v);
+    if !is_zero(&normal)? {
+        // If w = x u - y v, the lines cross at p + x u and r + y v.
+        let whole = dot(&normal, &normal);
+        let inside = |part: N| Some(part.sign()?.is_ge() && part.minus(&whole).sign()?.is_le());
+        return Some(
+            dot(&normal, &w).sign()?.is_eq()
+                && inside(dot(&cross(&w, &v), &normal))?
+                && inside(dot(&cross(&w, &u), &normal))?,
+        );
+    }
+    if !is_zero(&cross(&w, &u))? || !is_zero(&cross(&w, &v))? {
+        return Some(false);
+    }
+    // On one line: they overlap if they do along every axis.
+    for axis in 0..3 {
+        let beyond = |x: &[&Vector<N>; 2], y: &[&Vector<N>; 2]| {
+            let mut all = true;
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                all &= x[i][axis].minus(&y[j][axis]).sign()?.is_gt();
+            }
+            Some(all)
+        };
+        if beyond(&[p, q], &[r, s])? || beyond(&[r, s], &[p, q])? {
+            return Some(false);
+        }
+    }
+    Some(true)
+}

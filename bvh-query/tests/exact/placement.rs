@@ -1,0 +1,143 @@
+//! What queries are about: the placed corner is what `Pose` says it is, and how far that is from R x + t.
+//!
+//! A stored coordinate is origin + v without rounding; a placed one is `((R0 x + R1 y) + R2 z) + t` with each
+//! product and sum rounded to nearest, ties to even. Both are recomputed in integers.
+
+use super::dyadic::{on_grid, parts};
+use super::kinds::turn;
+use crate::common::{Random, bake, mesh, options};
+use bvh_format::leaf::{TriangleEncoding, decode_packet};
+use bvh_format::page::Page;
+use bvh_format::profile::Profile;
+use bvh_format::validate::packets;
+use bvh_query::Pose;
+use dashu_int::IBig;
+use std::cmp::Ordering;
+
+/// An integer times a power of two.
+#[derive(Clone)]
+struct Dyadic(IBig, i32);
+
+impl Dyadic {
+    fn new(x: f64) -> Self {
+        let (mantissa, exponent) = parts(x);
+        if mantissa == 0 { Self(IBig::ZERO, 0) } else { Self(IBig::from(mantissa), exponent) }
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        let lowest = self.1.min(other.1);
+        let at = |x: &Self| x.0.clone() << (x.1 - lowest) as usize;
+        Self(at(self) + at(other), lowest)
+    }
+
+    fn times(&self, other: &Self) -> Self {
+        Self(&self.0 * &other.0, self.1 + other.1)
+    }
+
+    fn compare(&self, other: &Self) -> Ordering {
+        self.plus(&Self(-other.0.clone(), other.1)).0.cmp(&IBig::ZERO)
+    }
+
+    /// Whether `x` is it, rounded to nearest, ties to even: no farther away than half way to a neighbour, and at
+    /// half way only with an even mantissa.
+    fn rounds_to(&self, x: f64) -> bool {
+        let twice = self.times(&Self::new(2.0));
+        let half_way = |neighbour: f64| Self::new(x).plus(&Self::new(neighbour));
+        let (below, above) = (twice.compare(&half_way(x.next_down())), twice.compare(&half_way(x.next_up())));
+        let even = x.to_bits() & 1 == 0;
+        (below.is_gt() || (even && below.is_eq())) && (above.is_lt() || (even && above.is_eq()))
+    }
+}
+
+/// The exact sum of four steps, each rounded; panics where `place` was rounded otherwise.
+fn check_place(pose: &Pose, point: [f64; 3]) {
+    let (placed, translation) = (pose.place(point), pose.translation());
+    for k in 0..3 {
+        let row = pose.rotation()[k];
+        let mut sum = 0.0;
+        for (j, (factor, x)) in row.into_iter().zip(point).enumerate() {
+            let product = factor * x;
+            assert!(Dyadic::new(factor).times(&Dyadic::new(x)).rounds_to(product), "{factor:e} {x:e}");
+            let before = sum;
+            sum = if j == 0 { product } else { sum + product };
+            assert!(j == 0 || Dyadic::new(before).plus(&Dyadic::new(product)).rounds_to(sum));
+        }
+        assert!(
+            Dyadic::new(sum).plus(&Dyadic::new(translation[k])).rounds_to(placed[k]),
+            "{pose:?} {point:?}"
+        );
+
+        // With u = 2^-53 a product passes at most four roundings and t one: off by at most 4u of the sum of
+        // magnitudes, and a little of second order; nothing underflows, or by less than a subnormal each.
+        let terms = [0, 1, 2].map(|j| Dyadic::new(row[j]).times(&Dyadic::new(point[j])));
+        let all = [&terms[0], &terms[1], &terms[2], &Dyadic::new(translation[k])];
+        let zero = Dyadic::new(0.0);
+        let exact = all.iter().fold(zero.clone(), |sum, term| sum.plus(term));
+        let magnitude =
+            |x: &Dyadic| if x.compare(&zero).is_lt() { Dyadic(-x.0.clone(), x.1) } else { x.clone() };
+        let sum = all.iter().fold(zero.clone(), |sum, term| sum.plus(&magnitude(term)));
+        let off = magnitude(&exact.plus(&Dyadic::new(-placed[k])));
+        let bound = sum.times(&Dyadic::new(2.0 * f64::EPSILON * (1.0 + 8.0 * f64::EPSILON)));
+        assert!(off.compare(&bound).is_le(), "{pose:?} {point:?}");
+    }
+}
+
+#[test]
+fn placed_corners_are_rounded_step_by_step() {
+    let mut random = Random::new(41);
+    for round in 0..20_000 {
+        let spread = [1.0, 1e-20, 1e30, 1e7][round % 4];
+        let rotation = turn(&mut random);
+        let mut number = |largest: f64| random.signed() * largest * 2f64.powi(-(random.below(30) as i32));
+        let translation = [(); 3].map(|()| number(spread));
+        let Ok(pose) = Pose::new(rotation, translation) else { continue };
+        let point = [(); 3].map(|()| f64::from(number(spread) as f32));
+        check_place(&pose, point);
+        check_place(&pose, point.map(|x| x + spread));
+    }
+}
+
+/// Entries that would underflow in exact arithmetic count as 0, and no others.
+#[test]
+fn entries_below_the_limits_are_zero() {
+    let (tiny_turn, tiny_move) = (2f64.powi(-64), 2f64.powi(-213));
+    for (entry, expected) in [(tiny_turn, tiny_turn), (tiny_turn.next_down(), 0.0), (-tiny_turn, -tiny_turn)]
+    {
+        let pose = Pose::new([[1.0, entry, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
+        assert_eq!(pose.rotation()[0][1], expected);
+    }
+    for (entry, expected) in [(tiny_move, tiny_move), (tiny_move.next_down(), 0.0), (-tiny_move, -tiny_move)]
+    {
+        assert_eq!(Pose::new(*Pose::IDENTITY.rotation(), [entry; 3]).unwrap().translation(), [expected; 3]);
+    }
+}
+
+#[test]
+fn stored_corners_are_sums_without_rounding() {
+    let mut random = Random::new(43);
+    for round in 0..400 {
+        let place = random.point().map(|x| x * 2f64.powi(random.below(100) as i32 - 40));
+        let size = 2f64.powi(random.below(60) as i32 - 30);
+        let mut corner = || [0, 1, 2].map(|k| place[k] + size * random.signed());
+        let triangles = [(); 8].map(|()| [(); 3].map(|()| corner()));
+        let encodings = [TriangleEncoding::F32, TriangleEncoding::Packed, TriangleEncoding::Quantized];
+        let profile = Profile::ALL[round % Profile::ALL.len()];
+        let file = bake(&mesh(&triangles), &options(profile, encodings[round % 3]));
+        let (object, layout) = (&file.objects()[0], file.layout());
+        let origin = object.record.origin.map(|x| x.get());
+        let page = object.record.first_page.get();
+        let page = Page::new(layout.page_bytes(file.bytes(), page).unwrap(), object.profile);
+        let block = layout.leaf_block(file.bytes(), page.header());
+        for (packet, count) in packets(&page) {
+            let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+            for corner in (0..count).flat_map(|lane| values.triangle(lane)) {
+                for k in 0..3 {
+                    let (v, sum) = (f64::from(corner[k]), origin[k] + f64::from(corner[k]));
+                    let grid = parts(origin[k]).1.min(parts(v).1).min(parts(sum).1);
+                    let [origin, v, sum] = [origin[k], v, sum].map(|x| on_grid(x, grid));
+                    assert_eq!(origin + v, sum);
+                }
+            }
+        }
+    }
+}

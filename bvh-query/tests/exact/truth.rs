@@ -1,0 +1,107 @@
+//! The right answers for two meshes in a pose, from the oracles over all pairs of triangles.
+
+use super::decide::{Boxed, Triangle, certainly_farther, intersect};
+use super::length::Length;
+use super::tally::Tally;
+use crate::common::{Stored, placed, size};
+use bvh_query::{Contact, Distance, Pose};
+
+/// A mesh as a file holds it.
+pub(crate) struct Surface {
+    pub(crate) stored: Vec<Stored>,
+    pub(crate) corners: Vec<Triangle>,
+}
+
+impl Surface {
+    pub(crate) fn new(stored: Vec<Stored>) -> Self {
+        let corners = stored.iter().map(|stored| stored.corners).collect();
+        Self { stored, corners }
+    }
+
+    /// The place in the list of the triangle that an answer names.
+    fn find(&self, object: u32, id: u32) -> Option<usize> {
+        self.stored.binary_search_by_key(&(object, id), |stored| (stored.object, stored.id)).ok()
+    }
+}
+
+/// Two meshes in place.
+pub(crate) struct Truth<'a> {
+    a: &'a Surface,
+    b: &'a Surface,
+    boxed_a: Vec<Boxed>,
+    boxed_b: Vec<Boxed>,
+    /// The diagonal of the box of both.
+    pub(crate) size: f64,
+}
+
+impl<'a> Truth<'a> {
+    pub(crate) fn new(a: &'a Surface, b: &'a Surface, pose: &Pose) -> Self {
+        let corners_b = placed(&b.corners, pose);
+        let boxed = |corners: &[Triangle]| corners.iter().map(|&t| Boxed::new(t)).collect();
+        let size = size(&a.corners, &corners_b);
+        Self { a, b, boxed_a: boxed(&a.corners), boxed_b: boxed(&corners_b), size }
+    }
+
+    /// Whether the meshes meet; `hint` is a pair to try first, and is told the pair that does.
+    pub(crate) fn collide(&self, hint: &mut (usize, usize), tally: &mut Tally) -> bool {
+        if intersect(&self.boxed_a[hint.0], &self.boxed_b[hint.1], &mut tally.decided) {
+            return true;
+        }
+        for (i, a) in self.boxed_a.iter().enumerate() {
+            for (j, b) in self.boxed_b.iter().enumerate() {
+                if intersect(a, b, &mut tally.decided) {
+                    *hint = (i, j);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// All pairs in contact, ascending.
+    pub(crate) fn contacts(&self, tally: &mut Tally) -> Vec<Contact> {
+        let mut contacts = Vec::new();
+        for (a, stored_a) in self.boxed_a.iter().zip(&self.a.stored) {
+            for (b, stored_b) in self.boxed_b.iter().zip(&self.b.stored) {
+                if intersect(a, b, &mut tally.decided) {
+                    contacts.push(Contact {
+                        object_a: stored_a.object,
+                        triangle_a: stored_a.id,
+                        object_b: stored_b.object,
+                        triangle_b: stored_b.id,
+                    });
+                }
+            }
+        }
+        tally.pairs += (self.boxed_a.len() * self.boxed_b.len()) as u64;
+        tally.contacts += contacts.len() as u64;
+        contacts
+    }
+
+    /// The pair that an answer names: its exact distance, and its largest difference of two coordinates.
+    pub(crate) fn named(&self, answer: &Distance, tally: &mut Tally) -> Option<(Length, f64)> {
+        let i = self.a.find(answer.object_a, answer.triangle_a)?;
+        let j = self.b.find(answer.object_b, answer.triangle_b)?;
+        tally.lengths += 1;
+        let (a, b) = (&self.boxed_a[i], &self.boxed_b[j]);
+        Some((Length::between(&a.corners, &b.corners), a.span(b)))
+    }
+
+    /// The same for the closest pair, which is the named one or closer.
+    pub(crate) fn distance(&self, named: (Length, f64), tally: &mut Tally) -> (Length, f64) {
+        let limit = named.0.floor().next_up();
+        let mut least = named;
+        for a in &self.boxed_a {
+            for b in &self.boxed_b {
+                if !certainly_farther(a, b, limit) {
+                    tally.lengths += 1;
+                    let length = Length::between(&a.corners, &b.corners);
+                    if length.is_less(&least.0) {
+                        least = (length, a.span(b));
+                    }
+                }
+            }
+        }
+        least
+    }
+}
