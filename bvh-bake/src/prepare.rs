@@ -96,8 +96,9 @@ fn choose_origin(object: &mesh::Object, used: &[bool]) -> [AxisOrigin; 3] {
         if largest <= 4.0 * half || all_f32() {
             return AxisOrigin { origin: 0.0, grid: 0.0 };
         }
-        // origin + v stays below twice the largest coordinate, where f64 has this spacing.
-        let grid = spacing(2.0 * largest);
+        // origin + v stays below twice the largest coordinate, where f64 has this spacing. Origins are multiples
+        // of the smallest f32, as all vertices are.
+        let grid = spacing(2.0 * largest).max(f64::from(f32::from_bits(1)));
         let middle = lo + half;
         AxisOrigin { origin: (middle / grid).round() * grid, grid }
     })

@@ -159,10 +159,16 @@ fn read_object(record: &ObjectRecord, names: &[u8], at: u64) -> Result<Object, F
     Ok(Object { name: name.to_owned(), profile, triangle_encoding, f16_scale, record: *record })
 }
 
+/// True for multiples of 2^-149, the smallest positive f32.
+fn is_multiple_of_smallest(value: f64) -> bool {
+    // At most 2^269: exact.
+    (value * 2f64.powi(149)).fract() == 0.0
+}
+
 fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
     let limit = MAX_COORDINATE;
     let coordinate = |v: f64| v.abs() <= limit;
-    let origin = record.origin.iter().all(|v| coordinate(v.get()));
+    let origin = record.origin.iter().all(|v| coordinate(v.get()) && is_multiple_of_smallest(v.get()));
     let boxed = (0..3).all(|a| {
         let (lo, hi) = (f64::from(record.box_lo[a].get()), f64::from(record.box_hi[a].get()));
         coordinate(lo) && coordinate(hi) && lo <= hi
@@ -182,4 +188,33 @@ fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
     ensure(holds, Rule::ObjectNumbers, at, || {
         ("finite, ordered numbers within the limits".into(), format!("{record:?}"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zerocopy::FromZeros;
+
+    #[test]
+    fn origins_are_multiples_of_the_smallest_f32() {
+        let mut record = ObjectRecord::new_zeroed();
+        record.triangles = 1.into();
+        record.packets = 1.into();
+        let smallest = 2f64.powi(-149);
+        for (origin, holds) in [
+            (0.0, true),
+            (-smallest, true),
+            (3.0 * smallest, true),
+            (-(2f64.powi(120)), true),
+            (smallest / 2.0, false),
+            (smallest * 1.5, false),
+            (2f64.powi(-149 + 51) + smallest / 2.0, false),
+            (2f64.powi(-1074), false),
+            (2f64.powi(121), false),
+            (f64::NAN, false),
+        ] {
+            record.origin[1] = origin.into();
+            assert_eq!(check_numbers(&record, 0).is_ok(), holds, "{origin:e}");
+        }
+    }
 }

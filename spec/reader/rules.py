@@ -139,6 +139,8 @@ def check_numbers(one):
 
     for field in ("origin", "box_lo", "box_hi", "sphere_centre"):
         need_field(field, is_within(getattr(one, field), MAX_COORDINATE), "at most 2^120 in magnitude")
+    # At most 2^269: exact.
+    need_field("origin", bool((np.modf(one.origin * 2.0**149)[0] == 0).all()), "multiples of 2^-149")
     need_field("box_lo", bool((one.box_lo <= one.box_hi).all()), "at most box_hi")
     need_field("max_vertex_rounding", 0 <= one.max_vertex_rounding <= MAX_COORDINATE, "0 to 2^120")
     need_field("max_quantization_error", 0 <= one.max_quantization_error <= MAX_COORDINATE, "0 to 2^120")

@@ -238,10 +238,6 @@ class AgainstCbvh(unittest.TestCase):
         self.assertNotIn(cbvh.IDS, file.sections)
         self.check_facts(file, path)
 
-    # `Kdop::of_points` widens a sum that was rounded by a step relative to the sum, which is less than the error of a
-    # partial sum once the third coordinate cancels the first, and `verify` projects in the same way. The mark goes
-    # when that is mended.
-    @unittest.expectedFailure
     def test_bounds_of_coordinates_that_cancel(self):
         """1 + 2^-60 - 1: the upper end along (1, 1, 1) must not be 0."""
         mesh = os.path.join(self.folder, "cancel.obj")

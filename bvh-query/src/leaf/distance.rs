@@ -9,7 +9,10 @@
 //!
 //! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the
 //! distance of two within 4 e. Combinations and projections of coordinates of magnitude r or less
-//! round by at most 16u r.
+//! round by at most 16u r. Products of coordinates that are dust in the local frame underflow. Those with a
+//! direction of length 1 lose less than 2^-140, which is charged; a guess whose square is below 2^-100 is not
+//! certified but taken as 0 to 2^-50, and above that all that underflows is less than 2^-95 of a length that
+//! `r` is not far below.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, splat4};
@@ -23,7 +26,10 @@ pub(crate) struct Bounds {
     pub(crate) direction: [[f32; 16]; 3],
 }
 
-/// The error of a bound: see above.
+/// 2^-100: the least square of a guess that is certified.
+const LEAST_SQUARE: f32 = f32::from_bits((127 - 100) << 23);
+
+/// The error of a bound: see above. `Local` charges 2^-140 to every coordinate.
 #[inline(always)]
 fn slack(local: &Local) -> f32 {
     4.0 * local.error + 16.0 * U * local.reach
@@ -141,11 +147,14 @@ fn certify<I: Isa>(
     guess: Guess<I::V>,
 ) -> Bounds {
     let slack = isa.splat(slack(local));
-    let length = guess.squared.sqrt();
+    let least = isa.splat(LEAST_SQUARE);
+    let length = guess.squared.max(least).sqrt();
     let n = guess.direction;
     let gap = min3(project(b, n)).sub(max3(project(a, n)));
     let shrink = isa.splat(1.0 - 16.0 * U);
-    let lower = gap.div(length).mul(shrink).sub(slack).max(isa.splat(0.0));
+    let zero = isa.splat(0.0);
+    let lower = gap.div(length).mul(shrink).sub(slack).max(zero);
+    let lower = I::V::select(least.le(guess.squared), lower, zero);
     let upper = length.mul_add(isa.splat(1.0 + 16.0 * U), slack);
     let mut bounds = Bounds { lower: [0.0; 16], upper: [0.0; 16], direction: [[0.0; 16]; 3] };
     isa.store(lower, &mut bounds.lower);

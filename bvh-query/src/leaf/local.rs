@@ -9,7 +9,9 @@
 //! |c| <= m_c, |a| <= m_a: a corner of A is off by u m_a (one rounded difference); a corner R w + c of B
 //! by at most 9u sum |R||w| + 4u m_c (rounded w, R and c, three products, three sums), and the sum is
 //! at most sqrt(3) m_b because rows of R have length 1 (within 2^-20). The pose's f64 error comes on
-//! top. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`.
+//! top. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`. Packets that are dust
+//! beside their object have coordinates that underflow: what is left of a coordinate after six roundings
+//! of 2^-150 and less is within 2^-140 more, which `e_pose` includes.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::math::{Corners, Vec3};
@@ -19,6 +21,9 @@ use bvh_format::object::Object;
 
 /// Unit roundoff of f32.
 pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
+
+/// Absolute error charged to each coordinate: 2^-140 units of the frame.
+const UNDERFLOW: f32 = f32::from_bits(1 << 9);
 
 /// What all packet pairs of a query share.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +56,7 @@ impl LocalFrame {
             translation: placement.translation,
             rotation32,
             scale: scale as f32,
-            error: ((placement.error * scale) as f32).next_up(),
+            error: ((placement.error * scale) as f32).next_up() + UNDERFLOW,
         }
     }
 }

@@ -60,6 +60,12 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
         return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: point, point_b: point };
     }
     let (distance, upper) = differences.length(&closest);
+    // Between two features that are about as near, the direction of either may be far off that of the gap.
+    let lower = if distance - lower > WEAK * (upper - distance) {
+        differences.widest(&closest).max(lower)
+    } else {
+        lower
+    };
     // A length that rounds to zero is still not a contact.
     let distance = (distance * differences.unit).max(f64::MIN_POSITIVE);
     let lower = lower * differences.unit;
@@ -72,6 +78,9 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
         point_b: closest.foot_b.place(b, &differences.edges_b, differences.unit),
     }
 }
+
+/// A lower bound this many times as far below the distance as the upper bound is above is not taken as it is.
+const WEAK: f64 = 8.0;
 
 /// A point of a triangle: `corner + along * (next - corner) + across * (previous - corner)`.
 ///
@@ -273,7 +282,8 @@ impl Differences {
     #[inline(always)]
     fn separation(&self, direction: Point) -> f64 {
         let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
-        if size == 0.0 {
+        // An edge without length leaves no direction.
+        if size == 0.0 || !direction.iter().all(|x| x.is_finite()) {
             return 0.0;
         }
         let scale = reciprocal_exponent(size);
@@ -288,6 +298,26 @@ impl Differences {
         }
         let width = ahead.max(behind) - f64::MIN_POSITIVE;
         if width > 0.0 { width / dot(direction, direction).sqrt() * (1.0 - 8.0 * UNIT_ROUNDOFF) } else { 0.0 }
+    }
+}
+
+impl Differences {
+    /// The best lower bound that any of eighteen directions gives: both normals, all cross products of edges,
+    /// and the gap as it is and made perpendicular to each edge.
+    #[cold]
+    #[inline(never)]
+    fn widest(&self, closest: &Candidate) -> f64 {
+        let (a, b) = (&self.edges_a, &self.edges_b);
+        let gap = self.between(closest);
+        let mut widest = self.separation(gap);
+        let mut look_along = |direction| widest = self.separation(direction).max(widest);
+        look_along(perpendicular_normal(a[0], a[2]));
+        look_along(perpendicular_normal(b[0], b[2]));
+        for &edge_a in a {
+            b.iter().for_each(|&edge_b| look_along(perpendicular_normal(edge_a, edge_b)));
+        }
+        a.iter().chain(b).for_each(|&edge| look_along(perpendicular_part(edge, gap)));
+        widest
     }
 }
 

@@ -115,8 +115,8 @@ impl Querier {
         if best.closest.distance == 0.0 {
             return self.touching(a, b, pose, best);
         }
-        let lower = search.limit_of(best.closest.distance).min(best.closest.lower);
-        Ok(best.distance(lower))
+        // What was pruned is beyond the limit, which only ever came down; the rest has been settled.
+        Ok(best.distance(search.settled_lower.min(f64::from(search.limit))))
     }
 
     /// True if the meshes are at most `d` apart (mesh units): exactly, if `distance` is at most `d`.
@@ -230,6 +230,8 @@ struct Search {
     /// `within`'s question: stop at the first pair at most this far apart.
     enough: Option<f64>,
     best: Option<Best>,
+    /// The least certified lower bound of the pairs settled.
+    settled_lower: f64,
     /// No pair is farther apart than this: f32, rounded up.
     upper: f32,
     /// Pairs with a lower bound beyond this do not matter.
@@ -243,6 +245,7 @@ impl Search {
             options,
             enough: enough.is_finite().then_some(enough),
             best: None,
+            settled_lower: f64::INFINITY,
             upper: f32::INFINITY,
             limit: f32::INFINITY,
             done: false,
@@ -270,6 +273,7 @@ impl Search {
             &scene.triangle_a(pair.a, pair.lane_a)?,
             &scene.triangle_b(pair.b, pair.lane_b)?,
         );
+        self.settled_lower = self.settled_lower.min(closest.lower);
         let nearer = match &self.best {
             None => true,
             Some(best) if closest.distance == best.closest.distance => {

@@ -7,8 +7,9 @@
 //! products and three sums, the computed end is within 8u (M sum |c_j| + |t|) of the exact one, where
 //! t is the offset of the pose along d; rounding the offset itself to f32 adds u of it. The pose
 //! itself, and the placed vertices it defines, are rounded in f64: that adds at most 2^-48 of the
-//! magnitudes involved. All go into the offsets, outward, once a query; a node test costs nothing for
-//! it.
+//! magnitudes involved. Among subnormal numbers rounding is absolute: three products and the offset lose
+//! 2^-150 each, and twice that is charged. All go into the offsets, outward, once a query; a node test costs
+//! nothing for it.
 
 use crate::pose::Pose;
 use bvh_format::kdop::{DirectionSet, FACTORS};
@@ -17,6 +18,8 @@ use bvh_format::support::{Form, upper_form};
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
+/// Absolute error charged to an end, mesh units: 2^-147, twice what four roundings of subnormal numbers give.
+const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 /// Relative error charged to all f64 work of a pose: 16 times what the handful of roundings give.
 pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
@@ -98,12 +101,12 @@ impl Alignment {
 }
 
 /// Bound on the error of evaluating a form plus an offset in f32, the rounding of the offset less or
-/// more this error included: 8u of the terms, and 2u of the offset and of all this.
+/// more this error included: 8u of the terms, and 2u of the offset and of all this; and what underflows.
 #[inline(always)]
 pub(crate) fn form_error(form: &Form, reach: f32, offset: f64) -> f64 {
     let [x, y, z] = form.coefficients;
     let terms = f64::from(reach) * f64::from(x.abs() + y.abs() + z.abs());
-    10.0 * U * (terms + offset.abs())
+    10.0 * U * (terms + offset.abs()) + UNDERFLOW
 }
 
 /// The nearest f32 at or above.

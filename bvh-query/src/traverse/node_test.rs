@@ -173,12 +173,17 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, a
         let gap = gap(isa, group_a, aligned, slab);
         largest = largest.max(gap.mul(isa.splat(INVERSE_LENGTHS[slab])));
     }
-    // Up to four roundings of the sum and one of the root, each 2^-24 relative or, where a square
-    // underflows, less than the largest gap loses.
+    // Up to four roundings of the sum and one of the root, each 2^-24 relative, and three squares that
+    // underflow by 2^-150 each: of a sum from 2^-126 on, no more than that again.
     //
     // Where the boxes overlap, the largest gap itself, perhaps negative, tells which pair overlaps
-    // most. Where squares overflow, at gaps beyond 2^63, it has to do as well.
-    let apart = I::V::select(zero.lt(sum), sum.sqrt(), largest);
+    // most. Where squares underflow to less, at gaps below 2^-63, or overflow, at gaps beyond 2^63, it has
+    // to do as well.
+    //
+    // Products with subnormal results may round up, but not past a limit, which is an f32 itself: one that
+    // the exact product does not exceed is not exceeded by the nearest f32 either.
+    let normal = isa.splat(f32::MIN_POSITIVE).le(sum);
+    let apart = I::V::select(normal, sum.sqrt(), largest);
     let apart = I::V::select(sum.le(isa.splat(f32::MAX)), apart, largest);
     largest.max(apart).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
 }

@@ -1,4 +1,5 @@
-//! Meshes of a few of the smallest numbers of f32: rounding there is absolute, and filters must allow for it.
+//! Meshes of a few of the smallest numbers of f32, and dust beside large triangles: where products underflow,
+//! rounding is absolute, and filters must allow for it.
 
 use super::ask::Asked;
 use super::effort::rounds;
@@ -13,7 +14,11 @@ use bvh_query::Pose;
 const UNIT: f64 = f64::from_bits((1023 - 149) << 52);
 
 fn in_units(t: [[i32; 3]; 3]) -> Triangle {
-    t.map(|p| p.map(|x| f64::from(x) * UNIT))
+    times(UNIT, t)
+}
+
+fn times(unit: f64, t: [[i32; 3]; 3]) -> Triangle {
+    t.map(|p| p.map(|x| f64::from(x) * unit))
 }
 
 /// A segment and a triangle that cross by a fraction of a unit, in all profiles.
@@ -78,4 +83,46 @@ fn random_triangles_of_a_few_units() {
         }
     }
     tally.report("a few subnormal units");
+}
+
+/// Triangles around the origin far below the size of their meshes, near each other.
+#[test]
+fn dust_beside_large_triangles() {
+    let (mut tally, mut queriers, mut random) = (Tally::default(), queriers(), Random::new(52));
+    for round in 0..rounds(200) {
+        let exponent = -(20 + random.below(130) as i32);
+        let unit = 2f64.powi(exponent);
+        let reach = 1 << random.below(12);
+        let mut number = |most: usize| random.below(2 * most + 1) as i32 - most as i32;
+        let mut triangles = |side: f64| -> Vec<Triangle> {
+            let mut triangle = || {
+                let centre = [(); 3].map(|()| number(4 * reach));
+                times(unit, [(); 3].map(|()| centre.map(|x| x + number(reach))))
+            };
+            let mut all: Vec<_> = (0..8).map(|_| triangle()).collect();
+            all.push([[side, 3.0, 0.0], [side, 4.0, 0.0], [side, 3.0, 1.0]]);
+            all
+        };
+        let (a, b) = (triangles(1.0), triangles(-1.0));
+        let [file_a, file_b] = [a, b].map(|triangles| {
+            let profile = Profile::ALL[random.below(Profile::ALL.len())];
+            bake(&mesh(&triangles), &options(profile, TriangleEncoding::F32))
+        });
+        let surfaces = [&file_a, &file_b].map(|file| Surface::new(stored(file)));
+        for _ in 0..3 {
+            let turned = random.pose(8.0 * reach as f64 * unit);
+            let pose = Pose::new(*Pose::IDENTITY.rotation(), turned.translation()).unwrap();
+            for pose in [turned, pose] {
+                let truth = Truth::new(&surfaces[0], &surfaces[1], &pose);
+                let mut asked = Asked { a: &file_a, b: &file_b, queriers: &mut queriers };
+                if let Err(error) = asked.all(&truth, &pose, &mut tally) {
+                    tally.wrong(format!("round {round}, unit 2^{exponent}: {error}, {pose:?}"));
+                }
+            }
+        }
+        if tally.is_full() {
+            break;
+        }
+    }
+    tally.report("dust");
 }
