@@ -51,9 +51,9 @@ fn check(a: &Bvh, b: &Bvh, pose: &Pose, label: f64, size: f64, queriers: &mut [Q
         let backend = querier.backend();
         assert_eq!(querier.collide(a, b, pose).unwrap(), label == 0.0, "{what} {backend}");
         assert_eq!(querier.distance(a, b, pose).unwrap(), first, "{what} {backend}");
-        let near = first.distance;
+        let near = first.upper;
         assert!(querier.within(a, b, pose, near).unwrap(), "{what} {backend} within {near}");
-        let nearer = near * (1.0 - 1e-9);
+        let nearer = first.lower * (1.0 - 1e-9);
         assert_eq!(
             querier.within(a, b, pose, nearer).unwrap(),
             label == 0.0,

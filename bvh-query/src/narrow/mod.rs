@@ -1,8 +1,8 @@
-//! Two triangles at a time, decided exactly: do they meet, and how far apart are they.
+//! Two triangles at a time, decided exactly: do they meet, how far apart are they, are they nearer than that.
 //!
-//! Everything above this module only filters; what a filter can't decide ends here. Both routines are scalar,
-//! use no fused multiply-add and no platform-dependent operation, so the answer is a function of the eighteen
-//! input numbers alone.
+//! Everything above this module only filters; what a filter can't decide ends here. All routines are scalar,
+//! use no fused multiply-add and no platform-dependent operation, so the answer is a function of the input numbers
+//! alone.
 //!
 //! # Precondition: the range in which nothing under- or overflows
 //! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-266.
@@ -17,9 +17,11 @@
 
 mod distance;
 mod intersect;
+mod within;
 
 pub(crate) use distance::{Closest, triangle_distance};
 pub(crate) use intersect::triangles_intersect;
+pub(crate) use within::triangles_within;
 
 #[cfg(test)]
 mod tests;

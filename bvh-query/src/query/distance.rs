@@ -13,7 +13,7 @@ use crate::error::QueryError;
 use crate::isa::Isa;
 use crate::leaf;
 use crate::leaf::local::Local;
-use crate::narrow::{Closest, triangle_distance};
+use crate::narrow::{Closest, triangle_distance, triangles_within};
 use crate::pose::Pose;
 use crate::traverse::align::round_up;
 use crate::traverse::opened::Leaf;
@@ -119,8 +119,9 @@ impl Querier {
         Ok(best.distance(search.settled_lower.min(f64::from(search.limit))))
     }
 
-    /// True if the meshes are at most `d` apart (mesh units): exactly, if `distance` is at most `d`.
-    /// NaN is no distance: false.
+    /// True if the placed meshes are at most `d` apart (mesh units). That is exact, also where `d` is between
+    /// the bounds of [`Querier::distance`]: integers of any length decide there, and are the one thing that a
+    /// warm query allocates. NaN is no distance: false.
     ///
     /// # Errors
     /// If a page that the query touches is damaged.
@@ -132,16 +133,16 @@ impl Querier {
         d: f64,
     ) -> Result<bool, QueryError> {
         let (a, b) = (a.into(), b.into());
-        if d.is_nan() || d < 0.0 {
+        if d.is_nan() || d < 0.0 || d == f64::INFINITY {
             self.stats = QueryStats::default();
-            return Ok(false);
+            return Ok(d > 0.0);
         }
         if d == 0.0 {
             return self.collide(a, b, pose);
         }
         let mut search = Search::new(DistanceOptions::default(), d);
         self.search(a, b, pose, &mut search)?;
-        Ok(search.best.is_some_and(|best| best.closest.distance <= d))
+        Ok(search.done)
     }
 
     fn search(
@@ -269,10 +270,9 @@ impl Search {
 
     /// Settles a pair in f64.
     fn settle(&mut self, scene: &Scene<'_>, pair: leaf::collide::Candidate) -> Result<(), QueryError> {
-        let closest = triangle_distance(
-            &scene.triangle_a(pair.a, pair.lane_a)?,
-            &scene.triangle_b(pair.b, pair.lane_b)?,
-        );
+        let triangle_a = scene.triangle_a(pair.a, pair.lane_a)?;
+        let triangle_b = scene.triangle_b(pair.b, pair.lane_b)?;
+        let closest = triangle_distance(&triangle_a, &triangle_b);
         self.settled_lower = self.settled_lower.min(closest.lower);
         let nearer = match &self.best {
             None => true,
@@ -287,8 +287,10 @@ impl Search {
         }
         // Slack for the f64 distance's own error: equal and nearly equal pairs stay candidates.
         self.lower_upper(round_up(closest.upper * (1.0 + 2f64.powi(-40))));
-        let enough = self.enough.unwrap_or(0.0);
-        self.done |= closest.distance <= enough;
+        self.done |= match self.enough {
+            Some(d) => triangles_within(&triangle_a, &triangle_b, &closest, d),
+            None => closest.distance == 0.0,
+        };
         Ok(())
     }
 }

@@ -1,8 +1,8 @@
 //! Every question on every backend, compared with the truth.
 //!
 //! The promises: `collide` and `contacts` are exact on the placed corners; `distance` is 0 exactly if the meshes
-//! touch, and the true distance of the placed meshes is from `lower` to `upper`; `within` is true exactly if
-//! `distance` is at most the limit; all backends say the same.
+//! touch, and the true distance of the placed meshes is from `lower` to `upper`; `within` is exact on
+//! them, too; all backends say the same.
 
 use super::length::Length;
 use super::tally::Tally;
@@ -67,10 +67,10 @@ impl Asked<'_> {
         let ends = [floor, distance, lower, upper].into_iter();
         let limits: Vec<_> = ends.flat_map(|x| [x.next_down(), x, x.next_up()]).collect();
         for limit in limits.into_iter().filter(|limit| *limit > 0.0) {
-            let expected = distance <= limit;
+            let expected = least.compare(limit).is_le();
             if lower <= limit && limit < upper {
                 tally.within[0] += 1;
-                tally.within[1] += u64::from(expected != least.compare(limit).is_le());
+                tally.within[1] += u64::from(expected != (distance <= limit));
             }
             self.within(limit, expected, pose, tally).map_err(|error| format!("{error}: {first:?}"))?;
         }

@@ -22,7 +22,7 @@ pub(crate) struct Tally {
     pub(crate) decided: Decided,
     /// Exact distances, each by both oracles.
     pub(crate) lengths: u64,
-    /// `within` inside the interval of `distance`, and of these not as exact arithmetic has it.
+    /// `within` inside the interval of `distance`, and of these not as the computed distance has it.
     pub(crate) within: [u64; 2],
     /// Widths of intervals as fractions of the size of both meshes.
     pub(crate) widths: Vec<f64>,
@@ -70,7 +70,7 @@ impl Tally {
             "{name}: {poses} poses, {boundaries} of them next to a change, {queries} queries; {pairs} triangle \
              pairs, {contacts} in contact; oracle: {by_boxes} by boxes, {by_balls} by balls, {by_integers} by integers, {lengths} exact \
              distances; {count} intervals, width / size: median {median:.2e}, largest {most:.2e}; within inside \
-             an interval: {inside}, {other} other than exact; {} intervals without the truth",
+             an interval: {inside}, {other} other than the computed distance has it; {} intervals without the truth",
             self.missed
         ));
         assert!(self.wrong.is_empty(), "{} wrong answers, the first: {}", self.wrong.len(), self.wrong[0]);
