@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// `bvh_format::validate::validate` with the pages checked in parallel.
 ///
 /// # Errors
-/// A rule that does not hold; of several, any.
+/// The rule that `bvh_format::validate::validate` finds broken, whatever the number of threads.
 pub fn validate_in_parallel(bytes: &[u8]) -> Result<Layout, FormatError> {
     let layout = Layout::read(bytes)?;
     let (sections, pages) = rayon::join(|| validate_sections(bytes), || validate_pages(&layout, bytes));
@@ -27,13 +27,19 @@ pub fn validate_in_parallel(bytes: &[u8]) -> Result<Layout, FormatError> {
 fn validate_pages(layout: &Layout, bytes: &[u8]) -> Result<(), FormatError> {
     for object in &layout.objects {
         let pages = object.pages().into_par_iter();
-        let counts: Result<Vec<_>, FormatError> =
-            pages.clone().map(|number| validate_page(layout, bytes, object, number)).collect();
-        let counts = counts?;
-        pages.map(|number| validate_links(layout, bytes, object, number)).collect::<Result<(), _>>()?;
+        let counts = first_error(pages.clone().map(|number| validate_page(layout, bytes, object, number)))?;
+        first_error(pages.map(|number| validate_links(layout, bytes, object, number)))?;
         validate_counts(layout, object, &counts)?;
     }
     Ok(())
+}
+
+/// All results, or the first of the errors: parallel `collect` would give any of them.
+fn first_error<T: Send>(
+    results: impl IndexedParallelIterator<Item = Result<T, FormatError>>,
+) -> Result<Vec<T>, FormatError> {
+    let results: Vec<_> = results.collect();
+    results.into_iter().collect()
 }
 
 /// Checks the bounds of a file whose structure has been validated; returns how loose they are.
@@ -80,11 +86,10 @@ fn prove_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<Inflat
             let roots = done.get((root.page() - first) as usize);
             roots.and_then(|roots| roots.get(usize::from(root.root()))).copied().unwrap_or(Kdop::EMPTY)
         };
-        let results: Result<Vec<_>, FormatError> = (start..stop)
-            .into_par_iter()
-            .map(|number| check_bounds(layout, bytes, object, &page(number)?, below))
-            .collect();
-        for (number, (roots, sums)) in (start..stop).zip(results?) {
+        let results = (start..stop).into_par_iter();
+        let results =
+            first_error(results.map(|number| check_bounds(layout, bytes, object, &page(number)?, below)))?;
+        for (number, (roots, sums)) in (start..stop).zip(results) {
             done[(number - first) as usize] = roots;
             inflation.join(&sums);
         }

@@ -165,7 +165,7 @@ pub fn read_header(bytes: &[u8]) -> Result<(Header, Vec<Section>), FormatError> 
     require(Rule::Version, 8, MAJOR, header.major.get())?;
     let mut zeroed = page.to_vec();
     zeroed[32..40].fill(0);
-    require(Rule::HeaderChecksum, 32, hex(checksum(&zeroed)), hex(header.header_checksum.get()))?;
+    require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(checksum(&zeroed)))?;
     require(Rule::FileLength, 16, header.file_length.get(), bytes.len() as u64)?;
     let count = header.sections.get() as usize;
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;

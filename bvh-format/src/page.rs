@@ -246,7 +246,7 @@ pub fn page_checksum(bytes: &[u8; PAGE]) -> u64 {
 pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> Result<(), FormatError> {
     let page = Page::new(bytes, object.profile);
     let header = page.header();
-    require(Rule::PageChecksum, at, hex(page_checksum(bytes)), hex(header.checksum.get()))?;
+    require(Rule::PageChecksum, at, hex(header.checksum.get()), hex(page_checksum(bytes)))?;
     require(Rule::PageNumber, at + 44, number, header.page_number.get())?;
     require(Rule::PageProfile, at + 62, object.profile.number(), header.profile)?;
     let (roots, remotes) = (usize::from(header.roots), usize::from(header.remotes));

@@ -36,6 +36,12 @@ impl Aabb {
         -(self.0[axis] + self.0[axis + 4])
     }
 
+    /// Twice the centre, and a spare lane.
+    #[inline(always)]
+    pub(super) fn centre(&self) -> [f32; 4] {
+        std::array::from_fn(|axis| self.0[axis] - self.0[axis + 4])
+    }
+
     /// The axis of the largest extent, the first of equals.
     pub(super) fn longest(&self) -> usize {
         (1..3).fold(0, |best, axis| if self.extent(axis) > self.extent(best) { axis } else { best })
@@ -74,14 +80,6 @@ impl Reference {
         let lanes: &[u32; 8] = bytemuck::cast_ref(self);
         const AXES: [u32; 8] = [!0, !0, !0, 0, !0, !0, !0, 0];
         Aabb(std::array::from_fn(|lane| f32::from_bits(lanes[lane] & AXES[lane])))
-    }
-}
-
-impl Aabb {
-    /// Twice the centre, and a spare lane.
-    #[inline(always)]
-    pub(super) fn centre(&self) -> [f32; 4] {
-        std::array::from_fn(|axis| self.0[axis] - self.0[axis + 4])
     }
 }
 

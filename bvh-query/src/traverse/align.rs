@@ -20,7 +20,7 @@ use bvh_format::support::{Form, upper_form};
 const U: f64 = 1.0 / (1u64 << 24) as f64;
 /// Absolute error charged to an end, mesh units: 2^-147, twice what four roundings of subnormal numbers give.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
-/// Relative error charged to all f64 work of a pose: 16 times what the handful of roundings give.
+/// Relative error charged to all f64 work of a pose: 32 roundings, three times what there are at most.
 pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// One direction of A: the forms of both ends and what to add.
