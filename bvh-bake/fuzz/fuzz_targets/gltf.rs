@@ -1,0 +1,11 @@
+//! Any bytes as glTF: a mesh or an error.
+#![no_main]
+
+mod reader;
+
+use bvh_bake::io::MeshFormat;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = reader::read(bytes, MeshFormat::Gltf);
+});

@@ -1,0 +1,31 @@
+//! A `.cbvh` file of any bytes, its checksums made right, against the mesh of a cube: `verify` says whether
+//! it is one, and `prove_bounds` runs on whatever has been validated.
+#![no_main]
+
+#[allow(dead_code, reason = "tests use the rest")]
+#[path = "../../../bvh-format/tests/common/seal.rs"]
+mod seal;
+
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{prove_bounds, validate_in_parallel, verify};
+use libfuzzer_sys::fuzz_target;
+use std::sync::LazyLock;
+
+static CUBE: LazyLock<Mesh> = LazyLock::new(|| {
+    let corner = |i: u32| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
+    let sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    let halves = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Mesh::from_triangles((0..8).map(corner).collect(), halves)
+});
+
+fuzz_target!(|bytes: &[u8]| {
+    if bytes.len() < 4096 {
+        return;
+    }
+    let mut bytes = bytes.to_vec();
+    seal::seal(&mut bytes);
+    let _ = verify(&bytes, &CUBE);
+    if let Ok(layout) = validate_in_parallel(&bytes) {
+        let _ = prove_bounds(&layout, &bytes);
+    }
+});

@@ -1,0 +1,44 @@
+//! Two forged files in any pose: every question, on every backend. Answers may be wrong, but there are some.
+#![no_main]
+
+#[path = "../../../bvh-format/tests/common/forge.rs"]
+mod forge;
+#[allow(dead_code, reason = "tests use the rest")]
+#[path = "../../../bvh-format/tests/common/seal.rs"]
+mod seal;
+
+use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier};
+use forge::{Input, forge};
+use libfuzzer_sys::fuzz_target;
+use std::ops::ControlFlow;
+
+/// Turns that are exact, and one that is not.
+const TURNS: [[[f64; 3]; 3]; 4] = [
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]],
+    [[0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [-0.8, 0.6, 0.0]],
+];
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut input = Input(bytes);
+    let turn = TURNS[input.below(TURNS.len())];
+    let Ok(pose) = Pose::new(turn, [(); 3].map(|()| f64::from(input.value()))) else { return };
+    let (near, allowed) = (f64::from(input.value()), f64::from(input.value()).abs());
+    let (Ok(a), Ok(b)) = (Bvh::from_bytes(forge(&mut input)), Bvh::from_bytes(forge(&mut input))) else {
+        return;
+    };
+    for backend in Backend::ALL {
+        let mut querier = Querier::with_backend(backend);
+        let _ = querier.collide(&a, &b, &pose);
+        let mut contacts = 0;
+        let _ = querier.visit_contacts(&a, &b, &pose, |_| {
+            contacts += 1;
+            if contacts < 100 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        let _ = querier.distance(&a, &b, &pose);
+        let options = DistanceOptions { rel_err: allowed, abs_err: allowed };
+        let _ = querier.distance_with(&a, &b, &pose, &options);
+        let _ = querier.within(&a, &b, &pose, near);
+    }
+});
