@@ -126,6 +126,8 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
         (format!("an object and {} bytes of names", head[1]), format!("{count}, {}", names.len()))
     })?;
     let mut next_page = 0;
+    // Copied names are no longer than the file: records that share theirs would multiply its size.
+    let mut names_left = names.len();
     let mut objects = Vec::with_capacity(count);
     for (index, record) in records.iter().enumerate() {
         let at = at + (TABLE_HEAD + index * size_of::<ObjectRecord>()) as u64;
@@ -136,7 +138,7 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
             (format!("pages from {next_page}"), format!("{} from {first}", record.pages))
         })?;
         next_page += u64::from(record.pages.get());
-        objects.push(read_object(record, names, at)?);
+        objects.push(read_object(record, names, &mut names_left, at)?);
     }
     ensure(next_page == node_pages, Rule::ObjectPages, at, || {
         (format!("{node_pages} pages in all"), next_page.to_string())
@@ -144,12 +146,22 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
     Ok(objects)
 }
 
-fn read_object(record: &ObjectRecord, names: &[u8], at: u64) -> Result<Object, FormatError> {
+/// `names_left` is how many bytes the names of this record and of those behind it may have together.
+fn read_object(
+    record: &ObjectRecord,
+    names: &[u8],
+    names_left: &mut usize,
+    at: u64,
+) -> Result<Object, FormatError> {
     let start = record.name_offset.get() as usize;
     let name = names.get(start..start.saturating_add(record.name_length.get() as usize));
     let name = name
         .and_then(|name| std::str::from_utf8(name).ok())
         .ok_or_else(|| FormatError::new(Rule::ObjectTable, at, "a UTF-8 name among the names", start))?;
+    ensure(name.len() <= *names_left, Rule::ObjectTable, at + 4, || {
+        (format!("at most {names_left} bytes of name behind the earlier ones"), name.len().to_string())
+    })?;
+    *names_left -= name.len();
     let unknown = |at, what, found| FormatError::new(Rule::ObjectProfile, at, what, found);
     let profile = Profile::from_number(record.profile)
         .ok_or_else(|| unknown(at + 132, "a profile from 0 to 9", record.profile))?;
@@ -194,6 +206,27 @@ fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
 mod tests {
     use super::*;
     use zerocopy::FromZeros;
+
+    /// Names that lie over each other would make a file of n bytes one of n^2 in memory.
+    #[test]
+    fn names_are_together_no_longer_than_their_bytes() {
+        let mut record = ObjectRecord::new_zeroed();
+        record.triangles = 1.into();
+        record.packets = 1.into();
+        record.pages = 1.into();
+        let names = ["first", "", "third"].map(|name| (name.to_owned(), record));
+        let mut section = write_objects(&names);
+        for (number, _) in names.iter().enumerate() {
+            let at = TABLE_HEAD + 192 * number + 80;
+            section[at..at + 4].copy_from_slice(&(number as u32).to_le_bytes());
+        }
+        let read = read_objects(&section, 0, 3).unwrap();
+        assert_eq!(read.iter().map(|object| &object.name[..]).collect::<Vec<_>>(), ["first", "", "third"]);
+        // The second name becomes the letter t, and then there is one too many.
+        section[TABLE_HEAD + 192 + 4] = 1;
+        let error = read_objects(&section, 0, 3).unwrap_err();
+        assert_eq!((error.rule, error.offset), (Rule::ObjectTable, TABLE_HEAD as u64 + 2 * 192 + 4));
+    }
 
     #[test]
     fn origins_are_multiples_of_the_smallest_f32() {

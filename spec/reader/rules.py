@@ -105,7 +105,7 @@ def check_objects(file):
     need(head.objects >= 1, 11, head.place("objects"), "at least 1", 0)
     length = cbvh.OBJECT_HEAD.itemsize + cbvh.OBJECT_RECORD.itemsize * head.objects + head.names_length
     need(entry.length == length, 11, entry.place("length"), length, entry.length)
-    first_page = 0
+    first_page = named = 0
     for number in range(head.objects):
         one = cbvh.Object(file, number)
         check_numbers(one)
@@ -118,6 +118,8 @@ def check_objects(file):
             one.name = one.name_bytes.decode("utf-8")
         except UnicodeDecodeError as error:
             raise Broken(11, one.name_at + error.start, "UTF-8", one.name_bytes.hex(" ")) from None
+        named += one.name_length
+        need(named <= head.names_length, 11, one.place("name_length"), f"a sum up to {head.names_length}", named)
         need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 9", one.profile)
         need(
             one.triangle_encoding < len(cbvh.ENCODINGS),
