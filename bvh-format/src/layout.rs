@@ -81,8 +81,8 @@ impl Layout {
     /// The bytes of a page; `None` beyond the last.
     #[inline]
     pub fn page_bytes<'a>(&self, bytes: &'a [u8], page: u32) -> Option<&'a [u8; PAGE]> {
-        let start = self.nodes.start + page as usize * PAGE;
-        if start + PAGE > self.nodes.end { None } else { bytes.get(start..)?.first_chunk() }
+        let start = (page as usize).checked_mul(PAGE)?.checked_add(self.nodes.start)?;
+        if start.checked_add(PAGE)? > self.nodes.end { None } else { bytes.get(start..)?.first_chunk() }
     }
 
     /// The leaf block of a page, empty if the page's header is nonsense.
@@ -139,7 +139,8 @@ impl Layout {
         let lines = header.leaf_lines.get() as usize;
         let packets = usize::from(header.packets.get());
         let there = |needed: usize| {
-            let holds = block.len() == lines * LINE && block.len() == needed.next_multiple_of(LINE);
+            // Not multiplied: a stated number may be anything.
+            let holds = block.len() / LINE == lines && block.len() == needed.next_multiple_of(LINE);
             ensure(holds, Rule::LeafPlace, at + 24, || {
                 (format!("a block of {needed} bytes"), format!("{} of {lines} lines", block.len()))
             })
@@ -180,7 +181,7 @@ impl Layout {
         }
         let bits = block.get(4).copied().unwrap_or(0);
         let needed = id_block_bytes(usize::from(header.packets.get()), bits);
-        let whole = block.len() == words * WORD && block.len() == needed && bits <= 32;
+        let whole = block.len() / WORD == words && block.len() == needed && bits <= 32;
         ensure(whole && block.len() >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
             (format!("a block of {needed} bytes"), format!("{} of {words} words", block.len()))
         })?;
@@ -195,7 +196,8 @@ use zerocopy::FromBytes;
 #[inline]
 fn slice(section: &[u8], first: u64, count: u32, unit: usize) -> &[u8] {
     let start = usize::try_from(first).ok().and_then(|first| first.checked_mul(unit));
-    let end = start.and_then(|start| start.checked_add(count as usize * unit));
+    let length = (count as usize).checked_mul(unit);
+    let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
     match (start, end) {
         (Some(start), Some(end)) => section.get(start..end).unwrap_or(&[]),
         _ => &[],
