@@ -11,7 +11,15 @@
 //! ```
 //!
 //! Depth-first, entries are a stack; best-first, a binary heap, until the visitor has seen enough
-//! leaves to go on depth-first.
+//! leaves to go on depth-first, or the heap holds as much as it may.
+//!
+//! The walk ends: each file is a tree (its rules say so, and `OpenedNodes` does not rely on it), an entry
+//! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
+//! visited twice, but for those of the first dive, and there are at most (nodes of A) * (nodes of B).
+//!
+//! Memory: each entry that is popped depth-first leaves fewer than 64 on the stack, and those below it are
+//! one level deeper in A or in B, so that there are fewer than 64 * (depth of A + depth of B) and those
+//! that the heap had. A tree is no deeper than it has treelets. Nothing recurses.
 
 use crate::bvh::Bvh;
 use crate::error::QueryError;
@@ -127,6 +135,11 @@ enum Phase {
     DepthFirst,
 }
 
+/// Entries that the heap may hold before the walk goes on depth-first, 12 bytes each. Meshes apart need some
+/// thousand, deep overlap ten thousand; but where inner nodes always come before leaves, as in a forged file,
+/// a heap would come to hold all pairs of leaves. Answers do not depend on it.
+const MOST_IN_HEAP: usize = 1 << 16;
+
 /// Nodes this many times larger than their partner are opened alone, to meet it at its size.
 const MUCH_LARGER: f32 = 2.0;
 
@@ -190,6 +203,10 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         match (phase, order) {
             (Phase::BestFirst, _) => {
                 stack.entries.drain(start..).for_each(|entry| stack.heap.push(Reverse(entry)));
+                if stack.heap.len() > MOST_IN_HEAP {
+                    phase = Phase::DepthFirst;
+                    stack.heap_to_stack(visitor.limit());
+                }
             }
             (_, Order::Tree) => new.reverse(),
             (Phase::Dive, _) => {
