@@ -11,6 +11,7 @@ use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
 use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::{Child, Links};
+use bvh_format::{FormatError, Rule};
 
 /// A leaf packet: its page, its number there and how many triangles it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,11 +105,22 @@ impl Opened {
 }
 
 /// The opened nodes of one side. Node 0 holds the object's root as its only child.
+///
+/// They are a tree whatever the file says: a node is opened once from one child of an earlier node. The
+/// rules of the format make it no larger than the object; `most` holds it to that even if the bytes change
+/// after they were checked, and so every walk ends.
 #[derive(Default)]
 pub(crate) struct OpenedNodes {
     nodes: Vec<Opened>,
     used: usize,
+    /// Node 0 and as many as the object can have treelets.
+    most: usize,
 }
+
+/// Treelets of a page by rule 17: header and one anchor take two of its 64 lines.
+const TREELETS_A_PAGE: usize = 62;
+/// Numbers of nodes are 29 bits of a `ChildRef`. As many take 600 GB.
+const MOST_NODES: usize = 1 << 29;
 
 impl OpenedNodes {
     /// Forgets all nodes and takes in the object's root.
@@ -125,6 +137,8 @@ impl OpenedNodes {
         root.opened = [CLOSED; 8];
         root.count = 1;
         self.used = 1;
+        let pages = object.record.pages.get() as usize;
+        self.most = pages.saturating_mul(TREELETS_A_PAGE).saturating_add(1).min(MOST_NODES);
         Ok(())
     }
 
@@ -146,6 +160,9 @@ impl OpenedNodes {
         if known != CLOSED {
             return Ok((known as usize, false));
         }
+        if self.used >= self.most {
+            return Err(self.too_many(bvh, object));
+        }
         if self.used == self.nodes.len() {
             self.nodes.resize(2 * self.used, Opened::EMPTY);
         }
@@ -156,6 +173,13 @@ impl OpenedNodes {
         parent.opened[at.child()] = number as u32;
         self.used += 1;
         Ok((number, true))
+    }
+
+    #[cold]
+    fn too_many(&self, bvh: &Bvh, object: &Object) -> QueryError {
+        let at = bvh.layout().page_offset(object.record.first_page.get());
+        let expected = format!("at most {} treelets to open", self.most - 1);
+        FormatError::new(Rule::Counts, at, expected, "more").into()
     }
 }
 
@@ -219,4 +243,38 @@ fn spread<I: Isa>(isa: I, node: &NodeSlabs) -> Group {
         isa.store(isa.repeat(&hi[q]), &mut group.hi[q]);
     }
     group
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::isa::{Backend, Task};
+
+    struct OpenRoot<'a>(&'a Bvh, &'a mut OpenedNodes);
+
+    impl Task for OpenRoot<'_> {
+        type Output = Result<(usize, bool), QueryError>;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> Self::Output {
+            self.1.open(isa, self.0, &self.0.objects()[0], ChildRef::ROOT)
+        }
+    }
+
+    /// No file that keeps the rules gets so far: the limit is for bytes that change after they were checked.
+    #[test]
+    fn no_more_nodes_are_opened_than_the_pages_can_hold() {
+        let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
+        let bvh = Bvh::from_static(bytes).unwrap();
+        let mut nodes = OpenedNodes::default();
+        nodes.start(&bvh, &bvh.objects()[0]).unwrap();
+        assert_eq!(nodes.most, 1 + 62);
+        nodes.most = 1;
+        let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
+        assert!(matches!(refused, QueryError::Damaged(error) if error.rule == Rule::Counts));
+        nodes.most = 2;
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, true)));
+        // The same again is not a new one.
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, false)));
+    }
 }
