@@ -7,7 +7,10 @@ use crate::error::QueryError;
 use crate::leaf::collide::Candidate;
 use crate::pose::Pose;
 use crate::traverse::pair::Order;
+use bvh_format::header::SectionKind;
+use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
+use bvh_format::{FormatError, Rule};
 use std::ops::ControlFlow;
 
 impl Querier {
@@ -47,15 +50,21 @@ impl Querier {
         mut visit: impl FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<u64, QueryError> {
         self.stats = QueryStats::default();
-        let mut calls = 0;
-        each_pair(a.into(), b.into(), pose, |scene| {
+        let (a, b) = (a.into(), b.into());
+        let most = most_triangles(a).saturating_mul(most_triangles(b));
+        let (mut calls, mut too_many) = (0, false);
+        each_pair(a, b, pose, |scene| {
             let found = self.contacts_of(&scene, &mut |contact| {
+                too_many = calls == most;
+                if too_many {
+                    return ControlFlow::Break(());
+                }
                 calls += 1;
                 visit(contact)
             })?;
             Ok(found.map(|_| ()))
         })?;
-        Ok(calls)
+        if too_many { Err(ids_repeat(a, b)) } else { Ok(calls) }
     }
 
     fn contacts_of(
@@ -81,6 +90,27 @@ impl Querier {
         self.stats.add(tests, stats);
         Ok(found)
     }
+}
+
+/// No fewer than the triangles of a side, duplicates included, whatever its file states: what its pages have
+/// room for. In a forged file any number of triangles may have the id that all duplicates belong to, and pairs
+/// of them would be without number.
+fn most_triangles(side: Shape<'_>) -> u64 {
+    let pages: u64 = side.objects().iter().map(|object| u64::from(object.record.pages.get())).sum();
+    let (layout, bytes) = (side.bvh().layout(), side.bvh().bytes());
+    pages * MOST_TRIANGLES_A_PAGE + layout.duplicate_ids(bytes).len() as u64
+}
+
+/// 62 treelets of 8 children, each a packet.
+const MOST_TRIANGLES_A_PAGE: u64 = 62 * 8 * PACKET as u64;
+
+/// The breach behind more contacts than there are pairs of triangles.
+#[cold]
+fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
+    let sections = [a, b].map(|side| &side.bvh().layout().sections);
+    let duplicates = sections.into_iter().flatten().find(|section| section.kind == SectionKind::Duplicates);
+    let at = duplicates.map_or(0, |section| section.range.start as u64);
+    FormatError::new(Rule::DuplicateIds, at, "each id on one triangle", "contacts without number").into()
 }
 
 /// Reports a pair of stored triangles and all pairs of duplicates that they stand for.
