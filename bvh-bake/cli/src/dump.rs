@@ -31,7 +31,9 @@ pub(crate) fn run(arguments: &DumpArguments) -> Result<(), Failure> {
         );
     }
     if let Some(number) = arguments.treelet {
-        let treelets: u64 = bvh.objects().iter().map(|object| object.record.treelets.get()).sum();
+        // As stated: the numbers of a forged file may have no sum.
+        let treelets = bvh.objects().iter().map(|object| object.record.treelets.get());
+        let treelets = treelets.fold(0, u64::saturating_add);
         return match page::TreeletDump::find(&bvh, number).map_err(failed)? {
             Some(dump) => print(arguments, &dump, page::TreeletDump::to_text),
             None => {

@@ -52,7 +52,9 @@ impl Side {
     /// Triangles of the mesh, exact duplicates too.
     pub(crate) fn triangles(&self) -> u64 {
         let records = self.shape().objects().iter().map(|object| &object.record);
-        records.map(|record| record.triangles.get() + record.duplicates.get()).sum()
+        // As stated: the numbers of a forged file may have no sum.
+        let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
+        counts.fold(0, u64::saturating_add)
     }
 
     /// Bytes of the file, and triangles stored in it.
