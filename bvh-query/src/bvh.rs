@@ -14,7 +14,8 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 /// A bounding volume hierarchy that can be queried. `Send` and `Sync`: share it between threads.
 ///
 /// Opening reads the header page and the object table, whatever the file's size. A page is checked
-/// when a query first touches it; the memory for that is one byte a page.
+/// when a query first touches it. Memory, whatever numbers the file holds: one byte a page, twice the
+/// bytes of the object table, and some KiB.
 pub struct Bvh {
     bytes: Bytes,
     layout: Layout,
@@ -50,8 +51,18 @@ const IDS_CHECKED: u8 = 4;
 impl Bvh {
     /// Maps a file.
     ///
-    /// Cost: microseconds, whatever the file's size. The file must not be changed while it is
-    /// open; see `from_bytes` for a way that does not ask for this.
+    /// Cost: microseconds, whatever the file's size; memory as said at [`Bvh`].
+    ///
+    /// The file's bytes must stay as they are while it is open:
+    ///
+    /// - Replaced by renaming another over it, or removed: the old content stays, and so do answers. That is
+    ///   how `cbvh bake` writes.
+    /// - Truncated, by whatever process: on Unix the first access to what is gone ends this process with
+    ///   SIGBUS. There is no error to catch.
+    /// - Written into: answers are undefined, and so is behaviour as far as Rust is concerned, since a page
+    ///   is checked at its first touch only. Walks still end.
+    ///
+    /// [`Bvh::read`] asks for none of this: use it where others may write to the file.
     ///
     /// # Errors
     /// If the system refuses the file, or its header or object table break the format.
@@ -59,6 +70,18 @@ impl Bvh {
         let path = path.as_ref();
         let map = mapped::map(path).map_err(|source| OpenError::io(path, source))?;
         Self::new(Bytes::Mapped(map)).map_err(|source| OpenError::format(path, source))
+    }
+
+    /// Reads a whole file into memory: a copy, so that it does not matter what becomes of the file.
+    ///
+    /// Cost: that of reading the file, and its size in memory.
+    ///
+    /// # Errors
+    /// As [`Bvh::open`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| OpenError::io(path, source))?;
+        Self::from_bytes(bytes).map_err(|source| OpenError::format(path, source))
     }
 
     /// Takes a file's bytes in memory, such as those that `bvh_bake::to_bytes` makes.

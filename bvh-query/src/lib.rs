@@ -1,6 +1,6 @@
 //! Exact collision and distance queries between `.cbvh` meshes.
 //!
-//! [`Bvh`] opens a file (mapped, from memory, or embedded with [`include_cbvh!`]), [`Pose`] places one
+//! [`Bvh`] opens a file (mapped, read, from memory, or embedded with [`include_cbvh!`]), [`Pose`] places one
 //! mesh in the frame of another, and a [`Querier`] answers:
 //!
 //! | question | method | answer |

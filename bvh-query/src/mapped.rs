@@ -11,7 +11,7 @@ use std::path::Path;
 /// mapped, queries may see changed bytes (a page's checksum is verified once, at its first touch),
 /// and a read beyond a truncated end kills the process with SIGBUS. Bake to a new name and rename,
 /// as `cbvh bake` does, and mapped files keep their old contents. Where others may write to files,
-/// read them into memory instead (`Bvh::from_bytes`).
+/// read them into memory instead (`Bvh::read`).
 pub(crate) fn map(path: &Path) -> io::Result<Mmap> {
     let file = File::open(path)?;
     if file.metadata()?.is_dir() {

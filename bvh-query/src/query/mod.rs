@@ -18,6 +18,21 @@ pub use distance::{Distance, DistanceOptions};
 
 /// Asks questions. Holds the backend and the memory that queries work in, so that a query allocates
 /// nothing once the memory has grown to what the meshes need. Use one a thread.
+///
+/// # Worst case
+/// This holds for files of any bytes, forged ones included. Each pair of objects is walked once (a distance
+/// of 0 takes a second walk); let their pages have t and u treelets, p and q leaf packets in all.
+///
+/// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or
+///   one packet test each. Ordinary meshes need a few hundred. Nothing but the sizes of the files bounds it
+///   further: where files come from strangers, bound their size.
+/// - Memory: at most 8 KiB for each treelet that the query opens, of either file, and 4 MiB; no recursion.
+///   A page has at most 62 treelets. What [`Querier::contacts`] returns comes on top, 16 bytes each.
+/// - Contacts: at most as many as the pages of both files have room for pairs of triangles, listed
+///   duplicates included; more are an error.
+///
+/// A byte that was changed in a page, leaf block or id block that a query touches is an error. A file forged
+/// with right checksums may hold wrong bounds: its answers may be wrong, or an error, and nothing else is.
 pub struct Querier {
     backend: Backend,
     stack: Stack,
