@@ -20,7 +20,7 @@ use crate::treelet::{Child, Links};
 
 /// Checks structure and checksums of the whole file.
 ///
-/// Cost: two passes over the bytes and 40 bytes of memory a page. Its parts are public for those who
+/// Cost: two passes over the bytes and 48 bytes of memory a page. Its parts are public for those who
 /// check pages in parallel.
 ///
 /// # Errors

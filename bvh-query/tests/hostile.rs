@@ -10,62 +10,13 @@ use bvh_format::page::Page;
 use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use bvh_format::{Layout, Rule};
-use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier, QueryError};
+use bvh_query::{Bvh, DistanceOptions, Pose, Querier, QueryError};
+use common::asked::{Answers, ask, victims};
 use common::seal::{put, seal, seal_header, section};
-use common::shapes::{dirty, soup, sphere};
+use common::shapes::{soup, sphere};
 use common::{Random, mesh, options, queriers, translation};
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
-
-/// What a file answers: everything that can be asked, errors included.
-#[derive(Debug, Clone, PartialEq)]
-struct Answers {
-    collide: Result<bool, QueryError>,
-    contacts: Result<Vec<Contact>, QueryError>,
-    distance: Result<Distance, QueryError>,
-    within: Result<bool, QueryError>,
-}
-
-impl Answers {
-    fn is_refused(&self) -> bool {
-        self.collide.is_err() || self.contacts.is_err() || self.distance.is_err() || self.within.is_err()
-    }
-}
-
-/// Asks a file that may be anything, on both sides. At most some thousand contacts: a forged file may have any
-/// number of equal triangles.
-fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) -> Option<[Answers; 2]> {
-    let bvh = Bvh::from_bytes(bytes.to_vec()).ok()?;
-    let mut ask = |a: &Bvh, b: &Bvh| {
-        let mut contacts = Vec::new();
-        let visited = querier.visit_contacts(a, b, pose, |contact| {
-            contacts.push(contact);
-            if contacts.len() < 5000 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-        });
-        contacts.sort_unstable();
-        Answers {
-            collide: querier.collide(a, b, pose),
-            contacts: visited.map(|_| contacts),
-            distance: querier.distance(a, b, pose),
-            within: querier.within(a, b, pose, 0.25),
-        }
-    };
-    Some([ask(&bvh, good), ask(good, &bvh)])
-}
-
-/// The valid files to damage: the golden ones, and one of several pages.
-fn victims() -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
-    let golden = ["plain", "everything", "profiles"].map(|name| format!("ok-{name}.cbvh"));
-    let mut files: Vec<_> =
-        golden.into_iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect();
-    for profile in [Profile::Dop26U4, Profile::Dop6F16, Profile::Dop14F32] {
-        let mesh = mesh(&dirty(&soup(900, 1), 2));
-        files.push(to_bytes(&mesh, &options(profile, TriangleEncoding::Packed)).unwrap().0);
-    }
-    files
-}
 
 /// Changes some bytes: a bit, a byte, a number that is often a limit, a copied stretch.
 fn mutate(bytes: &mut [u8], random: &mut Random) {
@@ -129,13 +80,8 @@ fn damage_is_refused_or_does_not_matter() {
                     // A query that meets no damage answers as ever, whatever the rest of the file holds.
                     for (answers, expected) in answers.iter().zip(&expected[which]) {
                         assert!(whole.is_err() || !answers.is_refused());
-                        let same = |other: &Answers| {
-                            (answers.collide.is_err() || answers.collide == other.collide)
-                                && (answers.distance.is_err() || answers.distance == other.distance)
-                                && (answers.within.is_err() || answers.within == other.within)
-                                && (answers.contacts.is_err() || answers.contacts == other.contacts)
-                        };
-                        assert!(same(expected), "round {round}: {answers:?}, not {expected:?}");
+                        let holds = answers.are_refused_or(expected);
+                        assert!(holds, "round {round}: {answers:?}, not {expected:?}");
                     }
                 }
             }

@@ -2,7 +2,10 @@
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
+pub(crate) mod asked;
 pub(crate) mod exact;
+#[path = "../../../bvh-format/tests/common/forge.rs"]
+pub(crate) mod forge;
 pub(crate) mod nearest;
 #[path = "../../../bvh-format/tests/common/seal.rs"]
 pub(crate) mod seal;

@@ -1,0 +1,219 @@
+//! What a forged file can cost: time by the product of both trees, memory by the treelets and the file's bytes.
+//!
+//! Counted by the allocator itself, in the worst files that the rules let through: every bound the same and around
+//! all of the other mesh, so that nothing is ever pruned, and tables that state what is not there.
+
+mod common;
+
+use bvh_bake::to_bytes;
+use bvh_format::Layout as FileLayout;
+use bvh_format::Rule;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::page::Page;
+use bvh_format::profile::Profile;
+use bvh_format::treelet::Links;
+use bvh_format::validate::validate;
+use bvh_query::{Backend, Bvh, Querier, QueryError};
+use common::seal::{put, put_together, seal, take_apart};
+use common::shapes::{cube, soup};
+use common::{mesh, options, translation};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+
+thread_local! {
+    /// Bytes that this thread holds, and the most that it held.
+    static HELD: Cell<[isize; 2]> = const { Cell::new([0; 2]) };
+}
+
+struct Counting;
+
+fn count(bytes: isize) {
+    // A thread that ends has no counter any more.
+    let _ = HELD.try_with(|held| {
+        let [now, most] = held.get();
+        held.set([now + bytes, most.max(now + bytes)]);
+    });
+}
+
+// SAFETY: every call goes on to the system's allocator unchanged; counting touches thread-local integers
+// that need no allocation and have no destructor.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count(layout.size() as isize);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count(-(layout.size() as isize));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// The most bytes that this thread held at once while `work` ran, beyond those that it held before.
+fn peak<R>(work: impl FnOnce() -> R) -> (usize, R) {
+    let [before, _] = HELD.get();
+    HELD.set([before, before]);
+    let result = work();
+    ((HELD.get()[1] - before) as usize, result)
+}
+
+/// A file all of whose inner nodes are from -1000 to 1000: with codes of 0 each is as large as its root. Leaf packets
+/// are flat at the upper end of y, so that pairs of inner nodes overlap more and come first, nearest as they are.
+/// Profiles of u8 in 64 bytes.
+fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
+    let mut bytes =
+        to_bytes(&mesh(&soup(triangles, seed)), &options(profile, TriangleEncoding::Packed)).unwrap().0;
+    let layout = FileLayout::read(&bytes).unwrap();
+    let (slabs, anchor, size) =
+        (profile.directions().slabs(), profile.anchor_bytes(), profile.treelet_bytes());
+    for number in 0..layout.page_count() {
+        let at = layout.page_offset(number) as usize;
+        let page = layout.page_bytes(&bytes, number).unwrap().to_owned();
+        let header = *Page::new(&page, profile).header();
+        for root in 0..usize::from(header.roots) {
+            for end in 0..2 * slabs {
+                let value = if end < slabs { -1000.0f32 } else { 1000.0 };
+                put(&mut bytes, at + 64 + root * anchor + 4 * end, &value.to_le_bytes());
+            }
+        }
+        for slot in 0..header.treelets {
+            let mut treelet = vec![0; size];
+            let links = Links::read(Page::new(&page, profile).treelet(slot));
+            for child in (0..links.children()).filter(|child| links.leaves() >> (4 * child) & 1 == 1) {
+                treelet[(child / 4) * 32 + profile.width().min(4) + child % 4] = 255;
+            }
+            links.write(&mut treelet);
+            put(&mut bytes, at + 64 * usize::from(header.treelet_line) + usize::from(slot) * size, &treelet);
+        }
+    }
+    // Centre and radius of the sphere, too.
+    let record = layout.sections[0].range.start + 16;
+    put(&mut bytes, record + 148, &2000.0f32.to_le_bytes());
+    seal(&mut bytes);
+    bytes
+}
+
+/// Treelets and leaf packets of the only object.
+fn sizes(bvh: &Bvh) -> (u64, u64) {
+    let record = &bvh.objects()[0].record;
+    (record.treelets.get(), record.packets.get())
+}
+
+#[test]
+fn a_walk_of_all_pairs_ends_in_bounded_memory() {
+    for (profile, triangles) in [(Profile::Dop6U8, 3000), (Profile::Dop14U8, 1500), (Profile::Dop26U8, 700)] {
+        let files = [1, 2].map(|seed| blown_up(triangles, seed, profile));
+        for file in &files {
+            validate(file).unwrap();
+        }
+        let [a, b] = files.map(|file| Bvh::from_bytes(file).unwrap());
+        let ((treelets_a, packets_a), (treelets_b, packets_b)) = (sizes(&a), sizes(&b));
+        // The triangles themselves are far apart: only bounds overlap.
+        let pose = translation(100.0, 0.0, 0.0);
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            let mut querier = Querier::with_backend(backend);
+            let most_memory = 8192 * (treelets_a + treelets_b) + (4 << 20);
+            let most_pairs = (treelets_a + packets_a) * (treelets_b + packets_b);
+            let (memory, distance) = peak(|| querier.distance(&a, &b, &pose).unwrap().distance);
+            let stats = querier.stats();
+            assert!(distance > 50.0 && memory as u64 <= most_memory, "{memory} bytes, not {most_memory}");
+            // Everything was visited once: the leaf pair of the first dive twice.
+            assert_eq!(stats.packet_tests, packets_a * packets_b + 1, "{profile:?}");
+            assert!(stats.node_tests <= 4 * most_pairs, "{stats:?}, not {most_pairs}");
+            let (memory, found) = peak(|| querier.collide(&a, &b, &pose).unwrap());
+            let stats = querier.stats();
+            assert!(!found && memory as u64 <= most_memory);
+            assert_eq!(stats.packet_tests, packets_a * packets_b);
+            assert!(stats.node_tests <= 4 * most_pairs);
+        }
+    }
+}
+
+/// Triangles that all have the id to which all duplicates belong: each contact would be that of thousands.
+#[test]
+fn contacts_without_number_are_refused() {
+    let plain = to_bytes(&mesh(&cube()), &options(Profile::Dop14U8, TriangleEncoding::F32)).unwrap().0;
+    let duplicates: Vec<u8> = (1..3000u32).flat_map(|id| [0, id]).flat_map(u32::to_le_bytes).collect();
+    let mut sections = take_apart(&plain);
+    sections.retain(|section| section.0 < 4);
+    let nodes = sections.iter_mut().find(|section| section.0 == 2).unwrap();
+    // One page: all its lanes have id 0, in no bits.
+    put(&mut nodes.2, 32, &0u64.to_le_bytes());
+    put(&mut nodes.2, 52, &2u32.to_le_bytes());
+    sections.push((4, 0, vec![0; 16]));
+    sections.push((5, 0, duplicates));
+    let forged = Bvh::from_bytes(put_together(&sections)).unwrap();
+    let mut querier = Querier::new().unwrap();
+    let mut calls = 0u64;
+    let asked = querier.visit_contacts(&forged, &forged, &translation(0.5, 0.25, 0.125), |_| {
+        calls += 1;
+        ControlFlow::Continue(())
+    });
+    let refused = matches!(&asked, Err(QueryError::Damaged(error)) if error.rule == Rule::DuplicateIds);
+    assert!(refused, "{asked:?} after {calls} calls");
+    assert_eq!(calls, (1984 + 2999) * (1984 + 2999));
+}
+
+/// Memory of opening and checking goes by the bytes that are there, not by the numbers that they state.
+#[test]
+fn stated_numbers_allocate_nothing() {
+    let (honest, _) =
+        to_bytes(&mesh(&soup(3000, 1)), &options(Profile::Dop14U8, TriangleEncoding::Packed)).unwrap();
+    let objects = FileLayout::read(&honest).unwrap().sections[0].range.start;
+    let nodes = FileLayout::read(&honest).unwrap().page_offset(0) as usize;
+    // Every 32-bit word of header, section table, object table and first page header at its most.
+    let places = (8..40).step_by(4).chain((64..256).step_by(4));
+    let places = places.chain((0..16 + 192).step_by(4).map(|at| objects + at));
+    let places: Vec<usize> = places.chain((0..64).step_by(4).map(|at| nodes + at)).collect();
+    for place in places {
+        for value in [u32::MAX, i32::MAX as u32, 1 << 20] {
+            let mut bytes = honest.clone();
+            put(&mut bytes, place, &value.to_le_bytes());
+            seal(&mut bytes);
+            let length = bytes.len();
+            let (memory, opened) = peak(|| FileLayout::read(&bytes).is_ok());
+            assert!(memory <= 16 << 10, "byte {place}, {value:#x}: {memory} bytes to open");
+            let (memory, _) = peak(|| validate(&bytes).is_ok());
+            assert!(
+                memory <= length / 64 + (16 << 10),
+                "byte {place}, {value:#x}: {memory} bytes to validate"
+            );
+            let (memory, bvh) = peak(|| Bvh::from_bytes(bytes));
+            assert!(memory <= 16 << 10, "byte {place}, {value:#x}: {memory} bytes beside the file");
+            assert_eq!(bvh.is_ok(), opened);
+        }
+    }
+}
+
+/// Names that all lie over each other would take the square of the file.
+#[test]
+fn shared_names_are_not_copied() {
+    let golden = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh")).unwrap();
+    let mut sections = take_apart(&golden);
+    let (table, page) = (sections[0].2.clone(), sections[1].2[..4096].to_vec());
+    let (count, names) = (200u32, vec![b'n'; 100_000]);
+    let mut objects = table[..16].to_vec();
+    put(&mut objects, 0, &count.to_le_bytes());
+    put(&mut objects, 4, &(names.len() as u32).to_le_bytes());
+    for number in 0..count {
+        let mut record = table[16..16 + 192].to_vec();
+        put(&mut record, 0, &0u32.to_le_bytes());
+        put(&mut record, 4, &(names.len() as u32).to_le_bytes());
+        put(&mut record, 80, &number.to_le_bytes());
+        objects.extend(record);
+    }
+    objects.extend(names);
+    let length = objects.len();
+    sections[0].2 = objects;
+    sections[1].2 = page.repeat(count as usize);
+    let bytes = put_together(&sections);
+    let (memory, opened) = peak(|| FileLayout::read(&bytes).map(|_| ()));
+    assert!(memory <= 2 * length, "{memory} bytes for a table of {length}");
+    assert_eq!(opened.unwrap_err().rule, Rule::ObjectTable);
+}

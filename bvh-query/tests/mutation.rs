@@ -1,0 +1,224 @@
+//! Tens of thousands of damaged files, the same ones each time: flipped, spliced, truncated, with blocks doubled,
+//! and their checksums made right up to any level.
+//!
+//! Where no checksum was forged, a question is refused or has the answer of the undamaged file. Where some was,
+//! there is an answer or an error, in little time. `CBVH_MUTATIONS=100000` makes as many files as it says.
+
+mod common;
+
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{Options, to_bytes, verify};
+use bvh_format::validate::validate;
+use bvh_query::{Bvh, Pose};
+use common::asked::{Answers, ask, victims};
+use common::forge::{Input, forge};
+use common::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
+use common::shapes::sphere;
+use common::{Random, mesh, queriers, translation};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+const FILES: usize = 30_000;
+
+/// Which checksums are made right again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Seal {
+    None,
+    Header,
+    Pages,
+    Sections,
+    All,
+}
+
+const SEALS: [Seal; 5] = [Seal::None, Seal::Header, Seal::Pages, Seal::Sections, Seal::All];
+
+impl Seal {
+    fn apply(self, bytes: &mut [u8]) {
+        if bytes.len() < 4096 {
+            return;
+        }
+        if self >= Self::Pages {
+            seal_blocks(bytes);
+            seal_pages(bytes);
+        }
+        if self >= Self::Sections {
+            seal_sections(bytes);
+        }
+        if self == Self::Header || self == Self::All {
+            seal_header(bytes);
+        }
+    }
+}
+
+/// A place in a file, more often where something is: at the start of a page.
+fn place(bytes: &[u8], random: &mut Random) -> usize {
+    let page = 4096 * random.below(bytes.len().div_ceil(4096));
+    let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
+    (page + within).min(bytes.len() - 1)
+}
+
+/// Damages a file in one of these ways; `other` is a second valid file.
+fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static str {
+    let at = place(bytes, random);
+    match random.below(6) {
+        0 => {
+            for _ in 0..1 + random.below(3) {
+                let at = place(bytes, random);
+                bytes[at] ^= 1 << random.below(8);
+            }
+            "flipped"
+        }
+        1 => {
+            let values: [u32; 8] =
+                [0, 1, u32::MAX, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x8000_0000, 0x7f7f_ffff];
+            let at = (at & !3).min(bytes.len() - 4);
+            put(bytes, at, &values[random.below(8)].to_le_bytes());
+            "limit"
+        }
+        2 => {
+            // A stretch of another file, at the same place or at any.
+            let most = 2 << random.below(13);
+            let length = (1 + random.below(most)).min(bytes.len() - at);
+            let from = if random.below(2) == 0 { at } else { place(other, random) };
+            let stretch = &other[from.min(other.len())..(from + length).min(other.len())];
+            put(bytes, at, stretch);
+            "spliced"
+        }
+        3 => {
+            match random.below(3) {
+                0 => bytes.truncate(random.below(bytes.len())),
+                1 => bytes.truncate(4096 * random.below(bytes.len() / 4096)),
+                _ => bytes.extend((0..random.below(5000)).map(|i| i as u8)),
+            }
+            "truncated"
+        }
+        4 => {
+            // A page, line or word over another one.
+            let unit = [4096, 64, 8][random.below(3)];
+            let (to, from) = (at / unit * unit, place(bytes, random) / unit * unit);
+            let length = unit.min(bytes.len() - to).min(bytes.len() - from);
+            bytes.copy_within(from..from + length, to);
+            "doubled"
+        }
+        _ => {
+            // A page, line or byte more or less: all behind it moves.
+            let unit = [4096, 64, 1][random.below(3)];
+            let end = (at + unit).min(bytes.len());
+            if random.below(2) == 0 {
+                bytes.drain(at..end);
+            } else {
+                let more = bytes[at..end].to_vec();
+                bytes.splice(at..at, more);
+            }
+            "moved"
+        }
+    }
+}
+
+/// What became of a file, for the table that the test prints.
+fn outcome(answers: &Option<[Answers; 2]>, expected: &[Answers; 2]) -> &'static str {
+    match answers {
+        None => "refused when opened",
+        Some(answers) if answers.iter().any(Answers::is_refused) => "refused when asked",
+        Some(answers) if answers == expected => "the same answers",
+        Some(_) => "other answers",
+    }
+}
+
+#[test]
+fn no_mutation_does_harm() {
+    let files = std::env::var("CBVH_MUTATIONS").map_or(FILES, |files| files.parse().unwrap());
+    let cube: Mesh = mesh(&sphere(1));
+    let good = Bvh::from_bytes(to_bytes(&cube, &Options::default()).unwrap().0).unwrap();
+    let poses = [Pose::IDENTITY, translation(1.5, 0.25, 0.0), Random::new(3).pose(2.5)];
+    let mut queriers = queriers();
+    let mut random = Random::new(79);
+    let victims = victims();
+    let expected: Vec<_> = victims
+        .iter()
+        .map(|victim| poses.map(|pose| ask(&mut queriers[0], victim, &good, &pose).unwrap()))
+        .collect();
+    let mut table: BTreeMap<_, usize> = BTreeMap::new();
+    let mut slowest = Duration::ZERO;
+    for number in 0..files {
+        let (which, pose) = (random.below(victims.len()), random.below(poses.len()));
+        let mut bytes = victims[which].clone();
+        let other = &victims[random.below(victims.len())];
+        let mut how = damage(&mut bytes, other, &mut random);
+        while random.below(4) == 0 && bytes.len() > 4096 {
+            how = damage(&mut bytes, other, &mut random);
+        }
+        let seal = SEALS[random.below(SEALS.len())];
+        seal.apply(&mut bytes);
+        let whole = validate(&bytes);
+        if number % 8 == 0 {
+            assert!(verify(&bytes, &cube).is_err(), "file {number}: it never was this mesh");
+        }
+        let backend = random.below(queriers.len());
+        let start = Instant::now();
+        let answers = ask(&mut queriers[backend], &bytes, &good, &poses[pose]);
+        slowest = slowest.max(start.elapsed());
+        let context = || format!("file {number}, {how}, {seal:?}, pose {pose}");
+        assert!(answers.is_some() || whole.is_err(), "{}", context());
+        let expected = &expected[which][pose];
+        for (answers, expected) in answers.iter().flatten().zip(expected) {
+            assert!(whole.is_err() || !answers.is_refused(), "{}: {answers:?}", context());
+            let holds = seal != Seal::None || answers.are_refused_or(expected);
+            assert!(holds, "{}: {answers:?}, not {expected:?}", context());
+        }
+        *table.entry((seal, outcome(&answers, expected))).or_default() += 1;
+    }
+    for ((seal, outcome), count) in &table {
+        println!("{:<10} {outcome:<20} {count}", format!("{seal:?}"));
+    }
+    println!("{files} files, the slowest took {slowest:?}");
+    let count = |seal, outcome| table.get(&(seal, outcome)).copied().unwrap_or(0);
+    assert_eq!(count(Seal::None, "other answers"), 0);
+    // All ways are taken, and often.
+    for (seal, outcome) in [
+        (Seal::None, "refused when opened"),
+        (Seal::None, "refused when asked"),
+        (Seal::None, "the same answers"),
+        (Seal::All, "refused when opened"),
+        (Seal::All, "refused when asked"),
+        (Seal::All, "other answers"),
+    ] {
+        assert!(count(seal, outcome) * 500 > files, "{seal:?}: {outcome}");
+    }
+    assert!(slowest < Duration::from_secs(20), "{slowest:?}");
+}
+
+/// Trees of the right shape with any content at all, in pairs.
+#[test]
+fn forged_pairs_do_no_harm() {
+    let pairs = std::env::var("CBVH_MUTATIONS").map_or(FILES, |files| files.parse().unwrap()) / 10;
+    let mut queriers = queriers();
+    let mut random = Random::new(80);
+    let (mut opened, mut answered, mut slowest) = (0, 0, Duration::ZERO);
+    for _ in 0..pairs {
+        let forged = |random: &mut Random| {
+            // Mostly small numbers: limits are rare enough for some files to be sound.
+            let bytes: Vec<u8> = (0..1200)
+                .map(|_| if random.below(40) == 0 { random.next() as u8 } else { random.below(64) as u8 })
+                .collect();
+            forge(&mut Input(&bytes))
+        };
+        let (a, b) = (forged(&mut random), forged(&mut random));
+        let (a_valid, b_valid) = (validate(&a).is_ok(), validate(&b).is_ok());
+        let Ok(b) = Bvh::from_bytes(b) else { continue };
+        let pose = random.pose(4.0);
+        let backend = random.below(queriers.len());
+        let start = Instant::now();
+        let answers = ask(&mut queriers[backend], &a, &b, &pose);
+        slowest = slowest.max(start.elapsed());
+        opened += usize::from(answers.is_some());
+        if let Some(answers) = answers {
+            let refused = answers.iter().any(Answers::is_refused);
+            assert!(!refused || !a_valid || !b_valid, "valid, but {answers:?}");
+            answered += usize::from(!refused);
+        }
+    }
+    println!("{pairs} forged pairs: {opened} opened, {answered} answered, the slowest took {slowest:?}");
+    assert!(opened * 2 > pairs && answered * 20 > pairs, "{opened} opened, {answered} answered");
+    assert!(slowest < Duration::from_secs(20), "{slowest:?}");
+}

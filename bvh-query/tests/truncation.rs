@@ -1,0 +1,104 @@
+//! What becomes of an open file when others replace, remove or truncate it: what `Bvh::open` says.
+#![cfg(unix)]
+
+mod common;
+
+use bvh_bake::{Options, to_bytes};
+use bvh_query::{Bvh, Pose, Querier};
+use common::mesh;
+use common::shapes::{soup, sphere};
+use std::fs::OpenOptions;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// In the child: the file that it opens, truncates and asks. The test runs itself.
+const VICTIM: &str = "CBVH_TRUNCATION_VICTIM";
+const SIGBUS: i32 = 7;
+
+fn file(seed: u64) -> Vec<u8> {
+    to_bytes(&mesh(&soup(3000, seed)), &Options::default()).unwrap().0
+}
+
+/// Writes a file into a folder that is removed with the guard.
+fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("victim.cbvh");
+    std::fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+fn truncate(path: &Path) {
+    // To the header page: all that opening has read is still there.
+    OpenOptions::new().write(true).open(path).unwrap().set_len(4096).unwrap();
+}
+
+fn contacts(bvh: &Bvh) -> usize {
+    let good = Bvh::from_bytes(to_bytes(&mesh(&sphere(1)), &Options::default()).unwrap().0).unwrap();
+    Querier::new().unwrap().contacts(bvh, &good, &Pose::IDENTITY).unwrap().len()
+}
+
+/// Does nothing by itself: the process that `a_truncated_map_ends_the_process` starts.
+#[test]
+fn the_child_process() {
+    let Ok(path) = std::env::var(VICTIM) else { return };
+    let bvh = Bvh::open(&path).unwrap();
+    truncate(Path::new(&path));
+    println!("{} contacts", contacts(&bvh));
+}
+
+#[test]
+fn a_truncated_map_ends_the_process() {
+    // Other systems number the signal otherwise, or have none.
+    if !cfg!(target_os = "linux") {
+        println!("skipped: SIGBUS is tested on Linux only");
+        return;
+    }
+    let (_folder, path) = written(&file(5));
+    let child = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "the_child_process", "--nocapture"])
+        .env(VICTIM, &path)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&child.stdout).into_owned();
+    assert!(!said.contains("contacts"), "{said}");
+    assert_eq!(
+        std::fs::metadata(&path).unwrap().len(),
+        4096,
+        "the child did not come to the question: {said}"
+    );
+    // A sanitizer catches the signal, reports it and exits instead.
+    let sanitized = String::from_utf8_lossy(&child.stderr).contains("AddressSanitizer: BUS");
+    assert!(child.status.signal() == Some(SIGBUS) || sanitized, "{:?}: {said}", child.status);
+}
+
+#[test]
+fn a_file_that_was_read_may_be_truncated() {
+    let bytes = file(5);
+    let expected = contacts(&Bvh::from_bytes(bytes.clone()).unwrap());
+    let (_folder, path) = written(&bytes);
+    let bvh = Bvh::read(&path).unwrap();
+    truncate(&path);
+    assert_eq!(contacts(&bvh), expected);
+    assert!(expected > 0);
+    // What is left is no file any more.
+    assert!(Bvh::read(&path).is_err() && Bvh::open(&path).is_err());
+    assert!(Bvh::read(path.with_extension("none")).is_err());
+}
+
+#[test]
+fn a_file_that_was_replaced_or_removed_stays_as_it_was() {
+    let bytes = file(5);
+    let expected = contacts(&Bvh::from_bytes(bytes.clone()).unwrap());
+    let (_folder, path) = written(&bytes);
+    let replaced = Bvh::open(&path).unwrap();
+    let other = path.with_extension("new");
+    std::fs::write(&other, file(6)).unwrap();
+    std::fs::rename(&other, &path).unwrap();
+    assert_eq!(contacts(&replaced), expected);
+    let removed = Bvh::open(&path).unwrap();
+    let new = contacts(&Bvh::read(&path).unwrap());
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(contacts(&removed), new);
+    assert_ne!(new, expected);
+}
