@@ -30,7 +30,7 @@ fn forged(golden: &[u8], seed: u64) -> Vec<u8> {
     for draw in 0..1 + seed % 3 {
         // Pages have what is in use at their start.
         let most = place.len().min(512);
-        let at = place.start + (random(seed, 3 * draw + 1) % most & !3).min(place.len().saturating_sub(4));
+        let at = place.start + (random(seed, 3 * draw + 1) % most / 4 * 4).min(place.len().saturating_sub(4));
         let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, 0x7f80_0000, random(seed, 3 * draw + 2) as u32];
         put(&mut bytes, at, &values[random(seed, 3 * draw + 3) % values.len()].to_le_bytes());
     }
