@@ -18,7 +18,7 @@ use common::{Random, mesh, queriers, translation};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-const FILES: usize = 30_000;
+const FILES: usize = 60_000;
 
 /// Which checksums are made right again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
