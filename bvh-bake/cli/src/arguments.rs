@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Verify(VerifyArguments),
     /// Ask two meshes whether they touch, where, and how far apart they are
     Query(QueryArguments),
+    /// Ask about hard cases whose exact answers are known
+    Report(ReportArguments),
 }
 
 const BAKE_HELP: &str = "\
@@ -236,6 +238,34 @@ pub(crate) struct QueryArguments {
     /// With --pose and --mode distance: write the closest points' segment and both triangles as OBJ
     #[arg(long, value_name = "OBJ")]
     pub(crate) witness: Option<PathBuf>,
+}
+
+const REPORT_HELP: &str = "\
+Examples:
+  cbvh report --hard --out hard
+  cbvh report --hard --out hard --peers peers/out
+
+--hard writes hard.md, for people, and hard.csv and hard.json, with every answer. Each case is a pair of small meshes in \
+a pose, with the exact truth known beforehand; it is asked in up to four orders, in every profile, in both triangle \
+encodings without loss, on every backend of this CPU. A wrong answer ends with exit code 3, after the files are written.
+
+--peers: other libraries are asked the same, one process a question, by the programs DIR/bin/peer_*: those take two \
+OBJ files, a pose file, --mode, --bv and --out as query does. Their wrong answers are listed and do not change the \
+exit code.";
+
+/// What `report` takes.
+#[derive(Debug, Args)]
+#[command(after_help = REPORT_HELP)]
+pub(crate) struct ReportArguments {
+    /// Report on the hard cases, which are built in
+    #[arg(long, required = true)]
+    pub(crate) hard: bool,
+    /// The folder to write to; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// A build of programs that ask other libraries
+    #[arg(long, value_name = "DIR")]
+    pub(crate) peers: Option<PathBuf>,
 }
 
 /// A question.

@@ -33,7 +33,7 @@ impl Failure {
         }
         if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
             return Self::Usage(
-                "expected a command: bake, dump, validate, verify or query (see --help)".into(),
+                "expected a command: bake, dump, validate, verify, query or report (see --help)".into(),
             );
         }
         let text = error.render().to_string();

@@ -11,6 +11,7 @@ mod error;
 mod opened;
 mod output;
 mod query;
+mod report;
 mod resident;
 mod validate;
 mod verify;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
             Command::Validate(arguments) => validate::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Query(arguments) => query::run(&arguments),
+            Command::Report(arguments) => report::run(&arguments),
         });
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,6 +1,6 @@
 //! `cbvh query`: asks two meshes about poses, timed like the peers of the benchmark kit, or about one pose.
 
-mod number;
+pub(crate) mod number;
 mod once;
 mod poses;
 mod record;

@@ -15,6 +15,7 @@ mod decide;
 mod dyadic;
 mod effort;
 mod features;
+mod hard_cases;
 mod kinds;
 mod lattice;
 mod length;
