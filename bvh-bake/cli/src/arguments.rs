@@ -246,8 +246,9 @@ Examples:
   cbvh report --hard --out hard --peers peers/out
 
 --hard writes hard.md, for people, and hard.csv and hard.json, with every answer. Each case is a pair of small meshes in \
-a pose, with the exact truth known beforehand; it is asked in up to four orders, in every profile, in both triangle \
-encodings without loss, on every backend of this CPU. A wrong answer ends with exit code 3, after the files are written.
+a pose, with the exact truth known beforehand; it is asked in every profile, in both triangle encodings without loss, \
+on every backend of this CPU, and in a fifth of these with corners, triangles and sides in other orders. A wrong answer \
+ends with exit code 3, after the files are written.
 
 --peers: other libraries are asked the same, one process a question, by the programs DIR/bin/peer_*: those take two \
 OBJ files, a pose file, --mode, --bv and --out as query does. Their wrong answers are listed and do not change the \

@@ -18,7 +18,7 @@ fn help_and_version_are_no_errors() {
     let here = Path::new(".");
     assert!(cbvh_in(here, &["--version"]).done().out.starts_with("cbvh "));
     let help = cbvh_in(here, &["--help"]).done().out;
-    for command in ["bake", "dump", "validate", "verify", "query"] {
+    for command in ["bake", "dump", "validate", "verify", "query", "report"] {
         assert!(help.contains(command));
         assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
     }
@@ -61,6 +61,9 @@ fn wrong_usage_is_1() {
         &["query", "cube.obj", "cube.obj", "--pose", pose, "--witness", "w.obj"],
         &["query", "cube.obj", "cube.obj", "p.txt,p.txt", "--out", "raw.txt"],
         &["query", "cube.obj", "cube.obj", ","],
+        &["report"],
+        &["report", "--hard"],
+        &["report", "--out", "r"],
     ];
     for case in cases {
         let ended = cbvh_in(directory, case).failed(1, &[]);

@@ -51,16 +51,23 @@ impl Report {
     fn new(mut peers: Vec<Peer>) -> Result<Self, Failure> {
         let questions = peers::Questions::new()?;
         let mut cases = Vec::new();
-        for case in cases::all() {
-            cases.push(Self::ask(&case, &mut peers, &questions)?);
+        for (number, case) in cases::all().iter().enumerate() {
+            cases.push(Self::ask(number, case, &mut peers, &questions)?);
         }
         Ok(Self { record: Record::new(cases, &peers) })
     }
 
-    fn ask(case: &Case, peers: &mut [Peer], questions: &peers::Questions) -> Result<record::Asked, Failure> {
+    fn ask(
+        number: usize,
+        case: &Case,
+        peers: &mut [Peer],
+        questions: &peers::Questions,
+    ) -> Result<record::Asked, Failure> {
         let mut asked = record::Asked::new(case);
-        for order in case.orders() {
-            let own = own::ask(case, &order);
+        for (turn, order) in case.orders().into_iter().enumerate() {
+            // As listed in all layouts; in the other orders these take turns, from case to case.
+            let share = (turn > 0).then_some(number + turn);
+            let own = own::ask(case, &order, share);
             let mut others = Vec::new();
             if !peers.is_empty() && !matches!(case.truth, cases::Truth::Refused { .. }) {
                 questions.write(&order)?;

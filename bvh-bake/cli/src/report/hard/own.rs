@@ -13,6 +13,9 @@ use serde::Serialize;
 /// phase allow for the pair of triangles, which is no larger.
 const ACCURACY: f64 = 1e-14;
 
+/// Into so many shares layouts are divided.
+const SHARES: usize = 5;
+
 /// The answers to one order of a case.
 #[derive(Serialize)]
 pub(super) struct Own {
@@ -43,7 +46,8 @@ struct Answers {
     upper: f64,
 }
 
-pub(super) fn ask(case: &Case, order: &Ordered) -> Own {
+/// Asks in all layouts, or in the share of them with this number.
+pub(super) fn ask(case: &Case, order: &Ordered, share: Option<usize>) -> Own {
     let mut own = Own {
         refusal: None,
         collide: None,
@@ -71,8 +75,11 @@ pub(super) fn ask(case: &Case, order: &Ordered) -> Own {
         }
     };
     let scale = span(&order.a, &order.b, &order.pose);
-    for profile in Profile::ALL {
-        for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
+    for (number, profile) in Profile::ALL.into_iter().enumerate() {
+        for (packed, encoding) in [TriangleEncoding::F32, TriangleEncoding::Packed].into_iter().enumerate() {
+            if share.is_some_and(|share| (2 * number + packed) % SHARES != share % SHARES) {
+                continue;
+            }
             let files = [&order.a, &order.b].map(|triangles| bake(triangles, profile, encoding));
             let [a, b] = match files {
                 [Ok(a), Ok(b)] => [a, b],

@@ -74,13 +74,13 @@ pub(super) fn cases() -> Vec<Case> {
     ]);
     let ask = |name: &str, a: Vec<Triangle>, b: Vec<Triangle>| question("any turn", name, ANY, a, b);
     cases.extend([
-        ask("a cube's edge 2^-30 off a face", cube(), cube())
+        ask("a cube's edge 2^-20 off a face", cube(), cube())
             .turned(PYTHAGORAS)
-            .moved([2.4 + two(-30), 0.2, 0.25])
-            .above(9.313225746154785e-10),
-        ask("a cube's edge 2^-30 in a face", cube(), cube())
+            .moved([2.4 + two(-20), 0.2, 0.25])
+            .above(9.5367431640625e-07),
+        ask("a cube's edge 2^-20 in a face", cube(), cube())
             .turned(PYTHAGORAS)
-            .moved([2.4 - two(-30), 0.2, 0.25])
+            .moved([2.4 - two(-20), 0.2, 0.25])
             .touching(9),
         ask("an octahedron in a cube, tips 2^-20 short", cube(), octahedron(1.0 - two(-20)))
             .turned(PYTHAGORAS)

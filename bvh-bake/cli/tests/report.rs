@@ -1,0 +1,83 @@
+//! `cbvh report --hard`: three files, no wrong answer of this library, and a fair account of others'.
+
+mod common;
+
+use common::{cbvh_in, names};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Longer than other commands may take: it bakes thousands of meshes.
+fn report(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cbvh")).args(["report", "--hard"]).args(arguments).output().unwrap()
+}
+
+fn json(folder: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(folder.join("hard.json")).unwrap()).unwrap()
+}
+
+#[cfg(unix)]
+fn program(path: &Path, text: &str) {
+    use std::os::unix::fs::PermissionsExt;
+    fs::write(path, text).unwrap();
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+/// One other library always says 0, one has no answer.
+#[cfg(unix)]
+#[test]
+fn all_answers_are_right_and_others_are_judged() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, build) = (folder.path().join("new/out"), folder.path().join("build"));
+    fs::create_dir_all(build.join("bin")).unwrap();
+    let zero = "#!/bin/sh\necho 0 1 > raw_pose.txt\necho '{\"version\":\"7.5\"}'\n";
+    program(&build.join("bin/peer_ode"), zero);
+    program(&build.join("bin/peer_cgal"), "#!/bin/sh\nexit 3\n");
+    let ended = report(&["--out", out.to_str().unwrap(), "--peers", build.to_str().unwrap()]);
+    assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
+    assert_eq!(names(&out), ["hard.csv", "hard.json", "hard.md"]);
+
+    let record = json(&out);
+    let cases = record["cases"].as_array().unwrap();
+    assert!(cases.len() >= 200);
+    let (mut touching, mut asked) = (0, 0);
+    for case in cases {
+        for order in case["orders"].as_array().unwrap() {
+            assert_eq!(order["own"]["wrong"].as_array().unwrap().len(), 0, "{case}");
+            assert_eq!(order["own"]["differ"].as_array().unwrap().len(), 0, "{case}");
+            if let Some(is_touching) = case["truth"]["touching"].as_bool() {
+                touching += u64::from(is_touching);
+                asked += 1;
+                assert_eq!(order["own"]["collide"], is_touching, "{case}");
+            } else {
+                assert!(
+                    order["own"]["refusal"].is_string() && order["others"].as_array().unwrap().is_empty()
+                );
+            }
+        }
+    }
+    let count = |peer: usize, what: &str| record["peers"][peer]["modes"][0][what].as_u64().unwrap();
+    assert_eq!([count(0, "asked"), count(0, "crashes"), count(0, "wrong")], [asked, asked, 0], "cgal-rigid");
+    assert_eq!(
+        [count(1, "asked"), count(1, "crashes"), count(1, "wrong")],
+        [asked, 0, touching],
+        "ode-opcode"
+    );
+    assert_eq!(record["peers"][1]["version"], "7.5");
+
+    let lines = fs::read_to_string(out.join("hard.csv")).unwrap().lines().count();
+    let orders: usize = cases.iter().map(|case| case["orders"].as_array().unwrap().len()).sum();
+    assert_eq!(lines, 1 + orders);
+    assert!(fs::read_to_string(out.join("hard.md")).unwrap().contains("**0 wrong answers**"));
+}
+
+#[test]
+fn what_cannot_be_had_is_told_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("file"), "").unwrap();
+    cbvh_in(directory, &["report", "--hard", "--out", "file"]).failed(2, &["file", "expected a folder"]);
+    cbvh_in(directory, &["report", "--hard", "--out", "o", "--peers", "missing"])
+        .failed(2, &["missing", "expected programs peer_*, found none"]);
+    assert_eq!(names(directory), ["file"]);
+}
