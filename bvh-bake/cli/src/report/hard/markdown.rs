@@ -137,6 +137,9 @@ fn own(case: &Asked) -> String {
 
 /// Everything but right, library by library: the mode, what was said, and in how many orders.
 fn others(case: &Asked, record: &Record) -> String {
+    if case.truth.touching.is_none() {
+        return "not asked".to_owned();
+    }
     let mut parts = Vec::new();
     for peer in &record.peers {
         let modes: Vec<_> =

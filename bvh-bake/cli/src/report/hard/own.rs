@@ -184,3 +184,29 @@ fn misjudged(answers: &Answers, truth: &Truth, scale: f64) -> Vec<String> {
     }
     wrong
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// There are no wrong answers to be had, so these are made up.
+    #[test]
+    fn wrong_answers_are_noticed() {
+        let right = Answers { collide: false, contacts: 0, distance: 1.0, lower: 0.75, upper: 1.25 };
+        let touching = Answers { collide: true, contacts: 3, distance: 0.0, lower: 0.0, upper: 0.0 };
+        let apart = Truth::Apart(Length::Exactly(1.0, ""));
+        let between = Truth::Apart(Length::Above(1.0));
+        let contact = Truth::Touching { contacts: 3 };
+        let count = |answers: Answers, truth: &Truth| misjudged(&answers, truth, 2.0).len();
+        assert_eq!([count(right, &apart), count(right, &between), count(touching, &contact)], [0; 3]);
+        assert_eq!(count(Answers { collide: true, ..right }, &apart), 1);
+        assert_eq!(count(Answers { contacts: 1, ..right }, &apart), 1);
+        assert_eq!(count(Answers { distance: 1.0 + 1e-12, ..right }, &apart), 1);
+        assert_eq!(count(Answers { lower: 1.0f64.next_up(), ..right }, &apart), 1);
+        // The truth is above 1, so an interval that ends there is without it.
+        assert_eq!(count(Answers { upper: 1.0, ..right }, &apart), 0);
+        assert_eq!(count(Answers { upper: 1.0, ..right }, &between), 1);
+        assert_eq!(count(Answers { contacts: 2, ..touching }, &contact), 1);
+        assert!(count(touching, &apart) >= 3 && count(right, &contact) >= 3);
+    }
+}

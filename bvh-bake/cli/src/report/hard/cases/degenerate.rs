@@ -2,6 +2,8 @@
 
 use super::shapes::{Triangle, crowd, joined, scaled, two};
 use super::{Case, question};
+// The f64 nearest to the root of 2 is above it.
+use std::f64::consts::SQRT_2;
 
 const POINT: &str = "a triangle of three equal corners is a point: it has no normal and no edges";
 const SEGMENT: &str = "a triangle of three collinear corners is a segment: it has no normal";
@@ -87,7 +89,7 @@ fn segments() -> Vec<Case> {
             .apart(two(-20), "end to end along x"),
         ask("parallel, 5 apart", straight, segment([-7.0, 3.0, 4.0], [7.0, 3.0, 4.0], 1))
             .apart(5.0, "3, 4, 5 across"),
-        ask("askew", straight, segment([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], 1)).above(1.414213562373095),
+        ask("askew", straight, segment([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], 1)).above(SQRT_2.next_down()),
     ]);
     cases
 }

@@ -2,6 +2,8 @@
 
 use super::shapes::{Triangle, axes, moved, plate, scaled, two};
 use super::{Case, question};
+// The f64 nearest to the root of 2 is above it.
+use std::f64::consts::SQRT_2;
 
 const PLANE: &str = "in one plane there is no side to be on: signs are zero, and overlap is a question in 2D";
 const SLANT: &str = "in a slanted plane coordinates cancel instead of being equal";
@@ -54,7 +56,7 @@ pub(super) fn cases() -> Vec<Case> {
         ask("slanted, one within the other", vec![large], vec![inside]).touching(1),
         ask("slanted, sharing an edge", vec![large], vec![[large[0], large[1], slanted(-3.0, 2.0)]])
             .touching(1),
-        ask("slanted, apart", vec![large], vec![outside]).above(1.414213562373095),
+        ask("slanted, apart", vec![large], vec![outside]).above(SQRT_2.next_down()),
         ask("slanted, one within the other, 2^-40 as large", scaled(&[large], two(-40)), {
             scaled(&[inside], two(-40))
         })
