@@ -149,8 +149,9 @@ fn answers(
     let Answers { distance, lower, upper, .. } = answers;
     for limit in [lower, distance, upper].into_iter().flat_map(|x| [x.next_down(), x, x.next_up()]) {
         let within = querier.within(a, b, pose, limit)?;
-        // It follows the distance; outside the interval that is the truth.
-        if within != (distance <= limit) {
+        // Of a truth from one f64 to the next nothing is stated about the lower one.
+        let misjudged = if within { limit < truth.floor() } else { limit >= truth.ceil() };
+        if misjudged {
             wrong.push(format!("within {limit:e}: {within}, distance {distance:e}"));
         }
     }

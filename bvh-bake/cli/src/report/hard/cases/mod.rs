@@ -53,6 +53,26 @@ pub(crate) enum Truth {
     Refused { words: &'static str },
 }
 
+impl Truth {
+    /// An f64 that the distance is at least; infinite where there is none.
+    pub(crate) fn floor(&self) -> f64 {
+        match self {
+            Self::Touching { .. } => 0.0,
+            Self::Apart(length) => length.floor(),
+            Self::Refused { .. } => f64::INFINITY,
+        }
+    }
+
+    /// An f64 that the distance is at most, the same or the next.
+    pub(crate) fn ceil(&self) -> f64 {
+        match self {
+            Self::Touching { .. } => 0.0,
+            Self::Apart(length) => length.ceil(),
+            Self::Refused { .. } => f64::INFINITY,
+        }
+    }
+}
+
 /// An exact distance, mesh units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Length {
