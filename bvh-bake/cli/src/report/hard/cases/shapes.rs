@@ -52,7 +52,7 @@ pub(super) fn octahedron(reach: f64) -> Vec<Triangle> {
         .collect()
 }
 
-/// A needle from `tail` to `tip`, four triangles around a square tail in the plane z = tail[2].
+/// A needle from `tail` to `tip`, four triangles around a square tail in the plane z = `tail[2]`.
 pub(super) fn needle(tail: [f64; 3], tip: [f64; 3], half: f64) -> Vec<Triangle> {
     let corner = |x: f64, y: f64| [tail[0] + x * half, tail[1] + y * half, tail[2]];
     let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
