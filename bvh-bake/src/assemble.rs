@@ -1,7 +1,6 @@
 //! Puts the parts of a file together: every block is copied once, to where it stays.
 
 use crate::encode::{Ends, PageParts};
-use crate::report::BakeReport;
 use bvh_format::checksum::checksum;
 use bvh_format::header::{Section, SectionKind, write_header};
 use bvh_format::ids::WORD;
@@ -12,45 +11,39 @@ use bvh_format::page::PAGE;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What goes into a file.
-pub(crate) struct Contents<'a> {
+/// What the objects of a file bring to it.
+#[derive(Default)]
+pub(crate) struct Contents {
     pub(crate) records: Vec<(String, ObjectRecord)>,
     pub(crate) pages: Vec<PageParts>,
     /// Where the pages' blocks end.
     pub(crate) ends: Ends,
-    pub(crate) ids: bool,
+    /// (kept id, id of an equal triangle left out).
     pub(crate) duplicates: Vec<[u32; 2]>,
-    pub(crate) provenance: &'a str,
 }
 
 /// Lays the sections out page by page and writes the header.
-pub(crate) fn assemble(contents: Contents<'_>, report: &mut BakeReport) -> Vec<u8> {
-    let Contents { records, pages, ends, ids, mut duplicates, provenance } = contents;
-    duplicates.sort_unstable();
-    let duplicates: Vec<u8> = duplicates.iter().flatten().flat_map(|id| id.to_le_bytes()).collect();
+pub(crate) fn assemble(contents: Contents, with_ids: bool, provenance: &str) -> Vec<u8> {
+    let Contents { records, pages, ends, mut duplicates } = contents;
     let objects = write_objects(&records);
     let mut sections = Sections::default();
-    let objects_at = sections.add(SectionKind::Objects, objects.len());
+    let mut small = vec![(sections.add(SectionKind::Objects, objects.len()), objects)];
     let nodes = sections.add(SectionKind::Nodes, ends.pages * PAGE);
     let leaves = sections.add(SectionKind::Leaves, ends.leaf_lines * LINE);
-    let ids = if ids {
-        sections.add(SectionKind::Ids, ends.id_words * WORD)
-    } else {
-        sections.end()..sections.end()
-    };
-    report.node_bytes = nodes.len() as u64;
-    report.triangle_bytes = leaves.len() as u64;
-    report.id_bytes = (ids.len() + duplicates.len()) as u64;
-    let mut small = vec![(objects_at, objects)];
-    if !duplicates.is_empty() {
-        small.push((sections.add(SectionKind::Duplicates, duplicates.len()), duplicates));
+    let mut ids = leaves.end..leaves.end;
+    if with_ids {
+        ids = sections.add(SectionKind::Ids, ends.id_words * WORD);
+        if !duplicates.is_empty() {
+            duplicates.sort_unstable();
+            let duplicates: Vec<u8> = duplicates.iter().flatten().flat_map(|id| id.to_le_bytes()).collect();
+            small.push((sections.add(SectionKind::Duplicates, duplicates.len()), duplicates));
+        }
     }
     if !provenance.is_empty() {
         let range = sections.add(SectionKind::Provenance, provenance.len());
         small.push((range, provenance.as_bytes().to_vec()));
     }
     let mut bytes = vec![0; sections.end()];
-    report.file_bytes = bytes.len() as u64;
     copy_pages(&mut bytes, [nodes, leaves, ids], pages);
     small.iter().for_each(|(range, data)| bytes[range.clone()].copy_from_slice(data));
     let header = sections.header(&bytes);
@@ -58,35 +51,32 @@ pub(crate) fn assemble(contents: Contents<'_>, report: &mut BakeReport) -> Vec<u
     bytes
 }
 
-/// Copies all pages and their blocks to the sections of nodes, leaves and ids.
-fn copy_pages(bytes: &mut [u8], sections: [Range<usize>; 3], pages: Vec<PageParts>) {
-    let mut rest = bytes;
-    let mut at = 0;
-    let mut take = |range: Range<usize>| {
-        let (_, behind) = std::mem::take(&mut rest).split_at_mut(range.start - at);
-        let (section, behind) = behind.split_at_mut(range.len());
-        (rest, at) = (behind, range.end);
-        section
-    };
-    let mut places = sections.map(&mut take);
-    // The last page takes what is left of each section, and there is nothing more.
-    let mut next = |section: usize, length: usize| {
-        let (place, behind) = std::mem::take(&mut places[section]).split_at_mut(length);
-        places[section] = behind;
-        place
-    };
-    let copies: Vec<_> = pages
-        .into_iter()
-        .map(|part| {
-            let places = [part.page.len(), part.leaf_block.len(), part.id_block.len()];
-            ([next(0, places[0]), next(1, places[1]), next(2, places[2])], part)
-        })
-        .collect();
+/// Copies all pages and their blocks to the sections of nodes, leaves and ids, which follow each other.
+fn copy_pages(bytes: &mut [u8], [nodes, leaves, ids]: [Range<usize>; 3], pages: Vec<PageParts>) {
+    let (_, rest) = bytes.split_at_mut(nodes.start);
+    let (mut nodes, rest) = rest.split_at_mut(leaves.start - nodes.start);
+    let (mut leaves, mut ids) = rest.split_at_mut(ids.start - leaves.start);
+    let mut copies = Vec::with_capacity(pages.len());
+    for part in pages {
+        let places = [
+            take(&mut nodes, part.page.len()),
+            take(&mut leaves, part.leaf_block.len()),
+            take(&mut ids, part.id_block.len()),
+        ];
+        copies.push((places, part));
+    }
     copies.into_par_iter().for_each(|([page, leaf_block, id_block], part)| {
         page.copy_from_slice(&part.page);
         leaf_block.copy_from_slice(&part.leaf_block);
         id_block.copy_from_slice(&part.id_block);
     });
+}
+
+/// Splits off the first bytes of a slice.
+fn take<'a>(rest: &mut &'a mut [u8], length: usize) -> &'a mut [u8] {
+    let (taken, behind) = std::mem::take(rest).split_at_mut(length);
+    *rest = behind;
+    taken
 }
 
 /// The sections of a file in ascending order.

@@ -4,14 +4,15 @@ use crate::arena::Arena;
 use crate::assemble::{Contents, assemble};
 use crate::auto;
 use crate::build::Bricks;
-use crate::encode::{Encoder, Ends, PageParts, Totals};
+use crate::encode::Encoder;
 use crate::error::BakeError;
 use crate::mesh::{self, Mesh};
 use crate::options::Options;
 use crate::pages;
-use crate::prepare::{Corners, Prepared, box_and_sphere, prepare};
+use crate::prepare::{Corners, box_and_sphere, prepare};
 use crate::prove::{prove_bounds, validate_in_parallel};
 use crate::report::BakeReport;
+use crate::summary::FileSummary;
 use crate::treelets::{Child, ChildKind, Cutter, packet};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
@@ -80,36 +81,26 @@ pub fn to_bytes_with(
         merged = mesh.clone().merged();
         &merged.objects
     };
-    let triangles_in = mesh.objects.iter().map(|object| object.triangles.len() as u64).sum();
     let largest_id = mesh.objects.iter().flat_map(|object| &object.triangle_ids).max();
     let id_count = largest_id.map_or(0, |&id| u64::from(id) + 1);
-    let mut baker = Baker::new(options, triangles_in, id_count);
+    let mut baker = Baker::new(options, id_count);
     for object in objects.iter().filter(|object| !object.triangles.is_empty()) {
         baker.add(object, progress)?;
     }
-    let mut report = baker.report;
-    let parts = Contents {
-        records: baker.records,
-        pages: baker.pages,
-        ends: baker.ends,
-        ids: options.ids,
-        duplicates: baker.duplicates,
-        provenance,
-    };
-    let bytes = assemble(parts, &mut report);
+    let bytes = assemble(baker.contents, options.ids, provenance);
     progress(Stage::Prove);
-    prove(&bytes, &mut report)?;
-    report.seconds = start.elapsed().as_secs_f64();
+    let layout = validate_in_parallel(&bytes).map_err(BakeError::Unproved)?;
+    let inflation = prove_bounds(&layout, &bytes).map_err(BakeError::Unproved)?;
+    let report = BakeReport {
+        file: FileSummary::new(&layout, bytes.len() as u64),
+        reason: baker.reason.unwrap_or_default(),
+        vertices: baker.vertices,
+        width_inflation: inflation.mean_width(),
+        volume_inflation: inflation.mean_volume(),
+        mean_children: baker.children as f64 / baker.treelets as f64,
+        seconds: start.elapsed().as_secs_f64(),
+    };
     Ok((bytes, report))
-}
-
-fn prove(bytes: &[u8], report: &mut BakeReport) -> Result<(), BakeError> {
-    let layout = validate_in_parallel(bytes).map_err(BakeError::Unproved)?;
-    let inflation = prove_bounds(&layout, bytes).map_err(BakeError::Unproved)?;
-    report.content_xxh3 = layout.content_checksum;
-    report.width_inflation = inflation.mean_width();
-    report.volume_inflation = inflation.mean_volume();
-    Ok(())
 }
 
 /// Gathers the objects of a file.
@@ -117,50 +108,18 @@ struct Baker<'a> {
     options: &'a Options,
     /// One more than the largest triangle id.
     id_count: u64,
-    pages: Vec<PageParts>,
-    ends: Ends,
-    records: Vec<(String, ObjectRecord)>,
-    duplicates: Vec<[u32; 2]>,
+    contents: Contents,
+    /// Why the first object is laid out as it is.
+    reason: Option<String>,
+    vertices: u64,
     children: u64,
     treelets: u64,
-    report: BakeReport,
 }
 
 impl<'a> Baker<'a> {
-    fn new(options: &'a Options, triangles_in: u64, id_count: u64) -> Self {
-        let report = BakeReport {
-            profile: Profile::Dop14U8,
-            triangle_encoding: TriangleEncoding::F32,
-            reason: String::new(),
-            triangles_in,
-            triangles: 0,
-            degenerate: 0,
-            duplicates: 0,
-            vertices: 0,
-            objects: 0,
-            file_bytes: 0,
-            node_bytes: 0,
-            triangle_bytes: 0,
-            id_bytes: 0,
-            max_vertex_rounding: 0.0,
-            max_quantization_error: 0.0,
-            width_inflation: 1.0,
-            volume_inflation: 1.0,
-            mean_children: 0.0,
-            content_xxh3: 0,
-            seconds: 0.0,
-        };
-        Self {
-            options,
-            id_count,
-            pages: Vec::new(),
-            ends: Ends::default(),
-            records: Vec::new(),
-            duplicates: Vec::new(),
-            children: 0,
-            treelets: 0,
-            report,
-        }
+    fn new(options: &'a Options, id_count: u64) -> Self {
+        let contents = Contents::default();
+        Self { options, id_count, contents, reason: None, vertices: 0, children: 0, treelets: 0 }
     }
 
     fn add(&mut self, object: &mesh::Object, progress: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
@@ -175,7 +134,7 @@ impl<'a> Baker<'a> {
         let (bounds, centre, radius) = box_and_sphere(&prepared.triangles);
         progress(Stage::Encode);
         let plan = pages::plan(&arena, &bricks, profile);
-        let first_page = self.ends.pages;
+        let first_page = self.contents.ends.pages;
         if (first_page + plan.pages.len()) as u64 > MAX_PAGES {
             return Err(BakeError::Limit("2^26 pages".into()));
         }
@@ -190,7 +149,7 @@ impl<'a> Baker<'a> {
             ids: self.options.ids,
             first_page: first_page as u32,
         };
-        let (mut pages, totals) = encoder.encode(&mut self.ends);
+        let (mut pages, totals) = encoder.encode(&mut self.contents.ends);
         if totals.packets >= 1 << 30 {
             return Err(BakeError::Limit("2^30 leaf packets".into()));
         }
@@ -215,32 +174,14 @@ impl<'a> Baker<'a> {
             sphere_radius: radius.into(),
             ..ObjectRecord::new_zeroed()
         };
-        self.pages.append(&mut pages);
+        self.reason.get_or_insert(choice.reason);
+        self.vertices += prepared.vertices;
         self.children += arena.treelets.iter().map(|t| t.children.len() as u64).sum::<u64>();
-        self.account(prepared, record, choice, totals);
-        Ok(())
-    }
-
-    fn account(&mut self, prepared: Prepared, record: ObjectRecord, choice: auto::Choice, totals: Totals) {
-        let report = &mut self.report;
-        if report.objects == 0 {
-            report.profile = choice.profile;
-            report.triangle_encoding = choice.encoding;
-            report.reason = choice.reason;
-        }
-        report.objects += 1;
-        report.triangles += prepared.triangles.len() as u64;
-        report.degenerate += prepared.degenerate;
-        report.duplicates += prepared.duplicates.len() as u64;
-        report.vertices += prepared.vertices;
-        report.max_vertex_rounding = report.max_vertex_rounding.max(prepared.max_rounding);
-        report.max_quantization_error = report.max_quantization_error.max(prepared.max_quantization);
         self.treelets += totals.treelets;
-        report.mean_children = self.children as f64 / self.treelets as f64;
-        if self.options.ids {
-            self.duplicates.extend(prepared.duplicates);
-        }
-        self.records.push((prepared.name, record));
+        self.contents.pages.append(&mut pages);
+        self.contents.duplicates.extend(prepared.duplicates);
+        self.contents.records.push((prepared.name, record));
+        Ok(())
     }
 }
 

@@ -6,10 +6,8 @@
 
 mod atomic;
 mod provenance;
-mod summary;
 
 pub use atomic::write_atomically;
-pub use summary::FileSummary;
 
 use crate::bake::{Stage, to_bytes_with};
 use crate::error::BakeError;
@@ -17,6 +15,7 @@ use crate::io::{self, MeshFormat, ReadError};
 use crate::mesh::Mesh;
 use crate::options::Options;
 use crate::report::BakeReport;
+use crate::summary::FileSummary;
 use atomic::Temporary;
 use bvh_format::checksum::{Hasher, checksum};
 use provenance::Provenance;

@@ -78,8 +78,8 @@ fn bake_all(mesh: &Mesh) -> Vec<(Options, Vec<u8>, BakeReport)> {
         let inflation = prove_bounds(&layout, &bytes).unwrap();
         assert_eq!(inflation.mean_width(), report.width_inflation);
         assert!(report.width_inflation >= 1.0 && report.volume_inflation >= 1.0, "{report:?}");
-        assert_eq!(report.file_bytes, bytes.len() as u64);
-        assert_eq!(report.triangles + report.duplicates, mesh.triangle_count());
+        assert_eq!(report.file.file_bytes, bytes.len() as u64);
+        assert_eq!(report.file.triangles + report.file.duplicates, mesh.triangle_count());
         (options, bytes, report)
     })
     .collect()
@@ -106,18 +106,18 @@ fn few_equal_collinear_and_point_triangles() {
     }
     let one = soup(1, 3)[0];
     for (_, bytes, report) in bake_all(&mesh(&vec![one; 500])) {
-        assert_eq!((report.triangles, report.duplicates), (1, 499));
+        assert_eq!((report.file.triangles, report.file.duplicates), (1, 499));
         assert_eq!(stored(&bytes), [(0, stored(&bytes)[0].1)]);
     }
     // Corners at 2^0 to 2^100 on a line: every triangle is a segment, and the last spans almost all.
     let row: Vec<Triangle> =
         (0..100).map(|i| [0, 1, 1].map(|step| [2f64.powi(i + step), 0.0, 2f64.powi(i + step)])).collect();
     for (_, _, report) in bake_all(&mesh(&row)) {
-        assert_eq!(report.degenerate, report.triangles);
+        assert_eq!(report.file.degenerate, report.file.triangles);
     }
     let points: Vec<Triangle> = soup(300, 4).into_iter().map(|[a, _, _]| [a; 3]).collect();
     for (_, _, report) in bake_all(&mesh(&points)) {
-        assert_eq!(report.degenerate, report.triangles);
+        assert_eq!(report.file.degenerate, report.file.triangles);
     }
     let same: Vec<Triangle> = vec![[[2f64.powi(120); 3]; 3], [[-(2f64.powi(120)); 3]; 3]];
     bake_all(&mesh(&same));
@@ -181,7 +181,7 @@ fn provenance_is_no_part_of_the_content() {
     let mut stages = Vec::new();
     let (told, told_report) =
         to_bytes_with(&mesh, &Options::default(), text, &mut |stage| stages.push(stage)).unwrap();
-    assert_eq!(report.content_xxh3, told_report.content_xxh3);
+    assert_eq!(report.file.content_xxh3, told_report.file.content_xxh3);
     assert_eq!(validate(&plain).unwrap().content_checksum, validate(&told).unwrap().content_checksum);
     assert!(plain.len() < told.len() && stages.len() == 4, "{stages:?}");
 }
@@ -270,9 +270,13 @@ fn quantized_vertices_move_by_at_most_the_stated_error() {
         let (bytes, report) = to_bytes(&mesh(&triangles), &options).unwrap();
         let diagonal = 2.2 * 3f64.sqrt();
         let allowed = max_error.unwrap_or(1e-5 * diagonal);
-        assert!(report.max_quantization_error <= allowed, "{} > {allowed}", report.max_quantization_error);
+        assert!(
+            report.file.max_quantization_error <= allowed,
+            "{} > {allowed}",
+            report.file.max_quantization_error
+        );
         let record = &validate(&bytes).unwrap().objects[0].record.clone();
-        assert_eq!(record.max_quantization_error.get(), report.max_quantization_error);
+        assert_eq!(record.max_quantization_error.get(), report.file.max_quantization_error);
         let mut moved = 0.0f64;
         for (id, stored) in stored(&bytes) {
             for (input, stored) in triangles[id as usize].iter().zip(stored) {
@@ -280,13 +284,13 @@ fn quantized_vertices_move_by_at_most_the_stated_error() {
             }
         }
         // Of triangles that become equal one is stored; its corners moved no farther.
-        assert!(moved <= report.max_quantization_error * (1.0 + 1e-14), "{moved} > {report:?}");
-        if report.duplicates == 0 {
-            assert!(moved >= report.max_quantization_error * (1.0 - 1e-14), "{moved} < {report:?}");
+        assert!(moved <= report.file.max_quantization_error * (1.0 + 1e-14), "{moved} > {report:?}");
+        if report.file.duplicates == 0 {
+            assert!(moved >= report.file.max_quantization_error * (1.0 - 1e-14), "{moved} < {report:?}");
         }
         let packed = to_bytes(&mesh(&triangles), &self::options(Profile::Dop14U8, TriangleEncoding::Packed));
         if max_error.is_none_or(|error| error > 1e-6) {
-            assert!(report.triangle_bytes < packed.unwrap().1.triangle_bytes, "{max_error:?}");
+            assert!(report.file.triangle_bytes < packed.unwrap().1.file.triangle_bytes, "{max_error:?}");
         }
     }
 }
@@ -307,16 +311,22 @@ fn numbers_beyond_f32_get_an_origin_and_the_rounding_is_measured() {
                     moved = moved.max(distance);
                 }
             }
-            assert!(moved <= report.max_vertex_rounding * (1.0 + 1e-14), "{offset}: {moved}, {report:?}");
-            assert!(moved >= report.max_vertex_rounding * (1.0 - 1e-14) || report.duplicates > 0, "{offset}");
+            assert!(
+                moved <= report.file.max_vertex_rounding * (1.0 + 1e-14),
+                "{offset}: {moved}, {report:?}"
+            );
+            assert!(
+                moved >= report.file.max_vertex_rounding * (1.0 - 1e-14) || report.file.duplicates > 0,
+                "{offset}"
+            );
             let ulp = 2.0 * offset.abs() * f64::EPSILON;
-            assert!(report.max_vertex_rounding <= 1e-6 + 4.0 * ulp, "{offset}: {report:?}");
+            assert!(report.file.max_vertex_rounding <= 1e-6 + 4.0 * ulp, "{offset}: {report:?}");
             // The third axis is of f32 numbers: its origin is 0.
             assert_eq!(validate(&bytes).unwrap().objects[0].record.origin[2].get(), 0.0);
         }
     }
     let exact = to_bytes(&mesh(&soup(100, 12)), &Options::default()).unwrap();
-    assert_eq!(exact.1.max_vertex_rounding, 0.0);
+    assert_eq!(exact.1.file.max_vertex_rounding, 0.0);
     assert_eq!(validate(&exact.0).unwrap().objects[0].record.origin.map(|o| o.get()), [0.0; 3]);
 }
 
@@ -337,11 +347,11 @@ fn duplicates_are_found_in_any_order_of_corners() {
     triangles.push([triangles[0][0], triangles[0][1], triangles[0][1]]);
     for ids in [true, false] {
         let (bytes, report) = to_bytes(&mesh(&triangles), &Options { ids, ..Options::default() }).unwrap();
-        assert_eq!((report.duplicates, report.triangles), (7, 102));
+        assert_eq!((report.file.duplicates, report.file.triangles), (7, 102));
         let layout = validate(&bytes).unwrap();
         let pairs: Vec<_> = layout.duplicate_ids(&bytes).iter().map(|pair| pair.map(|id| id.get())).collect();
         assert_eq!(pairs, if ids { expected.clone() } else { vec![] });
-        assert_eq!((layout.has_ids(), report.id_bytes > 0), (ids, ids));
+        assert_eq!((layout.has_ids(), report.file.id_bytes > 0), (ids, ids));
         let record = &layout.objects[0].record;
         assert_eq!(
             (record.triangles.get(), record.input_triangles.get(), record.duplicates.get()),
@@ -374,7 +384,7 @@ fn objects_are_merged_unless_split_and_keep_names_and_ids() {
     // 30 triangles of the third are the first of the second, but of another object.
     assert_eq!(names(&one), [(String::new(), 100)]);
     let expected = [("", 40), ("second", 60), ("", 30)].map(|(name, count)| (name.to_owned(), count));
-    assert_eq!((names(&split), report.objects), (expected.to_vec(), 3));
+    assert_eq!((names(&split), report.file.objects), (expected.to_vec(), 3));
     assert_eq!(stored(&split).iter().map(|&(id, _)| id).collect::<Vec<_>>(), (0..130).collect::<Vec<_>>());
     let empty = Mesh { objects: vec![input.objects[3].clone()] };
     assert!(to_bytes(&empty, &Options::default()).is_err());
@@ -385,7 +395,7 @@ fn every_page_holds_leaves_of_at_most_four_and_children_of_at_most_its_width() {
     for (options, bytes, report) in bake_all(&mesh(&soup(3000, 16))) {
         let layout = Layout::read(&bytes).unwrap();
         let (profile, pages) = (layout.objects[0].profile, layout.page_count());
-        assert_eq!((Some(profile), report.profile), (options.profile, profile));
+        assert_eq!((Some(profile), report.file.profile), (options.profile, profile));
         let mut children = 0;
         for number in 0..pages {
             let page = Page::new(layout.page_bytes(&bytes, number).unwrap(), profile);

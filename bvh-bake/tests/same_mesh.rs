@@ -131,11 +131,11 @@ fn every_format_gives_the_same_content() {
             let options = Options { profile, triangles: Some(encoding), ..Options::default() };
             let bake = |mesh| to_bytes(mesh, &options).unwrap();
             let (bytes, report) = bake(&meshes[0].1);
-            assert_eq!((report.triangles, report.duplicates, report.degenerate), (601, 1, 1));
+            assert_eq!((report.file.triangles, report.file.duplicates, report.file.degenerate), (601, 1, 1));
             for (name, mesh) in &meshes[1..] {
                 assert!(bake(mesh).0 == bytes, "{name}, {}", options.stamp());
             }
-            contents.push(report.content_xxh3);
+            contents.push(report.file.content_xxh3);
         }
     }
     contents.sort_unstable();

@@ -4,8 +4,7 @@ use crate::arguments::{BakeArguments, LayoutArguments};
 use crate::error::Failure;
 use crate::output::{self, hex};
 use crate::resident;
-use bvh_bake::{FileOptions, FileSummary, Options, Outcome, bake_files};
-use bvh_format::header::{MAJOR, MINOR};
+use bvh_bake::{FileOptions, Options, Outcome, bake_files};
 use bvh_format::leaf::TriangleEncoding;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -105,60 +104,23 @@ struct Report {
 
 impl Report {
     fn new(input: String, output: String, outcome: &Outcome, seconds: f64) -> Self {
-        let version = |(major, minor): (u16, u16)| format!("{major}.{minor}");
-        let peak_rss_bytes = resident::peak_bytes();
-        match outcome {
-            Outcome::Baked(baked) => Self {
-                input,
-                output,
-                format_version: version((MAJOR, MINOR)),
-                profile: baked.profile.name(),
-                triangle_encoding: baked.triangle_encoding.name(),
-                reason: baked.reason.clone(),
-                triangles_in: baked.triangles_in,
-                triangles: baked.triangles,
-                degenerate: baked.degenerate,
-                duplicates: baked.duplicates,
-                vertices: Some(baked.vertices),
-                objects: baked.objects,
-                file_bytes: baked.file_bytes,
-                node_bytes: baked.node_bytes,
-                triangle_bytes: baked.triangle_bytes,
-                id_bytes: baked.id_bytes,
-                bytes_per_tri: baked.bytes_per_tri(),
-                max_vertex_rounding: baked.max_vertex_rounding,
-                max_quantization_error: baked.max_quantization_error,
-                width_inflation: Some(baked.width_inflation),
-                volume_inflation: Some(baked.volume_inflation),
-                mean_children: Some(baked.mean_children),
-                bake_seconds: Some(baked.seconds),
-                seconds,
-                peak_rss_bytes,
-                content_xxh3: hex(baked.content_xxh3),
-                skipped: false,
-            },
-            Outcome::UpToDate(file) => Self {
-                format_version: version(file.version),
-                seconds,
-                peak_rss_bytes,
-                ..Self::of_file(input, output, file)
-            },
-        }
-    }
-
-    fn of_file(input: String, output: String, file: &FileSummary) -> Self {
+        let (file, baked) = match outcome {
+            Outcome::Baked(report) => (&report.file, Some(report)),
+            Outcome::UpToDate(file) => (file, None),
+        };
+        let (major, minor) = file.version;
         Self {
             input,
             output,
-            format_version: String::new(),
+            format_version: format!("{major}.{minor}"),
             profile: file.profile.name(),
             triangle_encoding: file.triangle_encoding.name(),
-            reason: "the output was up to date".into(),
+            reason: baked.map_or("the output was up to date".into(), |baked| baked.reason.clone()),
             triangles_in: file.triangles_in,
             triangles: file.triangles,
             degenerate: file.degenerate,
             duplicates: file.duplicates,
-            vertices: None,
+            vertices: baked.map(|baked| baked.vertices),
             objects: file.objects,
             file_bytes: file.file_bytes,
             node_bytes: file.node_bytes,
@@ -167,14 +129,14 @@ impl Report {
             bytes_per_tri: file.bytes_per_tri(),
             max_vertex_rounding: file.max_vertex_rounding,
             max_quantization_error: file.max_quantization_error,
-            width_inflation: None,
-            volume_inflation: None,
-            mean_children: None,
-            bake_seconds: None,
-            seconds: 0.0,
-            peak_rss_bytes: None,
+            width_inflation: baked.map(|baked| baked.width_inflation),
+            volume_inflation: baked.map(|baked| baked.volume_inflation),
+            mean_children: baked.map(|baked| baked.mean_children),
+            bake_seconds: baked.map(|baked| baked.seconds),
+            seconds,
+            peak_rss_bytes: resident::peak_bytes(),
             content_xxh3: hex(file.content_xxh3),
-            skipped: true,
+            skipped: baked.is_none(),
         }
     }
 

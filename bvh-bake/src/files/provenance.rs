@@ -1,7 +1,7 @@
 //! The provenance text of a file: where its mesh came from, and whether a bake would give it again.
 
-use super::summary::FileSummary;
 use crate::options::Options;
+use crate::summary::FileSummary;
 use bvh_format::Layout;
 use bvh_format::checksum::checksum;
 use bvh_format::header::{MAJOR, MINOR, SectionKind};

@@ -55,9 +55,9 @@ fn faithful_bakes_pass() {
     for (mesh, options) in bakes() {
         let (bytes, baked) = to_bytes(&mesh, &options).unwrap();
         let report = verify(&bytes, &mesh).unwrap_or_else(|e| panic!("{}: {e}", options.stamp()));
-        assert_eq!((report.triangles, report.duplicates), (baked.triangles, baked.duplicates));
+        assert_eq!((report.triangles, report.duplicates), (baked.file.triangles, baked.file.duplicates));
         assert_eq!(report.by_id, options.ids);
-        assert!(report.max_move <= baked.max_vertex_rounding + baked.max_quantization_error);
+        assert!(report.max_move <= baked.file.max_vertex_rounding + baked.file.max_quantization_error);
         assert!(options.split_objects || report.duplicates == 144);
     }
 }
@@ -78,7 +78,7 @@ fn a_moved_vertex_is_found() {
     for (mesh, options) in bakes() {
         let (bytes, baked) = to_bytes(&mesh, &options).unwrap();
         let mut other = mesh.clone();
-        let moved = 4.0 * (baked.max_vertex_rounding + baked.max_quantization_error) + 0.01;
+        let moved = 4.0 * (baked.file.max_vertex_rounding + baked.file.max_quantization_error) + 0.01;
         other.objects[0].positions[77][1] += moved;
         let error = verify(&bytes, &other).unwrap_err();
         assert!(matches!(error, VerifyError::Differs { .. }), "{}: {error}", options.stamp());

@@ -125,8 +125,8 @@ fn bake(triangles: &[Triangle], profile: Profile, encoding: TriangleEncoding) ->
     let mesh = Mesh::from_triangles(triangles.iter().flatten().copied().collect(), numbers);
     let options = Options { profile: Some(profile), triangles: Some(encoding), ..Options::default() };
     let (bytes, report) = to_bytes(&mesh, &options).map_err(|error| error.to_string())?;
-    if report.max_vertex_rounding > 0.0 {
-        return Err(format!("baking moved a vertex by {:e}", report.max_vertex_rounding));
+    if report.file.max_vertex_rounding > 0.0 {
+        return Err(format!("baking moved a vertex by {:e}", report.file.max_vertex_rounding));
     }
     Bvh::from_bytes(bytes).map_err(|error| error.to_string())
 }

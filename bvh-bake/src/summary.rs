@@ -1,11 +1,11 @@
-//! What a file says of itself, as a bake's report would say it.
+//! What a file says of itself.
 
 use bvh_format::Layout;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
-/// Counts and sizes of an existing file: the part of a [`crate::BakeReport`] that is stored.
+/// Counts and sizes of a file, from its header and object table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSummary {
     /// Major and minor version of the format.
