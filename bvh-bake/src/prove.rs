@@ -3,12 +3,11 @@
 //! Works on the finished bytes with the reference decoder, so that it trusts nothing of the baker.
 //! Part of every bake, in release builds too.
 
+use bvh_format::bounds::{Inflation, check_bounds};
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
-use bvh_format::validate::{
-    Inflation, check_bounds, validate_counts, validate_links, validate_page, validate_sections,
-};
+use bvh_format::validate::{validate_counts, validate_links, validate_page, validate_sections};
 use bvh_format::{FormatError, Layout, Rule};
 use rayon::prelude::*;
 

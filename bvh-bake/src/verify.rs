@@ -11,11 +11,12 @@ use crate::mesh::{InputError, Mesh, Object as MeshObject};
 use crate::prove::{prove_bounds, validate_in_parallel};
 use bvh_format::FormatError;
 use bvh_format::Layout;
+use bvh_format::bounds::Inflation;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::object::Object;
 use bvh_format::page::Page;
-use bvh_format::validate::{Inflation, packets};
+use bvh_format::validate::packets;
 
 /// What a successful verification found.
 #[derive(Debug, Clone, Copy, PartialEq)]

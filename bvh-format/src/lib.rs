@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bits;
+pub mod bounds;
 pub mod checksum;
 pub mod decode;
 mod error;

@@ -1,21 +1,14 @@
-//! Checks a whole file by the rules, page by page; and whether its bounds contain its triangles.
-//!
-//! `validate` looks at structure and checksums. `check_bounds` is the proof of the geometry: going through
-//! the pages from the last to the first it finds the tight k-DOP of every subtree from the stored
-//! triangles and compares it with what a query decodes.
+//! Checks the structure and the checksums of a whole file by the rules, page by page.
 
 use crate::checksum::checksum;
 use crate::checksum::hex;
-use crate::decode::decode_child;
 use crate::error::{FormatError, ensure, require};
 use crate::ids::decode_id;
-use crate::kdop::Kdop;
 use crate::layout::{ContentHasher, Layout};
 use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
-use crate::page::{Page, RootRef, check_crossing, check_page};
+use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
-use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, Links};
 
 /// Checks structure and checksums of the whole file.
@@ -24,7 +17,7 @@ use crate::treelet::{Child, Links};
 /// check pages in parallel.
 ///
 /// # Errors
-/// The first rule that does not hold; bounds (rule 35) are `check_bounds`' business.
+/// The first rule that does not hold; bounds (rule 35) are [`crate::bounds::check_bounds`]' business.
 pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
     let layout = validate_sections(bytes)?;
     for object in &layout.objects {
@@ -215,123 +208,4 @@ pub fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u16, usize)> + '
             _ => None,
         })
     })
-}
-
-/// The tight k-DOP of the triangles below every subtree root of a page, found from the stored
-/// triangles, after checking that every slab decoded in the page contains what is below it.
-///
-/// `below` gives the tight k-DOPs of roots in later pages. The page and its leaf block have been
-/// checked. Returns one k-DOP a root and the sums that inflation is reported from.
-///
-/// # Errors
-/// Rule 35 where a decoded slab cuts its triangles.
-pub fn check_bounds(
-    layout: &Layout,
-    bytes: &[u8],
-    object: &Object,
-    page: &Page,
-    below: impl Fn(RootRef) -> Kdop,
-) -> Result<(Vec<Kdop>, Inflation), FormatError> {
-    let header = page.header();
-    let slabs = object.profile.directions().slabs();
-    let at = layout.page_offset(header.page_number.get());
-    let block = layout.leaf_block(bytes, header);
-    let treelets = usize::from(header.treelets);
-    // Children have higher slots: tight bounds go up from the last slot, decoded ones down.
-    let mut tight = vec![Kdop::EMPTY; treelets];
-    let mut children = vec![[Kdop::EMPTY; 8]; treelets];
-    for slot in (0..treelets).rev() {
-        let links = Links::read(page.treelet(slot as u8));
-        for child in 0..links.children() {
-            let kdop = match links.child(child) {
-                Child::Treelet(slot) => tight[usize::from(slot)],
-                Child::Remote(link) => below(page.remote(link)),
-                Child::Leaf { packet, triangles } => {
-                    packet_kdop(object, block, usize::from(packet), usize::from(triangles))
-                }
-                Child::Empty => continue,
-            };
-            children[slot][child] = kdop;
-            tight[slot].join(&kdop, slabs);
-        }
-    }
-    let mut decoded = vec![NodeSlabs::default(); treelets];
-    let mut inflation = Inflation::default();
-    for root in 0..header.roots {
-        decoded[usize::from(root)] = page.anchor(root).slabs;
-    }
-    for slot in 0..treelets {
-        let held = decoded[slot].to_kdop(slabs);
-        ensure(held.contains(&tight[slot], slabs), Rule::BoundContains, at, || {
-            (format!("slot {slot} to contain {:?}", tight[slot]), format!("{held:?}"))
-        })?;
-        let links = Links::read(page.treelet(slot as u8));
-        for child in 0..links.children() {
-            let treelet = page.treelet(slot as u8);
-            let node = decode_child(object.profile, object.f16_scale, treelet, child, &decoded[slot]);
-            let (held, inner) = (node.to_kdop(slabs), &children[slot][child]);
-            ensure(held.contains(inner, slabs), Rule::BoundContains, at, || {
-                (format!("slot {slot}, child {child} to contain {inner:?}"), format!("{held:?}"))
-            })?;
-            inflation.add(&held, inner, slabs);
-            if let Child::Treelet(slot) = links.child(child) {
-                decoded[usize::from(slot)] = node;
-            }
-        }
-    }
-    tight.truncate(usize::from(header.roots));
-    Ok((tight, inflation))
-}
-
-/// The tight k-DOP of a packet's triangles.
-fn packet_kdop(object: &Object, block: &[u8], packet: usize, triangles: usize) -> Kdop {
-    let values = decode_packet(object.triangle_encoding, block, packet);
-    Kdop::of_points((0..triangles).flat_map(|lane| values.triangle(lane)))
-}
-
-/// How much wider decoded bounds are than tight ones.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Inflation {
-    /// Nodes counted.
-    pub nodes: u64,
-    /// Sum over nodes of the mean over slabs of decoded width / tight width.
-    pub width: f64,
-    /// Sum over nodes of the product over the box's sides of decoded width / tight width.
-    pub volume: f64,
-}
-
-impl Inflation {
-    fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize) {
-        let ratio = |slab: usize| {
-            let tight = f64::from(tight.hi[slab]) - f64::from(tight.lo[slab]);
-            let held = f64::from(held.hi[slab]) - f64::from(held.lo[slab]);
-            (tight > 0.0).then_some(held / tight)
-        };
-        let (sum, count) =
-            (0..slabs).filter_map(ratio).fold((0.0, 0), |(sum, n), ratio| (sum + ratio, n + 1));
-        // Flat in every direction (a point): no ratio is defined.
-        if count == 0 {
-            return;
-        }
-        self.nodes += 1;
-        self.width += sum / f64::from(count);
-        self.volume += (0..3).filter_map(ratio).product::<f64>();
-    }
-
-    /// Adds the sums of other nodes.
-    pub fn join(&mut self, other: &Self) {
-        self.nodes += other.nodes;
-        self.width += other.width;
-        self.volume += other.volume;
-    }
-
-    /// Mean width ratio, 1 without nodes.
-    pub fn mean_width(&self) -> f64 {
-        if self.nodes == 0 { 1.0 } else { self.width / self.nodes as f64 }
-    }
-
-    /// Mean volume ratio, 1 without nodes.
-    pub fn mean_volume(&self) -> f64 {
-        if self.nodes == 0 { 1.0 } else { self.volume / self.nodes as f64 }
-    }
 }

@@ -36,12 +36,18 @@ impl OpenError {
     }
 }
 
-/// A query that has no answer. Never from geometry: only a damaged file or a missing backend.
+/// A query that has no answer. Never from geometry: only a damaged file, a budget or a missing backend.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum QueryError {
     /// A page that the query touched breaks the format.
     #[error(transparent)]
     Damaged(#[from] FormatError),
+    /// The query needs more than [`crate::Querier::set_budget`] allows; nothing is known of its answer.
+    #[error("expected an answer within {visits} visits, found more to visit")]
+    Budget {
+        /// The budget.
+        visits: u64,
+    },
     /// The backend asked for cannot be had.
     #[error(transparent)]
     Backend(#[from] BackendError),

@@ -135,6 +135,41 @@ fn a_walk_of_all_pairs_ends_in_bounded_memory() {
     }
 }
 
+/// The same files under a budget: an error as soon as it is spent, the answer where it suffices.
+#[test]
+fn a_budget_ends_any_query() {
+    let files = [1, 2].map(|seed| blown_up(1500, seed, Profile::Dop14U8));
+    let [a, b] = files.map(|file| Bvh::from_bytes(file).unwrap());
+    let ((treelets_a, packets_a), (treelets_b, packets_b)) = (sizes(&a), sizes(&b));
+    let pose = translation(100.0, 0.0, 0.0);
+    let mut querier = Querier::new().unwrap();
+    type Ask<'a> = &'a dyn Fn(&mut Querier) -> Result<f64, QueryError>;
+    let asks: [Ask; 4] = [
+        &|querier| querier.distance(&a, &b, &pose).map(|distance| distance.distance),
+        &|querier| querier.collide(&a, &b, &pose).map(f64::from),
+        &|querier| querier.contacts(&a, &b, &pose).map(|contacts| contacts.len() as f64),
+        &|querier| querier.within(&a, &b, &pose, 50.0).map(f64::from),
+    ];
+    for ask in asks {
+        let free = ask(&mut querier);
+        assert!(free.is_ok());
+        for budget in [0, 1, 1000] {
+            querier.set_budget(budget);
+            assert_eq!(ask(&mut querier), Err(QueryError::Budget { visits: budget }));
+        }
+        // Every pair of nodes, the first dive twice, and the pair of objects.
+        querier.set_budget((treelets_a + packets_a) * (treelets_b + packets_b) + 100);
+        assert_eq!(ask(&mut querier), free);
+        querier.set_budget(u64::MAX);
+    }
+    // Pairs of objects that their spheres set apart cost a visit each.
+    let far = translation(1e6, 0.0, 0.0);
+    querier.set_budget(1);
+    assert_eq!(querier.collide(&a, &b, &far), Ok(false));
+    querier.set_budget(0);
+    assert_eq!(querier.collide(&a, &b, &far), Err(QueryError::Budget { visits: 0 }));
+}
+
 /// Triangles that all have the id to which all duplicates belong: each contact would be that of thousands.
 #[test]
 fn contacts_without_number_are_refused() {

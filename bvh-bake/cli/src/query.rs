@@ -122,6 +122,7 @@ impl<'a> Sides<'a> {
     fn blame(&self, error: QueryError) -> Failure {
         match error {
             QueryError::Backend(error) => error.into(),
+            QueryError::Budget { .. } => Failure::Limit(error.to_string()),
             QueryError::Damaged(breach) => {
                 // The error does not say which file; the one that is not valid is it.
                 let damaged = |bvh: &Bvh| bvh_format::validate::validate(bvh.bytes()).is_err();

@@ -1,5 +1,6 @@
 //! Decodes all of a file, page by page, whether or not the whole of it is valid.
 
+use bvh_format::bounds::check_bounds;
 use bvh_format::Layout;
 use bvh_format::decode::decode_child;
 use bvh_format::ids::decode_id;
@@ -7,7 +8,7 @@ use bvh_format::kdop::Kdop;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::{Page, check_crossing, check_page};
 use bvh_format::treelet::Links;
-use bvh_format::validate::{check_bounds, packets, validate};
+use bvh_format::validate::{packets, validate};
 
 pub fn decode(bytes: &[u8]) {
     let valid = validate(bytes).is_ok();

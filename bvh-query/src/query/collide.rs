@@ -26,7 +26,7 @@ impl Querier {
         b: impl Into<Shape<'a>>,
         pose: &Pose,
     ) -> Result<bool, QueryError> {
-        self.stats = QueryStats::default();
+        self.start();
         let found = each_pair(a.into(), b.into(), pose, |scene| {
             Ok(self.find_contact(&scene, Order::Nearest)?.map(|_| ()))
         });
@@ -39,6 +39,7 @@ impl Querier {
         scene: &Scene<'_>,
         order: Order,
     ) -> Result<Option<Candidate>, QueryError> {
+        self.stack.visit()?;
         if sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b) > 0.0 {
             return Ok(None);
         }

@@ -49,7 +49,7 @@ impl Querier {
         pose: &Pose,
         mut visit: impl FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<u64, QueryError> {
-        self.stats = QueryStats::default();
+        self.start();
         let (a, b) = (a.into(), b.into());
         let most = most_triangles(a).saturating_mul(most_triangles(b));
         let (mut calls, mut too_many) = (0, false);
@@ -72,6 +72,7 @@ impl Querier {
         scene: &Scene<'_>,
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<Option<Candidate>, QueryError> {
+        self.stack.visit()?;
         if sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b) > 0.0 {
             return Ok(None);
         }

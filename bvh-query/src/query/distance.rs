@@ -134,7 +134,7 @@ impl Querier {
     ) -> Result<bool, QueryError> {
         let (a, b) = (a.into(), b.into());
         if d.is_nan() || d < 0.0 || d == f64::INFINITY {
-            self.stats = QueryStats::default();
+            self.start();
             return Ok(d > 0.0);
         }
         if d == 0.0 {
@@ -152,8 +152,9 @@ impl Querier {
         pose: &Pose,
         search: &mut Search,
     ) -> Result<(), QueryError> {
-        self.stats = QueryStats::default();
+        self.start();
         each_pair(a, b, pose, |scene| {
+            self.stack.visit()?;
             let gap = sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b);
             if gap > f64::from(search.limit) {
                 return Ok(None);

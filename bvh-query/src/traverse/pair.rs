@@ -96,6 +96,9 @@ pub(crate) struct Stack {
     entries: Vec<Entry>,
     /// Best-first: the least is next.
     heap: BinaryHeap<Reverse<Entry>>,
+    /// How many visits the query may make, and how many are left.
+    budget: u64,
+    left: u64,
 }
 
 /// A pair of nodes to visit. Sorts by bound.
@@ -183,6 +186,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
             }
             continue;
         }
+        stack.visit()?;
         if let Some((a, b)) = stack.leaf_pair(next) {
             if visitor.leaves(isa, a, b)?.is_break() {
                 return Ok(tests);
@@ -230,6 +234,18 @@ struct Sides {
 }
 
 impl Stack {
+    /// Before a query that may visit so many pairs.
+    pub(crate) fn start(&mut self, budget: u64) {
+        (self.budget, self.left) = (budget, budget);
+    }
+
+    /// Counts a visit.
+    #[inline(always)]
+    pub(crate) fn visit(&mut self) -> Result<(), QueryError> {
+        self.left = self.left.checked_sub(1).ok_or(QueryError::Budget { visits: self.budget })?;
+        Ok(())
+    }
+
     /// Both leaf packets, if the entry is a pair of them.
     #[inline(always)]
     fn leaf_pair(&self, entry: Entry) -> Option<(Leaf, Leaf)> {

@@ -4,12 +4,10 @@
 //! the tight bounds of what is below each subtree root.
 
 use super::checked;
-use bvh_format::decode::decode_child;
+use bvh_format::bounds::{Inflation, visit_bounds};
 use bvh_format::kdop::Kdop;
-use bvh_format::leaf::decode_packet;
 use bvh_format::object::Object;
-use bvh_format::page::Page;
-use bvh_format::slabs::NodeSlabs;
+use bvh_format::page::{Page, RootRef};
 use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
 use bvh_query::Bvh;
@@ -21,20 +19,19 @@ pub(super) struct Level {
     children: u64,
     pub(super) packets: u64,
     triangles: u64,
-    /// Children that are not flat in every direction, and the sum of their mean width ratios.
-    measured: u64,
-    width: f64,
+    inflation: Inflation,
 }
 
 impl Level {
     pub(super) fn joined(self, other: &Self) -> Self {
+        let mut inflation = self.inflation;
+        inflation.join(&other.inflation);
         Self {
             treelets: self.treelets + other.treelets,
             children: self.children + other.children,
             packets: self.packets + other.packets,
             triangles: self.triangles + other.triangles,
-            measured: self.measured + other.measured,
-            width: self.width + other.width,
+            inflation,
         }
     }
 
@@ -48,7 +45,7 @@ impl Level {
 
     /// Decoded width by tight width; 1 where there is nothing to measure.
     pub(super) fn mean_width(&self) -> f64 {
-        if self.measured == 0 { 1.0 } else { self.width / self.measured as f64 }
+        self.inflation.mean_width()
     }
 }
 
@@ -95,15 +92,22 @@ impl Statistics {
                 }
             }
         }
+        let slabs = object.profile.directions().slabs();
         let mut below: Vec<Vec<Kdop>> = vec![Vec::new(); (end - first) as usize];
         for number in (first..end).rev() {
             let page = checked(bvh, object, number)?;
             let levels = slot_levels(&page, &root_levels[(number - first) as usize]);
-            let tight = statistics.measure(bvh, object, &page, &levels, |link| {
-                let to = page.remote(link);
+            let known = |to: RootRef| {
                 let roots = below.get((to.page() - first) as usize);
                 roots.and_then(|roots| roots.get(usize::from(to.root()))).copied().unwrap_or(Kdop::EMPTY)
-            });
+            };
+            let tight = visit_bounds(bvh.layout(), bvh.bytes(), object, &page, known, |bound| {
+                if bound.child.is_some() {
+                    let level = statistics.level(levels[usize::from(bound.slot)]);
+                    level.inflation.add(&bound.decoded, &bound.tight, slabs);
+                }
+                Ok(())
+            })?;
             below[(number - first) as usize] = tight;
         }
         if statistics.levels.is_empty() {
@@ -131,60 +135,6 @@ impl Statistics {
             }
         }
     }
-
-    /// Compares decoded with tight slabs in a page; returns the tight ones of its roots.
-    fn measure(
-        &mut self,
-        bvh: &Bvh,
-        object: &Object,
-        page: &Page,
-        levels: &[usize],
-        below: impl Fn(u8) -> Kdop,
-    ) -> Vec<Kdop> {
-        let header = page.header();
-        let slabs = object.profile.directions().slabs();
-        let block = bvh.layout().leaf_block(bvh.bytes(), header);
-        let treelets = usize::from(header.treelets);
-        let mut tight = vec![Kdop::EMPTY; treelets];
-        let mut children = vec![[Kdop::EMPTY; 8]; treelets];
-        for slot in (0..treelets).rev() {
-            let links = Links::read(page.treelet(slot as u8));
-            for child in 0..links.children() {
-                let kdop = match links.child(child) {
-                    Child::Treelet(slot) => tight[usize::from(slot)],
-                    Child::Remote(link) => below(link),
-                    Child::Leaf { packet, triangles } => {
-                        let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
-                        Kdop::of_points((0..usize::from(triangles)).flat_map(|lane| values.triangle(lane)))
-                    }
-                    Child::Empty => continue,
-                };
-                children[slot][child] = kdop;
-                tight[slot].join(&kdop, slabs);
-            }
-        }
-        let mut decoded = vec![NodeSlabs::default(); treelets];
-        for root in 0..header.roots {
-            decoded[usize::from(root)] = page.anchor_slabs(root);
-        }
-        for slot in 0..treelets {
-            let treelet = page.treelet(slot as u8);
-            let links = Links::read(treelet);
-            for child in 0..links.children() {
-                let node = decode_child(object.profile, object.f16_scale, treelet, child, &decoded[slot]);
-                if let Child::Treelet(slot) = links.child(child) {
-                    decoded[usize::from(slot)] = node;
-                }
-                if let Some(ratio) = width_ratio(&node.to_kdop(slabs), &children[slot][child], slabs) {
-                    let level = self.level(levels[slot]);
-                    level.measured += 1;
-                    level.width += ratio;
-                }
-            }
-        }
-        tight.truncate(usize::from(header.roots));
-        tight
-    }
 }
 
 /// The level of each slot of a page from those of its roots.
@@ -203,12 +153,4 @@ fn slot_levels(page: &Page, roots: &[usize]) -> Vec<usize> {
         }
     }
     levels
-}
-
-/// Mean over slabs of decoded by tight width, where the tight one is not 0.
-fn width_ratio(decoded: &Kdop, tight: &Kdop, slabs: usize) -> Option<f64> {
-    let width = |kdop: &Kdop, slab: usize| f64::from(kdop.hi[slab]) - f64::from(kdop.lo[slab]);
-    let ratios = (0..slabs).filter(|&slab| width(tight, slab) > 0.0);
-    let ratios: Vec<f64> = ratios.map(|slab| width(decoded, slab) / width(tight, slab)).collect();
-    if ratios.is_empty() { None } else { Some(ratios.iter().sum::<f64>() / ratios.len() as f64) }
 }

@@ -1,0 +1,163 @@
+//! Decoded bounds beside tight ones: the proof that every slab contains its triangles, and how loose it is.
+//!
+//! Going through an object's pages from the last to the first, the tight k-DOP of every subtree is found from
+//! the stored triangles and compared with what a query decodes.
+
+use crate::decode::decode_child;
+use crate::error::{FormatError, ensure};
+use crate::kdop::Kdop;
+use crate::layout::Layout;
+use crate::leaf::decode_packet;
+use crate::object::Object;
+use crate::page::{Page, RootRef};
+use crate::rule::Rule;
+use crate::slabs::NodeSlabs;
+use crate::treelet::{Child, Links};
+
+/// A child of a treelet, or a subtree root of a page, with its two bounds.
+pub struct Bound {
+    /// The treelet's slot.
+    pub slot: u8,
+    /// The child's place in the treelet; of a subtree root none.
+    pub child: Option<usize>,
+    /// What a query decodes.
+    pub decoded: Kdop,
+    /// What the triangles below need.
+    pub tight: Kdop,
+}
+
+/// Visits all subtree roots and children of a page; returns the tight k-DOPs of its roots.
+///
+/// `below` gives the tight k-DOPs of roots in later pages. The page and its leaf block have been checked.
+///
+/// # Errors
+/// The first error of `visit`.
+pub fn visit_bounds(
+    layout: &Layout,
+    bytes: &[u8],
+    object: &Object,
+    page: &Page,
+    below: impl Fn(RootRef) -> Kdop,
+    mut visit: impl FnMut(Bound) -> Result<(), FormatError>,
+) -> Result<Vec<Kdop>, FormatError> {
+    let header = page.header();
+    let slabs = object.profile.directions().slabs();
+    let block = layout.leaf_block(bytes, header);
+    let treelets = usize::from(header.treelets);
+    // Children have higher slots: tight bounds go up from the last slot, decoded ones down.
+    let mut tight = vec![Kdop::EMPTY; treelets];
+    let mut children = vec![[Kdop::EMPTY; 8]; treelets];
+    for slot in (0..treelets).rev() {
+        let links = Links::read(page.treelet(slot as u8));
+        for child in 0..links.children() {
+            let kdop = match links.child(child) {
+                Child::Treelet(slot) => tight[usize::from(slot)],
+                Child::Remote(link) => below(page.remote(link)),
+                Child::Leaf { packet, triangles } => {
+                    let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                    Kdop::of_points((0..usize::from(triangles)).flat_map(|lane| values.triangle(lane)))
+                }
+                Child::Empty => continue,
+            };
+            children[slot][child] = kdop;
+            tight[slot].join(&kdop, slabs);
+        }
+    }
+    let mut decoded = vec![NodeSlabs::default(); treelets];
+    for root in 0..header.roots {
+        let slot = usize::from(root);
+        decoded[slot] = page.anchor_slabs(root);
+        visit(Bound { slot: root, child: None, decoded: decoded[slot].to_kdop(slabs), tight: tight[slot] })?;
+    }
+    for slot in 0..treelets {
+        let treelet = page.treelet(slot as u8);
+        let links = Links::read(treelet);
+        for child in 0..links.children() {
+            let node = decode_child(object.profile, object.f16_scale, treelet, child, &decoded[slot]);
+            let (held, tight) = (node.to_kdop(slabs), children[slot][child]);
+            visit(Bound { slot: slot as u8, child: Some(child), decoded: held, tight })?;
+            if let Child::Treelet(slot) = links.child(child) {
+                decoded[usize::from(slot)] = node;
+            }
+        }
+    }
+    tight.truncate(usize::from(header.roots));
+    Ok(tight)
+}
+
+/// Checks that every slab decoded in a page contains what is below it. Returns the tight k-DOPs of the
+/// page's subtree roots and how loose the children's slabs are; otherwise as [`visit_bounds`].
+///
+/// # Errors
+/// Rule 35 where a decoded slab cuts its triangles.
+pub fn check_bounds(
+    layout: &Layout,
+    bytes: &[u8],
+    object: &Object,
+    page: &Page,
+    below: impl Fn(RootRef) -> Kdop,
+) -> Result<(Vec<Kdop>, Inflation), FormatError> {
+    let slabs = object.profile.directions().slabs();
+    let at = layout.page_offset(page.header().page_number.get());
+    let mut inflation = Inflation::default();
+    let tight = visit_bounds(layout, bytes, object, page, below, |bound| {
+        let Bound { slot, child, decoded, tight } = bound;
+        ensure(decoded.contains(&tight, slabs), Rule::BoundContains, at, || {
+            let place =
+                child.map_or_else(|| format!("slot {slot}"), |child| format!("slot {slot}, child {child}"));
+            (format!("{place} to contain {tight:?}"), format!("{decoded:?}"))
+        })?;
+        if child.is_some() {
+            inflation.add(&decoded, &tight, slabs);
+        }
+        Ok(())
+    })?;
+    Ok((tight, inflation))
+}
+
+/// How much wider decoded bounds are than tight ones.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inflation {
+    /// Nodes counted.
+    pub nodes: u64,
+    /// Sum over nodes of the mean over slabs of decoded width / tight width.
+    pub width: f64,
+    /// Sum over nodes of the product over the box's sides of decoded width / tight width.
+    pub volume: f64,
+}
+
+impl Inflation {
+    /// Adds a node; one that is flat in every direction (a point) has no ratio and is not counted.
+    pub fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize) {
+        let ratio = |slab: usize| {
+            let tight = f64::from(tight.hi[slab]) - f64::from(tight.lo[slab]);
+            let held = f64::from(held.hi[slab]) - f64::from(held.lo[slab]);
+            (tight > 0.0).then_some(held / tight)
+        };
+        let (sum, count) =
+            (0..slabs).filter_map(ratio).fold((0.0, 0), |(sum, n), ratio| (sum + ratio, n + 1));
+        if count == 0 {
+            return;
+        }
+        self.nodes += 1;
+        self.width += sum / f64::from(count);
+        self.volume += (0..3).filter_map(ratio).product::<f64>();
+    }
+
+    /// Adds the sums of other nodes.
+    pub fn join(&mut self, other: &Self) {
+        self.nodes += other.nodes;
+        self.width += other.width;
+        self.volume += other.volume;
+    }
+
+    /// Mean width ratio, 1 without nodes.
+    pub fn mean_width(&self) -> f64 {
+        if self.nodes == 0 { 1.0 } else { self.width / self.nodes as f64 }
+    }
+
+    /// Mean volume ratio, 1 without nodes.
+    pub fn mean_volume(&self) -> f64 {
+        if self.nodes == 0 { 1.0 } else { self.volume / self.nodes as f64 }
+    }
+}
