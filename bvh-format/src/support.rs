@@ -20,6 +20,13 @@ pub struct Form {
 }
 
 impl Form {
+    /// From a word of rows.
+    #[inline(always)]
+    pub fn new(rows: u32, coefficients: [f32; 3]) -> Self {
+        let [x, y, z, _] = rows.to_le_bytes();
+        Self { rows: [x, y, z], coefficients }
+    }
+
     /// The form of the lower end along the same direction: the other end of each slab.
     #[inline(always)]
     pub fn mirrored(self) -> Self {
@@ -32,44 +39,96 @@ impl Form {
 const ORDERS: [[u8; 3]; 8] =
     [[0, 1, 2], [1, 0, 2], [0, 2, 1], [0, 1, 2], [0, 1, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// Slab and sense of the cube diagonal with these signs; bit i is set where coordinate i is negative.
-const CUBE_DIAGONALS: [(u8, f64); 8] =
-    [(3, 1.0), (6, 1.0), (5, 1.0), (4, -1.0), (4, 1.0), (5, -1.0), (6, -1.0), (3, -1.0)];
+/// Slab of the cube diagonal with these signs, and whether it points the other way; bit i is set where
+/// coordinate i is negative.
+const CUBE_DIAGONALS: [(u8, bool); 8] =
+    [(3, false), (6, false), (5, false), (4, true), (4, false), (5, true), (6, true), (3, true)];
+
+/// Which cone around the directions of a set `d` is in: bits 0 to 2 tell the order of the magnitudes of its
+/// coordinates, as in `ORDERS`, bits 3 to 5 their signs, set where negative. Signs are taken as bits, of
+/// differences too, so that many directions go through vector registers.
+#[inline(always)]
+pub fn cone([x, y, z]: [f64; 3]) -> u64 {
+    let negative = |value: f64| value.to_bits() >> 63;
+    let less = |a: f64, b: f64| negative(a.abs() - b.abs());
+    let order = less(x, y) | less(y, z) << 1 | less(x, z) << 2;
+    order | negative(x) << 3 | negative(y) << 4 | negative(z) << 5
+}
+
+/// The rows of the three ends that make up the upper end along the directions of a cone. Coefficients are
+/// negative for lower ends, which have rows below 16. In one word, a row a byte, the first lowest.
+#[inline(always)]
+pub fn rows_of_cone(cone: u64, set: DirectionSet) -> u32 {
+    let rows = match set {
+        DirectionSet::Dop6 => const { &rows_by_cone(DirectionSet::Dop6) },
+        DirectionSet::Dop14 => const { &rows_by_cone(DirectionSet::Dop14) },
+        DirectionSet::Dop26 => const { &rows_by_cone(DirectionSet::Dop26) },
+    };
+    rows[(cone & 63) as usize]
+}
+
+/// The magnitudes of the three coefficients along `d`.
+#[inline(always)]
+pub fn magnitudes(d: [f64; 3], set: DirectionSet) -> [f64; 3] {
+    let [x, y, z] = [d[0].abs(), d[1].abs(), d[2].abs()];
+    let (less, more) = if x < y { (x, y) } else { (y, x) };
+    let largest = if more < z { z } else { more };
+    let rest = if more < z { more } else { z };
+    let (middle, least) = if less < rest { (rest, less) } else { (less, rest) };
+    match set {
+        DirectionSet::Dop6 => [largest, middle, least],
+        DirectionSet::Dop14 => [largest - middle, (middle + least) / 2.0, (middle - least) / 2.0],
+        DirectionSet::Dop26 => [largest - middle, middle - least, least],
+    }
+}
+
+/// The coefficient of this magnitude for end `j` of a word of rows: negative for lower ends.
+#[inline(always)]
+pub fn signed(magnitude: f32, rows: u32, j: usize) -> f32 {
+    f32::from_bits(magnitude.to_bits() ^ (!(rows >> (8 * j)) & 16) << 27)
+}
 
 /// The form of the upper end along `d` over the directions of a set.
 #[inline(always)]
 pub fn upper_form(d: [f64; 3], set: DirectionSet) -> Form {
-    let m = [d[0].abs(), d[1].abs(), d[2].abs()];
-    let order = usize::from(m[0] < m[1]) | usize::from(m[1] < m[2]) << 1 | usize::from(m[0] < m[2]) << 2;
-    let [p0, p1, p2] = ORDERS[order];
-    let (m0, m1, m2) = (m[usize::from(p0)], m[usize::from(p1)], m[usize::from(p2)]);
-    let negative = u8::from(d[0] < 0.0) | u8::from(d[1] < 0.0) << 1 | u8::from(d[2] < 0.0) << 2;
-    let sense = |axis: u8| 1.0 - 2.0 * f64::from(negative >> axis & 1);
-    let terms = match set {
-        DirectionSet::Dop6 => [(p0, sense(p0) * m0), (p1, sense(p1) * m1), (p2, sense(p2) * m2)],
-        DirectionSet::Dop14 => {
-            let (near, near_sense) = CUBE_DIAGONALS[usize::from(negative & 7)];
-            let (far, far_sense) = CUBE_DIAGONALS[usize::from((negative ^ 1 << p2) & 7)];
-            [
-                (p0, sense(p0) * (m0 - m1)),
-                (near, near_sense * (m1 + m2) / 2.0),
-                (far, far_sense * (m1 - m2) / 2.0),
-            ]
+    let (rows, magnitudes) = (rows_of_cone(cone(d), set), magnitudes(d, set));
+    Form::new(rows, [0, 1, 2].map(|j| signed(magnitudes[j] as f32, rows, j)))
+}
+
+/// The rows of all cones.
+const fn rows_by_cone(set: DirectionSet) -> [u32; 64] {
+    let mut rows = [0; 64];
+    let mut cone = 0;
+    while cone < 64 {
+        let [p0, p1, p2] = ORDERS[cone & 7];
+        let negative = (cone >> 3) as u8;
+        let (near, far) = (negative as usize, (negative ^ 1 << p2) as usize);
+        let terms = match set {
+            DirectionSet::Dop6 => {
+                [(p0, is_set(negative, p0)), (p1, is_set(negative, p1)), (p2, is_set(negative, p2))]
+            }
+            DirectionSet::Dop14 => [(p0, is_set(negative, p0)), CUBE_DIAGONALS[near], CUBE_DIAGONALS[far]],
+            DirectionSet::Dop26 => {
+                // The face diagonal in the plane of the two larger coordinates; it starts with +1.
+                let differ = is_set(negative, p0) != is_set(negative, p1);
+                let face = 9 - p2 + if differ { 3 } else { 0 };
+                let first = if p0 < p1 { p0 } else { p1 };
+                [(p0, is_set(negative, p0)), (face, is_set(negative, first)), CUBE_DIAGONALS[near]]
+            }
+        };
+        let mut j = 0;
+        while j < 3 {
+            let (slab, against) = terms[j];
+            rows[cone] |= (row(slab as usize) as u32 + if against { 0 } else { 16 }) << (8 * j);
+            j += 1;
         }
-        DirectionSet::Dop26 => {
-            let (cube, cube_sense) = CUBE_DIAGONALS[usize::from(negative & 7)];
-            // The face diagonal in the plane of the two larger coordinates; it starts with +1.
-            let differ = (negative >> p0 ^ negative >> p1) & 1;
-            let face = 9 - p2 + 3 * differ;
-            [(p0, sense(p0) * (m0 - m1)), (face, sense(p0.min(p1)) * (m1 - m2)), (cube, cube_sense * m2)]
-        }
-    };
-    let mut form = Form::default();
-    for (j, (slab, coefficient)) in terms.into_iter().enumerate() {
-        form.rows[j] = row(usize::from(slab)) as u8 + if coefficient < 0.0 { 0 } else { 16 };
-        form.coefficients[j] = coefficient as f32;
+        cone += 1;
     }
-    form
+    rows
+}
+
+const fn is_set(bits: u8, bit: u8) -> bool {
+    bits >> bit & 1 == 1
 }
 
 #[cfg(test)]
@@ -147,7 +206,7 @@ mod tests {
                     let slab = (0..set.slabs()).find(|&s| row(s) == held).expect("a slab of the set");
                     let coefficient = f64::from(form.coefficients[j]);
                     // A positive coefficient takes the upper end, a negative one the lower.
-                    assert_eq!(form.rows[j] >= 16, coefficient >= 0.0);
+                    assert_eq!(form.rows[j] >= 16, coefficient.is_sign_positive());
                     for i in 0..3 {
                         sum[i] += coefficient * f64::from(DIRECTIONS[slab][i]);
                     }

@@ -55,6 +55,10 @@ impl Queue {
         self.len = 0;
     }
 
+    pub(crate) fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     pub(crate) fn is_full(&self) -> bool {
         self.len == 16
     }

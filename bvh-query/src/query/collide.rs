@@ -28,7 +28,7 @@ impl Querier {
     ) -> Result<bool, QueryError> {
         self.start();
         let found = each_pair(a.into(), b.into(), pose, |scene| {
-            Ok(self.find_contact(&scene, Order::Nearest)?.map(|_| ()))
+            Ok(self.find_contact(scene, Order::Nearest)?.map(|_| ()))
         });
         Ok(found?.is_some())
     }
@@ -83,6 +83,9 @@ pub(super) struct Contacts<'a, F> {
 impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts<'_, F> {
     #[inline(always)]
     fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
+        if self.queue.is_empty() {
+            return Ok(ControlFlow::Continue(()));
+        }
         for candidate in self.queue.drain(isa) {
             if self.decide(candidate)?.is_break() {
                 return Ok(ControlFlow::Break(()));
@@ -124,7 +127,7 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
         let pair = &self.scene.pair;
         let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
         let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
-        let local = Local::new(isa, &self.scene.frame, &packet_a, &packet_b);
+        let local = Local::new(isa, self.scene.frame(), &packet_a, &packet_b);
         let mut mask = face_planes(isa, &local, a, b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;

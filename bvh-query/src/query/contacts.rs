@@ -54,7 +54,7 @@ impl Querier {
         let most = most_triangles(a).saturating_mul(most_triangles(b));
         let (mut calls, mut too_many) = (0, false);
         each_pair(a, b, pose, |scene| {
-            let found = self.contacts_of(&scene, &mut |contact| {
+            let found = self.contacts_of(scene, &mut |contact| {
                 too_many = calls == most;
                 if too_many {
                     return ControlFlow::Break(());

@@ -161,7 +161,7 @@ impl Querier {
             }
             self.candidates.clear();
             let mut visitor = Nearest {
-                scene: &scene,
+                scene,
                 search,
                 candidates: &mut self.candidates,
                 direction: None,
@@ -186,12 +186,12 @@ impl Querier {
         best: Best,
     ) -> Result<Distance, QueryError> {
         let first = each_pair(a, b, pose, |scene| {
-            let Some(pair) = self.find_contact(&scene, Order::Tree)? else { return Ok(None) };
+            let Some(pair) = self.find_contact(scene, Order::Tree)? else { return Ok(None) };
             let closest = triangle_distance(
                 &scene.triangle_a(pair.a, pair.lane_a)?,
                 &scene.triangle_b(pair.b, pair.lane_b)?,
             );
-            let ids = ids(&scene, &pair)?;
+            let ids = ids(scene, &pair)?;
             Ok(Some(Best { closest, numbers: scene.numbers, ids }))
         })?;
         Ok(first.unwrap_or(best).distance(0.0))
@@ -363,9 +363,9 @@ impl Visitor for Nearest<'_> {
         let pair = &self.scene.pair;
         let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
         let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
-        let local = Local::new(isa, &self.scene.frame, &packet_a, &packet_b);
+        let local = Local::new(isa, self.scene.frame(), &packet_a, &packet_b);
         let mut mask = leaf::local::valid_lanes(a.triangles, b.triangles);
-        let scale = self.scene.frame.scale;
+        let scale = self.scene.frame().scale;
         if let Some(direction) = self.direction {
             mask &= leaf::distance::near_along(isa, &local, direction, self.search.limit * scale);
             if mask == 0 {

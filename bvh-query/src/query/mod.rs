@@ -15,6 +15,7 @@ use crate::traverse::align::Placement;
 use crate::traverse::pair::{Pair, Stack, Visitor, traverse};
 use bvh_format::object::Object;
 pub use distance::{Distance, DistanceOptions};
+use std::cell::OnceCell;
 
 /// Asks questions. Holds the backend and the memory that queries work in, so that a query allocates
 /// nothing once the memory has grown to what the meshes need. Use one a thread.
@@ -115,13 +116,22 @@ pub struct Contact {
 }
 
 /// Two objects in place, with all that the leaf tests need.
-#[derive(Clone, Copy)]
 pub(crate) struct Scene<'a> {
     pub(crate) pair: Pair<'a>,
     pub(crate) pose: &'a Pose,
-    pub(crate) frame: LocalFrame,
+    /// Made when the first leaf is visited: most queries of meshes apart never do.
+    frame: OnceCell<LocalFrame>,
     /// Numbers of the objects in their files.
     pub(crate) numbers: (u32, u32),
+}
+
+impl Scene<'_> {
+    /// What all packet pairs share.
+    #[inline(always)]
+    pub(crate) fn frame(&self) -> &LocalFrame {
+        let Pair { object_a, object_b, placement, .. } = self.pair;
+        self.frame.get_or_init(|| LocalFrame::new(placement, object_a, object_b))
+    }
 }
 
 /// Calls `visit` for each pair of objects of the two sides, in the order of the files.
@@ -129,7 +139,7 @@ fn each_pair<R>(
     a: Shape<'_>,
     b: Shape<'_>,
     pose: &Pose,
-    mut visit: impl FnMut(Scene<'_>) -> Result<Option<R>, QueryError>,
+    mut visit: impl FnMut(&Scene<'_>) -> Result<Option<R>, QueryError>,
 ) -> Result<Option<R>, QueryError> {
     for (index_a, object_a) in a.objects().iter().enumerate() {
         for (index_b, object_b) in b.objects().iter().enumerate() {
@@ -137,10 +147,10 @@ fn each_pair<R>(
             let scene = Scene {
                 pair: Pair { bvh_a: a.bvh(), object_a, bvh_b: b.bvh(), object_b, placement: &placement },
                 pose,
-                frame: LocalFrame::new(&placement, object_a, object_b),
+                frame: OnceCell::new(),
                 numbers: ((a.first() + index_a) as u32, (b.first() + index_b) as u32),
             };
-            if let Some(result) = visit(scene)? {
+            if let Some(result) = visit(&scene)? {
                 return Ok(Some(result));
             }
         }

@@ -5,8 +5,7 @@ use crate::traverse::align::{Alignment, Placement, form_error};
 use crate::traverse::opened::Aligned;
 use crate::traverse::pair::{Measure, Pair};
 use bvh_format::kdop::DirectionSet;
-use bvh_format::slabs::Group;
-use bvh_format::slabs::row;
+use bvh_format::slabs::{Group, NodeSlabs, row};
 use bvh_format::support::{Form, upper_form};
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
@@ -16,14 +15,20 @@ const INVERSE_LENGTHS: [f32; 13] = {
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
 };
 
-/// A bound on the slab ends of all nodes: that of the root's.
-fn reach(root: &Group, set: DirectionSet) -> f32 {
-    let rows = root.rows();
-    let mut reach = 0.0f32;
-    for slab in 0..set.slabs() {
-        reach = reach.max(rows[row(slab)][0].abs()).max(rows[16 + row(slab)][0].abs());
+/// A bound on the slab ends of all nodes: that of the root's. Rows of no slab are zero.
+#[inline(always)]
+fn reach(root: &NodeSlabs) -> f32 {
+    let mut reach = [0.0f32; 16];
+    for row in 0..16 {
+        let (lo, hi) = (root.lo[row].abs(), root.hi[row].abs());
+        reach[row] = if lo < hi { hi } else { lo };
     }
-    reach
+    for half in [8, 4, 2, 1] {
+        for row in 0..half {
+            reach[row] = if reach[row] < reach[row + half] { reach[row + half] } else { reach[row] };
+        }
+    }
+    reach[0]
 }
 
 /// A direction in A's frame as one more pair of slab ends to compare.
@@ -39,7 +44,10 @@ pub(crate) struct Witness {
 
 /// The test of 16 pairs of nodes, for one pose.
 pub(crate) struct NodeTest {
+    /// B along A's directions.
     alignment: Alignment,
+    /// A along B's directions, once that pays.
+    inverse: Option<Alignment>,
     placement: Placement,
     set_a: DirectionSet,
     set_b: DirectionSet,
@@ -49,11 +57,11 @@ pub(crate) struct NodeTest {
 
 impl NodeTest {
     #[inline(always)]
-    pub(crate) fn new(pair: &Pair<'_>, root_a: &Group, root_b: &Group) -> Self {
+    pub(crate) fn new(pair: &Pair<'_>, root_a: &NodeSlabs, root_b: &NodeSlabs) -> Self {
         let (set_a, set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
-        let (reach_a, reach_b) = (reach(root_a, set_a), reach(root_b, set_b));
-        let alignment = Alignment::new(pair.placement, set_a, set_b, reach_b);
-        Self { alignment, placement: *pair.placement, set_a, set_b, reach_a, reach_b }
+        let (reach_a, reach_b) = (reach(root_a), reach(root_b));
+        let alignment = Alignment::new(pair.placement, set_b, reach_b);
+        Self { inverse: None, alignment, placement: *pair.placement, set_a, set_b, reach_a, reach_b }
     }
 
     /// Takes over a new witness direction.
@@ -73,44 +81,75 @@ impl NodeTest {
         let form_b = upper_form(self.placement.seen_from_b(d), self.set_b).mirrored();
         let t = self.placement.translation;
         let offset = d[0] * t[0] + d[1] * t[1] + d[2] * t[2];
-        let error = form_error(&form_a, self.reach_a, 0.0)
-            + form_error(&form_b, self.reach_b, offset)
+        let error = form_error(form_a.coefficients, self.reach_a, 0.0)
+            + form_error(form_b.coefficients, self.reach_b, offset)
             + 3.0 * self.placement.error;
         Witness { direction, form_a, form_b, offset: (offset - error) as f32 }
     }
 
+    /// From now on there is a test along B's directions, too.
+    #[cold]
+    pub(crate) fn look_along_b(&mut self) {
+        let placement = self.placement.inverse();
+        self.inverse = Some(Alignment::new(&placement, self.set_a, self.reach_a));
+    }
+
+    /// True if there is a test along B's directions.
+    #[inline(always)]
+    pub(crate) fn looks_along_b(&self) -> bool {
+        self.inverse.is_some()
+    }
+
     /// B's slab ends along A's directions, outward.
     #[inline(always)]
-    pub(crate) fn align<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
-        for slab in 0..self.set_a.slabs() {
-            let axis = &self.alignment.axes[slab];
-            let lo = evaluate(isa, &axis.lo, group, isa.splat4(axis.offset_lo));
-            let hi = evaluate(isa, &axis.hi, group, isa.splat4(axis.offset_hi));
-            isa.store4(lo, &mut aligned[slab][0]);
-            isa.store4(hi, &mut aligned[slab][1]);
+    pub(crate) fn align_b<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
+        align(isa, &self.alignment, self.set_a, group, aligned);
+    }
+
+    /// A's slab ends along B's directions, outward.
+    #[inline(always)]
+    pub(crate) fn align_a<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
+        if let Some(inverse) = &self.inverse {
+            align(isa, inverse, self.set_b, group, aligned);
         }
     }
 
-    /// Tests four nodes of A against four of B: element `4 * a + b` of `bounds` is the pair `(a, b)`,
-    /// and its bit is set if the bound is at most `limit`.
+    /// Tests four nodes of A against four of B along A's directions: element `4 * a + b` of `bounds` is the
+    /// pair `(a, b)`, and its bit is set if the bound is at most `limit`.
     #[inline(always)]
     pub(crate) fn run<I: Isa>(
         &self,
         isa: I,
         measure: Measure,
-        (group_a, group_b, aligned): (&Group, &Group, &Aligned),
+        (group_a, group_b, aligned_b): (&Group, &Group, &Aligned),
         witness: &Option<Witness>,
         limit: f32,
         bounds: &mut [f32; 16],
     ) -> u16 {
-        let mut gaps = match self.set_a {
-            DirectionSet::Dop6 => gaps::<I, 3>(isa, measure, group_a, aligned),
-            DirectionSet::Dop14 => gaps::<I, 7>(isa, measure, group_a, aligned),
-            DirectionSet::Dop26 => gaps::<I, 13>(isa, measure, group_a, aligned),
-        };
+        let mut gaps = gaps_along(isa, measure, self.set_a, AlongA(group_a, aligned_b));
         if let Some(witness) = witness {
             gaps = gaps.max(witness.gaps(isa, group_a, group_b));
         }
+        isa.store(gaps, bounds);
+        I::V::bits(gaps.le(isa.splat(limit)))
+    }
+
+    /// The same along B's directions: raises the bounds that `run` has found.
+    #[inline(always)]
+    pub(crate) fn run_along_b<I: Isa>(
+        &self,
+        isa: I,
+        measure: Measure,
+        (aligned_a, group_b): (&Aligned, &Group),
+        limit: f32,
+        bounds: &mut [f32; 16],
+    ) -> u16 {
+        let gaps = gaps_along(isa, measure, self.set_b, AlongB(aligned_a, group_b));
+        // Seen from A, B's directions are longer or shorter by at most 2^-19, all together: so far a rotation
+        // may be off.
+        let shrunk = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32));
+        let gaps = if measure == Measure::Overlap { gaps } else { shrunk };
+        let gaps = gaps.max(isa.load(bounds));
         isa.store(gaps, bounds);
         I::V::bits(gaps.le(isa.splat(limit)))
     }
@@ -138,24 +177,68 @@ fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
     sum
 }
 
-/// The signed gap of each of 16 pairs along one direction.
+/// Four nodes of A and four of B along the directions of one of them.
+trait Ends: Copy {
+    /// The signed gap of each of 16 pairs along one direction.
+    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V;
+}
+
+/// Along A's directions.
+#[derive(Clone, Copy)]
+struct AlongA<'a>(&'a Group, &'a Aligned);
+
+/// Along B's directions.
+#[derive(Clone, Copy)]
+struct AlongB<'a>(&'a Aligned, &'a Group);
+
+impl Ends for AlongA<'_> {
+    #[inline(always)]
+    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V {
+        let (rows_a, [lo_b, hi_b]) = (self.0.rows(), &self.1[slab]);
+        let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
+        lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
+    }
+}
+
+impl Ends for AlongB<'_> {
+    #[inline(always)]
+    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V {
+        let ([lo_a, hi_a], rows_b) = (&self.0[slab], self.1.rows());
+        let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
+        isa.repeat(lo_a).sub(hi_b).max(lo_b.sub(isa.repeat(hi_a)))
+    }
+}
+
+/// Slab ends of four nodes along the other side's directions, outward.
 #[inline(always)]
-fn gap<I: Isa>(isa: I, group_a: &Group, aligned: &Aligned, slab: usize) -> I::V {
-    let rows = group_a.rows();
-    let lo_a = isa.repeat(&rows[row(slab)]);
-    let hi_a = isa.repeat(&rows[16 + row(slab)]);
-    let [lo_b, hi_b] = &aligned[slab];
-    lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
+fn align<I: Isa>(isa: I, to: &Alignment, set: DirectionSet, group: &Group, aligned: &mut Aligned) {
+    for slab in 0..set.slabs() {
+        let upper = to.upper(slab);
+        let lo = evaluate(isa, &upper.mirrored(), group, isa.splat4(to.offset_lo[slab]));
+        let hi = evaluate(isa, &upper, group, isa.splat4(to.offset_hi[slab]));
+        isa.store4(lo, &mut aligned[slab][0]);
+        isa.store4(hi, &mut aligned[slab][1]);
+    }
+}
+
+/// `gaps` for the directions of a set.
+#[inline(always)]
+fn gaps_along<I: Isa, E: Ends>(isa: I, measure: Measure, set: DirectionSet, ends: E) -> I::V {
+    match set {
+        DirectionSet::Dop6 => gaps::<I, E, 3>(isa, measure, ends),
+        DirectionSet::Dop14 => gaps::<I, E, 7>(isa, measure, ends),
+        DirectionSet::Dop26 => gaps::<I, E, 13>(isa, measure, ends),
+    }
 }
 
 /// The gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
 /// `Distance` a lower bound of the distance.
 #[inline(always)]
-fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, aligned: &Aligned) -> I::V {
-    let mut largest = gap(isa, group_a, aligned, 0);
+fn gaps<I: Isa, E: Ends, const SLABS: usize>(isa: I, measure: Measure, ends: E) -> I::V {
+    let mut largest = ends.gap(isa, 0);
     if measure == Measure::Overlap {
         for slab in 1..SLABS {
-            largest = largest.max(gap(isa, group_a, aligned, slab));
+            largest = largest.max(ends.gap(isa, slab));
         }
         return largest;
     }
@@ -164,13 +247,13 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, group_a: &Group, a
     let positive = largest.max(zero);
     let mut sum = positive.mul(positive);
     for slab in 1..3 {
-        let gap = gap(isa, group_a, aligned, slab);
+        let gap = ends.gap(isa, slab);
         largest = largest.max(gap);
         let positive = gap.max(zero);
         sum = positive.mul_add(positive, sum);
     }
     for slab in 3..SLABS {
-        let gap = gap(isa, group_a, aligned, slab);
+        let gap = ends.gap(isa, slab);
         largest = largest.max(gap.mul(isa.splat(INVERSE_LENGTHS[slab])));
     }
     // Up to four roundings of the sum and one of the root, each 2^-24 relative, and three squares that

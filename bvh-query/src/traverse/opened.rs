@@ -60,6 +60,8 @@ pub(crate) struct Opened {
     links: Links,
     page: u32,
     pub(crate) count: usize,
+    /// True if the groups have been aligned to the other side's directions, where that is done on demand.
+    pub(crate) aligned: bool,
 }
 
 const CLOSED: u32 = u32::MAX;
@@ -72,6 +74,7 @@ impl Opened {
         links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
         page: 0,
         count: 0,
+        aligned: false,
     };
 
     /// The child, if it is a leaf packet.
@@ -123,28 +126,41 @@ const TREELETS_A_PAGE: usize = 62;
 const MOST_NODES: usize = 1 << 29;
 
 impl OpenedNodes {
-    /// Forgets all nodes and takes in the object's root.
-    pub(crate) fn start(&mut self, bvh: &Bvh, object: &Object) -> Result<(), QueryError> {
+    /// Forgets all nodes and takes in the object's root; returns its slabs.
+    #[inline(always)]
+    pub(crate) fn start<I: Isa>(
+        &mut self,
+        isa: I,
+        bvh: &Bvh,
+        object: &Object,
+    ) -> Result<NodeSlabs, QueryError> {
         if self.nodes.is_empty() {
             self.nodes.resize(64, Opened::EMPTY);
         }
         let page = object.record.first_page.get();
         let root = &mut self.nodes[0];
-        root.groups[0] = Group::of_one(&bvh.page(object, page)?.anchor_slabs(0));
+        let slabs = bvh.page(object, page)?.anchor_slabs(0);
+        root.groups[0] = spread(isa, &slabs);
         root.links = Links { kinds: 1, ..Links::default() };
         root.page = page;
         root.extents[0] = f32::INFINITY;
         root.opened = [CLOSED; 8];
         root.count = 1;
+        root.aligned = false;
         self.used = 1;
         let pages = object.record.pages.get() as usize;
         self.most = pages.saturating_mul(TREELETS_A_PAGE).saturating_add(1).min(MOST_NODES);
-        Ok(())
+        Ok(slabs)
     }
 
     #[inline(always)]
     pub(crate) fn get(&self, node: usize) -> &Opened {
         &self.nodes[node]
+    }
+
+    #[inline(always)]
+    pub(crate) fn get_mut(&mut self, node: usize) -> &mut Opened {
+        &mut self.nodes[node]
     }
 
     /// The opened node of an inner child and whether it is new. A leaf is not opened: an empty node.
@@ -220,6 +236,7 @@ fn decode_node<I: Isa>(
     to.page = page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];
+    to.aligned = false;
     to.measure(isa, profile.groups());
     Ok(())
 }
@@ -252,6 +269,17 @@ mod tests {
 
     struct OpenRoot<'a>(&'a Bvh, &'a mut OpenedNodes);
 
+    struct Start<'a>(&'a Bvh, &'a mut OpenedNodes);
+
+    impl Task for Start<'_> {
+        type Output = Result<NodeSlabs, QueryError>;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> Self::Output {
+            self.1.start(isa, self.0, &self.0.objects()[0])
+        }
+    }
+
     impl Task for OpenRoot<'_> {
         type Output = Result<(usize, bool), QueryError>;
 
@@ -267,7 +295,7 @@ mod tests {
         let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
         let bvh = Bvh::from_static(bytes).unwrap();
         let mut nodes = OpenedNodes::default();
-        nodes.start(&bvh, &bvh.objects()[0]).unwrap();
+        Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
         assert_eq!(nodes.most, 1 + 62);
         nodes.most = 1;
         let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
