@@ -14,88 +14,18 @@
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
 use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, largest_of, max3, min3, project, sub};
+use crate::leaf::queue::{Candidate, Queue};
 use crate::traverse::opened::Leaf;
 
 /// 2^-120: more than all underflows of a projection together.
 const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
 
-/// A triangle pair that face planes do not separate.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
-    pub(crate) a: Leaf,
-    pub(crate) b: Leaf,
-    pub(crate) lane_a: u8,
-    pub(crate) lane_b: u8,
-}
-
-/// Up to 16 candidates with their local corners.
-pub(crate) struct Queue {
-    /// `[side][corner][axis]`
-    corners: [[[[f32; 16]; 3]; 3]; 2],
-    error: [f32; 16],
-    reach: [f32; 16],
-    candidates: [Option<Candidate>; 16],
-    len: usize,
-}
-
-impl Default for Queue {
-    fn default() -> Self {
-        Self {
-            corners: [[[[0.0; 16]; 3]; 3]; 2],
-            error: [0.0; 16],
-            reach: [0.0; 16],
-            candidates: [None; 16],
-            len: 0,
-        }
-    }
-}
-
-impl Queue {
-    pub(crate) fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    pub(crate) fn is_full(&self) -> bool {
-        self.len == 16
-    }
-
-    pub(crate) fn push(&mut self, local: &Local, candidate: Candidate) {
-        let at = self.len & 15;
-        for corner in 0..3 {
-            for axis in 0..3 {
-                self.corners[0][corner][axis][at] = local.a[corner][axis][usize::from(candidate.lane_a & 3)];
-                self.corners[1][corner][axis][at] = local.b[corner][axis][usize::from(candidate.lane_b & 3)];
-            }
-        }
-        self.error[at] = local.error;
-        self.reach[at] = local.reach;
-        self.candidates[at] = Some(candidate);
-        self.len = at + 1;
-    }
-
-    #[inline(always)]
-    fn lanes<I: Isa>(&self, isa: I, side: usize) -> Corners<I::V> {
-        let c = &self.corners[side];
-        [
-            [isa.load(&c[0][0]), isa.load(&c[0][1]), isa.load(&c[0][2])],
-            [isa.load(&c[1][0]), isa.load(&c[1][1]), isa.load(&c[1][2])],
-            [isa.load(&c[2][0]), isa.load(&c[2][1]), isa.load(&c[2][2])],
-        ]
-    }
-
-    /// Empties the queue; what no edge axis separates, in the order of arrival.
-    #[inline(always)]
-    pub(crate) fn drain<I: Isa>(&mut self, isa: I) -> Survivors {
-        let (a, b) = (self.lanes(isa, 0), self.lanes(isa, 1));
-        let apart = edge_axes(isa, &a, &b, isa.load(&self.error), isa.load(&self.reach));
-        let filled = ((1u32 << self.len) - 1) as u16;
-        self.len = 0;
-        Survivors { candidates: self.candidates, mask: filled & !apart }
-    }
+/// Stage two: the candidates of a queue, in the order of arrival, that no edge axis separates.
+#[inline(always)]
+pub(crate) fn drain<I: Isa>(isa: I, queue: &mut Queue) -> Survivors {
+    let (a, b) = queue.corners(isa);
+    let mask = queue.filled() & !edge_axes(isa, &a, &b, queue.error(isa), queue.reach(isa));
+    Survivors { candidates: queue.take(), mask }
 }
 
 /// Candidates left by stage two.
@@ -164,7 +94,7 @@ fn one_sided<I: Isa>(isa: I, normal: Vec3<I::V>, offset: I::V, error: I::V, poin
     above | below
 }
 
-/// Stage two: the lanes that one of the nine cross products of edges separates.
+/// The lanes that one of the nine cross products of edges separates.
 #[inline(always)]
 fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, reach: I::V) -> u16 {
     let (edges_a, edges_b) = (edges(a), edges(b));

@@ -15,8 +15,9 @@
 //! `r` is not far below.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{Local, U, splat4};
-use crate::leaf::math::{Corners, Vec3, along, dot, edges, max3, min3, project, sub};
+use crate::leaf::local::{Local, U, repeat, splat4, tile};
+use crate::leaf::math::{Corners, Vec3, along, cross, dot, edges, max3, min3, project, sub};
+use crate::leaf::queue::Queue;
 
 /// Bounds on 16 distances, in units of the local frame.
 pub(crate) struct Bounds {
@@ -47,6 +48,79 @@ pub(crate) fn near_along<I: Isa>(isa: I, local: &Local, direction: [f32; 3], lim
     I::V::bits(gap.le(isa.splat(limit + slack(local))))
 }
 
+/// Lanes whose triangles may be closer than `limit`, looking along three directions of each pair: from centroid to
+/// centroid, and the normals of both faces. Whatever a direction is, the gap of the projections on it is at most
+/// its length times the distance.
+#[inline(always)]
+pub(crate) fn near<I: Isa>(isa: I, local: &Local, limit: f32) -> u16 {
+    let (a, b) = local.lanes(isa);
+    let limit = (limit + slack(local)) * (1.0 + 64.0 * U);
+    let limit = isa.splat(limit * limit);
+    let (face_a, face_b) = (Face::new(isa, &local.a), Face::new(isa, &local.b));
+    let normal = repeat(isa, &face_a.normal);
+    let ends = [isa.repeat(&face_a.lo), isa.repeat(&face_a.hi)];
+    let mut far = far_along(isa, gap(ends, ends_of(&b, normal)), isa.repeat(&face_a.squared), limit);
+    let normal = tile(isa, &face_b.normal);
+    let ends = [isa.tile(&face_b.lo), isa.tile(&face_b.hi)];
+    far |= far_along(isa, gap(ends, ends_of(&a, normal)), isa.tile(&face_b.squared), limit);
+    let between = sub(tile(isa, &face_b.sum), repeat(isa, &face_a.sum));
+    far |= far_along(isa, gap(ends_of(&a, between), ends_of(&b, between)), dot(between, between), limit);
+    !far
+}
+
+/// Four triangles: normals, their squared lengths, where the corners are along them, and the sums of the corners.
+struct Face {
+    normal: [[f32; 4]; 3],
+    squared: [f32; 4],
+    lo: [f32; 4],
+    hi: [f32; 4],
+    sum: [[f32; 4]; 3],
+}
+
+impl Face {
+    #[inline(always)]
+    fn new<I: Isa>(isa: I, side: &[[[f32; 4]; 3]; 3]) -> Self {
+        let mut face =
+            Self { normal: [[0.0; 4]; 3], squared: [0.0; 4], lo: [0.0; 4], hi: [0.0; 4], sum: [[0.0; 4]; 3] };
+        let corners = Local::quads(isa, side);
+        let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+        let [lo, hi] = ends_of(&corners, normal);
+        isa.store4(dot(normal, normal), &mut face.squared);
+        isa.store4(lo, &mut face.lo);
+        isa.store4(hi, &mut face.hi);
+        let (one, third) = (isa.splat4(1.0), corners[2]);
+        for axis in 0..3 {
+            isa.store4(normal[axis], &mut face.normal[axis]);
+            let sum = corners[0][axis].mul_add(one, corners[1][axis].mul_add(one, third[axis]));
+            isa.store4(sum, &mut face.sum[axis]);
+        }
+        face
+    }
+}
+
+/// The least and the greatest of the corners' projections.
+#[inline(always)]
+fn ends_of<V: Lanes>(corners: &Corners<V>, direction: Vec3<V>) -> [V; 2] {
+    let along = project(corners, direction);
+    [min3(along), max3(along)]
+}
+
+/// The gap of two intervals, negative if they overlap.
+#[inline(always)]
+fn gap<V: Lanes>([lo_a, hi_a]: [V; 2], [lo_b, hi_b]: [V; 2]) -> V {
+    lo_b.sub(hi_a).max(lo_a.sub(hi_b))
+}
+
+/// Lanes where a gap, over the length of its direction, exceeds a limit. Squares below 2^-100 may have underflown, and
+/// tell nothing; those that overflow compare as they should.
+#[inline(always)]
+fn far_along<I: Isa>(isa: I, gap: I::V, squared: I::V, limit_squared: I::V) -> u16 {
+    let (gap, least) = (gap.max(isa.splat(0.0)), isa.splat(LEAST_SQUARE));
+    let gap_squared = gap.mul(gap);
+    let far = I::V::bits(limit_squared.mul(squared).lt(gap_squared));
+    far & I::V::bits(least.le(gap_squared)) & I::V::bits(least.le(squared))
+}
+
 /// The best guess so far.
 #[derive(Clone, Copy)]
 struct Guess<V> {
@@ -66,10 +140,11 @@ impl<V: Lanes> Guess<V> {
     }
 }
 
-/// Bounds the distances of all 16 pairs of a packet pair.
+/// Bounds the distances of all pairs in a queue.
 #[inline(always)]
-pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
-    let (a, b) = local.lanes(isa);
+pub(crate) fn bounds<I: Isa>(isa: I, queue: &Queue) -> Bounds {
+    let (a, b) = queue.corners(isa);
+    let slack = queue.error(isa).mul_add(isa.splat(4.0), queue.reach(isa).mul(isa.splat(16.0 * U)));
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
     let mut guess = Guess { squared: isa.splat(f32::INFINITY), direction: [zero; 3] };
     let (edges_a, edges_b) = (edges(&a), edges(&b));
@@ -94,7 +169,7 @@ pub(crate) fn bounds<I: Isa>(isa: I, local: &Local) -> Bounds {
     }
     corners_on_face(isa, &a, &edges_a, &b, &mut guess, false);
     corners_on_face(isa, &b, &edges_b, &a, &mut guess, true);
-    certify(isa, local, &a, &b, guess)
+    certify(isa, slack, &a, &b, guess)
 }
 
 /// Between 0 and 1. NaN, from edges of no length, ends as 0: `max` returns its second operand.
@@ -139,14 +214,7 @@ fn corners_on_face<I: Isa>(
 }
 
 #[inline(always)]
-fn certify<I: Isa>(
-    isa: I,
-    local: &Local,
-    a: &Corners<I::V>,
-    b: &Corners<I::V>,
-    guess: Guess<I::V>,
-) -> Bounds {
-    let slack = isa.splat(slack(local));
+fn certify<I: Isa>(isa: I, slack: I::V, a: &Corners<I::V>, b: &Corners<I::V>, guess: Guess<I::V>) -> Bounds {
     let least = isa.splat(LEAST_SQUARE);
     let length = guess.squared.max(least).sqrt();
     let n = guess.direction;

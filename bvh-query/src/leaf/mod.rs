@@ -7,3 +7,4 @@ pub(crate) mod collide;
 pub(crate) mod distance;
 pub(crate) mod local;
 pub(crate) mod math;
+pub(crate) mod queue;

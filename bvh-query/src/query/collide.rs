@@ -4,8 +4,9 @@ use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
-use crate::leaf::collide::{Candidate, Queue, face_planes};
+use crate::leaf::collide::{drain, face_planes};
 use crate::leaf::local::Local;
+use crate::leaf::queue::{Candidate, Queue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
 use crate::traverse::opened::Leaf;
@@ -86,7 +87,7 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts
         if self.queue.is_empty() {
             return Ok(ControlFlow::Continue(()));
         }
-        for candidate in self.queue.drain(isa) {
+        for candidate in drain(isa, self.queue) {
             if self.decide(candidate)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
@@ -122,7 +123,12 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
     }
 
     #[inline(always)]
-    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError> {
+    fn leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        (a, b): (Leaf, Leaf),
+        _at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
         let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
@@ -132,7 +138,7 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            self.queue.push(&local, Candidate { a, b, lane_a: lane >> 2, lane_b: lane & 3 });
+            self.queue.push(&local, Candidate::in_lane(a, b, lane));
             if self.queue.is_full() && self.drain(isa)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }

@@ -4,7 +4,7 @@ use super::collide::Contacts;
 use super::{Contact, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::{Bvh, Shape, TrianglePlace};
 use crate::error::QueryError;
-use crate::leaf::collide::Candidate;
+use crate::leaf::queue::Candidate;
 use crate::pose::Pose;
 use crate::traverse::pair::Order;
 use bvh_format::header::SectionKind;

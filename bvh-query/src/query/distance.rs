@@ -11,8 +11,9 @@ use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
-use crate::leaf;
-use crate::leaf::local::Local;
+use crate::leaf::distance::{bounds, near, near_along};
+use crate::leaf::local::{Local, valid_lanes};
+use crate::leaf::queue::{self, Queue};
 use crate::narrow::{Closest, triangle_distance, triangles_within};
 use crate::pose::Pose;
 use crate::traverse::align::round_up;
@@ -65,7 +66,7 @@ pub(crate) struct Candidate {
     /// Bounds of the distance, mesh units.
     lower: f32,
     upper: f32,
-    pair: leaf::collide::Candidate,
+    pair: queue::Candidate,
 }
 
 /// The closest pair so far.
@@ -159,10 +160,12 @@ impl Querier {
             if gap > f64::from(search.limit) {
                 return Ok(None);
             }
+            self.queue.clear();
             self.candidates.clear();
             let mut visitor = Nearest {
                 scene,
                 search,
+                queue: &mut self.queue,
                 candidates: &mut self.candidates,
                 direction: None,
                 stats: QueryStats::default(),
@@ -205,7 +208,7 @@ fn no_answer(a: Shape<'_>) -> QueryError {
     bvh_format::FormatError::new(bvh_format::Rule::VertexFinite, at, "finite triangles", "none").into()
 }
 
-fn ids(scene: &Scene<'_>, pair: &leaf::collide::Candidate) -> Result<(u32, u32), QueryError> {
+fn ids(scene: &Scene<'_>, pair: &queue::Candidate) -> Result<(u32, u32), QueryError> {
     let (a, b) = (&scene.pair.object_a, &scene.pair.object_b);
     Ok((scene.pair.bvh_a.triangle_id(a, pair.place_a())?, scene.pair.bvh_b.triangle_id(b, pair.place_b())?))
 }
@@ -270,7 +273,7 @@ impl Search {
     }
 
     /// Settles a pair in f64.
-    fn settle(&mut self, scene: &Scene<'_>, pair: leaf::collide::Candidate) -> Result<(), QueryError> {
+    fn settle(&mut self, scene: &Scene<'_>, pair: queue::Candidate) -> Result<(), QueryError> {
         let triangle_a = scene.triangle_a(pair.a, pair.lane_a)?;
         let triangle_b = scene.triangle_b(pair.b, pair.lane_b)?;
         let closest = triangle_distance(&triangle_a, &triangle_b);
@@ -300,6 +303,7 @@ impl Search {
 struct Nearest<'a> {
     scene: &'a Scene<'a>,
     search: &'a mut Search,
+    queue: &'a mut Queue,
     candidates: &'a mut Vec<Candidate>,
     /// Of the closest pair so far, at most of length 1.
     direction: Option<[f32; 3]>,
@@ -307,8 +311,43 @@ struct Nearest<'a> {
 }
 
 impl Nearest<'_> {
+    /// Bounds the distances of the pairs in the queue, and keeps those that may be the closest.
+    #[inline(always)]
+    fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
+        if self.queue.is_empty() {
+            return Ok(ControlFlow::Continue(()));
+        }
+        let scale = self.scene.frame().scale;
+        let (bounds, filled) = (bounds(isa, self.queue), self.queue.filled());
+        for (lane, pair) in self.queue.take().into_iter().enumerate() {
+            let Some(pair) = pair.filter(|_| filled >> lane & 1 == 1) else { break };
+            // A power of two: exact, unless the meshes are so tiny that it takes a last outward step.
+            let lower = (bounds.lower[lane] / scale).next_down().max(0.0);
+            let upper = (bounds.upper[lane] / scale).next_up();
+            if lower > self.search.limit {
+                continue;
+            }
+            if upper < self.search.upper {
+                self.search.lower_upper(upper);
+                self.look_along(bounds.direction.map(|axis| axis[lane]));
+            }
+            if lower <= 0.0 {
+                // Perhaps touching: knowing at once may end the search.
+                if self.settle(pair)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            } else {
+                self.candidates.push(Candidate { lower, upper, pair });
+                if self.candidates.len() >= MANY_CANDIDATES && self.settle_candidates()?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
     #[inline(never)]
-    fn settle(&mut self, pair: leaf::collide::Candidate) -> Result<ControlFlow<()>, QueryError> {
+    fn settle(&mut self, pair: queue::Candidate) -> Result<ControlFlow<()>, QueryError> {
         self.stats.exact_tests += 1;
         self.search.settle(self.scene, pair)?;
         Ok(if self.search.done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
@@ -358,54 +397,41 @@ impl Visitor for Nearest<'_> {
     }
 
     #[inline(always)]
-    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError> {
+    fn leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        (a, b): (Leaf, Leaf),
+        at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
         let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
         let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
         let local = Local::new(isa, self.scene.frame(), &packet_a, &packet_b);
-        let mut mask = leaf::local::valid_lanes(a.triangles, b.triangles);
-        let scale = self.scene.frame().scale;
+        let limit = self.search.limit * self.scene.frame().scale;
+        let mut mask = valid_lanes(a.triangles, b.triangles);
         if let Some(direction) = self.direction {
-            mask &= leaf::distance::near_along(isa, &local, direction, self.search.limit * scale);
-            if mask == 0 {
-                return Ok(ControlFlow::Continue(()));
-            }
+            mask &= near_along(isa, &local, direction, limit);
         }
-        let bounds = leaf::distance::bounds(isa, &local);
+        if mask != 0 {
+            mask &= near(isa, &local, limit);
+        }
         while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
+            let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            // A power of two: exact, unless the meshes are so tiny that it takes a last outward step.
-            let lower = (bounds.lower[lane] / scale).next_down().max(0.0);
-            let upper = (bounds.upper[lane] / scale).next_up();
-            if lower > self.search.limit {
-                continue;
-            }
-            let (lane_a, lane_b) = ((lane >> 2) as u8, (lane & 3) as u8);
-            let candidate =
-                Candidate { lower, upper, pair: leaf::collide::Candidate { a, b, lane_a, lane_b } };
-            if upper < self.search.upper {
-                self.search.lower_upper(upper);
-                self.look_along(bounds.direction.map(|axis| axis[lane]));
-            }
-            if lower <= 0.0 {
-                // Perhaps touching: knowing at once may end the search.
-                if self.settle(candidate.pair)?.is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
-            } else {
-                self.candidates.push(candidate);
-                if self.candidates.len() >= MANY_CANDIDATES && self.settle_candidates()?.is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
+            self.queue.push(&local, queue::Candidate::in_lane(a, b, lane));
+            if self.queue.is_full() && self.drain(isa)?.is_break() {
+                return Ok(ControlFlow::Break(()));
             }
         }
-        Ok(ControlFlow::Continue(()))
+        if at_once { self.drain(isa) } else { Ok(ControlFlow::Continue(())) }
     }
 
     #[inline(always)]
-    fn finish<I: Isa>(&mut self, _isa: I) -> Result<(), QueryError> {
-        self.settle_candidates().map(|_| ())
+    fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
+        if self.drain(isa)?.is_continue() {
+            let _ = self.settle_candidates()?;
+        }
+        Ok(())
     }
 }

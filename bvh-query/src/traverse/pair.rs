@@ -10,8 +10,8 @@
 //!         if bound <= limit: push
 //! ```
 //!
-//! Depth-first, entries are a stack; best-first, a binary heap, until the visitor has seen enough
-//! leaves to go on depth-first, or the heap holds as much as it may.
+//! Depth-first, entries are a stack; best-first, a list that is searched for the least, until the visitor has
+//! seen enough leaves to go on depth-first, or the list is as long as it may be.
 //!
 //! The walk ends: each file is a tree (its rules say so, and `OpenedNodes` does not rely on it), an entry
 //! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
@@ -19,7 +19,7 @@
 //!
 //! Memory: each entry that is popped depth-first leaves fewer than 64 on the stack, and those below it are
 //! one level deeper in A or in B, so that there are fewer than 64 * (depth of A + depth of B) and those
-//! that the heap had. A tree is no deeper than it has treelets. Nothing recurses.
+//! that the list had. A tree is no deeper than it has treelets. Nothing recurses.
 
 use crate::bvh::Bvh;
 use crate::error::QueryError;
@@ -28,8 +28,6 @@ use crate::traverse::align::Placement;
 use crate::traverse::node_test::{NodeTest, Witness};
 use crate::traverse::opened::{Aligned, ChildRef, Leaf, OpenedNodes};
 use bvh_format::object::Object;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 /// What a bound is good for.
@@ -68,8 +66,13 @@ pub(crate) trait Visitor {
         None
     }
 
-    /// Two leaf packets.
-    fn leaves<I: Isa>(&mut self, isa: I, a: Leaf, b: Leaf) -> Result<ControlFlow<()>, QueryError>;
+    /// Two leaf packets. `at_once`: the limit that they lead to is wanted now, not later for less.
+    fn leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        leaves: (Leaf, Leaf),
+        at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError>;
 
     /// After the last pair.
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError>;
@@ -97,7 +100,7 @@ pub(crate) struct Stack {
     /// Depth-first: the top is next.
     entries: Vec<Entry>,
     /// Best-first: the least is next.
-    heap: BinaryHeap<Reverse<Entry>>,
+    list: List,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
@@ -129,21 +132,53 @@ impl Entry {
     }
 }
 
+/// Pairs in no order. Keys stand by themselves, so that the least is found in vector registers.
+#[derive(Default)]
+struct List {
+    keys: Vec<u32>,
+    pairs: Vec<(ChildRef, ChildRef)>,
+}
+
+impl List {
+    fn clear(&mut self) {
+        self.keys.clear();
+        self.pairs.clear();
+    }
+
+    #[inline(always)]
+    fn push(&mut self, Entry { key, a, b }: Entry) {
+        self.keys.push(key);
+        self.pairs.push((a, b));
+    }
+
+    /// Takes out the first of the least keys.
+    #[inline(always)]
+    fn pop_least(&mut self) -> Option<Entry> {
+        let least = self.keys.iter().fold(u32::MAX, |least, &key| least.min(key));
+        let place = self.keys.iter().position(|&key| key == least)?;
+        let (key, (a, b)) = (self.keys.swap_remove(place), self.pairs.swap_remove(place));
+        Some(Entry { key, a, b })
+    }
+
+    fn entries(&self) -> impl Iterator<Item = Entry> {
+        self.keys.iter().zip(&self.pairs).map(|(&key, &(a, b))| Entry { key, a, b })
+    }
+}
+
 /// How the next pair is found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// From each pair on to the nearest of its children alone.
     Dive,
-    /// From a heap.
+    /// From a list.
     BestFirst,
     /// From a stack.
     DepthFirst,
 }
 
-/// Entries that the heap may hold before the walk goes on depth-first, 12 bytes each. Meshes apart need some
-/// thousand, deep overlap ten thousand; but where inner nodes always come before leaves, as in a forged file,
-/// a heap would come to hold all pairs of leaves. Answers do not depend on it.
-const MOST_IN_HEAP: usize = 1 << 16;
+/// Entries that the list may hold before the walk goes on depth-first: what is searched in the time of a node
+/// test. Answers do not depend on it.
+const MOST_IN_LIST: usize = 1024;
 
 /// Nodes this many times larger than their partner are opened alone, to meet it at its size.
 const MUCH_LARGER: f32 = 2.0;
@@ -162,7 +197,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
     stack.entries.clear();
-    stack.heap.clear();
+    stack.list.clear();
     let root_a = stack.opened_a.start(isa, pair.bvh_a, pair.object_a)?;
     let root_b = stack.opened_b.start(isa, pair.bvh_b, pair.object_b)?;
     let mut node_test = NodeTest::new(&pair, &root_a, &root_b);
@@ -180,8 +215,8 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
                 phase = Phase::BestFirst;
                 Entry::ROOTS
             }
-            (None, Phase::BestFirst) => match stack.heap.pop() {
-                Some(Reverse(least)) => least,
+            (None, Phase::BestFirst) => match stack.list.pop_least() {
+                Some(least) => least,
                 None => break,
             },
         };
@@ -193,8 +228,8 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
             continue;
         }
         stack.visit()?;
-        if let Some((a, b)) = stack.leaf_pair(next) {
-            if visitor.leaves(isa, a, b)?.is_break() {
+        if let Some(leaves_of_pair) = stack.leaf_pair(next) {
+            if visitor.leaves(isa, leaves_of_pair, phase != Phase::DepthFirst)?.is_break() {
                 return Ok(tests);
             }
             node_test.update_witness(&mut witness, visitor.witness());
@@ -202,7 +237,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
             if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
             {
                 phase = Phase::DepthFirst;
-                stack.heap_to_stack(visitor.limit());
+                stack.list_to_stack(visitor.limit());
             }
             continue;
         }
@@ -215,10 +250,10 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         let new = &mut stack.entries[start..];
         match (phase, order) {
             (Phase::BestFirst, _) => {
-                stack.entries.drain(start..).for_each(|entry| stack.heap.push(Reverse(entry)));
-                if stack.heap.len() > MOST_IN_HEAP {
+                stack.entries.drain(start..).for_each(|entry| stack.list.push(entry));
+                if stack.list.keys.len() > MOST_IN_LIST {
                     phase = Phase::DepthFirst;
-                    stack.heap_to_stack(visitor.limit());
+                    stack.list_to_stack(visitor.limit());
                 }
             }
             (_, Order::Tree) => new.reverse(),
@@ -366,11 +401,11 @@ impl Stack {
         tests
     }
 
-    /// Goes on depth-first with what the heap holds, the least bound on top.
-    fn heap_to_stack(&mut self, limit: f32) {
-        let all = self.heap.drain().map(|Reverse(entry)| entry);
-        self.entries.extend(all.filter(|entry| entry.bound() <= limit));
-        self.entries.sort_unstable_by(|x, y| y.cmp(x));
+    /// Goes on depth-first with what the list holds, the least bound on top.
+    fn list_to_stack(&mut self, limit: f32) {
+        self.entries.extend(self.list.entries().filter(|entry| entry.bound() <= limit));
+        self.list.clear();
+        nearest_last(&mut self.entries);
     }
 }
 

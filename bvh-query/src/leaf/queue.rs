@@ -1,0 +1,117 @@
+//! Triangle pairs of several packet pairs, gathered until they fill all lanes of a register.
+//!
+//! Of the 16 pairs of two packets, cheap tests leave one or two. What is costly is done for 16 of these at once.
+
+use crate::isa::Isa;
+use crate::leaf::local::Local;
+use crate::leaf::math::Corners;
+use crate::traverse::opened::Leaf;
+
+/// A triangle pair that cheap tests do not settle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) a: Leaf,
+    pub(crate) b: Leaf,
+    pub(crate) lane_a: u8,
+    pub(crate) lane_b: u8,
+}
+
+impl Candidate {
+    /// The pair in a lane of two packets: element `4 * a + b`.
+    #[inline(always)]
+    pub(crate) fn in_lane(a: Leaf, b: Leaf, lane: u8) -> Self {
+        Self { a, b, lane_a: lane >> 2 & 3, lane_b: lane & 3 }
+    }
+}
+
+/// Up to 16 candidates with their local corners.
+pub(crate) struct Queue {
+    /// `[side][corner][axis]`
+    corners: [[[[f32; 16]; 3]; 3]; 2],
+    error: [f32; 16],
+    reach: [f32; 16],
+    candidates: [Option<Candidate>; 16],
+    len: usize,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Self {
+            corners: [[[[0.0; 16]; 3]; 3]; 2],
+            error: [0.0; 16],
+            reach: [0.0; 16],
+            candidates: [None; 16],
+            len: 0,
+        }
+    }
+}
+
+impl Queue {
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.len == 16
+    }
+
+    pub(crate) fn push(&mut self, local: &Local, candidate: Candidate) {
+        let at = self.len & 15;
+        let (lane_a, lane_b) = (usize::from(candidate.lane_a & 3), usize::from(candidate.lane_b & 3));
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.corners[0][corner][axis][at] = local.a[corner][axis][lane_a];
+                self.corners[1][corner][axis][at] = local.b[corner][axis][lane_b];
+            }
+        }
+        self.error[at] = local.error;
+        self.reach[at] = local.reach;
+        self.candidates[at] = Some(candidate);
+        self.len = at + 1;
+    }
+
+    /// Corners of both sides.
+    #[inline(always)]
+    pub(crate) fn corners<I: Isa>(&self, isa: I) -> (Corners<I::V>, Corners<I::V>) {
+        (self.side(isa, 0), self.side(isa, 1))
+    }
+
+    #[inline(always)]
+    fn side<I: Isa>(&self, isa: I, side: usize) -> Corners<I::V> {
+        let c = &self.corners[side];
+        [
+            [isa.load(&c[0][0]), isa.load(&c[0][1]), isa.load(&c[0][2])],
+            [isa.load(&c[1][0]), isa.load(&c[1][1]), isa.load(&c[1][2])],
+            [isa.load(&c[2][0]), isa.load(&c[2][1]), isa.load(&c[2][2])],
+        ]
+    }
+
+    /// The bounds on the error of coordinates: see `Local`.
+    #[inline(always)]
+    pub(crate) fn error<I: Isa>(&self, isa: I) -> I::V {
+        isa.load(&self.error)
+    }
+
+    /// The bounds on the magnitude of coordinates.
+    #[inline(always)]
+    pub(crate) fn reach<I: Isa>(&self, isa: I) -> I::V {
+        isa.load(&self.reach)
+    }
+
+    /// The lanes that hold a candidate.
+    #[inline(always)]
+    pub(crate) fn filled(&self) -> u16 {
+        ((1u32 << self.len) - 1) as u16
+    }
+
+    /// Empties the queue.
+    #[inline(always)]
+    pub(crate) fn take(&mut self) -> [Option<Candidate>; 16] {
+        self.len = 0;
+        self.candidates
+    }
+}
