@@ -183,10 +183,10 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// Exact projection as an integer number of 2^-149, the smallest step of `f32`.
-    fn exact(point: [f32; 3], direction: [i8; 3]) -> i128 {
-        // Test points are small multiples of 2^-60, so that 2^66 is scale enough.
-        (0..3).map(|a| (f64::from(point[a]) * 2f64.powi(66)) as i128 * i128::from(direction[a])).sum()
+    /// A test's number in units of 2^-100: points are multiples of 2^-62, and so are sums, of which those that
+    /// aren't 0 have neighbours that are multiples of 2^-86.
+    fn units(value: f32) -> i128 {
+        (f64::from(value) * 2f64.powi(100)) as i128
     }
 
     #[test]
@@ -211,10 +211,11 @@ mod tests {
                 let kdop = Kdop::of_points([point]);
                 let slab = DIRECTIONS.iter().position(|&d| d == direction).unwrap();
                 let (lo, hi) = (kdop.lo[slab], kdop.hi[slab]);
-                let true_value = exact(point, direction);
-                let scaled = |v: f32| (f64::from(v) * 2f64.powi(66)) as i128;
-                assert!(scaled(lo) <= true_value && true_value <= scaled(hi));
-                assert!(hi == lo || hi == lo.next_up(), "not tight: {point:?} {direction:?}");
+                let truth: i128 = (0..3).map(|a| units(point[a]) * i128::from(direction[a])).sum();
+                assert!(units(lo) <= truth && truth <= units(hi));
+                let tight = (units(lo) == truth || units(lo.next_up()) > truth)
+                    && (units(hi) == truth || units(hi.next_down()) < truth);
+                assert!(tight, "{lo:e} to {hi:e}, not tight: {point:?} {direction:?}");
             }
         }
     }
@@ -250,6 +251,28 @@ mod tests {
                 assert!(errors.as_flattened().as_flattened().iter().all(|&error| error == 0.0), "{point:?}");
             }
         }
+    }
+
+    #[test]
+    fn containing_asks_for_both_ends_of_the_first_slabs() {
+        let inner = Kdop { lo: [-1.0; 13], hi: [1.0; 13] };
+        assert!(inner.contains(&inner, 13));
+        for slab in 0..13 {
+            let (mut above, mut below) = (inner, inner);
+            (above.lo[slab], above.hi[slab]) = (-0.5, 2.0);
+            (below.lo[slab], below.hi[slab]) = (-2.0, 0.5);
+            for set in [DirectionSet::Dop6, DirectionSet::Dop14, DirectionSet::Dop26] {
+                let expected = slab >= set.slabs();
+                assert_eq!(above.contains(&inner, set.slabs()), expected, "{slab} {set:?}");
+                assert_eq!(below.contains(&inner, set.slabs()), expected, "{slab} {set:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_area_of_a_box_is_that_of_its_six_faces() {
+        let kdop = Kdop::of_points([[-1.0, 7.0, 10.0], [1.0, 4.0, 15.0]]);
+        assert_eq!(kdop.box_area(), f64::from(2 * 2 * 3 + 2 * 3 * 5 + 2 * 5 * 2));
     }
 
     #[test]

@@ -143,6 +143,38 @@ mod tests {
     }
 
     #[test]
+    fn steps_are_rounded_up_to_sixteen_bits() {
+        for bits in (0..0x7f00_0000u32).step_by(99_991) {
+            let rounded = round_step_up(f32::from_bits(bits)).to_bits();
+            assert!(rounded & 0xff == 0 && (bits..bits + 0x100).contains(&rounded), "{bits:x} {rounded:x}");
+        }
+    }
+
+    #[test]
+    fn codes_reach_from_one_end_to_the_other() {
+        for seed in 0..50_000u32 {
+            let lo =
+                (seed.wrapping_mul(0x9e37_79b9) as f32 - 2f32.powi(31)) * 2f32.powi(seed as i32 % 80 - 70);
+            let hi = lo + (seed.wrapping_mul(0x85eb_ca6b) as f32) * 2f32.powi(seed as i32 % 70 - 65);
+            for (encoding, last) in [(Encoding::U8, 255u16), (Encoding::U4, 15)] {
+                let unit = residual_unit(encoding, lo, hi, 7.0);
+                assert_eq!([decode_min(encoding, 0, lo, unit), decode_max(encoding, 0, hi, unit)], [lo, hi]);
+                // Off by a few roundings, and then rounded up to 16 bits.
+                let width = f64::from(hi) - f64::from(lo);
+                let ends = [decode_min(encoding, last, lo, unit), decode_max(encoding, last, hi, unit)];
+                for (end, opposite) in ends.into_iter().zip([hi, lo]) {
+                    let off = (f64::from(end) - f64::from(opposite)).abs();
+                    let rounding = f64::from(lo.abs().max(hi.abs())) * f64::from(f32::EPSILON);
+                    assert!(off <= 4e-5 * width + rounding, "{lo:e} {hi:e} {end:e}");
+                }
+            }
+            assert_eq!(residual_unit(Encoding::F16, lo, hi, 0.125), 0.125);
+            assert_eq!(residual_unit(Encoding::F32, lo, hi, 0.125), 0.0);
+            assert_eq!(residual(Encoding::F16, f16::from_f32(3.0).to_bits(), 0.125), 0.375);
+        }
+    }
+
+    #[test]
     fn products_of_code_and_step_are_exact() {
         for seed in 0..50_000u32 {
             let width = f32::from_bits(0x2000_0000 + seed.wrapping_mul(0x9e37_79b9) % 0x3000_0000);
