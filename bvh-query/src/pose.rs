@@ -172,11 +172,88 @@ mod tests {
     }
 
     #[test]
+    fn of_signed_permutations_the_turns_are_taken() {
+        for (index, order) in
+            [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]].iter().enumerate()
+        {
+            for signs in 0..8u32 {
+                let mut rows = [[0.0; 3]; 3];
+                for k in 0..3 {
+                    rows[k][order[k]] = if signs >> k & 1 == 1 { -1.0 } else { 1.0 };
+                }
+                let turns = (signs.count_ones() % 2 == 0) == (index < 3);
+                let refusal = Pose::new(rows, [0.0; 3]).err();
+                assert_eq!(refusal, (!turns).then_some(PoseError::Reflection), "{rows:?}");
+            }
+        }
+        for k in 0..3 {
+            let mut rows = ROWS.map(|row| row.map(|entry| entry / 121.0));
+            rows[k] = rows[k].map(|entry| -entry);
+            assert_eq!(Pose::new(rows, [0.0; 3]), Err(PoseError::Reflection));
+        }
+    }
+
+    #[test]
+    fn limits_are_allowed_and_the_next_number_is_not() {
+        let shear = |entry: f64| [[1.0, entry, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let limit = 2f64.powi(-20);
+        assert!(Pose::new(shear(-limit), [0.0; 3]).is_ok());
+        assert_eq!(Pose::new(shear(limit.next_up()), [0.0; 3]), Err(PoseError::NotRigid(limit.next_up())));
+        let most = 2f64.powi(120);
+        for axis in 0..3 {
+            let far = |value: f64| [0, 1, 2].map(|k| if k == axis { value } else { 0.0 });
+            assert!(Pose::new(Pose::IDENTITY.rotation, far(-most)).is_ok());
+            let refused = Pose::new(Pose::IDENTITY.rotation, far(-most.next_up()));
+            assert_eq!(refused, Err(PoseError::TooFar(-most.next_up())));
+        }
+    }
+
+    #[test]
     fn tiny_entries_count_as_zero() {
+        let (turn, shift) = (2f64.powi(-64), 2f64.powi(-213));
         let mut rows = Pose::IDENTITY.rotation;
-        rows[0][1] = 1e-30;
-        let pose = Pose::new(rows, [1e-100, -0.0, 1.0]).unwrap();
-        assert_eq!(pose.rotation, Pose::IDENTITY.rotation);
-        assert_eq!(pose.translation, [0.0, 0.0, 1.0]);
+        (rows[0][1], rows[0][2]) = (turn.next_down(), -turn);
+        let pose = Pose::new(rows, [shift.next_down(), -0.0, -shift]).unwrap();
+        assert_eq!(pose.rotation, [[1.0, 0.0, -turn], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        assert_eq!(pose.translation, [0.0, 0.0, -shift]);
+    }
+
+    /// The rotation of the quaternion 10 + i + 2j + 4k, times 121.
+    const ROWS: [[f64; 3]; 3] = [[81.0, -76.0, 48.0], [84.0, 87.0, -4.0], [-32.0, 36.0, 111.0]];
+
+    /// Panics unless `pose` is by `ROWS` and (5, 7, -9).
+    fn check_turn(pose: Result<Pose, PoseError>) {
+        let pose = pose.unwrap();
+        assert_eq!(pose.translation(), [5.0, 7.0, -9.0]);
+        for (row, expected) in pose.rotation().as_flattened().iter().zip(ROWS.as_flattened()) {
+            assert!((row - expected / 121.0).abs() < 1e-15, "{pose:?}");
+        }
+        // Rows times (4, 2, -3), over 121.
+        let expected = [28.0 / 121.0 + 5.0, 522.0 / 121.0 + 7.0, -389.0 / 121.0 - 9.0];
+        for (placed, expected) in pose.place([4.0, 2.0, -3.0]).into_iter().zip(expected) {
+            assert!((placed - expected).abs() < 1e-14, "{pose:?}");
+        }
+    }
+
+    #[test]
+    fn rows_turn_and_move() {
+        let [x, y, z] = ROWS.map(|row| row.map(|entry| entry / 121.0));
+        check_turn(Pose::new([x, y, z], [5.0, 7.0, -9.0]));
+        check_turn(Pose::from_rows(&[x[0], x[1], x[2], 5.0, y[0], y[1], y[2], 7.0, z[0], z[1], z[2], -9.0]));
+    }
+
+    #[test]
+    #[cfg(feature = "mint")]
+    fn matrices_and_quaternions_of_mint_turn_and_move_alike() {
+        let [x, y, z] = ROWS.map(|row| row.map(|entry| entry / 121.0));
+        let row = |x: [f64; 3], t: f64| mint::Vector4 { x: x[0], y: x[1], z: x[2], w: t };
+        let rows = mint::RowMatrix3x4 { x: row(x, 5.0), y: row(y, 7.0), z: row(z, -9.0) };
+        check_turn(rows.try_into());
+        let column = |k: usize| mint::Vector4 { x: x[k], y: y[k], z: z[k], w: 0.0 };
+        let w = mint::Vector4 { x: 5.0, y: 7.0, z: -9.0, w: 1.0 };
+        check_turn(mint::ColumnMatrix4 { x: column(0), y: column(1), z: column(2), w }.try_into());
+        let vector = mint::Vector3 { x: 1.0 / 11.0, y: 2.0 / 11.0, z: 4.0 / 11.0 };
+        let translation = mint::Vector3 { x: 5.0, y: 7.0, z: -9.0 };
+        check_turn((mint::Quaternion { v: vector, s: 10.0 / 11.0 }, translation).try_into());
     }
 }
