@@ -26,6 +26,7 @@ fn check(name: &str, a: &Triangle, b: &Triangle) -> Closest {
     assert!(exact.compare(distance - TOLERANCE * size).is_ge(), "too far: {context}");
     assert!(exact.compare(distance + TOLERANCE * size).is_le(), "too near: {context}");
     assert!(upper - distance <= TOLERANCE * size + f64::MIN_POSITIVE, "{context}");
+    assert!(distance - lower <= TOLERANCE * size + f64::MIN_POSITIVE, "{context}");
     assert_eq!(distance == 0.0, exact.compare(0.0).is_eq(), "{context}");
     assert_eq!(distance == 0.0, triangles_intersect(a, b), "{context}");
 
@@ -58,6 +59,18 @@ fn grid_pairs_agree_with_the_oracle() {
         for _ in 0..rounds {
             let (a, b) = (random.grid_triangle(n), random.grid_triangle(n));
             check("grid", &float(&a), &float(&b));
+        }
+    }
+}
+
+#[test]
+fn grid_pairs_at_the_ends_of_the_range_agree_with_the_oracle() {
+    // Multiples of 2^-266, and coordinates of 2^125.
+    for unit in [2_f64.powi(-266), 2_f64.powi(123)] {
+        let mut random = Random(41);
+        for _ in 0..200 {
+            let [a, b] = [(); 2].map(|()| float(&random.grid_triangle(5)).map(|p| p.map(|x| x * unit)));
+            check("end of the range", &a, &b);
         }
     }
 }
@@ -146,4 +159,17 @@ fn crossing_triangles_share_their_witness_point() {
     let a = [[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]];
     let closest = check("pierced", &a, &[[0.25, 0.5, -1.0], [0.25, 0.5, 1.0], [9.0, 9.0, 0.5]]);
     assert_eq!((closest.distance, closest.point_a), (0.0, [0.25, 0.5, 0.0]));
+}
+
+#[test]
+fn of_equal_distances_the_first_pair_of_corners_is_named() {
+    let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let over = a.map(|[x, y, _]| [x, y, 2.0]);
+    for turn in 0..3 {
+        let (mut a, mut over) = (a, over);
+        a.rotate_left(turn);
+        over.rotate_left(turn);
+        let closest = check("parallel", &a, &over);
+        assert_eq!((closest.point_a, closest.point_b), (a[0], over[0]));
+    }
 }

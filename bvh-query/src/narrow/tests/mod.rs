@@ -5,6 +5,7 @@ mod generate;
 mod intersect;
 mod many;
 mod oracle;
+mod within;
 
 #[path = "../../../tests/exact"]
 #[allow(dead_code, reason = "the integration tests use the rest")]

@@ -1,0 +1,49 @@
+//! `triangles_within` against the oracle, at the two neighbouring limits that the exact distance lies between.
+
+use super::exact::length::Length;
+use super::generate::{KINDS, Random, float, pair};
+use crate::narrow::{Closest, Triangle, triangle_distance, triangles_within};
+
+#[track_caller]
+fn check(name: &str, exact: &Length, a: &Triangle, b: &Triangle, closest: &Closest) {
+    let floor = exact.floor();
+    for limit in [floor, floor.next_up(), floor.next_down(), 0.0, 0.5 * floor, 2.0 * floor] {
+        let (limit, context) = (limit.max(0.0), format!("{name}, {limit:e}: {a:?} {b:?} {closest:?}"));
+        assert_eq!(triangles_within(a, b, closest, limit), exact.compare(limit).is_le(), "{context}");
+    }
+}
+
+/// Bounds that leave every limit to the integers.
+fn unknown(t: &Triangle) -> Closest {
+    Closest { distance: 0.0, lower: 0.0, upper: f64::INFINITY, point_a: t[0], point_b: t[0] }
+}
+
+#[test]
+fn grid_pairs_agree_with_the_oracle() {
+    // Integers have no range: subnormal numbers, those that just aren't, and what overflows when it is squared.
+    let units = [1.0, f64::from_bits(1), 2_f64.powi(-1024), 2_f64.powi(900)];
+    let mut random = Random(31);
+    for round in 0..1600 {
+        let n = 2 + round % 4;
+        let unit = units[random.below(4)];
+        let [a, b] = [(); 2].map(|()| float(&random.grid_triangle(n)).map(|p| p.map(|x| (x - 1.0) * unit)));
+        let exact = Length::between(&a, &b);
+        // Of triangles that meet it is never asked.
+        if exact.compare(0.0).is_gt() {
+            check("grid", &exact, &a, &b, &unknown(&a));
+        }
+    }
+}
+
+#[test]
+fn hard_pairs_agree_with_the_oracle() {
+    let mut random = Random(29);
+    for round in 0..KINDS * 40 {
+        let (name, a, b) = pair(round % KINDS, &mut random);
+        let exact = Length::between(&a, &b);
+        check(name, &exact, &a, &b, &triangle_distance(&a, &b));
+        if exact.compare(0.0).is_gt() {
+            check(name, &exact, &a, &b, &unknown(&a));
+        }
+    }
+}
