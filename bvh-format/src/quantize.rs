@@ -175,6 +175,15 @@ mod tests {
     }
 
     #[test]
+    fn codes_of_a_flat_parent_are_codes() {
+        for (encoding, last) in [(Encoding::U8, 255), (Encoding::U4, 15)] {
+            let unit = residual_unit(encoding, 3.0, 3.0, 1.0);
+            assert!(encode_min_outward(encoding, 3.0, 3.0, unit) <= last);
+            assert!(encode_max_outward(encoding, 3.0, 3.0, unit) <= last);
+        }
+    }
+
+    #[test]
     fn products_of_code_and_step_are_exact() {
         for seed in 0..50_000u32 {
             let width = f32::from_bits(0x2000_0000 + seed.wrapping_mul(0x9e37_79b9) % 0x3000_0000);
