@@ -1,19 +1,17 @@
 //! The treelets of an object in one array, brick by brick behind the tree above them.
 
+use crate::build::MOST_CHILDREN;
 use crate::treelets::{ChildKind, Treelet};
 use std::ops::Range;
 
 /// A treelet by number in an arena; children have higher numbers than their parents.
 pub(crate) type TreeletIndex = u32;
 
-/// Most children that a treelet of any profile has.
-const CHILDREN: usize = 8;
-
 /// A tree of treelets, depth-first.
 pub(crate) struct Arena {
     pub(crate) treelets: Vec<Treelet>,
     /// Per treelet and child the child treelet, if it is one.
-    children: Vec<[Option<TreeletIndex>; CHILDREN]>,
+    children: Vec<[Option<TreeletIndex>; MOST_CHILDREN]>,
 }
 
 impl Arena {
@@ -25,7 +23,7 @@ impl Arena {
         while let Some((mut treelet, from)) = stack.pop() {
             let index = arena.treelets.len();
             if let Some((parent, child)) = from {
-                let links: &mut [Option<TreeletIndex>; CHILDREN] = &mut arena.children[parent];
+                let links: &mut [Option<TreeletIndex>; MOST_CHILDREN] = &mut arena.children[parent];
                 links[child] = Some(index as u32);
             }
             for (child, slot) in treelet.children.iter_mut().enumerate().rev() {
@@ -35,7 +33,7 @@ impl Arena {
                 }
             }
             arena.treelets.push(treelet);
-            arena.children.push([None; CHILDREN]);
+            arena.children.push([None; MOST_CHILDREN]);
         }
         arena
     }

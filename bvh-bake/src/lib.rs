@@ -24,7 +24,7 @@ mod verify;
 pub use bake::{Stage, to_bytes, to_bytes_with};
 pub use error::BakeError;
 pub use files::{FileOptions, Outcome, Step, bake_files, estimate_memory, read_meshes, write_atomically};
-pub use options::Options;
+pub use options::{Effort, Options};
 pub use prove::{prove_bounds, validate_in_parallel};
 pub use report::BakeReport;
 pub use summary::FileSummary;

@@ -1,17 +1,21 @@
 //! Cuts a binary tree into treelets of W children and fits the k-DOPs.
 //!
-//! A treelet starts at a binary node and opens, of its children so far, the one that traversals
-//! enter most (the largest), until it has W. A subtree whose packets fit one treelet is left closed:
-//! opened, its packets would end up under a treelet that is not full. So it goes with bricks, the leaves of the
-//! tree above them.
+//! Of all ways to cut, the one is taken in which the sizes of the nodes where treelets start have the least sum: those
+//! are what traversals meet. From the leaves up, each node finds the least cost of what is below it for each
+//! number of places that it may take in the treelet above (dynamic programming). A treelet costs some more
+//! wherever it is, so that files stay small where it hardly matters. Of equal costs, that of more opened nodes
+//! is taken. The tree above bricks is cut in the same way, with bricks for leaves.
 
-use crate::build::{Node, PacketTriangles};
+use crate::build::{Inner, MOST_CHILDREN, Node, PacketTriangles};
 use crate::prepare::Corners;
 use bvh_format::kdop::Kdop;
 use rayon::prelude::*;
 
 /// Below this many leaves, threads cost more than they bring.
 const PARALLEL: usize = 2048;
+
+/// What a treelet costs wherever it is, in mean sizes of nodes with two leaves.
+const ROOM: f64 = 0.5;
 
 /// A treelet over its children.
 pub(crate) struct Treelet {
@@ -52,46 +56,76 @@ pub(crate) struct Cutter<F> {
 
 impl<F> Cutter<F> {
     /// The treelet that starts at `node`, with all below it.
-    pub(crate) fn cut<L: Send>(&self, node: Node<L>) -> Treelet
+    pub(crate) fn cut<L: Send>(&self, mut node: Node<L>) -> Treelet
+    where
+        F: Fn(L) -> Child + Sync,
+    {
+        let (mut sum, mut count) = (0.0, 0.0f64);
+        add_pairs(&node, &mut sum, &mut count);
+        let room = if count > 0.0 { ROOM * sum / count } else { 0.0 };
+        self.divide(&mut node, room);
+        self.treelet(node)
+    }
+
+    /// Finds how the places of treelets are best divided between the sides of each node. Returns the least cost
+    /// of what is below `node` if that takes at most 1, 2, ... places in a treelet. `room` is the cost of a
+    /// treelet wherever it is.
+    fn divide<L: Send>(&self, node: &mut Node<L>, room: f64) -> [f64; MOST_CHILDREN]
+    where
+        F: Sync,
+    {
+        let Node::Inner(inner) = node else { return [0.0; MOST_CHILDREN] };
+        let Inner { left, right, leaves, size, shares } = inner.as_mut();
+        let (left, right) = if *leaves > PARALLEL {
+            rayon::join(|| self.divide(left, room), || self.divide(right, room))
+        } else {
+            (self.divide(left, room), self.divide(right, room))
+        };
+        let mut costs = [f64::INFINITY; MOST_CHILDREN];
+        for places in 2..=self.width {
+            costs[places - 1] = costs[places - 2];
+            shares[places - 1] = shares[places - 2];
+            for share in 1..places {
+                let cost = left[share - 1] + right[places - share - 1];
+                if cost < costs[places - 1] {
+                    costs[places - 1] = cost;
+                    shares[places - 1] = share as u8;
+                }
+            }
+        }
+        // Or a treelet of its own starts here, in one place.
+        let closed = costs[self.width - 1] + *size + room;
+        shares[0] = shares[self.width - 1];
+        costs[0] = closed;
+        for places in 2..=self.width {
+            if closed < costs[places - 1] {
+                costs[places - 1] = closed;
+                shares[places - 1] = 0;
+            }
+        }
+        costs
+    }
+
+    /// The treelet that starts at a node whose places have been divided.
+    fn treelet<L: Send>(&self, node: Node<L>) -> Treelet
     where
         F: Fn(L) -> Child + Sync,
     {
         let leaves = node.leaves();
-        let mut open = Vec::with_capacity(self.width);
-        open.push(node);
-        while open.len() < self.width {
-            let Some(at) = self.next_to_open(&open) else { break };
-            // The children take the place of their parent, so that the order of the tree is kept.
-            if let Node::Inner(inner) = open.remove(at) {
-                open.insert(at, inner.right);
-                open.insert(at, inner.left);
+        let mut closed = Vec::with_capacity(self.width);
+        match node {
+            Node::Leaf(_) => closed.push(node),
+            Node::Inner(inner) => {
+                let share = inner.shares[0];
+                open(*inner, share, self.width, &mut closed);
             }
         }
         let children = if leaves > PARALLEL {
-            open.into_par_iter().map(|node| self.child(node)).collect()
+            closed.into_par_iter().map(|node| self.child(node)).collect()
         } else {
-            open.into_iter().map(|node| self.child(node)).collect()
+            closed.into_iter().map(|node| self.child(node)).collect()
         };
         Treelet { children }
-    }
-
-    /// The largest node that may be opened. At the start that is the treelet's own root.
-    fn next_to_open<L>(&self, open: &[Node<L>]) -> Option<usize> {
-        let alone = open.len() == 1;
-        // Within a treelet of nothing but leaves every inner node is opened.
-        let bottom: usize = open.iter().map(Node::leaves).sum();
-        let all_fit = bottom <= self.width;
-        let may = |node: &Node<L>| match node {
-            Node::Leaf(_) => false,
-            Node::Inner(inner) => alone || all_fit || inner.leaves > self.width,
-        };
-        let mut best: Option<usize> = None;
-        for (index, node) in open.iter().enumerate().filter(|(_, node)| may(node)) {
-            if best.is_none_or(|best| node.size() > open[best].size()) {
-                best = Some(index);
-            }
-        }
-        best
     }
 
     fn child<L: Send>(&self, node: Node<L>) -> Child
@@ -101,9 +135,37 @@ impl<F> Cutter<F> {
         match node {
             Node::Leaf(leaf) => (self.leaf)(leaf),
             inner => {
-                let treelet = self.cut(inner);
+                let treelet = self.treelet(inner);
                 Child { kdop: treelet.kdop(self.slabs), kind: ChildKind::Treelet(Box::new(treelet)) }
             }
+        }
+    }
+}
+
+/// Adds up number and sizes of the nodes with two leaves.
+fn add_pairs<L>(node: &Node<L>, sum: &mut f64, count: &mut f64) {
+    if let Node::Inner(inner) = node {
+        if inner.leaves == 2 {
+            *sum += inner.size;
+            *count += 1.0;
+        } else {
+            add_pairs(&inner.left, sum, count);
+            add_pairs(&inner.right, sum, count);
+        }
+    }
+}
+
+/// Divides `places` between the sides of a node, of which the left gets `share`, and adds what then stays closed
+/// in the order of the tree.
+fn open<L>(inner: Inner<L>, share: u8, places: usize, closed: &mut Vec<Node<L>>) {
+    let share = usize::from(share);
+    for (side, places) in [(inner.left, share), (inner.right, places - share)] {
+        match side {
+            Node::Inner(inner) if places > 1 && inner.shares[places - 1] > 0 => {
+                let share = inner.shares[places - 1];
+                open(*inner, share, places, closed);
+            }
+            side => closed.push(side),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use bvh_bake::io;
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{BakeReport, Options, prove_bounds, to_bytes, to_bytes_with};
+use bvh_bake::{BakeReport, Effort, Options, prove_bounds, to_bytes, to_bytes_with};
 use bvh_format::checksum::checksum;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::{TriangleEncoding, decode_packet};
@@ -136,7 +136,9 @@ fn meshes_of_every_scale() {
 fn the_bytes_depend_on_mesh_and_options_alone() {
     for encoding in TriangleEncoding::ALL {
         for profile in [Profile::Dop14U8, Profile::Dop6U8, Profile::Dop26U4] {
-            let (mesh, options) = (mesh(&soup(20_000, 6)), options(profile, encoding));
+            let effort = Effort::ALL[encoding as usize];
+            let options = Options { effort, ..options(profile, encoding) };
+            let mesh = mesh(&soup(20_000, 6));
             let bake = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| to_bytes(&mesh, &options).unwrap().0)
@@ -164,13 +166,16 @@ fn several_bricks_are_baked_to_the_same_bytes_by_any_number_of_threads() {
         })
         .collect();
     let mesh = mesh(&triangles);
-    let bake = |threads: usize| {
+    let bake = |effort: Effort, threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| to_bytes(&mesh, &options(Profile::Dop14U8, TriangleEncoding::Packed)).unwrap().0)
+        let options = Options { effort, ..options(Profile::Dop14U8, TriangleEncoding::Packed) };
+        pool.install(|| to_bytes(&mesh, &options).unwrap().0)
     };
-    let bytes = bake(1);
-    assert!(bytes == bake(2) && bytes == bake(5));
-    assert_eq!(stored(&bytes).len(), triangles.len());
+    for effort in Effort::ALL {
+        let bytes = bake(effort, 1);
+        assert!(bytes == bake(effort, 2) && bytes == bake(effort, 5), "{}", effort.name());
+        assert_eq!(stored(&bytes).len(), triangles.len());
+    }
 }
 
 #[test]

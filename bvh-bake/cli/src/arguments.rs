@@ -1,5 +1,6 @@
 //! The command line.
 
+use bvh_bake::Effort;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -58,6 +59,9 @@ pub(crate) struct BakeArguments {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
+    /// Time for a better tree: fast, default, or high, which takes about twice as long. Answers are the same
+    #[arg(long, value_name = "E", default_value = "default", value_parser = effort)]
+    pub(crate) effort: Effort,
     /// How far a vertex may move, in mesh units; only with --triangles quantized [default: 1e-5 of the diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) max_error: Option<f64>,
@@ -308,6 +312,10 @@ fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
     }
     let encoding = TriangleEncoding::ALL.into_iter().find(|encoding| encoding.name() == name);
     encoding.map(Choice::Named).ok_or_else(|| "expected auto, f32, packed or quantized".to_owned())
+}
+
+fn effort(name: &str) -> Result<Effort, String> {
+    Effort::from_name(name).ok_or_else(|| "expected fast, default or high".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

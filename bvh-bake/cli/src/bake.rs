@@ -23,6 +23,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     }
     let options = Options {
         max_error: arguments.max_error,
+        effort: arguments.effort,
         split_objects: arguments.split_objects,
         ids: !arguments.no_ids,
         ..options(&arguments.layout)

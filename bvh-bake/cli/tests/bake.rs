@@ -42,6 +42,22 @@ fn every_profile_and_encoding_verifies() {
 }
 
 #[test]
+fn every_effort_verifies_and_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("torus.obj"), torus(40, 20)).unwrap();
+    for effort in ["fast", "default", "high"] {
+        let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q", "--effort", effort];
+        assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], false);
+        assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], true);
+        assert!(cbvh_in(directory, &["dump", "t.cbvh"]).done().out.contains(&format!("effort={effort}")));
+        cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done();
+    }
+    let low = ["bake", "torus.obj", "-o", "t.cbvh", "--effort", "low"];
+    cbvh_in(directory, &low).failed(1, &["--effort", "expected fast, default or high"]);
+}
+
+#[test]
 fn the_report_has_the_fields_of_the_contract() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();

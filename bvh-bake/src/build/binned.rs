@@ -1,8 +1,8 @@
-//! Splits a brick top-down by planes between bins, down to a few dozen triangles.
+//! Splits a brick top-down by planes between bins, down to a few dozen triangles or less.
 
 use super::boxes::{Aabb, Binning, Cost, Reference};
-use super::swept::{self, SWEEP};
-use super::{Builder, Inner, Node, PACKET, PacketTriangles};
+use super::swept;
+use super::{Builder, Node, PACKET, PacketTriangles};
 
 const BINS: usize = 16;
 /// Below this, threads cost more than they bring.
@@ -31,7 +31,7 @@ impl Builder {
         depth: usize,
     ) -> Node<PacketTriangles> {
         let count = references.len();
-        if count <= SWEEP {
+        if count <= self.sweep {
             return swept::tree(self, references);
         }
         let Split { middle, bounds, centres } = self.split(references, scratch, centres, depth);
@@ -40,8 +40,7 @@ impl Builder {
         let mut left = || self.node(left, left_scratch, &centres[0], depth + 1);
         let mut right = || self.node(right, right_scratch, &centres[1], depth + 1);
         let (left, right) = if count > PARALLEL { rayon::join(left, right) } else { (left(), right()) };
-        let leaves = left.leaves() + right.leaves();
-        Node::Inner(Box::new(Inner { left, right, leaves, size: bounds.half_surface() }))
+        Node::above(left, right, bounds.squared_girth())
     }
 
     /// Orders the references so that the two sides stand apart.
@@ -60,7 +59,7 @@ impl Builder {
         if depth < MAX_COSTED_DEPTH {
             let cost = Cost::within(&bounds);
             for axis in 0..3 {
-                if let Some((cost, plane)) = self.best_of(&bins[axis], cost)
+                if let Some((cost, plane)) = Self::best_of(&bins[axis], cost)
                     && best.is_none_or(|(least, ..)| cost < least)
                 {
                     best = Some((cost, axis, plane));
@@ -89,17 +88,13 @@ impl Builder {
 
     /// The cost and number of the best of the planes before each bin but the first; `None` if all put everything
     /// on one side.
-    pub(super) fn best_of<const N: usize>(
-        &self,
-        bins: &[(usize, Aabb); N],
-        cost: Cost,
-    ) -> Option<(f32, usize)> {
+    pub(super) fn best_of<const N: usize>(bins: &[(usize, Aabb); N], cost: Cost) -> Option<(f32, usize)> {
         let mut right_cost = [0.0; N];
         let (mut bounds, mut right) = (Aabb::EMPTY, 0);
         for plane in (1..N).rev() {
             right += bins[plane].0;
             bounds.join(&bins[plane].1);
-            right_cost[plane] = if right > 0 { cost.of(&bounds, self.weight(right)) } else { f32::INFINITY };
+            right_cost[plane] = if right > 0 { cost.of(&bounds, weight(right)) } else { f32::INFINITY };
         }
         let mut best: Option<(f32, usize)> = None;
         let (mut bounds, mut left) = (Aabb::EMPTY, 0);
@@ -109,22 +104,20 @@ impl Builder {
             if left == 0 || right_cost[plane] == f32::INFINITY {
                 continue;
             }
-            let cost = cost.of(&bounds, self.weight(left)) + right_cost[plane];
+            let cost = cost.of(&bounds, weight(left)) + right_cost[plane];
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, plane));
             }
         }
         best
     }
+}
 
-    /// The weight of `count` triangles: whole packets, and whole treelets beyond one. That fills packets and
-    /// treelets; without it a third of the children's places stay empty.
-    #[inline(always)]
-    pub(super) fn weight(&self, count: usize) -> f32 {
-        let unit = if count > self.treelet / 2 { self.treelet } else { PACKET };
-        // Both are powers of two.
-        ((count + unit - 1) & !(unit - 1)) as f32
-    }
+/// The weight of `count` triangles: whole packets. That fills packets; without it a fifth of their places stay
+/// empty.
+#[inline(always)]
+pub(super) fn weight(count: usize) -> f32 {
+    count.next_multiple_of(PACKET) as f32
 }
 
 struct Split {

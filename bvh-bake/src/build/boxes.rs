@@ -47,10 +47,15 @@ impl Aabb {
         (1..3).fold(0, |best, axis| if self.extent(axis) > self.extent(best) { axis } else { best })
     }
 
-    /// Half of the surface.
-    pub(super) fn half_surface(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.extent(axis)));
-        x * y + y * z + z * x
+    /// The sum of the extents, at most 3 * 2^121.
+    #[inline(always)]
+    pub(super) fn girth(&self) -> f32 {
+        self.extent(0) + self.extent(1) + self.extent(2)
+    }
+
+    /// The square of the sum of the extents: how likely a traversal is to come by. See `Cost`.
+    pub(super) fn squared_girth(&self) -> f64 {
+        f64::from(self.girth()).powi(2)
     }
 }
 
@@ -113,12 +118,15 @@ impl<const BINS: usize> Binning<BINS> {
     }
 }
 
-/// The cost of a side of a split: its weight times the product over the axes of its extent plus half of the
-/// parent's largest extent. That product is the volume in which the centre of a box of the parent's size, the
-/// likely partner in a pair traversal, would overlap it.
+/// The cost of a side of a split: its weight times the square of the sum of its extents and the parent's largest.
+///
+/// A pair traversal comes by where the bounds of a partner of about the parent's size overlap the side's. Of
+/// convex shapes in all orientations, that is as often as the surface of their sum is large, where the shapes are
+/// patches of surfaces; and widths of sums are sums of widths. Products of extents, as surfaces and volumes
+/// are, think too well of flat boxes, which turned in space reach as far as others.
 #[derive(Clone, Copy)]
 pub(super) struct Cost {
-    /// One over the parent's largest extent: factors are then from 1/2 to 3/2, and `f32` is wide enough.
+    /// One over the parent's largest extent: sums are then from 1 to 4, and `f32` is wide enough.
     scale: f32,
 }
 
@@ -130,7 +138,7 @@ impl Cost {
 
     #[inline(always)]
     pub(super) fn of(self, bounds: &Aabb, weight: f32) -> f32 {
-        let factor = |axis: usize| bounds.extent(axis) * self.scale + 0.5;
-        weight * (factor(0) * factor(1) * factor(2))
+        let girth = bounds.girth() * self.scale + 1.0;
+        weight * (girth * girth)
     }
 }

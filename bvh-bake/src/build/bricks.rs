@@ -10,7 +10,7 @@
 //! Two passes over the triangles thus do for any mesh that is not crowded into a few spots.
 
 use super::boxes::{Aabb, Binning, Cost, Reference};
-use super::{Builder, Inner, Node};
+use super::{Builder, Node};
 use rayon::prelude::*;
 
 /// Cells of the grid along an axis.
@@ -46,7 +46,7 @@ pub(super) fn divide(
         let mut left = references;
         let right = left.split_off(left.len() / 2);
         let [left, right] = [left, right].map(|side| divide(side, builder, bricks));
-        return join(left, right, &cell.bounds);
+        return Node::above(left, right, cell.bounds.squared_girth());
     }
     let mut parts = Parts { of_cell: vec![0; CELLS * CELLS * CELLS], counts: Vec::new() };
     let tree = split(&mut cells, builder, &mut parts, 0);
@@ -55,11 +55,6 @@ pub(super) fn divide(
     let mut parts = parts.into_iter();
     // In the order in which the parts were numbered.
     tree.replace_leaves(&mut |_| divide(parts.next().unwrap_or_default(), builder, bricks))
-}
-
-fn join<L>(left: Node<L>, right: Node<L>, bounds: &Aabb) -> Node<L> {
-    let leaves = left.leaves() + right.leaves();
-    Node::Inner(Box::new(Inner { left, right, leaves, size: bounds.half_surface() }))
 }
 
 /// Counts and boxes of all cells.
@@ -170,7 +165,7 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
     }
     let mut bounds = Aabb::EMPTY;
     cells.iter().for_each(|cell| bounds.join(&cell.bounds));
-    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds, builder) } else { None };
+    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds) } else { None };
     let middle = match plane {
         Some((axis, plane)) => {
             // Stable, though cells have no order that matters: their places are unique.
@@ -190,11 +185,11 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
     let (left, right) = cells.split_at_mut(middle);
     let left = split(left, builder, parts, depth + 1);
     let right = split(right, builder, parts, depth + 1);
-    join(left, right, &bounds)
+    Node::above(left, right, bounds.squared_girth())
 }
 
 /// The axis and first cell of the right side of the cheapest split that leaves something on both sides.
-fn best_plane(cells: &[Cell], parent: &Aabb, builder: &Builder) -> Option<(usize, u8)> {
+fn best_plane(cells: &[Cell], parent: &Aabb) -> Option<(usize, u8)> {
     let mut bins = [[(0usize, Aabb::EMPTY); CELLS]; 3];
     for cell in cells {
         for axis in 0..3 {
@@ -205,7 +200,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb, builder: &Builder) -> Option<(usize
     }
     let cost = Cost::within(parent);
     let best =
-        (0..3).filter_map(|axis| builder.best_of(&bins[axis], cost).map(|(c, plane)| (c, axis, plane)));
+        (0..3).filter_map(|axis| Builder::best_of(&bins[axis], cost).map(|(c, plane)| (c, axis, plane)));
     let least = best.reduce(|best, other| if other.0 < best.0 { other } else { best });
     least.map(|(_, axis, plane)| (axis, plane as u8))
 }
@@ -215,7 +210,7 @@ mod tests {
     use super::*;
     use crate::prepare::Corners;
 
-    const BUILDER: Builder = Builder { treelet: 16, brick: 100 };
+    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, passes: &[] };
 
     fn small(at: [f32; 3], size: f32) -> Corners {
         let [x, y, z] = at;

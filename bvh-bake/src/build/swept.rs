@@ -2,18 +2,19 @@
 //!
 //! References are sorted along the axes once; splits keep the orders.
 
+use super::binned::weight;
 use super::boxes::{Aabb, Cost, Reference};
-use super::{Builder, Inner, Node, PACKET, PacketTriangles};
+use super::{Builder, Node, PACKET, PacketTriangles};
 use bvh_format::leaf::to_ordered;
 
-/// Nodes of at most this many triangles are swept.
-pub(super) const SWEEP: usize = 64;
+/// Most triangles that are swept: sets of them are 64 bits.
+pub(super) const MOST: usize = 64;
 
-/// The tree of at most `SWEEP` references.
+/// The tree of at most `MOST` references.
 pub(super) fn tree(builder: &Builder, references: &[Reference]) -> Node<PacketTriangles> {
     let count = references.len();
-    let mut boxes = [Aabb::EMPTY; SWEEP];
-    let mut keys = [[0u64; SWEEP]; 3];
+    let mut boxes = [Aabb::EMPTY; MOST];
+    let mut keys = [[0u64; MOST]; 3];
     for (place, reference) in references.iter().enumerate() {
         boxes[place] = reference.aabb();
         let centre = boxes[place].centre();
@@ -23,7 +24,7 @@ pub(super) fn tree(builder: &Builder, references: &[Reference]) -> Node<PacketTr
             keys[axis][place] = u64::from(ordered) << 32 | place as u64;
         }
     }
-    let mut orders = [[0u8; SWEEP]; 3];
+    let mut orders = [[0u8; MOST]; 3];
     for axis in 0..3 {
         let keys = &mut keys[axis][..count];
         keys.sort_unstable();
@@ -36,12 +37,12 @@ pub(super) fn tree(builder: &Builder, references: &[Reference]) -> Node<PacketTr
 struct Sweep<'a> {
     builder: &'a Builder,
     references: &'a [Reference],
-    boxes: &'a [Aabb; SWEEP],
+    boxes: &'a [Aabb; MOST],
 }
 
 impl Sweep<'_> {
     fn aabb(&self, place: u8) -> &Aabb {
-        &self.boxes[usize::from(place) % SWEEP]
+        &self.boxes[usize::from(place) % MOST]
     }
 
     /// `orders` holds the same places, sorted along each axis.
@@ -62,8 +63,7 @@ impl Sweep<'_> {
         let [x, y, z] = orders.map(|order| order.split_at_mut(middle));
         let left = self.node([x.0, y.0, z.0]);
         let right = self.node([x.1, y.1, z.1]);
-        let leaves = left.leaves() + right.leaves();
-        Node::Inner(Box::new(Inner { left, right, leaves, size: bounds.half_surface() }))
+        Node::above(left, right, bounds.squared_girth())
     }
 
     /// The axis and length of the first side of the cheapest split.
@@ -79,16 +79,16 @@ impl Sweep<'_> {
         let mut best = (f32::INFINITY, 0, PACKET);
         for axis in 0..3 {
             let order = &orders[axis][..count];
-            let mut right_cost = [0.0; SWEEP];
+            let mut right_cost = [0.0; MOST];
             let mut right = Aabb::EMPTY;
             for position in (1..count).rev() {
                 right.join(self.aabb(order[position]));
-                right_cost[position % SWEEP] = cost.of(&right, builder.weight(count - position));
+                right_cost[position % MOST] = cost.of(&right, weight(count - position));
             }
             let mut left = Aabb::EMPTY;
             for position in 1..count {
                 left.join(self.aabb(order[position - 1]));
-                let cost = cost.of(&left, builder.weight(position)) + right_cost[position % SWEEP];
+                let cost = cost.of(&left, weight(position)) + right_cost[position % MOST];
                 if cost < best.0 && may(position) {
                     best = (cost, axis, position);
                 }
@@ -100,13 +100,13 @@ impl Sweep<'_> {
 
 /// Brings the places of one side to the front; both keep their order.
 fn partition(order: &mut [u8], is_left: u64) {
-    let mut others = [0u8; SWEEP];
+    let mut others = [0u8; MOST];
     let mut ends = [0; 2];
     for index in 0..order.len() {
         let place = order[index];
         let side = usize::from(is_left >> place & 1 == 0);
         order[ends[0]] = place;
-        others[ends[1] % SWEEP] = place;
+        others[ends[1] % MOST] = place;
         ends[side] += 1;
     }
     order[ends[0]..].copy_from_slice(&others[..ends[1]]);

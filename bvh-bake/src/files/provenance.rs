@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Raised whenever a bake of the same mesh with the same options gives other bytes, so that files of
 /// an earlier revision do not count as up to date.
-const REVISION: u32 = 2;
+const REVISION: u32 = 3;
 
 /// The lines `key=value` of the provenance section.
 pub(super) struct Provenance {
