@@ -7,7 +7,7 @@ use crate::build::Bricks;
 use crate::encode::Encoder;
 use crate::error::BakeError;
 use crate::mesh::{self, Mesh};
-use crate::options::{Effort, Options};
+use crate::options::Options;
 use crate::pages;
 use crate::prepare::{Corners, box_and_sphere, prepare};
 use crate::prove::{prove_bounds, validate_in_parallel};
@@ -130,10 +130,10 @@ impl<'a> Baker<'a> {
         let choice = auto::choose(&prepared.triangles, self.options);
         progress(Stage::Build);
         let (profile, encoding) = (choice.profile, choice.encoding);
-        let (arena, bricks) = plant(&prepared.triangles, profile, self.options.effort);
+        let (arena, bricks) = plant(&prepared.triangles, profile, self.options);
         let (bounds, centre, radius) = box_and_sphere(&prepared.triangles);
         progress(Stage::Encode);
-        let plan = pages::plan(&arena, &bricks, profile);
+        let plan = pages::plan(&arena, &bricks, profile, self.options.ablation.pages);
         let first_page = self.contents.ends.pages;
         if (first_page + plan.pages.len()) as u64 > MAX_PAGES {
             return Err(BakeError::Limit("2^26 pages".into()));
@@ -186,14 +186,15 @@ impl<'a> Baker<'a> {
 }
 
 /// The treelets of an object, and those of each brick if there is more than one.
-fn plant(triangles: &[Corners], profile: Profile, effort: Effort) -> (Arena, Vec<Range<usize>>) {
+fn plant(triangles: &[Corners], profile: Profile, options: &Options) -> (Arena, Vec<Range<usize>>) {
     let (width, slabs) = (profile.width(), profile.directions().slabs());
     let cutter = Cutter { width, slabs, leaf: |leaf| packet(triangles, leaf) };
     let grow = |tree| {
         let root = cutter.cut(tree);
         (root.kdop(slabs), Arena::flatten(root))
     };
-    let (mut bricks, top) = Bricks::divide(triangles, width, effort).build(triangles, grow);
+    let bricks = Bricks::divide(triangles, width, options.effort, options.ablation.splits);
+    let (mut bricks, top) = bricks.build(triangles, grow);
     if bricks.len() == 1
         && let Some((_, arena)) = bricks.pop()
     {

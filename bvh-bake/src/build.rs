@@ -13,6 +13,7 @@ mod bricks;
 mod reinsert;
 mod swept;
 
+use crate::ablation::SplitRule;
 use crate::options::Effort;
 use crate::prepare::Corners;
 use boxes::Reference;
@@ -108,10 +109,10 @@ pub(crate) struct Bricks {
 
 impl Bricks {
     /// Divides triangles into bricks, for treelets of `width` children.
-    pub(crate) fn divide(triangles: &[Corners], width: usize, effort: Effort) -> Self {
+    pub(crate) fn divide(triangles: &[Corners], width: usize, effort: Effort, splits: SplitRule) -> Self {
         let references = triangles.par_iter().enumerate();
         let references = references.map(|(index, corners)| Reference::new(index as u32, corners)).collect();
-        let builder = Builder::new(width, effort);
+        let builder = Builder::new(width, effort, splits);
         let mut bricks = Vec::new();
         let top = bricks::divide(references, &builder, &mut bricks);
         Self { bricks, top, builder }
@@ -142,15 +143,17 @@ struct Builder {
     sweep: usize,
     /// What is moved once a brick's tree stands.
     passes: &'static [Pass],
+    /// How nodes are split.
+    splits: SplitRule,
 }
 
 impl Builder {
-    fn new(width: usize, effort: Effort) -> Self {
+    fn new(width: usize, effort: Effort, splits: SplitRule) -> Self {
         let (sweep, passes): (_, &[_]) = match effort {
             Effort::Fast => (16, &[]),
             Effort::Default => (swept::MOST, &[Pass { one_in: 10 }]),
             Effort::High => (swept::MOST, &[Pass { one_in: 1 }; 3]),
         };
-        Self { treelet: PACKET * width, brick: BRICK, sweep, passes }
+        Self { treelet: PACKET * width, brick: BRICK, sweep, passes, splits }
     }
 }

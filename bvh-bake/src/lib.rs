@@ -1,6 +1,7 @@
 //! Bakes triangle meshes into `.cbvh` files.
 #![forbid(unsafe_code)]
 
+mod ablation;
 mod arena;
 mod assemble;
 mod auto;
@@ -21,6 +22,8 @@ mod summary;
 mod treelets;
 mod verify;
 
+#[doc(hidden)]
+pub use ablation::{Ablation, PageOrder, SplitRule};
 pub use bake::{Stage, to_bytes, to_bytes_with};
 pub use error::BakeError;
 pub use files::{FileOptions, Outcome, Step, bake_files, estimate_memory, read_meshes, write_atomically};

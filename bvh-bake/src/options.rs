@@ -1,5 +1,6 @@
 //! What a user may choose when baking.
 
+use crate::ablation::Ablation;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
@@ -52,6 +53,9 @@ pub struct Options {
     pub split_objects: bool,
     /// Keep the original triangle numbers.
     pub ids: bool,
+    /// For measurements: what to do otherwise than usual.
+    #[doc(hidden)]
+    pub ablation: Ablation,
 }
 
 impl Default for Options {
@@ -63,6 +67,7 @@ impl Default for Options {
             effort: Effort::Default,
             split_objects: false,
             ids: true,
+            ablation: Ablation::default(),
         }
     }
 }
@@ -70,7 +75,7 @@ impl Default for Options {
 impl Options {
     /// The options as one line of text: equal options, equal text.
     pub fn stamp(&self) -> String {
-        format!(
+        let mut stamp = format!(
             "profile={} triangles={} max_error={} effort={} split={} ids={}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
@@ -78,6 +83,10 @@ impl Options {
             self.effort.name(),
             self.split_objects,
             self.ids
-        )
+        );
+        if self.ablation != Ablation::default() {
+            stamp += &format!(" {:?}", self.ablation);
+        }
+        stamp
     }
 }

@@ -9,6 +9,9 @@
 //! Each brick is planned by itself, up to a rest of half a page at most. The rests and the tree above the bricks
 //! are planned last, and come first in the file; bricks follow one after the other.
 
+mod order;
+
+use crate::ablation::PageOrder;
 use crate::arena::{Arena, TreeletIndex};
 use bvh_format::page::{PAGE, fits};
 use bvh_format::profile::Profile;
@@ -69,7 +72,7 @@ impl Load {
 }
 
 /// Plans the pages of an object. Each of `bricks` is a run of treelets below its first.
-pub(crate) fn plan(arena: &Arena, bricks: &[Range<usize>], profile: Profile) -> Plan {
+pub(crate) fn plan(arena: &Arena, bricks: &[Range<usize>], profile: Profile, order: PageOrder) -> Plan {
     let count = arena.treelets.len();
     let mut whole = Region::new(arena, profile, 0..count);
     let mut pages = Vec::new();
@@ -84,13 +87,23 @@ pub(crate) fn plan(arena: &Arena, bricks: &[Range<usize>], profile: Profile) -> 
     }
     let mut all = whole.plan(Until::Nothing);
     all.extend(pages);
+    let mut places = places(&all, count);
+    if order != PageOrder::Levels {
+        all = order::arrange(all, &places, order);
+        places = self::places(&all, count);
+    }
+    Plan { pages: all, places }
+}
+
+/// Where each of `count` treelets is.
+fn places(pages: &[PagePlan], count: usize) -> Vec<Place> {
     let mut places = vec![Place::default(); count];
-    for (page, plan) in all.iter().enumerate() {
+    for (page, plan) in pages.iter().enumerate() {
         for (slot, &treelet) in plan.slots.iter().enumerate() {
             places[treelet as usize] = Place { page: page as u32, slot: slot as u8 };
         }
     }
-    Plan { pages: all, places }
+    places
 }
 
 /// How much of a region may be left.

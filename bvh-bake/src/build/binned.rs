@@ -3,6 +3,7 @@
 use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::swept;
 use super::{Builder, Node, PACKET, PacketTriangles};
+use crate::ablation::SplitRule;
 
 const BINS: usize = 16;
 /// Below this, threads cost more than they bring.
@@ -56,8 +57,8 @@ impl Builder {
         let mut bounds = Aabb::EMPTY;
         bins[0].iter().for_each(|(_, bin)| bounds.join(bin));
         let mut best: Option<(f32, usize, usize)> = None;
-        if depth < MAX_COSTED_DEPTH {
-            let cost = Cost::within(&bounds);
+        if depth < MAX_COSTED_DEPTH && self.splits != SplitRule::Median {
+            let cost = Cost::within(&bounds, self.splits);
             for axis in 0..3 {
                 if let Some((cost, plane)) = Self::best_of(&bins[axis], cost)
                     && best.is_none_or(|(least, ..)| cost < least)

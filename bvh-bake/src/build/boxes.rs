@@ -1,5 +1,6 @@
 //! Boxes and references to triangles in eight lanes, which compilers join in two vector instructions.
 
+use crate::ablation::SplitRule;
 use crate::prepare::Corners;
 use bytemuck::{Pod, Zeroable};
 
@@ -128,16 +129,21 @@ impl<const BINS: usize> Binning<BINS> {
 pub(super) struct Cost {
     /// One over the parent's largest extent: sums are then from 1 to 4, and `f32` is wide enough.
     scale: f32,
+    rule: SplitRule,
 }
 
 impl Cost {
-    pub(super) fn within(parent: &Aabb) -> Self {
+    pub(super) fn within(parent: &Aabb, rule: SplitRule) -> Self {
         let largest = parent.extent(parent.longest());
-        Self { scale: (1.0 / largest).min(f32::MAX) }
+        Self { scale: (1.0 / largest).min(f32::MAX), rule }
     }
 
     #[inline(always)]
     pub(super) fn of(self, bounds: &Aabb, weight: f32) -> f32 {
+        if self.rule == SplitRule::SurfaceArea {
+            let [x, y, z] = [0, 1, 2].map(|axis| bounds.extent(axis) * self.scale);
+            return weight * (x * y + y * z + z * x);
+        }
         let girth = bounds.girth() * self.scale + 1.0;
         weight * (girth * girth)
     }

@@ -11,6 +11,7 @@
 
 use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::{Builder, Node};
+use crate::ablation::SplitRule;
 use rayon::prelude::*;
 
 /// Cells of the grid along an axis.
@@ -165,7 +166,7 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
     }
     let mut bounds = Aabb::EMPTY;
     cells.iter().for_each(|cell| bounds.join(&cell.bounds));
-    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds) } else { None };
+    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds, builder.splits) } else { None };
     let middle = match plane {
         Some((axis, plane)) => {
             // Stable, though cells have no order that matters: their places are unique.
@@ -189,7 +190,7 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
 }
 
 /// The axis and first cell of the right side of the cheapest split that leaves something on both sides.
-fn best_plane(cells: &[Cell], parent: &Aabb) -> Option<(usize, u8)> {
+fn best_plane(cells: &[Cell], parent: &Aabb, splits: SplitRule) -> Option<(usize, u8)> {
     let mut bins = [[(0usize, Aabb::EMPTY); CELLS]; 3];
     for cell in cells {
         for axis in 0..3 {
@@ -198,7 +199,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb) -> Option<(usize, u8)> {
             bounds.join(&cell.bounds);
         }
     }
-    let cost = Cost::within(parent);
+    let cost = Cost::within(parent, splits);
     let best =
         (0..3).filter_map(|axis| Builder::best_of(&bins[axis], cost).map(|(c, plane)| (c, axis, plane)));
     let least = best.reduce(|best, other| if other.0 < best.0 { other } else { best });
@@ -210,7 +211,8 @@ mod tests {
     use super::*;
     use crate::prepare::Corners;
 
-    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, passes: &[] };
+    const BUILDER: Builder =
+        Builder { treelet: 16, brick: 100, sweep: 64, passes: &[], splits: SplitRule::Reach };
 
     fn small(at: [f32; 3], size: f32) -> Corners {
         let [x, y, z] = at;

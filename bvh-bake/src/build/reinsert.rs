@@ -251,6 +251,7 @@ impl Tree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ablation::SplitRule;
     use crate::build::Bricks;
     use crate::options::Effort;
 
@@ -297,11 +298,12 @@ mod tests {
     #[test]
     fn passes_lower_the_cost_and_keep_all_packets() {
         for triangles in [sticks(3000), sticks(30), vec![[[1.0, 2.0, 3.0]; 3]; 500]] {
-            let (trees, _) = Bricks::divide(&triangles, 4, Effort::Fast).build(&triangles, |tree| {
-                let mut flat = Tree { nodes: Vec::new(), root: 0 };
-                flat.add(tree, NONE, &triangles);
-                flat
-            });
+            let (trees, _) =
+                Bricks::divide(&triangles, 4, Effort::Fast, SplitRule::Reach).build(&triangles, |tree| {
+                    let mut flat = Tree { nodes: Vec::new(), root: 0 };
+                    flat.add(tree, NONE, &triangles);
+                    flat
+                });
             for mut tree in trees {
                 let kept = packets(&tree);
                 for one_in in [10, 1, 1] {

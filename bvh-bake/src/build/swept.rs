@@ -5,6 +5,7 @@
 use super::binned::weight;
 use super::boxes::{Aabb, Cost, Reference};
 use super::{Builder, Node, PACKET, PacketTriangles};
+use crate::ablation::SplitRule;
 use bvh_format::leaf::to_ordered;
 
 /// Most triangles that are swept: sets of them are 64 bits.
@@ -69,8 +70,12 @@ impl Sweep<'_> {
     /// The axis and length of the first side of the cheapest split.
     fn best_position(&self, orders: &[&mut [u8]; 3], bounds: &Aabb) -> (usize, usize) {
         let builder = self.builder;
-        let cost = Cost::within(bounds);
+        let cost = Cost::within(bounds, builder.splits);
         let count = orders[0].len();
+        if builder.splits == SplitRule::Median {
+            let unit = if count > builder.treelet { builder.treelet } else { PACKET };
+            return (bounds.longest(), (count / 2).next_multiple_of(unit));
+        }
         // Below a treelet of leaves no packet more than needed is opened.
         let packets = if count <= builder.treelet { count.div_ceil(PACKET) } else { usize::MAX };
         let may =
