@@ -59,7 +59,7 @@ pub(crate) fn names(paths: &[PathBuf]) -> String {
 }
 
 /// Shows the stage on standard error, if that is a terminal.
-fn spinner(quiet: bool) -> ProgressBar {
+pub(crate) fn spinner(quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let spinner = ProgressBar::with_draw_target(None, target);
     if !spinner.is_hidden() {

@@ -2,10 +2,10 @@
 
 pub(crate) mod number;
 mod once;
-mod poses;
-mod record;
+pub(crate) mod poses;
+pub(crate) mod record;
 mod runner;
-mod side;
+pub(crate) mod side;
 
 use crate::arguments::{Mode, QueryArguments};
 use crate::error::Failure;
@@ -81,12 +81,12 @@ fn run_files(
 }
 
 /// The backend of `--isa`; what it does not decide, `CBVH_ISA` may.
-fn backend(name: &str) -> Result<Backend, Failure> {
+pub(crate) fn backend(name: &str) -> Result<Backend, Failure> {
     Ok(if name == "auto" { Backend::detect()? } else { Backend::from_name(name)? })
 }
 
 /// A file's name without directories and what follows its last dot.
-fn stem(path: &Path) -> String {
+pub(crate) fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
@@ -184,7 +184,7 @@ impl Question {
 }
 
 /// Adds what one query did to what others did.
-fn add(sum: &mut QueryStats, stats: QueryStats) {
+pub(crate) fn add(sum: &mut QueryStats, stats: QueryStats) {
     sum.node_tests += stats.node_tests;
     sum.packet_tests += stats.packet_tests;
     sum.exact_tests += stats.exact_tests;

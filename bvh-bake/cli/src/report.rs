@@ -1,11 +1,33 @@
-//! `cbvh report`: questions whose answers are known, and what came of them. So far, the hard cases.
+//! `cbvh report`: speed against error over all layouts, or questions whose answers are known.
 
+mod answers;
+mod cold;
+mod csv;
+mod files;
 mod hard;
+mod html;
+mod json;
+mod machine;
+mod measure;
+mod model;
+mod pairs;
+mod pareto;
+mod pin;
+mod plot;
+mod row;
+mod scatter;
+mod source;
+mod speed;
+mod spread;
+mod variant;
 
 use crate::arguments::ReportArguments;
 use crate::error::Failure;
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
-    // The command line has made sure of --hard.
-    hard::run(&arguments.out, arguments.peers.as_deref())
+    match &arguments.pairs {
+        Some(pairs) => speed::run(pairs, arguments),
+        // The command line has made sure of --hard.
+        None => hard::run(&arguments.out, arguments.peers.as_deref()),
+    }
 }

@@ -123,7 +123,7 @@ impl Answer {
 }
 
 /// A sorted time at a fraction of the way, counted as the peers do.
-fn quantile(sorted: &[u64], fraction: f64) -> u64 {
+pub(crate) fn quantile(sorted: &[u64], fraction: f64) -> u64 {
     let index = (fraction * sorted.len() as f64) as usize;
     sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0)
 }
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_the_peers() {
+    pub(crate) fn quantiles_are_those_of_the_peers() {
         let times: Vec<u64> = (0..10).collect();
         let found = [0.1, 0.5, 0.9, 1.0].map(|fraction| quantile(&times, fraction));
         assert_eq!(found, [1, 5, 9, 9]);

@@ -64,7 +64,7 @@ impl Side {
 }
 
 /// True for `.cbvh` files, by content or, so that a damaged one is called so, by name.
-fn is_baked(path: &Path) -> Result<bool, Failure> {
+pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
     let failed = |error| Failure::from_input(path, &error);
     let mut file = std::fs::File::open(path).map_err(failed)?;
     let mut head = Vec::new();

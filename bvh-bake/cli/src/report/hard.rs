@@ -4,7 +4,6 @@ mod cases;
 mod csv;
 mod judge;
 mod kit;
-mod machine;
 mod markdown;
 mod own;
 mod peers;

@@ -3,6 +3,7 @@
 use super::peers::Other;
 use super::record::{Answers, Asked, Record};
 use crate::query::number::significant;
+use crate::report::csv::line;
 
 pub(super) fn table(record: &Record) -> String {
     let mut header: Vec<String> = [
@@ -82,26 +83,4 @@ fn fields(case: &Asked, answers: &Answers, columns: &[(&str, &str)]) -> Vec<Stri
         fields.push(other.map_or(String::new(), |other| other.verdict.name().to_owned()));
     }
     fields
-}
-
-/// Quoted where RFC 4180 wants it.
-fn line(fields: &[String]) -> String {
-    let quoted: Vec<_> = fields
-        .iter()
-        .map(|field| {
-            let plain = !field.contains([',', '"', '\n', '\r']);
-            if plain { field.clone() } else { format!("\"{}\"", field.replace('"', "\"\"")) }
-        })
-        .collect();
-    quoted.join(",") + "\n"
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn commas_and_quotes_are_quoted() {
-        assert_eq!(line(&["a".into(), "b, c".into(), "d \"e\"".into()]), "a,\"b, c\",\"d \"\"e\"\"\"\n");
-    }
 }

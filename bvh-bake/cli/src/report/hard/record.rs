@@ -2,9 +2,9 @@
 
 use super::cases::{Case, Length, Truth};
 use super::judge::Verdict;
-use super::machine;
 use super::own::Own;
 use super::peers::{Other, Peer};
+use crate::report::machine;
 use bvh_query::Backend;
 use serde::Serialize;
 

@@ -1,5 +1,6 @@
-//! When and where: the date, and the processor as it names itself.
+//! When and where: the date, and what the system tells of the machine.
 
+use serde::Serialize;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Year, month and day, in UTC.
@@ -42,6 +43,50 @@ pub(super) fn processor() -> String {
         (Some(family), Some(model)) => format!("{name}, family {family}, model {model}"),
         _ => name,
     }
+}
+
+/// A cache of the processor.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Cache {
+    pub(super) level: u64,
+    pub(super) kind: String,
+    pub(super) bytes: u64,
+}
+
+/// The caches of the first processor that hold data, the nearest first; none where the system does not tell.
+pub(super) fn caches() -> Vec<Cache> {
+    let read = |index: usize, name: &str| {
+        let path = format!("/sys/devices/system/cpu/cpu0/cache/index{index}/{name}");
+        Some(std::fs::read_to_string(path).ok()?.trim().to_owned())
+    };
+    let cache = |index| {
+        let kind = read(index, "type")?;
+        let bytes = read(index, "size")?.strip_suffix('K')?.parse::<u64>().ok()? * 1024;
+        Some(Cache { level: read(index, "level")?.parse().ok()?, kind, bytes })
+    };
+    (0..8).map_while(cache).filter(|cache| cache.kind != "Instruction").collect()
+}
+
+/// The system's name and release.
+pub(super) fn system() -> String {
+    let read = |name: &str| std::fs::read_to_string(format!("/proc/sys/kernel/{name}")).ok();
+    match (read("ostype"), read("osrelease")) {
+        (Some(name), Some(release)) => format!("{} {}", name.trim(), release.trim()),
+        _ => std::env::consts::OS.to_owned(),
+    }
+}
+
+/// True in a virtual machine that says so.
+pub(super) fn is_virtual() -> bool {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    text.lines().any(|line| line.starts_with("flags") && line.split_whitespace().any(|f| f == "hypervisor"))
+}
+
+/// Page faults of this process so far that had to wait for a disk; `None` where the system does not tell.
+pub(super) fn disk_faults() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name, in brackets, may hold anything; the twelfth field of all is the tenth behind it.
+    text.rsplit(')').next()?.split_whitespace().nth(9)?.parse().ok()
 }
 
 #[cfg(test)]

@@ -1,0 +1,135 @@
+//! Holds answers against those of the reference: the profile of plain floats, with the same triangles.
+//!
+//! Contact and exact distances have one right answer for given triangles, bit for bit; with an allowed error the
+//! answer is from the least distance to that much more. Triangles that were moved have answers of their own:
+//! those are held against the reference with the same moved triangles, and how far they are from the answers
+//! for the mesh itself is an error that is reported.
+
+use super::measure::{Asked, Baked, Question};
+use super::row::Errors;
+use super::spread::median;
+use bvh_format::leaf::TriangleEncoding;
+
+/// Roundings allowed to the product of a distance and 1 + an allowed error: two of 2^-53 each, with room.
+const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
+
+/// What is wrong with the answers, one line each, and the errors of each variant's answers, by question.
+pub(super) fn judge(pair: &str, bakes: &[Baked], asked: &[Vec<Asked>]) -> (Vec<String>, Vec<Vec<Errors>>) {
+    let reference = |triangles: TriangleEncoding| {
+        let place = bakes.iter().position(|bake| bake.variant.is_reference(triangles));
+        &asked[place.unwrap_or(0)]
+    };
+    let distance = Question::ALL.iter().position(|&q| q == Question::Distance(0.0)).unwrap_or(0);
+    let exact = &reference(TriangleEncoding::F32)[distance].answers;
+    let mut wrong = Vec::new();
+    let mut errors = Vec::new();
+    for (bake, found) in bakes.iter().zip(asked) {
+        let variant = &bake.variant;
+        let right = reference(variant.triangles);
+        let name = format!("{pair}, {} {}", variant.group.name(), variant.name);
+        let mut errors_of = Vec::new();
+        for (number, question) in Question::ALL.into_iter().enumerate() {
+            let expected = match question {
+                Question::Collide => &right[number].answers,
+                Question::Distance(_) => &right[distance].answers,
+            };
+            for (pose, (&found, &expected)) in found[number].answers.iter().zip(expected).enumerate() {
+                if !is_right(question, found, expected) {
+                    let (asked, rel_err) = (question.name(), question.rel_err().unwrap_or(0.0));
+                    wrong.push(format!(
+                        "{name}, {asked} with an allowed error of {rel_err}, pose {}: expected {expected:?}, \
+                         found {found:?}",
+                        pose + 1
+                    ));
+                }
+            }
+            errors_of.push(match question {
+                Question::Collide => Errors::default(),
+                Question::Distance(_) => errors_against(exact, &found[number].answers),
+            });
+        }
+        errors.push(errors_of);
+    }
+    (wrong, errors)
+}
+
+fn is_right(question: Question, found: f64, expected: f64) -> bool {
+    match question {
+        Question::Collide => found == expected,
+        Question::Distance(0.0) => found.to_bits() == expected.to_bits(),
+        Question::Distance(rel_err) => expected <= found && found <= expected * (1.0 + rel_err) * ROUNDING,
+    }
+}
+
+fn errors_against(exact: &[f64], found: &[f64]) -> Errors {
+    let pairs = || exact.iter().zip(found);
+    let relative: Vec<f64> = pairs()
+        .filter(|(exact, _)| **exact > 0.0)
+        .map(|(exact, found)| (found - exact).abs() / exact)
+        .collect();
+    let largest = |values: Vec<f64>| values.into_iter().reduce(f64::max);
+    Errors {
+        max: largest(relative.clone()),
+        median: median(relative),
+        max_length: largest(pairs().map(|(exact, found)| (found - exact).abs()).collect()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn right_and_wrong_are_told_apart() {
+        let exact = Question::Distance(0.0);
+        assert!(is_right(exact, 2.0, 2.0) && !is_right(exact, 2.0f64.next_up(), 2.0));
+        let loose = Question::Distance(0.1);
+        assert!(is_right(loose, 2.2, 2.0) && is_right(loose, 2.0, 2.0) && is_right(loose, 0.0, 0.0));
+        assert!(!is_right(loose, 2.21, 2.0) && !is_right(loose, 1.99, 2.0) && !is_right(loose, 0.1, 0.0));
+        assert!(!is_right(loose, f64::NAN, 2.0));
+        assert!(is_right(Question::Collide, 1.0, 1.0) && !is_right(Question::Collide, 0.0, 1.0));
+    }
+
+    #[test]
+    fn relative_errors_are_of_poses_that_are_apart() {
+        let errors = errors_against(&[0.0, 1.0, 2.0, 4.0], &[0.5, 1.0, 2.5, 3.0]);
+        assert_eq!((errors.median, errors.max, errors.max_length), (Some(0.25), Some(0.25), Some(1.0)));
+        let touching = errors_against(&[0.0], &[0.0]);
+        assert_eq!((touching.median, touching.max, touching.max_length), (None, None, Some(0.0)));
+    }
+
+    /// All variants of two triangles, and answers as they should be.
+    fn asked() -> (Vec<Baked>, Vec<Vec<Asked>>) {
+        let mesh = bvh_bake::mesh::Mesh::from_triangles(
+            vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            vec![[0, 1, 2]],
+        );
+        let bakes: Vec<Baked> = super::super::variant::all()
+            .into_iter()
+            .map(|variant| {
+                let (bytes, _) = bvh_bake::to_bytes(&mesh, &variant.options()).unwrap();
+                let a = std::sync::Arc::new(bvh_query::Bvh::from_bytes(bytes).unwrap());
+                Baked { variant, b: a.clone(), a }
+            })
+            .collect();
+        let poses = [0.0, 2.0]
+            .map(|z| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [0.0, 0.0, z]).unwrap());
+        let asked = super::super::measure::rounds(&bakes, &poses, bvh_query::Backend::Scalar, 1).unwrap();
+        (bakes, asked)
+    }
+
+    #[test]
+    fn one_wrong_answer_is_named() {
+        let (bakes, mut found) = asked();
+        assert!(judge("pair", &bakes, &found).0.is_empty());
+        let variant = bakes.iter().position(|bake| bake.variant.name == "dop6-u8 packed").unwrap();
+        found[variant][0].answers[1] = 1.0;
+        let (wrong, _) = judge("pair", &bakes, &found);
+        assert_eq!(
+            wrong,
+            [
+                "pair, layout dop6-u8 packed, collide with an allowed error of 0, pose 2: expected 0.0, found 1.0"
+            ]
+        );
+    }
+}
