@@ -17,7 +17,7 @@ use std::path::PathBuf;
 mod seal;
 
 /// What ends the names of the files that today's baker makes.
-const GENERATION: &str = "-2";
+const GENERATION: &str = "";
 
 /// The cube from -1 to 1 around a point, 12 triangles.
 fn cube(centre: [f64; 3]) -> Mesh {
