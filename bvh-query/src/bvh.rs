@@ -9,7 +9,7 @@ use bvh_format::treelet::Links;
 use bvh_format::{FormatError, Layout, Rule, ids};
 use memmap2::Mmap;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 /// A bounding volume hierarchy that can be queried. `Send` and `Sync`: share it between threads.
 ///
@@ -22,6 +22,8 @@ pub struct Bvh {
     /// What has been checked of each page.
     checked: Box<[AtomicU8]>,
     duplicates_checked: AtomicBool,
+    /// No other one of this process has it, open or closed.
+    identity: u64,
 }
 
 enum Bytes {
@@ -103,7 +105,9 @@ impl Bvh {
     fn new(bytes: Bytes) -> Result<Self, FormatError> {
         let layout = Layout::read(bytes.get())?;
         let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
-        Ok(Self { bytes, layout, checked, duplicates_checked: AtomicBool::new(false) })
+        static OPENED: AtomicU64 = AtomicU64::new(0);
+        let identity = OPENED.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { bytes, layout, checked, duplicates_checked: AtomicBool::new(false), identity })
     }
 
     /// Where everything is in the file.
@@ -300,9 +304,19 @@ impl<'a> Shape<'a> {
         &self.bvh.objects()[self.first..self.end]
     }
 
+    /// Tells it from every other shape of this process, those of closed files included.
+    pub(crate) fn identity(&self) -> (u64, usize, usize) {
+        (self.bvh.identity, self.first, self.end)
+    }
+
     /// Number of its first object in the file.
     pub(crate) fn first(&self) -> usize {
         self.first
+    }
+
+    /// The object of this number in the file, if it belongs to this side.
+    pub(crate) fn numbered(&self, number: u32) -> Option<&'a Object> {
+        self.objects().get((number as usize).checked_sub(self.first)?)
     }
 
     /// Triangles of all its objects.

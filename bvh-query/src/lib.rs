@@ -10,6 +10,8 @@
 //! | how far apart? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | nearer than d? | [`Querier::within`] | `bool` |
 //!
+//! [`Tracker`] asks the same questions about poses that follow a path, for less.
+//!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by
 //! AVX-512, AVX2 or portable code; what the filters cannot decide goes to `f64` and exact predicates.
 //! So answers are bit-identical on every backend and in every order of queries.
@@ -48,6 +50,7 @@ pub use bvh::{Bvh, Shape};
 pub use error::{OpenError, QueryError};
 pub use isa::{Backend, BackendError};
 pub use pose::{Pose, PoseError};
+pub use query::tracker::Tracker;
 pub use query::{Contact, Distance, DistanceOptions, Querier, QueryStats};
 
 /// The examples of the README, compiled.

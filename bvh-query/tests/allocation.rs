@@ -1,7 +1,7 @@
 //! A warm query allocates nothing: counted by the allocator itself.
 
 use bvh_bake::mesh::Mesh;
-use bvh_query::{Bvh, Pose, Querier};
+use bvh_query::{Bvh, Pose, Querier, Tracker};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -60,12 +60,16 @@ fn warm_queries_allocate_nothing() {
         .collect();
     let mut ask = |poses: &[Pose]| {
         let mut answers = 0.0;
+        let mut tracker = Tracker::new();
         for pose in poses {
             answers += f64::from(u8::from(querier.collide(&bvh, &bvh, pose).unwrap()));
             answers += querier.distance(&bvh, &bvh, pose).unwrap().distance;
             answers += f64::from(u8::from(querier.within(&bvh, &bvh, pose, 0.1).unwrap()));
             answers +=
                 querier.visit_contacts(&bvh, &bvh, pose, |_| ControlFlow::Continue(())).unwrap() as f64;
+            answers += f64::from(u8::from(tracker.collide(&mut querier, &bvh, &bvh, pose).unwrap()));
+            answers += tracker.distance(&mut querier, &bvh, &bvh, pose).unwrap().distance;
+            answers += f64::from(u8::from(tracker.within(&mut querier, &bvh, &bvh, pose, 0.1).unwrap()));
         }
         answers
     };

@@ -1,6 +1,6 @@
 //! Do the meshes touch? Also the first contact in the order of the trees.
 
-use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
+use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
@@ -28,10 +28,20 @@ impl Querier {
         pose: &Pose,
     ) -> Result<bool, QueryError> {
         self.start();
-        let found = each_pair(a.into(), b.into(), pose, |scene| {
-            Ok(self.find_contact(scene, Order::Nearest)?.map(|_| ()))
-        });
-        Ok(found?.is_some())
+        Ok(self.any_contact(a.into(), b.into(), pose)?.is_some())
+    }
+
+    /// One pair of triangles in contact, whichever is found first.
+    pub(super) fn any_contact(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<Option<Found>, QueryError> {
+        each_pair(a, b, pose, |scene| {
+            let pair = self.find_contact(scene, Order::Nearest)?;
+            Ok(pair.map(|pair| Found { numbers: scene.numbers, pair }))
+        })
     }
 
     /// One pair of triangles in contact. In `Order::Tree` it is the same on every backend.

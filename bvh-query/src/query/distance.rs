@@ -7,7 +7,7 @@
 //! visits. Touching meshes are at distance 0, and the pair of triangles is the first in the order of
 //! the trees.
 
-use super::{Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
+use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
@@ -71,9 +71,9 @@ pub(crate) struct Candidate {
 
 /// The closest pair so far.
 #[derive(Clone, Copy)]
-struct Best {
+pub(super) struct Best {
     closest: Closest,
-    numbers: (u32, u32),
+    pub(super) found: Found,
     ids: (u32, u32),
 }
 
@@ -109,15 +109,27 @@ impl Querier {
         options: &DistanceOptions,
     ) -> Result<Distance, QueryError> {
         let (a, b) = (a.into(), b.into());
+        self.start();
         let mut search = Search::new(*options, f64::INFINITY);
-        self.search(a, b, pose, &mut search)?;
         // Shapes have triangles, and nothing is pruned before a distance is known.
-        let best = search.best.ok_or_else(|| no_answer(a))?;
-        if best.closest.distance == 0.0 {
-            return self.touching(a, b, pose, best);
+        let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;
+        Ok(best.distance(search.proved()))
+    }
+
+    /// The closest pair of triangles that the limit of `search` leaves to be found; of touching meshes, the first
+    /// contact.
+    pub(super) fn nearest(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        search: &mut Search,
+    ) -> Result<Option<Best>, QueryError> {
+        self.search(a, b, pose, search)?;
+        if search.best.is_some_and(|best| best.closest.distance == 0.0) {
+            return Ok(self.first_contact(a, b, pose)?.or(search.best));
         }
-        // What was pruned is beyond the limit, which only ever came down; the rest has been settled.
-        Ok(best.distance(search.settled_lower.min(f64::from(search.limit))))
+        Ok(search.best)
     }
 
     /// True if the placed meshes are at most `d` apart (mesh units). That is exact, also where `d` is between
@@ -141,19 +153,20 @@ impl Querier {
         if d == 0.0 {
             return self.collide(a, b, pose);
         }
+        self.start();
         let mut search = Search::new(DistanceOptions::default(), d);
         self.search(a, b, pose, &mut search)?;
         Ok(search.done)
     }
 
-    fn search(
+    /// Looks for the closest pair that the limit of `search` leaves to be found.
+    pub(super) fn search(
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
         search: &mut Search,
     ) -> Result<(), QueryError> {
-        self.start();
         each_pair(a, b, pose, |scene| {
             self.stack.visit()?;
             let gap = sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b);
@@ -164,10 +177,10 @@ impl Querier {
             self.candidates.clear();
             let mut visitor = Nearest {
                 scene,
+                direction: search.direction,
                 search,
                 queue: &mut self.queue,
                 candidates: &mut self.candidates,
-                direction: None,
                 stats: QueryStats::default(),
             };
             let task = Traversal { pair: scene.pair, stack: &mut self.stack, visitor: &mut visitor };
@@ -181,29 +194,27 @@ impl Querier {
 
     /// The answer for touching meshes: the first contact in the order of the trees.
     #[cold]
-    fn touching(
+    pub(super) fn first_contact(
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-        best: Best,
-    ) -> Result<Distance, QueryError> {
-        let first = each_pair(a, b, pose, |scene| {
+    ) -> Result<Option<Best>, QueryError> {
+        each_pair(a, b, pose, |scene| {
             let Some(pair) = self.find_contact(scene, Order::Tree)? else { return Ok(None) };
             let closest = triangle_distance(
                 &scene.triangle_a(pair.a, pair.lane_a)?,
                 &scene.triangle_b(pair.b, pair.lane_b)?,
             );
             let ids = ids(scene, &pair)?;
-            Ok(Some(Best { closest, numbers: scene.numbers, ids }))
-        })?;
-        Ok(first.unwrap_or(best).distance(0.0))
+            Ok(Some(Best { closest, found: Found { numbers: scene.numbers, pair }, ids }))
+        })
     }
 }
 
 /// A distance without a pair of triangles: only a forged file can bring it about.
 #[cold]
-fn no_answer(a: Shape<'_>) -> QueryError {
+pub(super) fn no_answer(a: Shape<'_>) -> QueryError {
     let at = a.bvh().layout().page_offset(0);
     bvh_format::FormatError::new(bvh_format::Rule::VertexFinite, at, "finite triangles", "none").into()
 }
@@ -214,38 +225,45 @@ fn ids(scene: &Scene<'_>, pair: &queue::Candidate) -> Result<(u32, u32), QueryEr
 }
 
 impl Best {
-    fn distance(&self, lower: f64) -> Distance {
+    /// As an answer, given what `Search::proved` says.
+    pub(super) fn distance(&self, proved: f64) -> Distance {
+        let lower = if self.closest.distance == 0.0 { 0.0 } else { proved };
+        let (object_a, object_b) = self.found.numbers;
         Distance {
             distance: self.closest.distance,
             lower,
             upper: self.closest.upper,
             point_a: self.closest.point_a,
             point_b: self.closest.point_b,
-            object_a: self.numbers.0,
+            object_a,
             triangle_a: self.ids.0,
-            object_b: self.numbers.1,
+            object_b,
             triangle_b: self.ids.1,
         }
     }
 }
 
 /// What is known of the distance, over all pairs of objects.
-struct Search {
+pub(super) struct Search {
     options: DistanceOptions,
     /// `within`'s question: stop at the first pair at most this far apart.
     enough: Option<f64>,
-    best: Option<Best>,
+    pub(super) best: Option<Best>,
     /// The least certified lower bound of the pairs settled.
     settled_lower: f64,
     /// No pair is farther apart than this: f32, rounded up.
     upper: f32,
     /// Pairs with a lower bound beyond this do not matter.
     limit: f32,
-    done: bool,
+    pub(super) done: bool,
+    /// Along which the meshes are likely apart, at most of length 1.
+    direction: Option<[f32; 3]>,
+    order: Order,
 }
 
 impl Search {
-    fn new(options: DistanceOptions, enough: f64) -> Self {
+    /// Stops at the first pair at most `enough` apart, or looks for the closest if that is infinite.
+    pub(super) fn new(options: DistanceOptions, enough: f64) -> Self {
         let mut search = Self {
             options,
             enough: enough.is_finite().then_some(enough),
@@ -254,9 +272,26 @@ impl Search {
             upper: f32::INFINITY,
             limit: f32::INFINITY,
             done: false,
+            direction: None,
+            order: Order::Best { leaves: BEST_FIRST_LEAVES },
         };
         search.lower_upper(round_up(enough * (1.0 + 2f64.powi(-40))));
         search
+    }
+
+    /// Starts from a pair of triangles of the meshes: what is farther apart is not looked at, and the pair
+    /// itself is yet to be found.
+    pub(super) fn start_from(&mut self, closest: &Closest) {
+        let Closest { point_a, point_b, upper, .. } = closest;
+        self.direction = within_unit([0, 1, 2].map(|axis| point_b[axis] - point_a[axis]));
+        self.order = Order::Nearest;
+        self.lower_upper(with_slack(*upper));
+    }
+
+    /// No two triangles of the meshes are nearer: what was pruned is beyond the limit, which only ever came
+    /// down; the rest has been settled.
+    pub(super) fn proved(&self) -> f64 {
+        self.settled_lower.min(f64::from(self.limit))
     }
 
     /// What has been proved when pairs beyond `limit_of(upper)` are pruned.
@@ -282,21 +317,34 @@ impl Search {
             None => true,
             Some(best) if closest.distance == best.closest.distance => {
                 let order = |numbers: (u32, u32), ids: (u32, u32)| (numbers.0, ids.0, numbers.1, ids.1);
-                order(scene.numbers, ids(scene, &pair)?) < order(best.numbers, best.ids)
+                order(scene.numbers, ids(scene, &pair)?) < order(best.found.numbers, best.ids)
             }
             Some(best) => closest.distance < best.closest.distance,
         };
         if nearer {
-            self.best = Some(Best { closest, numbers: scene.numbers, ids: ids(scene, &pair)? });
+            let found = Found { numbers: scene.numbers, pair };
+            self.best = Some(Best { closest, found, ids: ids(scene, &pair)? });
         }
-        // Slack for the f64 distance's own error: equal and nearly equal pairs stay candidates.
-        self.lower_upper(round_up(closest.upper * (1.0 + 2f64.powi(-40))));
+        self.lower_upper(with_slack(closest.upper));
         self.done |= match self.enough {
             Some(d) => triangles_within(&triangle_a, &triangle_b, &closest, d),
             None => closest.distance == 0.0,
         };
         Ok(())
     }
+}
+
+/// The limit that a pair of triangles sets, with slack for the f64 distance's own error: equal and nearly equal
+/// pairs stay candidates.
+fn with_slack(upper: f64) -> f32 {
+    round_up(upper * (1.0 + 2f64.powi(-40)))
+}
+
+/// A direction made at most 1 long; none if it has no length.
+fn within_unit(direction: [f64; 3]) -> Option<[f32; 3]> {
+    let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let unit = direction.map(|d| (d / length * (1.0 - 2f64.powi(-20))) as f32);
+    (length > 0.0 && unit.iter().all(|d| d.is_finite())).then_some(unit)
 }
 
 /// Looks for the closest pair of triangles.
@@ -371,11 +419,7 @@ impl Nearest<'_> {
 
     /// Remembers the direction of the closest pair, made at most 1 long.
     fn look_along(&mut self, direction: [f32; 3]) {
-        let length = direction.map(f64::from).iter().map(|d| d * d).sum::<f64>().sqrt();
-        let unit = direction.map(|d| (f64::from(d) / length * (1.0 - 2f64.powi(-20))) as f32);
-        if length > 0.0 && unit.iter().all(|d| d.is_finite()) {
-            self.direction = Some(unit);
-        }
+        self.direction = within_unit(direction.map(f64::from)).or(self.direction);
     }
 }
 
@@ -383,7 +427,7 @@ impl Visitor for Nearest<'_> {
     const MEASURE: Measure = Measure::Distance;
 
     fn order(&self) -> Order {
-        Order::Best { leaves: BEST_FIRST_LEAVES }
+        self.search.order
     }
 
     #[inline(always)]

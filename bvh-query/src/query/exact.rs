@@ -1,26 +1,34 @@
 //! From a stored triangle to its exactly defined corners in A's frame.
 
+use crate::bvh::Bvh;
 use crate::error::QueryError;
 use crate::narrow::Triangle;
+use crate::pose::Pose;
 use crate::query::Scene;
 use crate::traverse::opened::Leaf;
+use bvh_format::object::Object;
 
 impl Scene<'_> {
-    /// A triangle of A: origin plus stored offset, which is exact.
+    /// A triangle of A.
     pub(crate) fn triangle_a(&self, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
-        let object = self.pair.object_a;
-        let packet = self.pair.bvh_a.packet(object, leaf.page, leaf.packet)?;
-        let origin = object.record.origin.map(|o| o.get());
-        let corners = packet.triangle(usize::from(lane & 3));
-        Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
+        stored(self.pair.bvh_a, self.pair.object_a, leaf, lane)
     }
 
     /// A triangle of B, placed.
     pub(crate) fn triangle_b(&self, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
-        let object = self.pair.object_b;
-        let packet = self.pair.bvh_b.packet(object, leaf.page, leaf.packet)?;
-        let origin = object.record.origin.map(|o| o.get());
-        let corners = packet.triangle(usize::from(lane & 3));
-        Ok(corners.map(|v| self.pose.place([0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis])))))
+        Ok(placed(&stored(self.pair.bvh_b, self.pair.object_b, leaf, lane)?, self.pose))
     }
+}
+
+/// A triangle in its own file's frame: origin plus stored offset, which is exact.
+pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
+    let packet = bvh.packet(object, leaf.page, leaf.packet)?;
+    let origin = object.record.origin.map(|o| o.get());
+    let corners = packet.triangle(usize::from(lane & 3));
+    Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
+}
+
+/// Where a pose puts a triangle of B.
+pub(super) fn placed(triangle: &Triangle, pose: &Pose) -> Triangle {
+    triangle.map(|corner| pose.place(corner))
 }

@@ -4,12 +4,13 @@ pub(crate) mod collide;
 pub(crate) mod contacts;
 pub(crate) mod distance;
 mod exact;
+pub(crate) mod tracker;
 
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::{Backend, Isa, Task};
 use crate::leaf::local::LocalFrame;
-use crate::leaf::queue::Queue;
+use crate::leaf::queue::{Candidate, Queue};
 use crate::pose::Pose;
 use crate::traverse::align::Placement;
 use crate::traverse::pair::{Pair, Stack, Visitor, traverse};
@@ -132,6 +133,14 @@ impl Scene<'_> {
         let Pair { object_a, object_b, placement, .. } = self.pair;
         self.frame.get_or_init(|| LocalFrame::new(placement, object_a, object_b))
     }
+}
+
+/// A pair of triangles of the meshes that a query came by.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    /// Numbers of the objects in their files.
+    numbers: (u32, u32),
+    pair: Candidate,
 }
 
 /// Calls `visit` for each pair of objects of the two sides, in the order of the files.

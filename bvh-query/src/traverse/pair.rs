@@ -180,6 +180,9 @@ enum Phase {
 /// test. Answers do not depend on it.
 const MOST_IN_LIST: usize = 1024;
 
+/// Visits that cost less than to find out whether they pay.
+const SOME: u64 = 8;
+
 /// Nodes this many times larger than their partner are opened alone, to meet it at its size.
 const MUCH_LARGER: f32 = 2.0;
 
@@ -202,6 +205,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     let root_b = stack.opened_b.start(isa, pair.bvh_b, pair.object_b)?;
     let mut node_test = NodeTest::new(&pair, &root_a, &root_b);
     let mut witness: Option<Witness> = None;
+    node_test.update_witness(&mut witness, visitor.witness());
     let (mut tests, mut leaves) = (0, 0);
     let order = visitor.order();
     let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
@@ -281,6 +285,11 @@ impl Stack {
     /// Before a query that may visit so many pairs.
     pub(crate) fn start(&mut self, budget: u64) {
         (self.budget, self.left) = (budget, budget);
+    }
+
+    /// Lets what follows make as many visits as have been made since `start`, and some, but none beyond the budget.
+    pub(crate) fn allow_as_much_again(&mut self) {
+        self.left = self.left.min((self.budget - self.left).saturating_add(SOME));
     }
 
     /// Counts a visit.
