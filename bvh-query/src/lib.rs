@@ -10,7 +10,8 @@
 //! | how far apart? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | nearer than d? | [`Querier::within`] | `bool` |
 //!
-//! [`Tracker`] asks the same questions about poses that follow a path, for less.
+//! [`Tracker`] asks the same questions about poses that follow a path, for less, and [`Batch`] about many poses on all
+//! cores. The feature `parallel`, on by default, brings the latter and the dependency on rayon.
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by
 //! AVX-512, AVX2 or portable code; what the filters cannot decide goes to `f64` and exact predicates.
@@ -50,11 +51,13 @@ pub use bvh::{Bvh, Shape};
 pub use error::{OpenError, QueryError};
 pub use isa::{Backend, BackendError};
 pub use pose::{Pose, PoseError};
+#[cfg(feature = "parallel")]
+pub use query::batch::Batch;
 pub use query::tracker::Tracker;
 pub use query::{Contact, Distance, DistanceOptions, Querier, QueryStats};
 
 /// The examples of the README, compiled.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "parallel"))]
 #[doc = include_str!("../../README.md")]
 struct Readme;
 

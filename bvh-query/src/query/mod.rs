@@ -1,5 +1,7 @@
 //! The questions: collide, contacts, distance, within. Each is a visitor of one pair traversal.
 
+#[cfg(feature = "parallel")]
+pub(crate) mod batch;
 pub(crate) mod collide;
 pub(crate) mod contacts;
 pub(crate) mod distance;

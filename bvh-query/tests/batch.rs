@@ -1,0 +1,182 @@
+//! Batches answer as a querier does one by one, and end where it would, on any number of threads.
+#![cfg(feature = "parallel")]
+
+mod common;
+
+use bvh_bake::Options;
+use bvh_bake::mesh::Mesh;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+use bvh_query::{Backend, Batch, Bvh, Pose, Querier, QueryError, Tracker};
+use common::shapes::{cube, dirty, moved, soup, sphere, torus};
+use common::{Random, backends, bake, mesh, options, translation};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+fn pools() -> Vec<ThreadPool> {
+    [1, 2, 3, 8].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap()).into()
+}
+
+/// First along a line through the mesh, then anywhere.
+fn poses(random: &mut Random, count: usize) -> Vec<Pose> {
+    let along = |i: usize| translation(3.0 - i as f64 / 64.0, 0.25, 0.125);
+    (0..count).map(|i| if i < count / 2 { along(i) } else { random.pose(2.5) }).collect()
+}
+
+#[test]
+fn batches_answer_as_one_by_one() {
+    let a = bake(&mesh(&dirty(&soup(300, 4), 5)), &options(Profile::Dop14U8, TriangleEncoding::F32));
+    let b = bake(&mesh(&torus(12, 8)), &options(Profile::Dop26U4, TriangleEncoding::Packed));
+    let mut random = Random::new(3);
+    let pools = pools();
+    for backend in backends() {
+        let mut querier = Querier::with_backend(backend);
+        let batch = Batch::with_backend(&a, &b, backend);
+        for count in [0, 1, 2, 31, 33, 64, 400] {
+            let poses = poses(&mut random, count);
+            let collide: Vec<_> = poses.iter().map(|p| querier.collide(&a, &b, p).unwrap()).collect();
+            let contacts: Vec<_> = poses.iter().map(|p| querier.contacts(&a, &b, p).unwrap()).collect();
+            let distance: Vec<_> = poses.iter().map(|p| querier.distance(&a, &b, p).unwrap()).collect();
+            let within: Vec<_> = poses.iter().map(|p| querier.within(&a, &b, p, 0.2).unwrap()).collect();
+            let first = collide.iter().position(|touching| *touching);
+            for pool in &pools {
+                pool.install(|| {
+                    assert_eq!(batch.collide(&poses), Ok(collide.clone()));
+                    assert_eq!(batch.contacts(&poses), Ok(contacts.clone()));
+                    assert_eq!(batch.distance(&poses), Ok(distance.clone()));
+                    assert_eq!(batch.within(&poses, 0.2), Ok(within.clone()));
+                    assert_eq!(batch.first_collision(&poses), Ok(first));
+                });
+            }
+        }
+    }
+}
+
+/// Which of many contacts is met first by some thread must not matter.
+#[test]
+fn the_first_collision_is_the_first_wherever_it_is() {
+    let a = bake(&mesh(&sphere(3)), &Options::default());
+    let (near, far) = (translation(1.5, 0.0, 0.0), translation(2.5, 0.0, 0.0));
+    let batch = Batch::new(&a, &a).unwrap();
+    let pools = pools();
+    let mut random = Random::new(8);
+    for count in [1, 5, 40, 700] {
+        for _ in 0..30 {
+            let mut poses = vec![far; count];
+            assert_eq!(batch.first_collision(&poses), Ok(None));
+            let first = random.below(count);
+            poses[first] = near;
+            for _ in 0..random.below(20) {
+                poses[first + random.below(count - first)] = near;
+            }
+            for pool in &pools {
+                assert_eq!(pool.install(|| batch.first_collision(&poses)), Ok(Some(first)));
+            }
+        }
+    }
+}
+
+/// Two cubes as two objects, at -3 and at 3; a byte of the second one's page is wrong.
+fn half_damaged() -> Bvh {
+    let mut split = Mesh::default();
+    for (number, x) in [(0, -3.0), (1, 3.0)] {
+        let mut object = mesh(&moved(&cube(), 1.0, [x, 0.0, 0.0])).objects.remove(0);
+        object.name = format!("cube {number}");
+        object.triangle_ids = (12 * number..12 * (number + 1)).collect();
+        split.objects.push(object);
+    }
+    let good = bake(&split, &Options { split_objects: true, ..Options::default() });
+    let page = good.objects()[1].record.first_page.get();
+    let mut bytes = good.bytes().to_vec();
+    bytes[good.layout().page_offset(page) as usize + 100] ^= 1;
+    Bvh::from_bytes(bytes).unwrap()
+}
+
+#[test]
+fn a_batch_ends_at_its_first_error_or_contact() {
+    let a = half_damaged();
+    let b = bake(&mesh(&moved(&cube(), 0.5, [0.0; 3])), &Options::default());
+    let (hit, free, error) =
+        (translation(-3.0, 1.25, 0.0), translation(0.0, 50.0, 0.0), translation(3.0, 1.25, 0.0));
+    let mut querier = Querier::new().unwrap();
+    assert_eq!(querier.collide(&a, &b, &hit), Ok(true));
+    assert_eq!(querier.collide(&a, &b, &free), Ok(false));
+    let refused = querier.collide(&a, &b, &error).unwrap_err();
+    assert!(matches!(refused, QueryError::Damaged(_)));
+    let batch = Batch::new(&a, &b).unwrap();
+    let pools = pools();
+    let mut random = Random::new(15);
+    for count in [3, 50, 600] {
+        for _ in 0..30 {
+            let mut poses = vec![free; count];
+            for _ in 0..1 + random.below(6) {
+                poses[random.below(count)] = [hit, error][random.below(2)];
+            }
+            let first_error = poses.iter().position(|pose| *pose == error);
+            let first =
+                poses.iter().position(|pose| *pose != free).filter(|first| Some(*first) != first_error);
+            let expected = match (first, first_error) {
+                (None, Some(_)) => Err(refused.clone()),
+                (first, _) => Ok(first),
+            };
+            let all: Result<Vec<bool>, _> = match first_error {
+                Some(_) => Err(refused.clone()),
+                None => Ok(poses.iter().map(|pose| *pose == hit).collect()),
+            };
+            for pool in &pools {
+                assert_eq!(pool.install(|| batch.first_collision(&poses)), expected);
+                assert_eq!(pool.install(|| batch.collide(&poses)), all);
+            }
+        }
+    }
+}
+
+/// The error of the first pose that has one, not of the first that a thread came by: pages differ.
+#[test]
+fn the_error_is_that_of_the_first_pose() {
+    let good = bake(&mesh(&soup(900, 1)), &options(Profile::Dop14U8, TriangleEncoding::F32));
+    let mut bytes = good.bytes().to_vec();
+    let layout = good.layout();
+    (1..layout.page_count()).for_each(|page| bytes[layout.page_offset(page) as usize + 200] ^= 1);
+    let damaged = Bvh::from_bytes(bytes).unwrap();
+    let other = bake(&mesh(&moved(&cube(), 0.05, [0.0; 3])), &Options::default());
+    let mut random = Random::new(2);
+    let mut errors = Vec::new();
+    for _ in 0..40 {
+        let poses: Vec<_> = (0..100).map(|_| random.pose(1.0)).collect();
+        let mut querier = Querier::new().unwrap();
+        // Without a tracker: contacts have none.
+        let one_by_one: Result<Vec<_>, _> =
+            poses.iter().map(|pose| querier.contacts(&damaged, &other, pose)).collect();
+        let batch = Batch::new(&damaged, &other).unwrap();
+        for pool in &pools() {
+            assert_eq!(pool.install(|| batch.contacts(&poses)), one_by_one);
+        }
+        errors.extend(one_by_one.err().map(|error| error.to_string()));
+    }
+    errors.sort();
+    errors.dedup();
+    assert!(errors.len() > 1, "{errors:?}");
+}
+
+#[test]
+fn budgets_hold_for_each_pose_and_end_batches_alike_on_any_number_of_threads() {
+    let a = bake(&mesh(&soup(600, 4)), &Options::default());
+    let mut random = Random::new(31);
+    let poses = poses(&mut random, 200);
+    let mut querier = Querier::with_backend(Backend::Scalar);
+    let ends = |querier: &mut Querier, budget: u64| {
+        querier.set_budget(budget);
+        let mut tracker = Tracker::new();
+        poses.iter().position(|pose| tracker.distance(querier, &a, &a, pose).is_err())
+    };
+    let mut batch = Batch::with_backend(&a, &a, Backend::Scalar);
+    for budget in [0, 10, 60, 200, 1000] {
+        batch.set_budget(budget);
+        let answers: Vec<_> = pools().iter().map(|pool| pool.install(|| batch.distance(&poses))).collect();
+        assert!(answers.iter().all(|answer| *answer == answers[0]), "budget {budget}");
+        // Runs shorter than this one tracker's change what is visited, but not that nothing fits in nothing.
+        assert!(budget > 0 || (answers[0].is_err() && ends(&mut querier, budget) == Some(0)));
+    }
+    batch.set_budget(u64::MAX);
+    assert!(batch.distance(&poses).is_ok());
+}
