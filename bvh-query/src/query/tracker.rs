@@ -15,8 +15,9 @@
 //!
 //! A walk that only looks for contact learns nothing of clearance. So after the answer no, the tracker at times asks
 //! further whether the meshes come as near as [`AHEAD`] times the last motion, with no more work than the question
-//! took. If not, some next answers are known; if they do or that is too much work, it waits longer each time. Conservative advancement bounds motion in the same way: B. Mirtich,
-//! "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996, section 2.3.2.
+//! took. If not, some next answers are known; if they do or that is too much work, it waits longer each time.
+//! Conservative advancement bounds motion in the same way: B. Mirtich, "Impulse-based Dynamic Simulation of Rigid
+//! Body Systems", 1996, section 2.3.2.
 
 use super::distance::{DistanceOptions, Search, no_answer};
 use super::exact::{placed, stored};
