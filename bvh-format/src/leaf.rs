@@ -220,27 +220,14 @@ impl PackedHead {
 }
 
 /// Reads packet `index` of a packed block. Bytes beyond the block read as zero.
-#[inline]
+#[inline(always)]
 pub fn decode_packed(block: &[u8], index: usize) -> Packet {
     let mut packet = Packet::default();
     let Some(head) = PackedHead::read(block) else { return packet };
-    let mut offsets = [[0u32; 12]; 3];
-    for place in 0..12 {
-        let at = head.vertex_at(head.index(block, index, place));
-        let vertex = match wide_word(block, at / 8) {
-            // All three offsets of a vertex in one load, mostly.
-            Some(word) if head.stride() <= 120 => {
-                let word = word >> (at % 8);
-                let [x, y, z] = head.bits.map(|bits| u32::from(bits.min(32)));
-                let part = |from: u32, bits: u32| (word >> from) as u32 & ((1u64 << bits) - 1) as u32;
-                [part(0, x), part(x, y), part(x + y, z)]
-            }
-            _ => head.offsets(block, at),
-        };
-        for axis in 0..3 {
-            offsets[axis][place] = vertex[axis];
-        }
-    }
+    let offsets = match head.offsets_of_twelve(block, index) {
+        Some(offsets) => offsets,
+        None => head.offsets_one_by_one(block, index),
+    };
     // Axis by axis, twelve at once: loops that compilers turn into vector code.
     for axis in 0..3 {
         let base = head.base[axis];
@@ -262,14 +249,59 @@ pub fn decode_packed(block: &[u8], index: usize) -> Packet {
     packet
 }
 
-/// Sixteen bytes as a number, if they are all there.
-#[inline]
-fn wide_word(block: &[u8], start: usize) -> Option<u128> {
-    block.get(start..)?.first_chunk().map(|bytes| u128::from_le_bytes(*bytes))
+impl PackedHead {
+    /// The offsets of a packet's twelve vertices, by axis, without a loop over bits: all indices in one load, two
+    /// loads a vertex. `None` where fields are too wide for that, or stand too near the end of the block.
+    #[inline(always)]
+    fn offsets_of_twelve(&self, block: &[u8], packet: usize) -> Option<[[u32; 12]; 3]> {
+        let [x, y, z] = self.bits.map(u32::from);
+        let width = usize::from(self.index_bits);
+        // A field and the bits of its first byte before it fit in a load.
+        if x + y > 57 || z > 32 || x > 32 || y > 32 || 12 * width > 121 {
+            return None;
+        }
+        let at = self.indices_at as usize * 8 + packet * 12 * width;
+        let indices = u128::from_le_bytes(*block.get(at / 8..)?.first_chunk()?) >> (at % 8);
+        let (low, middle) = (indices as u64, (indices >> (6 * width)) as u64);
+        let mask = (1u64 << width) - 1;
+        let mut offsets = [[0; 12]; 3];
+        for place in 0..12 {
+            let half = if place < 6 { low } else { middle };
+            let index = half >> (place % 6 * width) & mask;
+            let at = self.vertex_at(index as u32);
+            let both = field_at(block, at)?;
+            let third = field_at(block, at + (x + y) as usize)?;
+            offsets[0][place] = (both & ((1 << x) - 1)) as u32;
+            offsets[1][place] = (both >> x & ((1 << y) - 1)) as u32;
+            offsets[2][place] = (third & ((1 << z) - 1)) as u32;
+        }
+        Some(offsets)
+    }
+
+    /// The same for fields of any width. Bytes beyond the block read as zero.
+    #[cold]
+    #[inline(never)]
+    fn offsets_one_by_one(&self, block: &[u8], packet: usize) -> [[u32; 12]; 3] {
+        let mut offsets = [[0; 12]; 3];
+        for place in 0..12 {
+            let vertex = self.offsets(block, self.vertex_at(self.index(block, packet, place)));
+            for axis in 0..3 {
+                offsets[axis][place] = vertex[axis];
+            }
+        }
+        offsets
+    }
+}
+
+/// The 57 bits or more from a bit on, if all their bytes are there.
+#[inline(always)]
+fn field_at(block: &[u8], at: usize) -> Option<u64> {
+    let bytes = block.get(at / 8..)?.first_chunk()?;
+    Some(u64::from_le_bytes(*bytes) >> (at % 8))
 }
 
 /// Reads packet `index` of a block.
-#[inline]
+#[inline(always)]
 pub fn decode_packet(encoding: TriangleEncoding, block: &[u8], index: usize) -> Packet {
     match encoding {
         TriangleEncoding::F32 => decode_f32(block, index),

@@ -95,8 +95,8 @@ pub fn upper_form(d: [f64; 3], set: DirectionSet) -> Form {
     Form::new(rows, [0, 1, 2].map(|j| signed(magnitudes[j] as f32, rows, j)))
 }
 
-/// The rows of all cones.
-const fn rows_by_cone(set: DirectionSet) -> [u32; 64] {
+/// What `rows_of_cone` says of all 64 cones.
+pub const fn rows_by_cone(set: DirectionSet) -> [u32; 64] {
     let mut rows = [0; 64];
     let mut cone = 0;
     while cone < 64 {

@@ -235,12 +235,26 @@ impl Bvh {
         Ok(self.layout.id_block(self.bytes(), page.header()))
     }
 
-    /// A leaf packet.
+    /// A leaf packet: where it stands in the file if it can be read there, else decoded into `room`.
     #[inline(always)]
-    pub(crate) fn packet(&self, object: &Object, page: u32, packet: u16) -> Result<Packet, QueryError> {
+    pub(crate) fn packet<'a>(
+        &'a self,
+        object: &Object,
+        page: u32,
+        packet: u16,
+        room: &'a mut Packet,
+    ) -> Result<&'a Packet, QueryError> {
         let page = self.page(object, page)?;
         let block = self.leaf_block(object, &page)?;
-        Ok(decode_packet(object.triangle_encoding, block, usize::from(packet)))
+        if cfg!(target_endian = "little") && object.triangle_encoding == TriangleEncoding::F32 {
+            let rest = block.get(usize::from(packet) * F32_PACKET_BYTES..).unwrap_or_default();
+            let bytes: Option<&[u8; F32_PACKET_BYTES]> = rest.first_chunk();
+            if let Some(Ok(packet)) = bytes.map(|bytes| bytemuck::try_from_bytes(bytes)) {
+                return Ok(packet);
+            }
+        }
+        *room = decode_packet(object.triangle_encoding, block, usize::from(packet));
+        Ok(room)
     }
 
     /// The bytes of a treelet's leaf packets, where they stand together.

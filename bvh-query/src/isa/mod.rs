@@ -17,6 +17,7 @@ pub(crate) mod avx2;
 pub(crate) mod avx512;
 pub(crate) mod scalar;
 
+use bvh_format::slabs::Group;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -48,12 +49,35 @@ pub(crate) trait Lanes: Copy {
     fn bits(mask: Self::Mask) -> u16;
 }
 
+/// Rows of a group that are picked from together. The places in a part are those of four lower ends, then those of
+/// the upper ends of the same four slabs; and 8 added to the place for four slabs more.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Rows 0 to 3.
+    Axes,
+    /// Rows 3 to 6.
+    Cube,
+    /// Rows 8 to 15.
+    Faces,
+}
+
+/// Which rows to pick, for backends that pick lanes of registers and for those that load rows.
+#[derive(Clone, Copy)]
+pub(crate) struct FourRows<'a> {
+    /// Rows of a group, upper ends from 16 on.
+    pub(crate) rows: &'a [u32; 4],
+    /// Element `4 * i + j` is four times the place of row i in its part, and j.
+    pub(crate) lanes: &'a [u32; 16],
+}
+
 /// A backend.
 pub(crate) trait Isa: Copy {
     /// Sixteen lanes.
     type V: Lanes;
     /// Four lanes.
     type H: Lanes;
+    /// The rows of a group, to pick from.
+    type Rows<'a>: Copy;
 
     fn splat(self, value: f32) -> Self::V;
     fn load(self, from: &[f32; 16]) -> Self::V;
@@ -64,6 +88,11 @@ pub(crate) trait Isa: Copy {
     fn tile(self, from: &[f32; 4]) -> Self::V;
     /// Lane `4 * i + j` is lane `4 * i + column`.
     fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
+    /// A group to pick rows from.
+    fn rows<'a>(self, group: &'a Group) -> Self::Rows<'a>;
+    /// Four rows of a group, all of one part, and beside them the other ends of the same slabs.
+    fn pick(self, rows: &Self::Rows<'_>, part: Part, four: FourRows<'_>) -> (Self::V, Self::V);
+
     /// `bvh_format::quantize::round_step_up` in each lane.
     fn round_step_up(self, step: Self::V) -> Self::V;
 
@@ -85,6 +114,17 @@ pub(crate) trait Isa: Copy {
     fn splat4(self, value: f32) -> Self::H;
     fn load4(self, from: &[f32; 4]) -> Self::H;
     fn store4(self, value: Self::H, to: &mut [f32; 4]);
+
+    /// The elements whose bits are set to the front, in order; what follows them is of no meaning.
+    #[inline(always)]
+    fn compress(self, mask: u16, from: &[u32; 16], to: &mut [u32; 16]) {
+        let (mut mask, mut at) = (mask, 0);
+        while mask != 0 {
+            to[at & 15] = from[mask.trailing_zeros() as usize & 15];
+            mask &= mask - 1;
+            at += 1;
+        }
+    }
 
     /// Asks for bytes that will soon be read.
     fn prefetch(self, bytes: &[u8]);

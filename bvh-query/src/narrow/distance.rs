@@ -48,7 +48,10 @@ pub(crate) struct Closest {
 /// gap; the exact value is in `lower..=upper`. Where both bounds of a gap near 2^-53 of the size fail to tell
 /// it from zero, the distance is still positive but may be as small as the smallest normal number. A triangle
 /// without area is the segment or point that its corners span. Constant cost.
+///
+/// The same bits whatever it is compiled for: nothing is fused, and lanes do not meet.
 #[must_use]
+#[inline(always)]
 pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
     let Some(differences) = Differences::new(a, b) else {
         return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: a[0], point_b: b[0] };
@@ -124,15 +127,9 @@ struct Candidate {
     foot_b: Foot,
 }
 
-impl Candidate {
-    /// Ties go to the candidate that came first, so that the result is a function of the input.
-    #[inline(always)]
-    fn improve(&mut self, squared: f64, foot_a: Foot, foot_b: Foot) {
-        if squared < self.squared {
-            *self = Self { squared, foot_a, foot_b };
-        }
-    }
-}
+/// Candidates in order: 9 of two corners, 9 of an edge of `a` and a corner, 9 of an edge of `b` and a corner, 9 of two
+/// edges, 3 of the face of `a`, 3 of the face of `b`; and as many infinite ones as fill registers.
+const CANDIDATES: usize = 48;
 
 /// The gaps between two triangles and their edges, in multiples of `unit`, each coordinate rounded once.
 struct Differences {
@@ -185,40 +182,29 @@ impl Differences {
         [negated(self.gaps[0][j]), negated(self.gaps[1][j]), negated(self.gaps[2][j])]
     }
 
-    /// The closest pair among all candidates.
+    /// The closest pair among all candidates. Ties go to the first, so that the result is a function of the input.
+    #[inline(always)]
     fn closest(&self) -> Candidate {
-        let mut best = Candidate { squared: f64::INFINITY, foot_a: Foot::corner(0), foot_b: Foot::corner(0) };
-        for i in 0..3 {
-            for j in 0..3 {
-                let gap = self.gaps[i][j];
-                best.improve(dot(gap, gap), Foot::corner(i), Foot::corner(j));
-            }
+        let mut squared = [f64::INFINITY; CANDIDATES];
+        let lines = Lines::new(self);
+        lines.corners(&mut squared);
+        let (s, t) = lines.edges(&self.edges_b, &mut squared);
+        let faces = [self.face(&lines, 0, &mut squared), self.face(&lines, 1, &mut squared)];
+        let mut least = f64::INFINITY;
+        for candidate in squared {
+            least = if candidate < least { candidate } else { least };
         }
-
-        let line_a = |i: usize| Line::new(self.edges_a[i], &self.gaps[i]);
-        let line_b = |j: usize| Line::new(self.edges_b[j], &self.gaps_to(j));
-        let lines_a = [line_a(0), line_a(1), line_a(2)];
-        let lines_b = [line_b(0), line_b(1), line_b(2)];
-
-        for (i, line) in lines_a.iter().enumerate() {
-            for k in 0..3 {
-                best.improve(line.corner(k), Foot::edge(i, line.along[k]), Foot::corner(k));
-            }
-        }
-        for (j, line) in lines_b.iter().enumerate() {
-            for k in 0..3 {
-                best.improve(line.corner(k), Foot::corner(k), Foot::edge(j, line.along[k]));
-            }
-        }
-        for (i, line) in lines_a.iter().enumerate() {
-            for (j, edge) in self.edges_b.iter().enumerate() {
-                let (squared, s, t) = line.edge(*edge, j);
-                best.improve(squared, Foot::edge(i, s), Foot::edge(j, t));
-            }
-        }
-        face(&self.edges_a, &lines_a, |squared, foot, k| best.improve(squared, foot, Foot::corner(k)));
-        face(&self.edges_b, &lines_b, |squared, foot, k| best.improve(squared, Foot::corner(k), foot));
-        best
+        let found = squared.iter().position(|&candidate| candidate == least).unwrap_or(0);
+        let (row, column) = (found % 9 / 3, found % 3);
+        let (foot_a, foot_b) = match found {
+            0..9 => (Foot::corner(row), Foot::corner(column)),
+            9..18 => (Foot::edge(row, lines.along[found - 9]), Foot::corner(column)),
+            18..27 => (Foot::corner(column), Foot::edge(row, lines.along[found - 9])),
+            27..36 => (Foot::edge(row, s[found - 27]), Foot::edge(column, t[found - 27])),
+            36..39 => (faces[0].foot(column), Foot::corner(column)),
+            _ => (Foot::corner(column), faces[1].foot(column)),
+        };
+        Candidate { squared: least, foot_a, foot_b }
     }
 
     /// The direction in which the triangles are most likely separated: the one between the closest points.
@@ -321,73 +307,149 @@ impl Differences {
     }
 }
 
-/// An edge of one triangle with the three corners of the other, seen from the edge's first corner.
-struct Line {
-    edge: Point,
+/// The six edges, each with the three corners of the other triangle, seen from the edge's first corner: element
+/// `3 * i + k` is edge i of `a` and corner k of `b`, `9 + 3 * j + k` edge j of `b` and corner k of `a`. One array a
+/// coordinate, so that all go through vector registers at once; their ends hold nothing of meaning.
+struct Lines {
+    gap: [[f64; LINES]; 3],
+    edge: [[f64; LINES]; 3],
     /// 1 over the edge's squared length; infinite or NaN are never used, an edge without length has 0.
-    inverse: f64,
-    /// For each corner of the other triangle the weight on `edge` of the foot of its perpendicular.
-    along: [f64; 3],
-    /// For each corner of the other triangle the perpendicular that leads to it.
-    perpendicular: Triangle,
+    inverse: [f64; LINES],
+    /// The weight on `edge` of the foot of the corner's perpendicular.
+    along: [f64; LINES],
+    /// The perpendicular that leads to the corner.
+    perpendicular: [[f64; LINES]; 3],
 }
 
-impl Line {
+/// 18, and as many as fill registers.
+const LINES: usize = 24;
+
+/// 9, and as many as fill registers.
+const EDGES: usize = 16;
+
+impl Lines {
     #[inline(always)]
-    fn new(edge: Point, gaps: &Triangle) -> Self {
-        let squared = dot(edge, edge);
-        let inverse = if squared >= f64::MIN_POSITIVE { 1.0 / squared } else { 0.0 };
-        let along = [0, 1, 2].map(|k: usize| dot(gaps[k], edge) * inverse);
-        let part = |k: usize| add_scaled(gaps[k], -along[k], edge);
-        let perpendicular = [part(0), part(1), part(2)];
-        Self { edge, inverse, along, perpendicular }
+    fn new(differences: &Differences) -> Self {
+        let Differences { gaps, edges_a, edges_b, .. } = differences;
+        let (mut gap, mut edge) = ([[0.0; LINES]; 3], [[0.0; LINES]; 3]);
+        for axis in 0..3 {
+            for i in 0..3 {
+                for k in 0..3 {
+                    gap[axis][3 * i + k] = gaps[i][k][axis];
+                    gap[axis][9 + 3 * i + k] = -gaps[k][i][axis];
+                    edge[axis][3 * i + k] = edges_a[i][axis];
+                    edge[axis][9 + 3 * i + k] = edges_b[i][axis];
+                }
+            }
+        }
+        let (mut inverse, mut along) = ([0.0; LINES], [0.0; LINES]);
+        let mut perpendicular = [[0.0; LINES]; 3];
+        for l in 0..LINES {
+            let (edge, gap) = (at(&edge, l), at(&gap, l));
+            let squared = dot(edge, edge);
+            inverse[l] = if squared >= f64::MIN_POSITIVE { 1.0 / squared } else { 0.0 };
+            along[l] = dot(gap, edge) * inverse[l];
+            put(&mut perpendicular, l, add_scaled(gap, -along[l], edge));
+        }
+        Self { gap, edge, inverse, along, perpendicular }
     }
 
-    /// The squared distance of corner `k` of the other triangle, infinite unless its foot is inside the edge.
+    /// The squared distances of corners from corners and from edges; infinite unless the foot is inside the edge.
     #[inline(always)]
-    fn corner(&self, k: usize) -> f64 {
-        let inside = (self.along[k] > 0.0) & (self.along[k] < 1.0);
-        if inside { dot(self.perpendicular[k], self.perpendicular[k]) } else { f64::INFINITY }
+    fn corners(&self, squared: &mut [f64; CANDIDATES]) {
+        let (mut between, mut beside) = ([0.0; EDGES], [0.0; LINES]);
+        for l in 0..EDGES {
+            let gap = at(&self.gap, l);
+            between[l] = dot(gap, gap);
+        }
+        for l in 0..LINES {
+            let perpendicular = at(&self.perpendicular, l);
+            let inside = (self.along[l] > 0.0) & (self.along[l] < 1.0);
+            beside[l] = if inside { dot(perpendicular, perpendicular) } else { f64::INFINITY };
+        }
+        squared[..9].copy_from_slice(&between[..9]);
+        squared[9..27].copy_from_slice(&beside[..18]);
     }
 
-    /// The squared distance from an edge of the other triangle, which begins at its corner `k`, and the
-    /// weights on both edges; infinite unless the feet are inside both.
+    /// The squared distances of edges from edges, and the weights on both; infinite unless the feet are inside both.
     #[inline(always)]
-    fn edge(&self, other: Point, k: usize) -> (f64, f64, f64) {
-        let slope = dot(other, self.edge) * self.inverse;
-        let across = add_scaled(other, -slope, self.edge);
-        // NaN or infinite, hence not inside, if nothing is left of the edge.
-        let t = -dot(self.perpendicular[k], across) / dot(across, across);
-        let s = self.along[k] + t * slope;
-        let inside = (t > 0.0) & (t < 1.0) & (s > 0.0) & (s < 1.0);
-        let perpendicular = add_scaled(self.perpendicular[k], t, across);
-        (if inside { dot(perpendicular, perpendicular) } else { f64::INFINITY }, s, t)
+    fn edges(&self, edges_b: &Triangle, squared: &mut [f64; CANDIDATES]) -> ([f64; EDGES], [f64; EDGES]) {
+        let mut others = [[0.0; LINES]; 3];
+        for l in 0..9 {
+            // Edge j of `b` begins at its corner j.
+            put(&mut others, l, edges_b[l % 3]);
+        }
+        let (mut s, mut t, mut lengths) = ([0.0; EDGES], [0.0; EDGES], [0.0; EDGES]);
+        for l in 0..EDGES {
+            let (edge, perpendicular, other) =
+                (at(&self.edge, l), at(&self.perpendicular, l), at(&others, l));
+            let slope = dot(other, edge) * self.inverse[l];
+            let across = add_scaled(other, -slope, edge);
+            // NaN or infinite, hence not inside, if nothing is left of the edge.
+            t[l] = -dot(perpendicular, across) / dot(across, across);
+            s[l] = self.along[l] + t[l] * slope;
+            let inside = (t[l] > 0.0) & (t[l] < 1.0) & (s[l] > 0.0) & (s[l] < 1.0);
+            let shortest = add_scaled(perpendicular, t[l], across);
+            lengths[l] = if inside { dot(shortest, shortest) } else { f64::INFINITY };
+        }
+        squared[27..36].copy_from_slice(&lengths[..9]);
+        (s, t)
     }
 }
 
-/// Calls `found(squared distance, foot, corner)` for the corners of the other triangle; the distance is
-/// infinite unless the foot is inside the face. The longest edge is projected out first, so that the height
-/// on it is as small as the sliver.
+/// Element `l` of three arrays.
 #[inline(always)]
-fn face(edges: &Triangle, lines: &[Line; 3], mut found: impl FnMut(f64, Foot, usize)) {
-    let base = longest(edges);
-    let line = &lines[base];
-    let apex = negated(edges[(base + 2) % 3]);
-    let slope = dot(apex, line.edge) * line.inverse;
-    let height = add_scaled(apex, -slope, line.edge);
-    let whole = dot(height, height);
-    if whole < f64::MIN_POSITIVE {
-        return;
+fn at(arrays: &[[f64; LINES]; 3], l: usize) -> Point {
+    [arrays[0][l], arrays[1][l], arrays[2][l]]
+}
+
+#[inline(always)]
+fn put(arrays: &mut [[f64; LINES]; 3], l: usize, value: Point) {
+    (arrays[0][l], arrays[1][l], arrays[2][l]) = (value[0], value[1], value[2]);
+}
+
+/// The feet of the other triangle's corners on a face: the base they are given from, and two weights each.
+struct FaceFeet {
+    base: usize,
+    along: [f64; 3],
+    across: [f64; 3],
+}
+
+impl FaceFeet {
+    fn foot(&self, corner: usize) -> Foot {
+        Foot { corner: self.base, along: self.along[corner], across: self.across[corner] }
     }
-    let inverse = 1.0 / whole;
-    for k in 0..3 {
-        let across = dot(line.perpendicular[k], height) * inverse;
-        let along = line.along[k] - across * slope;
-        // A sum that rounds to less than 1 is less than 1.
-        let inside = (across > 0.0) & (along > 0.0) & (across + along < 1.0);
-        let perpendicular = add_scaled(line.perpendicular[k], -across, height);
-        let squared = if inside { dot(perpendicular, perpendicular) } else { f64::INFINITY };
-        found(squared, Foot { corner: base, along, across }, k);
+}
+
+impl Differences {
+    /// The squared distances of the face of `a` (side 0) or `b` (side 1) from the corners of the other triangle,
+    /// infinite unless the foot is inside the face. The longest edge is projected out first, so that the height
+    /// on it is as small as the sliver.
+    #[inline(always)]
+    fn face(&self, lines: &Lines, side: usize, squared: &mut [f64; CANDIDATES]) -> FaceFeet {
+        let edges = if side == 0 { &self.edges_a } else { &self.edges_b };
+        let base = longest(edges);
+        let first = 9 * side + 3 * base;
+        let (edge, apex) = (edges[base], negated(edges[(base + 2) % 3]));
+        let slope = dot(apex, edge) * lines.inverse[first];
+        let height = add_scaled(apex, -slope, edge);
+        let whole = dot(height, height);
+        let mut feet = FaceFeet { base, along: [0.0; 3], across: [0.0; 3] };
+        if whole < f64::MIN_POSITIVE {
+            return feet;
+        }
+        let inverse = 1.0 / whole;
+        for k in 0..3 {
+            let to_corner = at(&lines.perpendicular, first + k);
+            let across = dot(to_corner, height) * inverse;
+            let along = lines.along[first + k] - across * slope;
+            // A sum that rounds to less than 1 is less than 1.
+            let inside = (across > 0.0) & (along > 0.0) & (across + along < 1.0);
+            let shortest = add_scaled(to_corner, -across, height);
+            squared[36 + 3 * side + k] = if inside { dot(shortest, shortest) } else { f64::INFINITY };
+            (feet.along[k], feet.across[k]) = (along, across);
+        }
+        feet
     }
 }
 

@@ -11,6 +11,7 @@ use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
 use crate::traverse::opened::Leaf;
 use crate::traverse::pair::{Measure, Order, Visitor};
+use bvh_format::leaf::Packet;
 use std::ops::ControlFlow;
 
 impl Querier {
@@ -141,9 +142,10 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
-        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
-        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
-        let local = Local::new(isa, self.scene.frame(), &packet_a, &packet_b);
+        let (mut room_a, mut room_b) = (Packet::default(), Packet::default());
+        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet, &mut room_a)?;
+        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet, &mut room_b)?;
+        let local = Local::new(isa, self.scene.frame(), packet_a, packet_b);
         let mut mask = face_planes(isa, &local, a, b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;

@@ -7,6 +7,7 @@
 //! visits. Touching meshes are at distance 0, and the pair of triangles is the first in the order of
 //! the trees.
 
+use super::exact::TriangleDistance;
 use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::Shape;
 use crate::error::QueryError;
@@ -14,11 +15,12 @@ use crate::isa::Isa;
 use crate::leaf::distance::{bounds, near, near_along};
 use crate::leaf::local::{Local, valid_lanes};
 use crate::leaf::queue::{self, Queue};
-use crate::narrow::{Closest, triangle_distance, triangles_within};
+use crate::narrow::{Closest, triangles_within};
 use crate::pose::Pose;
 use crate::traverse::align::round_up;
 use crate::traverse::opened::Leaf;
 use crate::traverse::pair::{Measure, Order, Visitor};
+use bvh_format::leaf::Packet;
 use std::ops::ControlFlow;
 
 /// Leaf pairs to visit best-first before going on depth-first.
@@ -202,10 +204,9 @@ impl Querier {
     ) -> Result<Option<Best>, QueryError> {
         each_pair(a, b, pose, |scene| {
             let Some(pair) = self.find_contact(scene, Order::Tree)? else { return Ok(None) };
-            let closest = triangle_distance(
-                &scene.triangle_a(pair.a, pair.lane_a)?,
-                &scene.triangle_b(pair.b, pair.lane_b)?,
-            );
+            let triangle_a = scene.triangle_a(pair.a, pair.lane_a)?;
+            let triangle_b = scene.triangle_b(pair.b, pair.lane_b)?;
+            let closest = self.backend.run(TriangleDistance(&triangle_a, &triangle_b));
             let ids = ids(scene, &pair)?;
             Ok(Some(Best { closest, found: Found { numbers: scene.numbers, pair }, ids }))
         })
@@ -308,10 +309,15 @@ impl Search {
     }
 
     /// Settles a pair in f64.
-    fn settle(&mut self, scene: &Scene<'_>, pair: queue::Candidate) -> Result<(), QueryError> {
+    fn settle<I: Isa>(
+        &mut self,
+        isa: I,
+        scene: &Scene<'_>,
+        pair: queue::Candidate,
+    ) -> Result<(), QueryError> {
         let triangle_a = scene.triangle_a(pair.a, pair.lane_a)?;
         let triangle_b = scene.triangle_b(pair.b, pair.lane_b)?;
-        let closest = triangle_distance(&triangle_a, &triangle_b);
+        let closest = isa.run(TriangleDistance(&triangle_a, &triangle_b));
         self.settled_lower = self.settled_lower.min(closest.lower);
         let nearer = match &self.best {
             None => true,
@@ -381,12 +387,12 @@ impl Nearest<'_> {
             }
             if lower <= 0.0 {
                 // Perhaps touching: knowing at once may end the search.
-                if self.settle(pair)?.is_break() {
+                if self.settle(isa, pair)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
             } else {
                 self.candidates.push(Candidate { lower, upper, pair });
-                if self.candidates.len() >= MANY_CANDIDATES && self.settle_candidates()?.is_break() {
+                if self.candidates.len() >= MANY_CANDIDATES && self.settle_candidates(isa)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
             }
@@ -395,22 +401,22 @@ impl Nearest<'_> {
     }
 
     #[inline(never)]
-    fn settle(&mut self, pair: queue::Candidate) -> Result<ControlFlow<()>, QueryError> {
+    fn settle<I: Isa>(&mut self, isa: I, pair: queue::Candidate) -> Result<ControlFlow<()>, QueryError> {
         self.stats.exact_tests += 1;
-        self.search.settle(self.scene, pair)?;
+        self.search.settle(isa, self.scene, pair)?;
         Ok(if self.search.done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
     /// Settles the candidates that still may be the closest, nearest first.
     #[inline(never)]
-    fn settle_candidates(&mut self) -> Result<ControlFlow<()>, QueryError> {
+    fn settle_candidates<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         self.candidates.sort_unstable_by(|x, y| y.lower.total_cmp(&x.lower));
         while let Some(candidate) = self.candidates.pop() {
             // With an allowed error, the pair that the limit came from may be beyond it.
             if candidate.lower > self.search.limit && candidate.upper > self.search.upper {
                 continue;
             }
-            if self.settle(candidate.pair)?.is_break() {
+            if self.settle(isa, candidate.pair)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
@@ -449,9 +455,10 @@ impl Visitor for Nearest<'_> {
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
-        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet)?;
-        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet)?;
-        let local = Local::new(isa, self.scene.frame(), &packet_a, &packet_b);
+        let (mut room_a, mut room_b) = (Packet::default(), Packet::default());
+        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet, &mut room_a)?;
+        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet, &mut room_b)?;
+        let local = Local::new(isa, self.scene.frame(), packet_a, packet_b);
         let limit = self.search.limit * self.scene.frame().scale;
         let mut mask = valid_lanes(a.triangles, b.triangles);
         if let Some(direction) = self.direction {
@@ -474,7 +481,7 @@ impl Visitor for Nearest<'_> {
     #[inline(always)]
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
         if self.drain(isa)?.is_continue() {
-            let _ = self.settle_candidates()?;
+            let _ = self.settle_candidates(isa)?;
         }
         Ok(())
     }

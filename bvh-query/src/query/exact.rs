@@ -2,10 +2,12 @@
 
 use crate::bvh::Bvh;
 use crate::error::QueryError;
-use crate::narrow::Triangle;
+use crate::isa::{Isa, Task};
+use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
 use crate::query::Scene;
 use crate::traverse::opened::Leaf;
+use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 
 impl Scene<'_> {
@@ -22,10 +24,23 @@ impl Scene<'_> {
 
 /// A triangle in its own file's frame: origin plus stored offset, which is exact.
 pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
-    let packet = bvh.packet(object, leaf.page, leaf.packet)?;
+    let mut room = Packet::default();
+    let packet = bvh.packet(object, leaf.page, leaf.packet, &mut room)?;
     let origin = object.record.origin.map(|o| o.get());
     let corners = packet.triangle(usize::from(lane & 3));
     Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
+}
+
+/// `triangle_distance`, with the features of a backend: its 42 candidates fill vector registers.
+pub(super) struct TriangleDistance<'a>(pub(super) &'a Triangle, pub(super) &'a Triangle);
+
+impl Task for TriangleDistance<'_> {
+    type Output = Closest;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _isa: I) -> Closest {
+        triangle_distance(self.0, self.1)
+    }
 }
 
 /// Where a pose puts a triangle of B.

@@ -20,11 +20,12 @@
 //! Body Systems", 1996, section 2.3.2.
 
 use super::distance::{DistanceOptions, Search, no_answer};
+use super::exact::TriangleDistance;
 use super::exact::{placed, stored};
 use super::{Distance, Found, Querier};
 use crate::bvh::Shape;
 use crate::error::QueryError;
-use crate::narrow::{Triangle, triangle_distance, triangles_intersect, triangles_within};
+use crate::narrow::{Triangle, triangles_intersect, triangles_within};
 use crate::pose::Pose;
 use crate::traverse::align::POSE_ERROR;
 use bvh_format::object::Object;
@@ -143,7 +144,7 @@ impl Tracker {
         let search = || Search::new(DistanceOptions::default(), f64::INFINITY);
         let (mut limited, mut found) = (search(), None);
         if let Some((triangle_a, triangle_b)) = self.triangles(querier, a, b, pose) {
-            let closest = triangle_distance(&triangle_a, &triangle_b);
+            let closest = querier.backend.run(TriangleDistance(&triangle_a, &triangle_b));
             if closest.distance == 0.0 {
                 found = querier.first_contact(a, b, pose)?;
             } else if is_small(moved, b) {
@@ -193,7 +194,7 @@ impl Tracker {
         }
         let mut search = Search::new(DistanceOptions::default(), d);
         if let Some((triangle_a, triangle_b)) = self.triangles(querier, a, b, pose) {
-            let closest = triangle_distance(&triangle_a, &triangle_b);
+            let closest = querier.backend.run(TriangleDistance(&triangle_a, &triangle_b));
             if triangles_within(&triangle_a, &triangle_b, &closest, d) {
                 return Ok(true);
             }
@@ -367,7 +368,8 @@ mod tests {
                 for number in object.pages() {
                     let page = bvh.page(object, number).unwrap();
                     for packet in 0..page.header().packets.get() {
-                        let values = bvh.packet(object, number, packet).unwrap();
+                        let mut room = Default::default();
+                        let values = bvh.packet(object, number, packet, &mut room).unwrap();
                         let origin = object.record.origin.map(|o| o.get());
                         for v in (0..4).flat_map(|lane| values.triangle(lane)) {
                             let point = [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]));

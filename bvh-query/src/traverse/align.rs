@@ -11,10 +11,12 @@
 //! 2^-150 each, and twice that is charged. All go into the offsets, outward, once a query; a node test costs
 //! nothing for it.
 
+use crate::isa::{FourRows, Isa, Lanes, Part, Task};
 use crate::pose::Pose;
 use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::object::Object;
-use bvh_format::support::{Form, cone, magnitudes, rows_of_cone, signed};
+use bvh_format::slabs::{Group, row};
+use bvh_format::support::{cone, magnitudes, rows_by_cone};
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
@@ -23,30 +25,64 @@ const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 /// Relative error charged to all f64 work of a pose: 32 roundings, three times what there are at most.
 pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
-/// All directions of A for one pose: the forms of B's upper ends along them and what to add. The lower end has
-/// the same coefficients over the other ends. One array a quantity, so that all directions are prepared at
-/// once in vector registers; three of the 16 elements are of no direction.
-#[derive(Clone, Debug)]
+/// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end
+/// has the same coefficients over the other ends of the slabs.
+///
+/// Everything is laid out as the groups that it turns out: four rows of four nodes to a register. Rows of no
+/// slab hold nothing of meaning.
+#[repr(C, align(64))]
 pub(crate) struct Alignment {
-    rows: [u32; 16],
-    coefficients: [[f32; 16]; 3],
-    pub(crate) offset_lo: [f32; 16],
-    pub(crate) offset_hi: [f32; 16],
+    /// Where each term's end is taken from, `[term]`, as lanes and as rows: see `FourRows`.
+    lanes: [[[u32; 16]; 4]; 3],
+    rows: [[u32; 16]; 3],
+    coefficients: [[[f32; 16]; 4]; 3],
+    offset_lo: [[f32; 16]; 4],
+    offset_hi: [[f32; 16]; 4],
+    /// The directions of B.
+    set: DirectionSet,
 }
 
-/// `FACTORS` by axis.
+/// `FACTORS` by axis and row.
 const FACTORS_BY_AXIS: [[f64; 16]; 3] = {
     let mut factors = [[0.0; 16]; 3];
     let mut slab = 0;
     while slab < 13 {
         let mut axis = 0;
         while axis < 3 {
-            factors[axis][slab] = FACTORS[slab][axis];
+            factors[axis][row(slab)] = FACTORS[slab][axis];
             axis += 1;
         }
         slab += 1;
     }
     factors
+};
+
+/// Where the ends of the rows of `rows_by_cone` stand in their `Part`: each of the terms of a set keeps to one.
+const PLACES: [[u32; 64]; 3] = {
+    let sets = [DirectionSet::Dop6, DirectionSet::Dop14, DirectionSet::Dop26];
+    let mut places = [[0; 64]; 3];
+    let mut set = 0;
+    while set < 3 {
+        let rows = rows_by_cone(sets[set]);
+        let mut cone = 0;
+        while cone < 64 {
+            let mut term = 0;
+            while term < 3 {
+                let end = rows[cone] >> (8 * term) & 31;
+                let row = end & 15;
+                let place = match row {
+                    0..3 => row,
+                    3..8 => row - 3,
+                    _ => (row & 3) + 2 * (row & 4),
+                };
+                places[set][cone] |= (place + end / 16 * 4) << (8 * term);
+                term += 1;
+            }
+            cone += 1;
+        }
+        set += 1;
+    }
+    places
 };
 
 /// The pose of object B in the frame of object A, both around their origins.
@@ -60,6 +96,9 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
+    /// Of no pose yet.
+    pub(crate) const NONE: Self = Self { rotation: [[0.0; 3]; 3], translation: [0.0; 3], error: 0.0 };
+
     pub(crate) fn new(pose: &Pose, a: &Object, b: &Object) -> Self {
         let (record_a, record_b) = (&a.record, &b.record);
         let mut origin = [[0.0; 3]; 2];
@@ -113,55 +152,165 @@ impl Placement {
 }
 
 impl Alignment {
-    /// Prepares a pose. `reach_b` bounds the slab ends of B's nodes.
+    /// Of no pose yet.
+    pub(crate) const NONE: Self = Self {
+        rows: [[0; 16]; 3],
+        lanes: [[[0; 16]; 4]; 3],
+        coefficients: [[[0.0; 16]; 4]; 3],
+        offset_lo: [[0.0; 16]; 4],
+        offset_hi: [[0.0; 16]; 4],
+        set: DirectionSet::Dop6,
+    };
+
+    /// Prepares a pose, in place: it is as much as 50 lines of memory. `reach_b` bounds the slab ends of B's nodes.
     #[inline(always)]
-    pub(crate) fn new(placement: &Placement, set_b: DirectionSet, reach_b: f32) -> Self {
+    pub(crate) fn prepare<I: Isa>(
+        &mut self,
+        isa: I,
+        placement: &Placement,
+        set_b: DirectionSet,
+        reach_b: f32,
+    ) {
         match set_b {
-            DirectionSet::Dop6 => Self::along_all(placement, DirectionSet::Dop6, reach_b),
-            DirectionSet::Dop14 => Self::along_all(placement, DirectionSet::Dop14, reach_b),
-            DirectionSet::Dop26 => Self::along_all(placement, DirectionSet::Dop26, reach_b),
+            DirectionSet::Dop6 => self.prepare_set(isa, placement, DirectionSet::Dop6, reach_b),
+            DirectionSet::Dop14 => self.prepare_set(isa, placement, DirectionSet::Dop14, reach_b),
+            DirectionSet::Dop26 => self.prepare_set(isa, placement, DirectionSet::Dop26, reach_b),
         }
     }
 
     #[inline(always)]
-    fn along_all(placement: &Placement, set_b: DirectionSet, reach_b: f32) -> Self {
+    fn prepare_set<I: Isa>(&mut self, isa: I, placement: &Placement, set: DirectionSet, reach_b: f32) {
         let (r, t) = (&placement.rotation, &placement.translation);
+        // One array a quantity, so that all directions go through vector registers at once.
         let mut cones = [0; 16];
         let mut coefficients = [[0.0f32; 16]; 3];
         let (mut offset_lo, mut offset_hi) = ([0.0; 16], [0.0; 16]);
-        for slab in 0..16 {
-            let [x, y, z] = [FACTORS_BY_AXIS[0][slab], FACTORS_BY_AXIS[1][slab], FACTORS_BY_AXIS[2][slab]];
+        for row in 0..16 {
+            let [x, y, z] = [FACTORS_BY_AXIS[0][row], FACTORS_BY_AXIS[1][row], FACTORS_BY_AXIS[2][row]];
             let seen = [
                 r[0][0] * x + r[1][0] * y + r[2][0] * z,
                 r[0][1] * x + r[1][1] * y + r[2][1] * z,
                 r[0][2] * x + r[1][2] * y + r[2][2] * z,
             ];
             let offset = t[0] * x + t[1] * y + t[2] * z;
-            let [c0, c1, c2] = magnitudes(seen, set_b);
+            let [c0, c1, c2] = magnitudes(seen, set);
             let rounded = [c0 as f32, c1 as f32, c2 as f32];
             let error = form_error(rounded, reach_b, offset) + 3.0 * placement.error;
-            cones[slab] = cone(seen);
-            (coefficients[0][slab], coefficients[1][slab], coefficients[2][slab]) =
+            cones[row] = cone(seen);
+            (coefficients[0][row], coefficients[1][row], coefficients[2][row]) =
                 (rounded[0], rounded[1], rounded[2]);
-            (offset_lo[slab], offset_hi[slab]) = ((offset - error) as f32, (offset + error) as f32);
+            (offset_lo[row], offset_hi[row]) = ((offset - error) as f32, (offset + error) as f32);
         }
-        let mut rows = [0; 16];
-        for slab in 0..16 {
-            rows[slab] = rows_of_cone(cones[slab], set_b);
+        let (rows, places) = match set {
+            DirectionSet::Dop6 => (const { &rows_by_cone(DirectionSet::Dop6) }, &PLACES[0]),
+            DirectionSet::Dop14 => (const { &rows_by_cone(DirectionSet::Dop14) }, &PLACES[1]),
+            DirectionSet::Dop26 => (const { &rows_by_cone(DirectionSet::Dop26) }, &PLACES[2]),
+        };
+        let (mut rows_of, mut places_of) = ([0; 16], [0; 16]);
+        for row in 0..16 {
+            let cone = (cones[row] & 63) as usize;
+            (rows_of[row], places_of[row]) = (rows[cone], places[cone]);
         }
-        for (j, coefficients) in coefficients.iter_mut().enumerate() {
-            for slab in 0..16 {
-                coefficients[slab] = signed(coefficients[slab], rows[slab], j);
+        for (term, coefficients) in coefficients.iter_mut().enumerate() {
+            let mut first = [0.0; 16];
+            for row in 0..16 {
+                let end = rows_of[row] >> (8 * term) & 31;
+                self.rows[term][row] = end;
+                // The coefficients of lower ends, which have rows below 16, are negative.
+                coefficients[row] = f32::from_bits(coefficients[row].to_bits() ^ (!end & 16) << 27);
+                first[row] = f32::from_bits(4 * (places_of[row] >> (8 * term) & 15));
             }
+            for q in 0..4 {
+                let mut lanes = [0.0; 16];
+                isa.store(isa.repeat(&first.as_chunks::<4>().0[q]), &mut lanes);
+                for lane in 0..16 {
+                    self.lanes[term][q][lane] = lanes[lane].to_bits() | lane as u32 & 3;
+                }
+            }
+            spread(isa, coefficients, &mut self.coefficients[term]);
         }
-        Self { rows, coefficients, offset_lo, offset_hi }
+        spread(isa, &offset_lo, &mut self.offset_lo);
+        spread(isa, &offset_hi, &mut self.offset_hi);
+        self.set = set;
     }
 
-    /// The form of the upper end along a slab's direction.
+    /// The ends of four nodes of B along the first `slabs` directions of A, outward.
     #[inline(always)]
-    pub(crate) fn upper(&self, slab: usize) -> Form {
-        let c = &self.coefficients;
-        Form::new(self.rows[slab], [c[0][slab], c[1][slab], c[2][slab]])
+    pub(crate) fn align<I: Isa>(&self, isa: I, to: DirectionSet, group: &Group, aligned: &mut Group) {
+        match self.set {
+            DirectionSet::Dop6 => self.align_terms(isa, [Part::Axes; 3], to, group, aligned),
+            DirectionSet::Dop14 => {
+                self.align_terms(isa, [Part::Axes, Part::Cube, Part::Cube], to, group, aligned)
+            }
+            DirectionSet::Dop26 => {
+                self.align_terms(isa, [Part::Axes, Part::Faces, Part::Cube], to, group, aligned)
+            }
+        }
+    }
+
+    /// The same, given the part of a group that each term takes its ends from.
+    #[inline(always)]
+    fn align_terms<I: Isa>(
+        &self,
+        isa: I,
+        parts: [Part; 3],
+        to: DirectionSet,
+        group: &Group,
+        aligned: &mut Group,
+    ) {
+        match to {
+            DirectionSet::Dop6 => self.align_rows::<I, 1>(isa, parts, group, aligned),
+            DirectionSet::Dop14 => self.align_rows::<I, 2>(isa, parts, group, aligned),
+            DirectionSet::Dop26 => self.align_rows::<I, 4>(isa, parts, group, aligned),
+        }
+    }
+
+    #[inline(always)]
+    fn align_rows<I: Isa, const REGISTERS: usize>(
+        &self,
+        isa: I,
+        parts: [Part; 3],
+        group: &Group,
+        aligned: &mut Group,
+    ) {
+        let rows = isa.rows(group);
+        for q in 0..REGISTERS {
+            let (mut lo, mut hi) = (isa.load(&self.offset_lo[q]), isa.load(&self.offset_hi[q]));
+            for term in 0..3 {
+                let four = FourRows { rows: &self.rows[term].as_chunks().0[q], lanes: &self.lanes[term][q] };
+                let (end, other) = isa.pick(&rows, parts[term], four);
+                let coefficients = isa.load(&self.coefficients[term][q]);
+                hi = end.mul_add(coefficients, hi);
+                lo = other.mul_add(coefficients, lo);
+            }
+            isa.store(lo, &mut aligned.lo[q]);
+            isa.store(hi, &mut aligned.hi[q]);
+        }
+    }
+}
+
+/// Each value four times: for the four nodes of its row.
+#[inline(always)]
+fn spread<I: Isa>(isa: I, values: &[f32; 16], to: &mut [[f32; 16]; 4]) {
+    for (register, values) in to.iter_mut().zip(values.as_chunks::<4>().0) {
+        isa.store(isa.repeat(values), register);
+    }
+}
+
+/// Prepares a pose, called from where it is not worth its own place in the code.
+pub(crate) struct Prepare<'a> {
+    pub(crate) alignment: &'a mut Alignment,
+    pub(crate) placement: &'a Placement,
+    pub(crate) set: DirectionSet,
+    pub(crate) reach: f32,
+}
+
+impl Task for Prepare<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        self.alignment.prepare(isa, self.placement, self.set, self.reach);
     }
 }
 
@@ -182,16 +331,25 @@ pub(crate) fn round_up(value: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::isa::Backend;
     use bvh_format::kdop::Kdop;
     use bvh_format::slabs::NodeSlabs;
+    use bvh_format::treelet::child_slabs;
 
-    /// An end of a form over a node's slabs, as the kernels evaluate it.
-    fn end(form: &Form, node: &NodeSlabs, offset: f32) -> f32 {
-        let rows = [node.lo, node.hi];
-        (0..3).fold(offset, |sum, j| {
-            let row = usize::from(form.rows[j]);
-            rows[row / 16][row % 16].mul_add(form.coefficients[j], sum)
-        })
+    /// The ends of a node along the directions of a set, as a backend aligns them.
+    struct Aligned<'a>(&'a Placement, DirectionSet, DirectionSet, &'a NodeSlabs);
+
+    impl Task for Aligned<'_> {
+        type Output = NodeSlabs;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> NodeSlabs {
+            let Self(placement, of, to, node) = self;
+            let (mut aligned, mut alignment) = (Group::ZERO, Alignment::NONE);
+            alignment.prepare(isa, placement, of, 3.0);
+            alignment.align(isa, to, &Group::of_one(node), &mut aligned);
+            child_slabs(&aligned, 0)
+        }
     }
 
     /// A matrix as far from a rotation as a pose may be: its transpose as an inverse would be off by 2^-20 of the
@@ -218,16 +376,16 @@ mod tests {
                 (DirectionSet::Dop14, DirectionSet::Dop14),
                 (DirectionSet::Dop26, DirectionSet::Dop6),
             ] {
-                let alignment = Alignment::new(&inverse, set_a, 3.0);
+                let backend = Backend::ALL[round as usize % 3];
+                let backend = if backend.is_available() { backend } else { Backend::Scalar };
                 for point in &points {
                     let node = NodeSlabs::from_kdop(&Kdop::of_points([*point]), set_a.slabs());
                     // Where B's frame has the point: solved by elimination, z first.
                     let [x, y, z] = [0, 1, 2].map(|axis| f64::from(point[axis]) - translation[axis]);
                     let seen = [cos * x + sin * y - shear * z, cos * y - sin * x, z];
+                    let aligned = backend.run(Aligned(&inverse, set_a, set_b, &node));
                     for slab in 0..set_b.slabs() {
-                        let form = alignment.upper(slab);
-                        let lo = end(&form.mirrored(), &node, alignment.offset_lo[slab]);
-                        let hi = end(&form, &node, alignment.offset_hi[slab]);
+                        let (lo, hi) = (aligned.lo[row(slab)], aligned.hi[row(slab)]);
                         let along: f64 = (0..3).map(|axis| FACTORS[slab][axis] * seen[axis]).sum();
                         assert!(f64::from(lo) <= along && along <= f64::from(hi), "{lo} <= {along} <= {hi}");
                         // No looser than the forms are.

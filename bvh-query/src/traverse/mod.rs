@@ -5,3 +5,4 @@ pub(crate) mod decode;
 pub(crate) mod node_test;
 pub(crate) mod opened;
 pub(crate) mod pair;
+pub(crate) mod pairs;

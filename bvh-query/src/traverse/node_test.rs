@@ -1,8 +1,7 @@
 //! The node test: 16 pairs of nodes at a time along A's directions.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{Alignment, Placement, form_error};
-use crate::traverse::opened::Aligned;
+use crate::traverse::align::{Alignment, Placement, Prepare, form_error};
 use crate::traverse::pair::{Measure, Pair};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::slabs::{Group, NodeSlabs, row};
@@ -47,7 +46,8 @@ pub(crate) struct NodeTest {
     /// B along A's directions.
     alignment: Alignment,
     /// A along B's directions, once that pays.
-    inverse: Option<Alignment>,
+    inverse: Alignment,
+    looks_along_b: bool,
     placement: Placement,
     set_a: DirectionSet,
     set_b: DirectionSet,
@@ -56,12 +56,32 @@ pub(crate) struct NodeTest {
 }
 
 impl NodeTest {
+    /// Of no pose yet.
+    pub(crate) const NONE: Self = Self {
+        alignment: Alignment::NONE,
+        inverse: Alignment::NONE,
+        looks_along_b: false,
+        placement: Placement::NONE,
+        set_a: DirectionSet::Dop6,
+        set_b: DirectionSet::Dop6,
+        reach_a: 0.0,
+        reach_b: 0.0,
+    };
+
+    /// Prepares a pose.
     #[inline(always)]
-    pub(crate) fn new(pair: &Pair<'_>, root_a: &NodeSlabs, root_b: &NodeSlabs) -> Self {
-        let (set_a, set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
-        let (reach_a, reach_b) = (reach(root_a), reach(root_b));
-        let alignment = Alignment::new(pair.placement, set_b, reach_b);
-        Self { inverse: None, alignment, placement: *pair.placement, set_a, set_b, reach_a, reach_b }
+    pub(crate) fn prepare<I: Isa>(
+        &mut self,
+        isa: I,
+        pair: &Pair<'_>,
+        root_a: &NodeSlabs,
+        root_b: &NodeSlabs,
+    ) {
+        self.looks_along_b = false;
+        self.placement = *pair.placement;
+        (self.set_a, self.set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
+        (self.reach_a, self.reach_b) = (reach(root_a), reach(root_b));
+        self.alignment.prepare(isa, pair.placement, self.set_b, self.reach_b);
     }
 
     /// Takes over a new witness direction.
@@ -88,30 +108,30 @@ impl NodeTest {
     }
 
     /// From now on there is a test along B's directions, too.
-    #[cold]
-    pub(crate) fn look_along_b(&mut self) {
+    #[inline(always)]
+    pub(crate) fn look_along_b<I: Isa>(&mut self, isa: I) {
         let placement = self.placement.inverse();
-        self.inverse = Some(Alignment::new(&placement, self.set_a, self.reach_a));
+        let (alignment, set, reach) = (&mut self.inverse, self.set_a, self.reach_a);
+        isa.run(Prepare { alignment, placement: &placement, set, reach });
+        self.looks_along_b = true;
     }
 
     /// True if there is a test along B's directions.
     #[inline(always)]
     pub(crate) fn looks_along_b(&self) -> bool {
-        self.inverse.is_some()
+        self.looks_along_b
     }
 
     /// B's slab ends along A's directions, outward.
     #[inline(always)]
-    pub(crate) fn align_b<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
-        align(isa, &self.alignment, self.set_a, group, aligned);
+    pub(crate) fn align_b<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Group) {
+        self.alignment.align(isa, self.set_a, group, aligned);
     }
 
-    /// A's slab ends along B's directions, outward.
+    /// A's slab ends along B's directions, outward, after `look_along_b`.
     #[inline(always)]
-    pub(crate) fn align_a<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Aligned) {
-        if let Some(inverse) = &self.inverse {
-            align(isa, inverse, self.set_b, group, aligned);
-        }
+    pub(crate) fn align_a<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Group) {
+        self.inverse.align(isa, self.set_b, group, aligned);
     }
 
     /// Tests four nodes of A against four of B along A's directions: element `4 * a + b` of `bounds` is the
@@ -121,12 +141,12 @@ impl NodeTest {
         &self,
         isa: I,
         measure: Measure,
-        (group_a, group_b, aligned_b): (&Group, &Group, &Aligned),
+        (group_a, group_b, aligned_b): (&Group, &Group, &Group),
         witness: &Option<Witness>,
         limit: f32,
         bounds: &mut [f32; 16],
     ) -> u16 {
-        let mut gaps = gaps_along(isa, measure, self.set_a, AlongA(group_a, aligned_b));
+        let mut gaps = gaps_along(isa, measure, self.set_a, (group_a, aligned_b));
         if let Some(witness) = witness {
             gaps = gaps.max(witness.gaps(isa, group_a, group_b));
         }
@@ -140,11 +160,11 @@ impl NodeTest {
         &self,
         isa: I,
         measure: Measure,
-        (aligned_a, group_b): (&Aligned, &Group),
+        (aligned_a, group_b): (&Group, &Group),
         limit: f32,
         bounds: &mut [f32; 16],
     ) -> u16 {
-        let gaps = gaps_along(isa, measure, self.set_b, AlongB(aligned_a, group_b));
+        let gaps = gaps_along(isa, measure, self.set_b, (aligned_a, group_b));
         // Seen from A, B's directions are longer or shorter by at most 2^-19, all together: so far a rotation
         // may be off.
         let shrunk = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32));
@@ -177,85 +197,55 @@ fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
     sum
 }
 
-/// Four nodes of A and four of B along the directions of one of them.
-trait Ends: Copy {
-    /// The signed gap of each of 16 pairs along one direction.
-    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V;
-}
-
-/// Along A's directions.
-#[derive(Clone, Copy)]
-struct AlongA<'a>(&'a Group, &'a Aligned);
-
-/// Along B's directions.
-#[derive(Clone, Copy)]
-struct AlongB<'a>(&'a Aligned, &'a Group);
-
-impl Ends for AlongA<'_> {
-    #[inline(always)]
-    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V {
-        let (rows_a, [lo_b, hi_b]) = (self.0.rows(), &self.1[slab]);
-        let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
-        lo_a.sub(isa.tile(hi_b)).max(isa.tile(lo_b).sub(hi_a))
-    }
-}
-
-impl Ends for AlongB<'_> {
-    #[inline(always)]
-    fn gap<I: Isa>(self, isa: I, slab: usize) -> I::V {
-        let ([lo_a, hi_a], rows_b) = (&self.0[slab], self.1.rows());
-        let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
-        isa.repeat(lo_a).sub(hi_b).max(lo_b.sub(isa.repeat(hi_a)))
-    }
-}
-
-/// Slab ends of four nodes along the other side's directions, outward.
+/// The signed gap of each of 16 pairs, four nodes of A and four of B, along one direction of both groups.
 #[inline(always)]
-fn align<I: Isa>(isa: I, to: &Alignment, set: DirectionSet, group: &Group, aligned: &mut Aligned) {
-    for slab in 0..set.slabs() {
-        let upper = to.upper(slab);
-        let lo = evaluate(isa, &upper.mirrored(), group, isa.splat4(to.offset_lo[slab]));
-        let hi = evaluate(isa, &upper, group, isa.splat4(to.offset_hi[slab]));
-        isa.store4(lo, &mut aligned[slab][0]);
-        isa.store4(hi, &mut aligned[slab][1]);
-    }
+fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::V {
+    let (rows_a, rows_b) = (group_a.rows(), group_b.rows());
+    let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
+    let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
+    lo_a.sub(hi_b).max(lo_b.sub(hi_a))
 }
 
 /// `gaps` for the directions of a set.
 #[inline(always)]
-fn gaps_along<I: Isa, E: Ends>(isa: I, measure: Measure, set: DirectionSet, ends: E) -> I::V {
+fn gaps_along<I: Isa>(isa: I, measure: Measure, set: DirectionSet, ends: (&Group, &Group)) -> I::V {
     match set {
-        DirectionSet::Dop6 => gaps::<I, E, 3>(isa, measure, ends),
-        DirectionSet::Dop14 => gaps::<I, E, 7>(isa, measure, ends),
-        DirectionSet::Dop26 => gaps::<I, E, 13>(isa, measure, ends),
+        DirectionSet::Dop6 => gaps::<I, 3>(isa, measure, ends),
+        DirectionSet::Dop14 => gaps::<I, 7>(isa, measure, ends),
+        DirectionSet::Dop26 => gaps::<I, 13>(isa, measure, ends),
     }
 }
 
 /// The gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
 /// `Distance` a lower bound of the distance.
 #[inline(always)]
-fn gaps<I: Isa, E: Ends, const SLABS: usize>(isa: I, measure: Measure, ends: E) -> I::V {
-    let mut largest = ends.gap(isa, 0);
+fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Group)) -> I::V {
+    // Three maxima side by side, so that none waits for the one before.
+    let [mut x, mut y, mut z] = [gap(isa, ends, 0), gap(isa, ends, 1), gap(isa, ends, 2)];
     if measure == Measure::Overlap {
-        for slab in 1..SLABS {
-            largest = largest.max(ends.gap(isa, slab));
+        for slab in 3..SLABS {
+            let gap = gap(isa, ends, slab);
+            match slab % 3 {
+                0 => x = x.max(gap),
+                1 => y = y.max(gap),
+                _ => z = z.max(gap),
+            }
         }
-        return largest;
+        return x.max(y).max(z);
     }
     // Along the three axes gaps add up like the sides of a box.
     let zero = isa.splat(0.0);
-    let positive = largest.max(zero);
-    let mut sum = positive.mul(positive);
-    for slab in 1..3 {
-        let gap = ends.gap(isa, slab);
-        largest = largest.max(gap);
-        let positive = gap.max(zero);
-        sum = positive.mul_add(positive, sum);
-    }
+    let [side_x, side_y, side_z] = [x.max(zero), y.max(zero), z.max(zero)];
+    let sum = side_z.mul_add(side_z, side_y.mul_add(side_y, side_x.mul(side_x)));
     for slab in 3..SLABS {
-        let gap = ends.gap(isa, slab);
-        largest = largest.max(gap.mul(isa.splat(INVERSE_LENGTHS[slab])));
+        let gap = gap(isa, ends, slab).mul(isa.splat(INVERSE_LENGTHS[slab]));
+        match slab % 3 {
+            0 => x = x.max(gap),
+            1 => y = y.max(gap),
+            _ => z = z.max(gap),
+        }
     }
+    let largest = x.max(y).max(z);
     // Up to four roundings of the sum and one of the root, each 2^-24 relative, and three squares that
     // underflow by 2^-150 each: of a sum from 2^-126 on, no more than that again.
     //

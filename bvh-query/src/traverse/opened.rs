@@ -35,6 +35,17 @@ impl ChildRef {
     }
 
     #[inline(always)]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// From what `bits` returned.
+    #[inline(always)]
+    pub(crate) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    #[inline(always)]
     pub(crate) fn node(self) -> usize {
         (self.0 >> 3) as usize
     }
@@ -44,9 +55,6 @@ impl ChildRef {
         (self.0 & 7) as usize
     }
 }
-
-/// Slab ends of four nodes of B along A's directions: `[slab][lo or hi]`.
-pub(crate) type Aligned = [[[f32; 4]; 2]; 13];
 
 /// The children of a node, decoded.
 #[derive(Clone, Copy)]
@@ -60,8 +68,6 @@ pub(crate) struct Opened {
     links: Links,
     page: u32,
     pub(crate) count: usize,
-    /// True if the groups have been aligned to the other side's directions, where that is done on demand.
-    pub(crate) aligned: bool,
 }
 
 const CLOSED: u32 = u32::MAX;
@@ -74,7 +80,6 @@ impl Opened {
         links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
         page: 0,
         count: 0,
-        aligned: false,
     };
 
     /// The child, if it is a leaf packet.
@@ -89,6 +94,14 @@ impl Opened {
     #[inline(always)]
     pub(crate) fn is_leaf(&self, child: usize) -> bool {
         self.links.kinds >> (4 * child + 2) & 1 == 1
+    }
+
+    /// A bit for each of four children, set for leaf packets.
+    #[inline(always)]
+    pub(crate) fn leaves(&self, part: usize) -> u16 {
+        // Every fourth bit, brought together.
+        let kinds = self.links.kinds >> (16 * (part & 1) + 2) & 0x1111;
+        ((kinds | kinds >> 3 | kinds >> 6 | kinds >> 9) & 0xf) as u16
     }
 
     /// Finds extents after the slabs have been decoded.
@@ -146,7 +159,6 @@ impl OpenedNodes {
         root.extents[0] = f32::INFINITY;
         root.opened = [CLOSED; 8];
         root.count = 1;
-        root.aligned = false;
         self.used = 1;
         let pages = object.record.pages.get() as usize;
         self.most = pages.saturating_mul(TREELETS_A_PAGE).saturating_add(1).min(MOST_NODES);
@@ -156,11 +168,6 @@ impl OpenedNodes {
     #[inline(always)]
     pub(crate) fn get(&self, node: usize) -> &Opened {
         &self.nodes[node]
-    }
-
-    #[inline(always)]
-    pub(crate) fn get_mut(&mut self, node: usize) -> &mut Opened {
-        &mut self.nodes[node]
     }
 
     /// The opened node of an inner child and whether it is new. A leaf is not opened: an empty node.
@@ -236,7 +243,6 @@ fn decode_node<I: Isa>(
     to.page = page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];
-    to.aligned = false;
     to.measure(isa, profile.groups());
     Ok(())
 }

@@ -23,11 +23,13 @@
 
 use crate::bvh::Bvh;
 use crate::error::QueryError;
-use crate::isa::Isa;
+use crate::isa::{Isa, Task};
 use crate::traverse::align::Placement;
 use crate::traverse::node_test::{NodeTest, Witness};
-use crate::traverse::opened::{Aligned, ChildRef, Leaf, OpenedNodes};
+use crate::traverse::opened::{ChildRef, Leaf, Opened, OpenedNodes};
+use crate::traverse::pairs::{Entry, Pairs, Tested};
 use bvh_format::object::Object;
+use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
 /// What a bound is good for.
@@ -91,78 +93,24 @@ pub(crate) struct Pair<'a> {
 /// Memory of a traversal, kept from one query to the next.
 #[derive(Default)]
 pub(crate) struct Stack {
+    /// Taken out while a walk is under way.
+    node_test: Option<Box<NodeTest>>,
     opened_a: OpenedNodes,
     opened_b: OpenedNodes,
-    /// The groups of A's opened nodes along B's directions, where they were asked for.
-    aligned_a: Vec<[Aligned; 2]>,
+    /// The groups of A's opened nodes along B's directions, made when they are asked for.
+    aligned_a: Vec<[Group; 2]>,
+    is_aligned_a: Vec<bool>,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: Vec<[Aligned; 2]>,
+    aligned_b: Vec<[Group; 2]>,
     /// Depth-first: the top is next.
-    entries: Vec<Entry>,
+    entries: Pairs,
+    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
+    leaf_pairs: Pairs,
     /// Best-first: the least is next.
-    list: List,
+    list: Pairs,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
-}
-
-/// A pair of nodes to visit. Sorts by bound.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Entry {
-    /// The bits of the bound, made monotone.
-    key: u32,
-    a: ChildRef,
-    b: ChildRef,
-}
-
-impl Entry {
-    /// The roots, at the least bound of all (that of minus infinity).
-    const ROOTS: Self = Self { key: 0x007f_ffff, a: ChildRef::ROOT, b: ChildRef::ROOT };
-
-    #[inline(always)]
-    fn new(bound: f32, a: ChildRef, b: ChildRef) -> Self {
-        let bits = bound.to_bits();
-        let key = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
-        Self { key, a, b }
-    }
-
-    #[inline(always)]
-    fn bound(self) -> f32 {
-        f32::from_bits(if self.key >> 31 == 1 { self.key & !(1 << 31) } else { !self.key })
-    }
-}
-
-/// Pairs in no order. Keys stand by themselves, so that the least is found in vector registers.
-#[derive(Default)]
-struct List {
-    keys: Vec<u32>,
-    pairs: Vec<(ChildRef, ChildRef)>,
-}
-
-impl List {
-    fn clear(&mut self) {
-        self.keys.clear();
-        self.pairs.clear();
-    }
-
-    #[inline(always)]
-    fn push(&mut self, Entry { key, a, b }: Entry) {
-        self.keys.push(key);
-        self.pairs.push((a, b));
-    }
-
-    /// Takes out the first of the least keys.
-    #[inline(always)]
-    fn pop_least(&mut self) -> Option<Entry> {
-        let least = self.keys.iter().fold(u32::MAX, |least, &key| least.min(key));
-        let place = self.keys.iter().position(|&key| key == least)?;
-        let (key, (a, b)) = (self.keys.swap_remove(place), self.pairs.swap_remove(place));
-        Some(Entry { key, a, b })
-    }
-
-    fn entries(&self) -> impl Iterator<Item = Entry> {
-        self.keys.iter().zip(&self.pairs).map(|(&key, &(a, b))| Entry { key, a, b })
-    }
 }
 
 /// How the next pair is found.
@@ -179,6 +127,9 @@ enum Phase {
 /// Entries that the list may hold before the walk goes on depth-first: what is searched in the time of a node
 /// test. Answers do not depend on it.
 const MOST_IN_LIST: usize = 1024;
+
+/// Pairs of leaf packets that are visited together. Answers do not depend on it.
+const SEVERAL: usize = 4;
 
 /// Visits that cost less than to find out whether they pay.
 const SOME: u64 = 8;
@@ -199,11 +150,26 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     stack: &mut Stack,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
+    let mut node_test = stack.node_test.take().unwrap_or_else(|| Box::new(NodeTest::NONE));
+    let tests = walk(isa, pair, stack, &mut node_test, visitor);
+    stack.node_test = Some(node_test);
+    tests
+}
+
+#[inline(always)]
+fn walk<I: Isa, W: Visitor>(
+    isa: I,
+    pair: Pair<'_>,
+    stack: &mut Stack,
+    node_test: &mut NodeTest,
+    visitor: &mut W,
+) -> Result<u64, QueryError> {
     stack.entries.clear();
+    stack.leaf_pairs.clear();
     stack.list.clear();
     let root_a = stack.opened_a.start(isa, pair.bvh_a, pair.object_a)?;
     let root_b = stack.opened_b.start(isa, pair.bvh_b, pair.object_b)?;
-    let mut node_test = NodeTest::new(&pair, &root_a, &root_b);
+    node_test.prepare(isa, &pair, &root_a, &root_b);
     let mut witness: Option<Witness> = None;
     node_test.update_witness(&mut witness, visitor.witness());
     let (mut tests, mut leaves) = (0, 0);
@@ -211,6 +177,12 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
     stack.entries.push(Entry::ROOTS);
     loop {
+        if stack.leaf_pairs.len() >= SEVERAL || stack.entries.len() == 0 && stack.leaf_pairs.len() > 0 {
+            if stack.visit_leaf_pairs(isa, visitor)?.is_break() {
+                return Ok(tests);
+            }
+            node_test.update_witness(&mut witness, visitor.witness());
+        }
         let next = match (stack.entries.pop(), phase) {
             (Some(top), _) => top,
             (None, Phase::DepthFirst) => break,
@@ -246,26 +218,26 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
             continue;
         }
         if tests >= TESTS_ALONG_A_ALONE && !node_test.looks_along_b() {
-            node_test.look_along_b();
+            node_test.look_along_b(isa);
         }
-        let sides = stack.open(isa, &pair, &node_test, next)?;
+        let sides = stack.open(isa, &pair, node_test, next)?;
         let start = stack.entries.len();
-        tests += stack.push_children(isa, W::MEASURE, &node_test, &witness, &sides, visitor.limit());
-        let new = &mut stack.entries[start..];
+        let apart = phase == Phase::DepthFirst;
+        tests += stack.push_children(isa, W::MEASURE, node_test, &witness, &sides, (visitor.limit(), apart));
         match (phase, order) {
             (Phase::BestFirst, _) => {
-                stack.entries.drain(start..).for_each(|entry| stack.list.push(entry));
-                if stack.list.keys.len() > MOST_IN_LIST {
+                stack.entries.move_to(start, &mut stack.list);
+                if stack.list.len() > MOST_IN_LIST {
                     phase = Phase::DepthFirst;
                     stack.list_to_stack(visitor.limit());
                 }
             }
-            (_, Order::Tree) => new.reverse(),
+            (_, Order::Tree) => stack.entries.reverse(start),
             (Phase::Dive, _) => {
-                nearest_last(new);
-                stack.entries.drain(..stack.entries.len().saturating_sub(1));
+                stack.entries.nearest_last(start);
+                stack.entries.keep_last(start);
             }
-            (Phase::DepthFirst, _) => nearest_last(new),
+            (Phase::DepthFirst, _) => stack.entries.nearest_last(start),
         }
     }
     visitor.finish(isa)?;
@@ -279,6 +251,24 @@ struct Sides {
     only_a: Option<usize>,
     node_b: usize,
     only_b: Option<usize>,
+}
+
+/// Aligns an opened node of A to B's directions, in a place of its own in the code: not every query gets here.
+struct AlignA<'a> {
+    node_test: &'a NodeTest,
+    node: &'a Opened,
+    to: &'a mut [Group; 2],
+}
+
+impl Task for AlignA<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        for part in 0..self.node.count.div_ceil(4) {
+            self.node_test.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+        }
+    }
 }
 
 impl Stack {
@@ -297,6 +287,29 @@ impl Stack {
     pub(crate) fn visit(&mut self) -> Result<(), QueryError> {
         self.left = self.left.checked_sub(1).ok_or(QueryError::Budget { visits: self.budget })?;
         Ok(())
+    }
+
+    /// Visits the pairs of leaf packets that have come together.
+    #[inline(always)]
+    fn visit_leaf_pairs<I: Isa, W: Visitor>(
+        &mut self,
+        isa: I,
+        visitor: &mut W,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        for at in 0..self.leaf_pairs.len() {
+            let next = self.leaf_pairs.get(at);
+            if next.bound() > visitor.limit() {
+                continue;
+            }
+            self.visit()?;
+            if let Some(leaves) = self.leaf_pair(next)
+                && visitor.leaves(isa, leaves, false)?.is_break()
+            {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        self.leaf_pairs.clear();
+        Ok(ControlFlow::Continue(()))
     }
 
     /// Both leaf packets, if the entry is a pair of them.
@@ -330,14 +343,19 @@ impl Stack {
         // In a forged file both comparisons may hold: one node is opened in any case.
         let b_is_small = extent_a > MUCH_LARGER * extent_b && !a_is_small;
         if !leaf_a && (leaf_b || !a_is_small) {
-            (sides.node_a, _) = self.opened_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
-            sides.only_a = None;
+            let (number, new) = self.opened_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            (sides.node_a, sides.only_a) = (number, None);
+            if self.aligned_a.len() <= number {
+                self.aligned_a.resize(2 * number + 64, [Group::ZERO; 2]);
+                self.is_aligned_a.resize(2 * number + 64, false);
+            }
+            self.is_aligned_a[number] &= !new;
         }
         if !leaf_b && (leaf_a || !b_is_small) {
             let (number, new) = self.opened_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             (sides.node_b, sides.only_b) = (number, None);
             if self.aligned_b.len() <= number {
-                self.aligned_b.resize(2 * number + 64, [[[[0.0; 4]; 2]; 13]; 2]);
+                self.aligned_b.resize(2 * number + 64, [Group::ZERO; 2]);
             }
             if new {
                 let opened = self.opened_b.get(number);
@@ -346,24 +364,7 @@ impl Stack {
                 }
             }
         }
-        if node_test.looks_along_b() {
-            self.align_a(isa, node_test, sides.node_a);
-        }
         Ok(sides)
-    }
-
-    /// Aligns an opened node of A to B's directions, unless it has been.
-    #[inline(always)]
-    fn align_a<I: Isa>(&mut self, isa: I, node_test: &NodeTest, number: usize) {
-        if self.aligned_a.len() <= number {
-            self.aligned_a.resize(2 * number + 64, [[[[0.0; 4]; 2]; 13]; 2]);
-        }
-        let opened = self.opened_a.get_mut(number);
-        if !std::mem::replace(&mut opened.aligned, true) {
-            for part in 0..opened.count.div_ceil(4) {
-                node_test.align_a(isa, &opened.groups[part & 1], &mut self.aligned_a[number][part & 1]);
-            }
-        }
     }
 
     /// Tests all pairs of children and pushes those within the limit. Returns the number of tests.
@@ -375,7 +376,7 @@ impl Stack {
         node_test: &NodeTest,
         witness: &Option<Witness>,
         sides: &Sides,
-        limit: f32,
+        (limit, leaves_apart): (f32, bool),
     ) -> u64 {
         let (side_a, side_b) = (self.opened_a.get(sides.node_a), self.opened_b.get(sides.node_b));
         let aligned_b = &self.aligned_b[sides.node_b];
@@ -390,18 +391,22 @@ impl Stack {
                 mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
                 mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
                 if mask != 0 && node_test.looks_along_b() {
-                    let aligned_a = &self.aligned_a[sides.node_a];
+                    let aligned_a = &mut self.aligned_a[sides.node_a];
+                    if !std::mem::replace(&mut self.is_aligned_a[sides.node_a], true) {
+                        isa.run(AlignA { node_test, node: side_a, to: aligned_a });
+                    }
                     let groups = (&aligned_a[part_a & 1], &side_b.groups[part_b & 1]);
                     mask &= node_test.run_along_b(isa, measure, groups, limit, &mut bounds);
                 }
-                self.entries.reserve(16);
-                while mask != 0 {
-                    let bit = mask.trailing_zeros() as usize;
-                    mask &= mask - 1;
-                    let a = ChildRef::new(sides.node_a, 4 * part_a + bit / 4);
-                    let b = ChildRef::new(sides.node_b, 4 * part_b + bit % 4);
-                    self.entries.push(Entry::new(bounds[bit & 15], a, b));
+                let first_a = ChildRef::new(sides.node_a, 4 * part_a);
+                let first_b = ChildRef::new(sides.node_b, 4 * part_b);
+                let tested = Tested::new(&bounds, first_a, first_b);
+                let mut leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
+                if !leaves_apart {
+                    leaves = 0;
                 }
+                self.entries.append(isa, &tested, mask & !leaves);
+                self.leaf_pairs.append(isa, &tested, mask & leaves);
                 tests += 1;
                 part_b += 1;
             }
@@ -412,10 +417,22 @@ impl Stack {
 
     /// Goes on depth-first with what the list holds, the least bound on top.
     fn list_to_stack(&mut self, limit: f32) {
-        self.entries.extend(self.list.entries().filter(|entry| entry.bound() <= limit));
+        for at in 0..self.list.len() {
+            let entry = self.list.get(at);
+            if entry.bound() <= limit {
+                self.entries.push(entry);
+            }
+        }
         self.list.clear();
-        nearest_last(&mut self.entries);
+        self.entries.nearest_last(0);
     }
+}
+
+/// The lanes of the children of A in a mask of four.
+#[inline(always)]
+fn rows_of(children: u16) -> u16 {
+    // Each bit to the first lane of its row; times 15 to all of them.
+    15 * ((children | children << 3 | children << 6 | children << 9) & 0x1111)
 }
 
 /// The groups of four children to test: all, or that of the only child in question.
@@ -443,16 +460,4 @@ fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
         Some(child) => 0x1111 << (child % 4),
         None => 0x1111 * ((1u16 << (count - 4 * part).min(4)) - 1),
     }
-}
-
-/// Moves the entry of least bound to the end, from where it is popped first. A full sort gains little
-/// and costs several mispredicted branches.
-#[inline(always)]
-fn nearest_last(entries: &mut [Entry]) {
-    let Some(last) = entries.len().checked_sub(1) else { return };
-    let mut least = last;
-    for index in 0..last {
-        least = if entries[index].key < entries[least].key { index } else { least };
-    }
-    entries.swap(least, last);
 }

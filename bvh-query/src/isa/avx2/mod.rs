@@ -3,7 +3,8 @@
 //! All `unsafe` here rests on one fact: an `Avx2` can only be had from `detect`, which makes sure that
 //! the CPU has the features below, and `Y` and `X` can only be made with an `Avx2`.
 
-use super::{Isa, Lanes, Task};
+use super::{FourRows, Isa, Lanes, Part, Task};
+use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
 
 /// The token of the AVX2 backend.
@@ -181,6 +182,7 @@ impl Lanes for X {
 impl Isa for Avx2 {
     type V = Y;
     type H = X;
+    type Rows<'a> = &'a Group;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Y {
@@ -219,6 +221,17 @@ impl Isa for Avx2 {
             let places = _mm256_set1_epi32(column as i32);
             Y(_mm256_permutevar_ps(value.0, places), _mm256_permutevar_ps(value.1, places))
         })
+    }
+    #[inline(always)]
+    fn rows(self, group: &Group) -> &Group {
+        group
+    }
+    #[inline(always)]
+    fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Y, Y) {
+        let rows = group.rows();
+        let [a, b, c, d] = four.rows.map(|row| (row & 31) as usize);
+        let ends = self.four_rows([&rows[a], &rows[b], &rows[c], &rows[d]]);
+        (ends, self.four_rows([&rows[a ^ 16], &rows[b ^ 16], &rows[c ^ 16], &rows[d ^ 16]]))
     }
     #[inline(always)]
     fn round_step_up(self, step: Y) -> Y {
@@ -288,6 +301,15 @@ impl Isa for Avx2 {
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
         unsafe { run_with_features(self, task) }
+    }
+}
+
+impl Avx2 {
+    #[inline(always)]
+    fn four_rows(self, rows: [&[f32; 4]; 4]) -> Y {
+        let [a, b, c, d] =
+            [self.load4(rows[0]), self.load4(rows[1]), self.load4(rows[2]), self.load4(rows[3])];
+        with_features!(Y(_mm256_set_m128(b.0, a.0), _mm256_set_m128(d.0, c.0)))
     }
 }
 

@@ -3,7 +3,8 @@
 //! All `unsafe` here rests on one fact: an `Avx512` can only be had from `detect`, which makes sure
 //! that the CPU has the features below, and `Z` and `X` can only be made with an `Avx512`.
 
-use super::{Isa, Lanes, Task};
+use super::{FourRows, Isa, Lanes, Part, Task};
+use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
 
 /// The token of the AVX-512 backend.
@@ -171,6 +172,8 @@ impl Lanes for X {
 impl Isa for Avx512 {
     type V = Z;
     type H = X;
+    /// Lower and upper ends of the axes, the cube's diagonals, and its faces' in two parts.
+    type Rows<'a> = [[Z; 2]; 4];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Z {
@@ -198,6 +201,30 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn quad_splat(self, value: Z, column: usize) -> Z {
         Z(with_features!(_mm512_permutevar_ps(value.0, _mm512_set1_epi32(column as i32))))
+    }
+    #[inline(always)]
+    fn rows(self, group: &Group) -> [[Z; 2]; 4] {
+        let (lo, hi) = (&group.lo, &group.hi);
+        let axes = [self.load(&lo[0]), self.load(&hi[0])];
+        let cube = [straddle(axes[0], self.load(&lo[1])), straddle(axes[1], self.load(&hi[1]))];
+        let faces = [self.load(&lo[2]), self.load(&hi[2])];
+        [axes, cube, faces, [self.load(&lo[3]), self.load(&hi[3])]]
+    }
+    #[inline(always)]
+    fn pick(self, [axes, cube, faces, more]: &[[Z; 2]; 4], part: Part, four: FourRows<'_>) -> (Z, Z) {
+        let at = four.lanes;
+        match part {
+            Part::Axes => self.pick_of(axes, at),
+            Part::Cube => self.pick_of(cube, at),
+            Part::Faces => {
+                let is_more = with_features!({
+                    let at = _mm512_loadu_si512(at.as_ptr().cast());
+                    _mm512_test_epi32_mask(at, _mm512_set1_epi32(32))
+                });
+                let ((end, other), (end_2, other_2)) = (self.pick_of(faces, at), self.pick_of(more, at));
+                (Z::select(is_more, end_2, end), Z::select(is_more, other_2, other))
+            }
+        }
     }
     #[inline(always)]
     fn round_step_up(self, step: Z) -> Z {
@@ -259,6 +286,13 @@ impl Isa for Avx512 {
         with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
     }
     #[inline(always)]
+    fn compress(self, mask: u16, from: &[u32; 16], to: &mut [u32; 16]) {
+        with_features!({
+            let chosen = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(from.as_ptr().cast()));
+            _mm512_storeu_si512(to.as_mut_ptr().cast(), chosen);
+        });
+    }
+    #[inline(always)]
     fn prefetch(self, bytes: &[u8]) {
         for line in bytes.chunks(64) {
             with_features!(_mm_prefetch::<_MM_HINT_T0>(line.as_ptr().cast()));
@@ -267,6 +301,26 @@ impl Isa for Avx512 {
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
         unsafe { run_with_features(self, task) }
+    }
+}
+
+/// The last four lanes of one, and the first twelve of another.
+#[inline(always)]
+fn straddle(first: Z, second: Z) -> Z {
+    Z(with_features!({
+        let (first, second) = (_mm512_castps_si512(first.0), _mm512_castps_si512(second.0));
+        _mm512_castsi512_ps(_mm512_alignr_epi32::<12>(second, first))
+    }))
+}
+
+impl Avx512 {
+    /// Elements of two registers, and those of the same registers exchanged.
+    #[inline(always)]
+    fn pick_of(self, [lo, hi]: &[Z; 2], at: &[u32; 16]) -> (Z, Z) {
+        with_features!({
+            let at = _mm512_loadu_si512(at.as_ptr().cast());
+            (Z(_mm512_permutex2var_ps(lo.0, at, hi.0)), Z(_mm512_permutex2var_ps(hi.0, at, lo.0)))
+        })
     }
 }
 

@@ -1,7 +1,8 @@
 //! The portable backend: arrays, one element at a time. What it does defines what the others do.
 
-use super::{Isa, Lanes, Task};
+use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::quantize::round_step_up;
+use bvh_format::slabs::Group;
 use half::f16;
 
 /// The token of the portable backend.
@@ -84,6 +85,7 @@ impl<const N: usize> Lanes for Array<N> {
 impl Isa for Scalar {
     type V = Array<16>;
     type H = Array<4>;
+    type Rows<'a> = &'a Group;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Array<16> {
@@ -108,6 +110,20 @@ impl Isa for Scalar {
     #[inline(always)]
     fn quad_splat(self, value: Array<16>, column: usize) -> Array<16> {
         Array(std::array::from_fn(|i| value.0[i / 4 * 4 + column % 4]))
+    }
+    #[inline(always)]
+    fn rows(self, group: &Group) -> &Group {
+        group
+    }
+    #[inline(always)]
+    fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Array<16>, Array<16>) {
+        let (mut ends, mut others) = (Array([0.0; 16]), Array([0.0; 16]));
+        let each = ends.0.as_chunks_mut().0.iter_mut().zip(others.0.as_chunks_mut().0).zip(four.rows);
+        for ((end, other), row) in each {
+            let row = (row & 31) as usize;
+            (*end, *other) = (group.rows()[row], group.rows()[row ^ 16]);
+        }
+        (ends, others)
     }
     #[inline(always)]
     fn round_step_up(self, step: Array<16>) -> Array<16> {
