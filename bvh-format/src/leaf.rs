@@ -230,17 +230,9 @@ pub fn decode_packed(block: &[u8], index: usize) -> Packet {
     };
     // Axis by axis, twelve at once: loops that compilers turn into vector code.
     for axis in 0..3 {
-        let base = head.base[axis];
         let mut values = [0.0; 12];
-        if head.fixed >> axis & 1 == 1 {
-            let scale = power_of_two(head.exponent[axis]);
-            for place in 0..12 {
-                values[place] = base.wrapping_add(offsets[axis][place] as i32) as f32 * scale;
-            }
-        } else {
-            for place in 0..12 {
-                values[place] = from_ordered(base.wrapping_add(offsets[axis][place] as i32));
-            }
+        for place in 0..12 {
+            values[place] = head.coordinate(axis, offsets[axis][place]);
         }
         for corner in 0..3 {
             packet.corners[corner][axis].copy_from_slice(&values[PACKET * corner..PACKET * (corner + 1)]);
@@ -249,7 +241,32 @@ pub fn decode_packed(block: &[u8], index: usize) -> Packet {
     packet
 }
 
+/// Reads one triangle of a packet: `decode_packet(..).triangle(lane)`, for less. Bytes beyond the block read as zero.
+#[inline]
+pub fn decode_triangle(encoding: TriangleEncoding, block: &[u8], index: usize, lane: usize) -> [[f32; 3]; 3] {
+    match (encoding, PackedHead::read(block)) {
+        (TriangleEncoding::F32, _) => decode_f32(block, index).triangle(lane),
+        (_, None) => [[0.0; 3]; 3],
+        (_, Some(head)) => [0, 1, 2].map(|corner| {
+            let vertex = head.vertex_at(head.index(block, index, PACKET * corner + lane));
+            let offsets = head.offsets(block, vertex);
+            [0, 1, 2].map(|axis| head.coordinate(axis, offsets[axis]))
+        }),
+    }
+}
+
 impl PackedHead {
+    /// The coordinate that an offset stands for.
+    #[inline(always)]
+    fn coordinate(&self, axis: usize, offset: u32) -> f32 {
+        let value = self.base[axis].wrapping_add(offset as i32);
+        if self.fixed >> axis & 1 == 1 {
+            value as f32 * power_of_two(self.exponent[axis])
+        } else {
+            from_ordered(value)
+        }
+    }
+
     /// The offsets of a packet's twelve vertices, by axis, without a loop over bits: all indices in one load, two
     /// loads a vertex. `None` where fields are too wide for that, or stand too near the end of the block.
     #[inline(always)]
@@ -471,10 +488,46 @@ mod tests {
                         let decoded = decode_packet(encoding, &block, index);
                         let bits = |p: &Packet| p.corners.map(|c| c.map(|a| a.map(f32::to_bits)));
                         assert_eq!(bits(&decoded), bits(packet), "kind {kind}, packet {index}");
+                        for lane in 0..PACKET {
+                            let triangle = decode_triangle(encoding, &block, index, lane);
+                            assert_eq!(triangle, packet.triangle(lane), "kind {kind}, packet {index}");
+                        }
                     }
                 }
             }
         }
+    }
+
+    /// Whatever the bytes are: the ways that read several fields at once agree with the one that reads bit by bit.
+    #[test]
+    fn all_ways_to_decode_agree_on_any_bytes() {
+        let mut state = 9u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as usize
+        };
+        let mut at_once = 0;
+        for round in 0..20_000 {
+            let mut block: Vec<u8> = (0..random() % 400).map(|_| random() as u8).collect();
+            if let Some(head) = block.get_mut(..28) {
+                // Fields that mostly lead into the block.
+                (head[2], head[4], head[5], head[6]) = ((random() % 14) as u8, 20, (random() % 40) as u8, 30);
+                head[24..28].copy_from_slice(&(random() as u32 % 400).to_le_bytes());
+                if round % 3 > 0 {
+                    head[2] %= 4;
+                }
+            }
+            let index = random() % 5;
+            let packet = decode_packed(&block, index);
+            let head = PackedHead::read(&block);
+            at_once += usize::from(head.is_some_and(|head| head.offsets_of_twelve(&block, index).is_some()));
+            for lane in 0..PACKET {
+                let triangle = decode_triangle(TriangleEncoding::Packed, &block, index, lane);
+                let bits = |t: [[f32; 3]; 3]| t.map(|corner| corner.map(f32::to_bits));
+                assert_eq!(bits(triangle), bits(packet.triangle(lane)), "round {round}");
+            }
+        }
+        assert!(at_once > 1000, "{at_once} of 20000 at once");
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! An opened `.cbvh` file: its bytes, its objects, and which of its pages have been checked.
 
 use crate::error::{OpenError, QueryError};
+use crate::leaf::decoded::Decoded;
 use crate::mapped;
-use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet};
+use crate::traverse::opened::Leaf;
+use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
 use bvh_format::treelet::Links;
@@ -235,26 +237,40 @@ impl Bvh {
         Ok(self.layout.id_block(self.bytes(), page.header()))
     }
 
-    /// A leaf packet: where it stands in the file if it can be read there, else decoded into `room`.
+    /// A leaf packet for a walk that comes by it several times: where it stands in the file if it can be read there.
     #[inline(always)]
-    pub(crate) fn packet<'a>(
+    pub(crate) fn packet_again<'a>(
         &'a self,
         object: &Object,
-        page: u32,
-        packet: u16,
-        room: &'a mut Packet,
+        leaf: Leaf,
+        decoded: &'a mut Decoded,
     ) -> Result<&'a Packet, QueryError> {
-        let page = self.page(object, page)?;
-        let block = self.leaf_block(object, &page)?;
-        if cfg!(target_endian = "little") && object.triangle_encoding == TriangleEncoding::F32 {
-            let rest = block.get(usize::from(packet) * F32_PACKET_BYTES..).unwrap_or_default();
-            let bytes: Option<&[u8; F32_PACKET_BYTES]> = rest.first_chunk();
-            if let Some(Ok(packet)) = bytes.map(|bytes| bytemuck::try_from_bytes(bytes)) {
+        if object.triangle_encoding == TriangleEncoding::F32 {
+            let page = self.page(object, leaf.page)?;
+            let block = self.leaf_block(object, &page)?;
+            if let Some(packet) = plain_packet(object, block, leaf.packet) {
                 return Ok(packet);
             }
         }
-        *room = decode_packet(object.triangle_encoding, block, usize::from(packet));
+        let (known, room) = decoded.place(leaf.page, leaf.packet);
+        if !known {
+            let page = self.page(object, leaf.page)?;
+            let block = self.leaf_block(object, &page)?;
+            *room = decode_packet(object.triangle_encoding, block, usize::from(leaf.packet));
+        }
         Ok(room)
+    }
+
+    /// A triangle of a leaf packet.
+    pub(crate) fn triangle(
+        &self,
+        object: &Object,
+        leaf: Leaf,
+        lane: u8,
+    ) -> Result<[[f32; 3]; 3], QueryError> {
+        let page = self.page(object, leaf.page)?;
+        let block = self.leaf_block(object, &page)?;
+        Ok(decode_triangle(object.triangle_encoding, block, usize::from(leaf.packet), usize::from(lane)))
     }
 
     /// The bytes of a treelet's leaf packets, where they stand together.
@@ -289,6 +305,17 @@ impl std::fmt::Debug for Bvh {
             .field("objects", &self.objects().len())
             .finish()
     }
+}
+
+/// A packet of plain floats where it stands.
+#[inline(always)]
+fn plain_packet<'a>(object: &Object, block: &'a [u8], packet: u16) -> Option<&'a Packet> {
+    if cfg!(target_endian = "big") || object.triangle_encoding != TriangleEncoding::F32 {
+        return None;
+    }
+    let bytes: &[u8; F32_PACKET_BYTES] =
+        block.get(usize::from(packet) * F32_PACKET_BYTES..)?.first_chunk()?;
+    bytemuck::try_from_bytes(bytes).ok()
 }
 
 /// Where a triangle is stored.

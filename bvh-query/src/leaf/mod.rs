@@ -4,6 +4,7 @@
 //! certainly farther apart than others. The rest goes to `narrow`.
 
 pub(crate) mod collide;
+pub(crate) mod decoded;
 pub(crate) mod distance;
 pub(crate) mod local;
 pub(crate) mod math;

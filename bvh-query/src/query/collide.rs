@@ -5,13 +5,13 @@ use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
 use crate::leaf::collide::{drain, face_planes};
+use crate::leaf::decoded::Decoded;
 use crate::leaf::local::Local;
 use crate::leaf::queue::{Candidate, Queue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
 use crate::traverse::opened::Leaf;
 use crate::traverse::pair::{Measure, Order, Visitor};
-use bvh_format::leaf::Packet;
 use std::ops::ControlFlow;
 
 impl Querier {
@@ -56,9 +56,11 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
+        self.decoded.iter_mut().for_each(Decoded::start);
         let mut visitor = Contacts {
             scene,
             queue: &mut self.queue,
+            decoded: &mut self.decoded,
             order,
             stats: QueryStats::default(),
             visit: |candidate| Ok(ControlFlow::Break(candidate)),
@@ -85,6 +87,7 @@ impl QueryStats {
 pub(super) struct Contacts<'a, F> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) queue: &'a mut Queue,
+    pub(super) decoded: &'a mut [Decoded; 2],
     pub(super) order: Order,
     pub(super) stats: QueryStats,
     pub(super) visit: F,
@@ -142,9 +145,9 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
-        let (mut room_a, mut room_b) = (Packet::default(), Packet::default());
-        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet, &mut room_a)?;
-        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet, &mut room_b)?;
+        let [decoded_a, decoded_b] = &mut *self.decoded;
+        let packet_a = pair.bvh_a.packet_again(pair.object_a, a, decoded_a)?;
+        let packet_b = pair.bvh_b.packet_again(pair.object_b, b, decoded_b)?;
         let local = Local::new(isa, self.scene.frame(), packet_a, packet_b);
         let mut mask = face_planes(isa, &local, a, b);
         while mask != 0 {

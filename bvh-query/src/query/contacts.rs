@@ -4,6 +4,7 @@ use super::collide::Contacts;
 use super::{Contact, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
 use crate::bvh::{Bvh, Shape, TrianglePlace};
 use crate::error::QueryError;
+use crate::leaf::decoded::Decoded;
 use crate::leaf::queue::Candidate;
 use crate::pose::Pose;
 use crate::traverse::pair::Order;
@@ -77,9 +78,11 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
+        self.decoded.iter_mut().for_each(Decoded::start);
         let mut visitor = Contacts {
             scene,
             queue: &mut self.queue,
+            decoded: &mut self.decoded,
             order: Order::Tree,
             stats: QueryStats::default(),
             visit: |candidate| report(scene, candidate, visit),

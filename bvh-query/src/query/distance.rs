@@ -12,6 +12,7 @@ use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap}
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
+use crate::leaf::decoded::Decoded;
 use crate::leaf::distance::{bounds, near, near_along};
 use crate::leaf::local::{Local, valid_lanes};
 use crate::leaf::queue::{self, Queue};
@@ -20,7 +21,6 @@ use crate::pose::Pose;
 use crate::traverse::align::round_up;
 use crate::traverse::opened::Leaf;
 use crate::traverse::pair::{Measure, Order, Visitor};
-use bvh_format::leaf::Packet;
 use std::ops::ControlFlow;
 
 /// Leaf pairs to visit best-first before going on depth-first.
@@ -176,12 +176,14 @@ impl Querier {
                 return Ok(None);
             }
             self.queue.clear();
+            self.decoded.iter_mut().for_each(Decoded::start);
             self.candidates.clear();
             let mut visitor = Nearest {
                 scene,
                 direction: search.direction,
                 search,
                 queue: &mut self.queue,
+                decoded: &mut self.decoded,
                 candidates: &mut self.candidates,
                 stats: QueryStats::default(),
             };
@@ -358,6 +360,7 @@ struct Nearest<'a> {
     scene: &'a Scene<'a>,
     search: &'a mut Search,
     queue: &'a mut Queue,
+    decoded: &'a mut [Decoded; 2],
     candidates: &'a mut Vec<Candidate>,
     /// Of the closest pair so far, at most of length 1.
     direction: Option<[f32; 3]>,
@@ -455,9 +458,9 @@ impl Visitor for Nearest<'_> {
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let pair = &self.scene.pair;
-        let (mut room_a, mut room_b) = (Packet::default(), Packet::default());
-        let packet_a = pair.bvh_a.packet(pair.object_a, a.page, a.packet, &mut room_a)?;
-        let packet_b = pair.bvh_b.packet(pair.object_b, b.page, b.packet, &mut room_b)?;
+        let [decoded_a, decoded_b] = &mut *self.decoded;
+        let packet_a = pair.bvh_a.packet_again(pair.object_a, a, decoded_a)?;
+        let packet_b = pair.bvh_b.packet_again(pair.object_b, b, decoded_b)?;
         let local = Local::new(isa, self.scene.frame(), packet_a, packet_b);
         let limit = self.search.limit * self.scene.frame().scale;
         let mut mask = valid_lanes(a.triangles, b.triangles);

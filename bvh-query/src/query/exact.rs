@@ -7,7 +7,6 @@ use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
 use crate::query::Scene;
 use crate::traverse::opened::Leaf;
-use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 
 impl Scene<'_> {
@@ -24,10 +23,8 @@ impl Scene<'_> {
 
 /// A triangle in its own file's frame: origin plus stored offset, which is exact.
 pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
-    let mut room = Packet::default();
-    let packet = bvh.packet(object, leaf.page, leaf.packet, &mut room)?;
+    let corners = bvh.triangle(object, leaf, lane & 3)?;
     let origin = object.record.origin.map(|o| o.get());
-    let corners = packet.triangle(usize::from(lane & 3));
     Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
 }
 

@@ -11,6 +11,7 @@ pub(crate) mod tracker;
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::{Backend, Isa, Task};
+use crate::leaf::decoded::Decoded;
 use crate::leaf::local::LocalFrame;
 use crate::leaf::queue::{Candidate, Queue};
 use crate::pose::Pose;
@@ -41,6 +42,8 @@ pub struct Querier {
     backend: Backend,
     stack: Stack,
     queue: Queue,
+    /// Of A and of B.
+    decoded: [Decoded; 2],
     candidates: Vec<distance::Candidate>,
     budget: u64,
     stats: QueryStats,
@@ -73,6 +76,7 @@ impl Querier {
             backend,
             stack: Stack::default(),
             queue: Queue::default(),
+            decoded: Default::default(),
             candidates: Vec::new(),
             budget: u64::MAX,
             stats: QueryStats::default(),

@@ -340,6 +340,7 @@ fn motion(b: Shape<'_>, from: &Pose, to: &Pose) -> f64 {
 mod tests {
     use super::*;
     use crate::bvh::Bvh;
+    use crate::traverse::opened::Leaf;
 
     /// Of the golden file's vertices, none goes farther than the bound; and the bound is not much farther than the
     /// farthest goes, and what is charged for rounding, of an origin at 2^22.
@@ -368,10 +369,9 @@ mod tests {
                 for number in object.pages() {
                     let page = bvh.page(object, number).unwrap();
                     for packet in 0..page.header().packets.get() {
-                        let mut room = Default::default();
-                        let values = bvh.packet(object, number, packet, &mut room).unwrap();
                         let origin = object.record.origin.map(|o| o.get());
-                        for v in (0..4).flat_map(|lane| values.triangle(lane)) {
+                        let leaf = Leaf { page: number, packet, triangles: 4 };
+                        for v in (0..4).flat_map(|lane| bvh.triangle(object, leaf, lane).unwrap()) {
                             let point = [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]));
                             let (p, q) = (from.place(point), to.place(point));
                             let squared: f64 = (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum();
