@@ -177,6 +177,15 @@ impl<'a> Page<'a> {
         self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size])
     }
 
+    /// The bytes of a treelet's children in this page, which stand together.
+    #[inline]
+    pub fn treelets_ahead(&self, links: &Links) -> &'a [u8] {
+        let size = self.profile.treelet_bytes();
+        let start = usize::from(self.header().treelet_line) * 64 + usize::from(links.first_treelet) * size;
+        let end = start + links.treelets().count_ones() as usize * size;
+        self.bytes.get(start..end).unwrap_or(&[])
+    }
+
     /// The anchor of a root.
     #[inline]
     pub fn anchor(&self, root: u8) -> Anchor {

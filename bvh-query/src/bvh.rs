@@ -45,6 +45,9 @@ impl Bytes {
     }
 }
 
+/// Bytes of a file that no cache near a processor holds.
+const LARGE: usize = 8 << 20;
+
 /// The page's own bytes are right.
 const PAGE_CHECKED: u8 = 1;
 /// The page's leaf block is right.
@@ -84,16 +87,18 @@ impl Bvh {
     /// As [`Bvh::open`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| OpenError::io(path, source))?;
-        Self::from_bytes(bytes).map_err(|source| OpenError::format(path, source))
+        let bytes = mapped::read(path).map_err(|source| OpenError::io(path, source))?;
+        Self::new(Bytes::Mapped(bytes)).map_err(|source| OpenError::format(path, source))
     }
 
-    /// Takes a file's bytes in memory, such as those that `bvh_bake::to_bytes` makes.
+    /// Takes a file's bytes in memory, such as those that `bvh_bake::to_bytes` makes. Many of them are moved to
+    /// large pages of memory, where the system has them: at the cost of a copy, queries take a tenth less.
     ///
     /// # Errors
     /// If the header or the object table break the format.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, FormatError> {
-        Self::new(Bytes::Owned(bytes))
+        let copy = (bytes.len() >= LARGE).then(|| mapped::copy(&bytes).ok()).flatten();
+        Self::new(copy.map_or(Bytes::Owned(bytes), Bytes::Mapped))
     }
 
     /// Borrows bytes that live as long as the program: see `include_cbvh!`.
@@ -120,6 +125,12 @@ impl Bvh {
     /// The bytes of the file.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get()
+    }
+
+    /// True if queries will mostly read what is in no cache.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        self.bytes.get().len() >= LARGE
     }
 
     /// The objects of the file, at least one.

@@ -92,8 +92,12 @@ fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
             put(&mut bytes, at + 64 * usize::from(header.treelet_line) + usize::from(slot) * size, &treelet);
         }
     }
-    // Centre and radius of the sphere, too.
+    // The box and the sphere, too.
     let record = layout.sections[0].range.start + 16;
+    for end in 0..6 {
+        let value = if end < 3 { -1000.0f32 } else { 1000.0 };
+        put(&mut bytes, record + 32 + 4 * end, &value.to_le_bytes());
+    }
     put(&mut bytes, record + 148, &2000.0f32.to_le_bytes());
     seal(&mut bytes);
     bytes

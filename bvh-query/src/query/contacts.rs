@@ -1,13 +1,13 @@
 //! All pairs of triangles in contact.
 
 use super::collide::Contacts;
-use super::{Contact, Querier, QueryStats, Scene, Traversal, each_pair, sphere_gap};
+use super::{Contact, Querier, QueryStats, Scene, Traversal, boxes_apart, each_pair, sphere_gap};
 use crate::bvh::{Bvh, Shape, TrianglePlace};
 use crate::error::QueryError;
 use crate::leaf::decoded::Decoded;
 use crate::leaf::queue::Candidate;
 use crate::pose::Pose;
-use crate::traverse::pair::Order;
+use crate::traverse::pair::{Order, Pair};
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
@@ -74,7 +74,8 @@ impl Querier {
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<Option<Candidate>, QueryError> {
         self.stack.visit()?;
-        if sphere_gap(scene.pair.placement, scene.pair.object_a, scene.pair.object_b) > 0.0 {
+        let Pair { placement, object_a, object_b, .. } = scene.pair;
+        if sphere_gap(placement, object_a, object_b) > 0.0 || boxes_apart(placement, object_a, object_b) {
             return Ok(None);
         }
         self.queue.clear();

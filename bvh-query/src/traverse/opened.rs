@@ -240,6 +240,9 @@ fn decode_node<I: Isa>(
     }
     to.links = Links::read(treelet);
     isa.prefetch(bvh.packets_ahead(object, &page, &to.links));
+    if bvh.is_large() {
+        isa.prefetch(page.treelets_ahead(&to.links));
+    }
     to.page = page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];
