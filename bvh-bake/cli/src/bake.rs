@@ -28,7 +28,11 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         ids: !arguments.no_ids,
         ..options(&arguments.layout)
     };
-    let file_options = FileOptions { force: arguments.force, max_memory: arguments.max_memory };
+    let file_options = FileOptions {
+        force: arguments.force,
+        max_memory: arguments.max_memory,
+        scratch: arguments.scratch.clone(),
+    };
     let inputs = names(&arguments.inputs);
     let spinner = spinner(arguments.quiet);
     let outcome = bake_files(&arguments.inputs, &arguments.output, &options, &file_options, &mut |step| {
