@@ -29,9 +29,9 @@ use zerocopy::FromZeros;
 pub enum Stage {
     /// Origins, rounding, duplicates.
     Prepare,
-    /// The binary tree.
+    /// Bricks, their trees and the drafts of their pages.
     Build,
-    /// Treelets and pages.
+    /// Pages with their numbers, sections, checksums.
     Encode,
     /// The proof of the finished bytes.
     Prove,
@@ -42,8 +42,8 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Prepare => "preparing",
-            Self::Build => "building the tree",
-            Self::Encode => "encoding pages",
+            Self::Build => "building bricks",
+            Self::Encode => "putting pages together",
             Self::Prove => "proving bounds",
         }
     }

@@ -186,6 +186,7 @@ impl Job<'_> {
         let mut stage = |stage| progress(Step::Bake(stage));
         let mut baker = Baker::new(self.options, triangles, &means);
         for prepared in gatherer.finish(|diagonal| bake::grid_error(self.options, diagonal))? {
+            stage(Stage::Prepare);
             baker.add(prepared, &mut stage)?;
         }
         let mut target = Target::beside(self.output)?;
