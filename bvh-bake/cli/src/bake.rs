@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let outcome = outcome.map_err(|error| Failure::from_bake(&inputs, &error))?;
     let output = arguments.output.display().to_string();
     let mut report = Report::new(inputs, output, &outcome, start.elapsed().as_secs_f64());
-    report.stage_seconds = clock.finish();
+    report.stage_seconds = Some(clock.finish()).filter(|_| !report.skipped);
     if arguments.json {
         output::json(&report)
     } else if arguments.quiet {
@@ -137,7 +137,7 @@ struct Report {
     mean_children: Option<f64>,
     bake_seconds: Option<f64>,
     seconds: f64,
-    stage_seconds: BTreeMap<&'static str, f64>,
+    stage_seconds: Option<BTreeMap<&'static str, f64>>,
     scratch_bytes: Option<u64>,
     scratch_written_bytes: Option<u64>,
     scratch_read_bytes: Option<u64>,
@@ -178,7 +178,7 @@ impl Report {
             mean_children: baked.map(|baked| baked.mean_children),
             bake_seconds: baked.map(|baked| baked.seconds),
             seconds,
-            stage_seconds: BTreeMap::new(),
+            stage_seconds: None,
             scratch_bytes: baked.map(|baked| baked.scratch.most),
             scratch_written_bytes: baked.map(|baked| baked.scratch.written),
             scratch_read_bytes: baked.map(|baked| baked.scratch.read),
@@ -234,8 +234,12 @@ impl Report {
             let [most, written, read] = [most, written, read].map(|bytes| bytes as f64 / 1048576.0);
             line("scratch", format!("{most:.0} MiB at most; {written:.0} MiB written, {read:.0} MiB read"));
         }
-        let stages: Vec<String> =
-            self.stage_seconds.iter().map(|(stage, seconds)| format!("{stage} {seconds:.2}")).collect();
+        let stages: Vec<String> = self
+            .stage_seconds
+            .iter()
+            .flatten()
+            .map(|(stage, seconds)| format!("{stage} {seconds:.2}"))
+            .collect();
         line("took", format!("{:.2} s{memory}: {}", self.seconds, stages.join(", ")));
         text
     }
