@@ -84,6 +84,9 @@ fn good_files_bake_alike() {
         let _ = folder.compare(name, text.replace('\n', "\r").as_bytes());
         let _ = folder.compare(name, format!("\u{feff}{text}").as_bytes());
     }
+    // A corner in the place of another, which cutting may leave out.
+    let twice = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 2 2 0\nv 1 3 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
+    folder.compare("d.obj", twice.as_bytes()).unwrap();
     // Duplicates, too: all 11 kinds of triangles occur many times.
     folder.compare("c.stl", &binary_stl(500)).unwrap();
 }

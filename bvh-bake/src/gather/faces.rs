@@ -164,9 +164,13 @@ impl Indexed {
                     for _ in 0..run.faces {
                         let face = at..at + run.arity as usize;
                         at = face.end;
-                        window[face.clone()].iter().for_each(|&vertex| counter.add(vertex, self.vertices));
+                        let (vertices, positions) = (&window[face.clone()], &positions[face]);
                         let object = object_of(run);
-                        cutter.cut_polygon(&positions[face], |corners| gatherer.add(object, corners))?;
+                        cutter.cut_polygon(positions, |triangle| {
+                            // Cutting may leave out corners that add nothing.
+                            triangle.iter().for_each(|&place| counter.add(vertices[place], self.vertices));
+                            gatherer.add(object, triangle.map(|place| positions[place]))
+                        })?;
                     }
                 }
             }
