@@ -1,118 +1,167 @@
-//! Puts the parts of a file together: every block is copied once, to where it stays.
+//! Puts the parts of a file together, section by section from the first to the last.
 
-use crate::encode::{Ends, PageParts};
-use bvh_format::checksum::checksum;
+use crate::draft::{Drafts, Ends, Run};
+use crate::error::BakeError;
+use crate::scratch::Spill;
+use crate::sorter::Sorter;
+use crate::target::Target;
+use bvh_format::checksum::Hasher;
 use bvh_format::header::{Section, SectionKind, write_header};
-use bvh_format::ids::WORD;
 use bvh_format::layout::ContentHasher;
-use bvh_format::leaf::LINE;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::PAGE;
 use rayon::prelude::*;
-use std::ops::Range;
+use std::borrow::Cow;
+
+/// Pages that are in memory at a time, unless a single run has more.
+const BATCH: usize = 1024;
 
 /// What the objects of a file bring to it.
-#[derive(Default)]
 pub(crate) struct Contents {
     pub(crate) records: Vec<(String, ObjectRecord)>,
-    pub(crate) pages: Vec<PageParts>,
-    /// Where the pages' blocks end.
-    pub(crate) ends: Ends,
+    /// The pages of each object.
+    pub(crate) drafts: Vec<Drafts>,
     /// (kept id, id of an equal triangle left out).
-    pub(crate) duplicates: Vec<[u32; 2]>,
+    pub(crate) duplicates: Sorter<[u32; 2]>,
+    /// For what the sorter does not hold in memory.
+    pub(crate) spill: Spill,
+}
+
+impl Contents {
+    /// Pages of all objects so far.
+    pub(crate) fn page_count(&self) -> usize {
+        self.drafts.iter().map(Drafts::page_count).sum()
+    }
 }
 
 /// Lays the sections out page by page and writes the header.
-pub(crate) fn assemble(contents: Contents, with_ids: bool, provenance: &str) -> Vec<u8> {
-    let Contents { records, pages, ends, mut duplicates } = contents;
+pub(crate) fn assemble(
+    contents: Contents,
+    with_ids: bool,
+    provenance: &str,
+    target: &mut Target,
+) -> Result<(), BakeError> {
+    let Contents { records, drafts, duplicates, .. } = contents;
+    let runs: Vec<Vec<Run>> = drafts.iter().map(Drafts::runs).collect();
+    let sum = |bytes: fn(&Drafts) -> usize| drafts.iter().map(bytes).sum::<usize>();
     let objects = write_objects(&records);
-    let mut sections = Sections::default();
-    let mut small = vec![(sections.add(SectionKind::Objects, objects.len()), objects)];
-    let nodes = sections.add(SectionKind::Nodes, ends.pages * PAGE);
-    let leaves = sections.add(SectionKind::Leaves, ends.leaf_lines * LINE);
-    let mut ids = leaves.end..leaves.end;
-    if with_ids {
-        ids = sections.add(SectionKind::Ids, ends.id_words * WORD);
-        if !duplicates.is_empty() {
-            duplicates.sort_unstable();
-            let duplicates: Vec<u8> = duplicates.iter().flatten().flat_map(|id| id.to_le_bytes()).collect();
-            small.push((sections.add(SectionKind::Duplicates, duplicates.len()), duplicates));
+    let lengths =
+        [objects.len(), sum(|d| d.page_count() * PAGE), sum(Drafts::leaf_bytes), sum(Drafts::id_bytes)];
+    let rest = duplicates.count() as usize * 8 + provenance.len() + 7 * PAGE;
+    target.expect((lengths.iter().sum::<usize>() + rest) as u64);
+    target.append(&[0; PAGE])?;
+    let mut file = Sections { target, table: Vec::new(), content: ContentHasher::default() };
+    file.section(SectionKind::Objects, lengths[0], |section| section.write(&objects))?;
+    file.section(SectionKind::Nodes, lengths[1], |section| {
+        let mut ends = Ends::default();
+        for (drafts, runs) in drafts.iter().zip(&runs) {
+            let numbering = drafts.numbering(ends.pages as u32);
+            let mut ends_of_object = ends.of_next_object();
+            for batch in batches(runs) {
+                for pages in numbering.pages(batch, &mut ends_of_object)? {
+                    section.write(&pages)?;
+                }
+            }
+            ends = ends_of_object;
         }
+        Ok(())
+    })?;
+    let blocks = |section: &mut OpenSection, read: Blocks| {
+        for (drafts, runs) in drafts.iter().zip(&runs) {
+            for batch in batches(runs) {
+                let read = batch.par_iter().map(|run| read(drafts, run)).collect::<Result<Vec<_>, _>>()?;
+                read.iter().try_for_each(|blocks| section.write(blocks))?;
+            }
+        }
+        Ok(())
+    };
+    file.section(SectionKind::Leaves, lengths[2], |section| blocks(section, Drafts::leaves))?;
+    if with_ids {
+        file.section(SectionKind::Ids, lengths[3], |section| blocks(section, Drafts::ids))?;
+    }
+    drop(runs);
+    if with_ids && duplicates.count() > 0 {
+        file.section(SectionKind::Duplicates, duplicates.count() as usize * 8, |section| {
+            let mut bytes = Vec::new();
+            duplicates.visit(|pair| {
+                pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
+                if bytes.len() >= 1 << 20 {
+                    section.write(&bytes)?;
+                    bytes.clear();
+                }
+                Ok(())
+            })?;
+            section.write(&bytes)
+        })?;
     }
     if !provenance.is_empty() {
-        let range = sections.add(SectionKind::Provenance, provenance.len());
-        small.push((range, provenance.as_bytes().to_vec()));
+        let text = provenance.as_bytes();
+        file.section(SectionKind::Provenance, text.len(), |section| section.write(text))?;
     }
-    let mut bytes = vec![0; sections.end()];
-    copy_pages(&mut bytes, [nodes, leaves, ids], pages);
-    small.iter().for_each(|(range, data)| bytes[range.clone()].copy_from_slice(data));
-    let header = sections.header(&bytes);
-    bytes[..header.len()].copy_from_slice(&header);
-    bytes
+    let Sections { table, content, .. } = file;
+    let header = write_header(target.length(), content.finish(), &table);
+    target.replace_first(&header)
 }
 
-/// Copies all pages and their blocks to the sections of nodes, leaves and ids, which follow each other.
-fn copy_pages(bytes: &mut [u8], [nodes, leaves, ids]: [Range<usize>; 3], pages: Vec<PageParts>) {
-    let (_, rest) = bytes.split_at_mut(nodes.start);
-    let (mut nodes, rest) = rest.split_at_mut(leaves.start - nodes.start);
-    let (mut leaves, mut ids) = rest.split_at_mut(ids.start - leaves.start);
-    let mut copies = Vec::with_capacity(pages.len());
-    for part in pages {
-        let places = [
-            take(&mut nodes, part.page.len()),
-            take(&mut leaves, part.leaf_block.len()),
-            take(&mut ids, part.id_block.len()),
-        ];
-        copies.push((places, part));
-    }
-    copies.into_par_iter().for_each(|([page, leaf_block, id_block], part)| {
-        page.copy_from_slice(&part.page);
-        leaf_block.copy_from_slice(&part.leaf_block);
-        id_block.copy_from_slice(&part.id_block);
-    });
-}
+/// Reads the blocks of a run.
+type Blocks = for<'a> fn(&'a Drafts, &Run) -> Result<Cow<'a, [u8]>, BakeError>;
 
-/// Splits off the first bytes of a slice.
-fn take<'a>(rest: &mut &'a mut [u8], length: usize) -> &'a mut [u8] {
-    let (taken, behind) = std::mem::take(rest).split_at_mut(length);
-    *rest = behind;
-    taken
+/// Runs by the batch.
+fn batches(runs: &[Run]) -> impl Iterator<Item = &[Run]> {
+    let mut pages = 0;
+    runs.chunk_by(move |run, _| {
+        pages += run.page_count();
+        let goes_on = pages < BATCH;
+        pages = if goes_on { pages } else { 0 };
+        goes_on
+    })
 }
 
 /// The sections of a file in ascending order.
-#[derive(Default)]
-struct Sections(Vec<(SectionKind, Range<usize>)>);
+struct Sections<'a> {
+    target: &'a mut Target,
+    table: Vec<Section>,
+    content: ContentHasher,
+}
 
-impl Sections {
-    fn add(&mut self, kind: SectionKind, length: usize) -> Range<usize> {
-        let start = self.end();
-        self.0.push((kind, start..start + length));
-        start..start + length
+impl Sections<'_> {
+    /// Adds a section of so many bytes, which `write` writes, and fills its last page.
+    fn section(
+        &mut self,
+        kind: SectionKind,
+        length: usize,
+        write: impl FnOnce(&mut OpenSection) -> Result<(), BakeError>,
+    ) -> Result<(), BakeError> {
+        let start = self.target.length() as usize;
+        if kind.is_content() {
+            self.content.begin(kind, length as u64);
+        }
+        let content = kind.is_content().then_some(&mut self.content);
+        let mut section = OpenSection { target: self.target, checksum: Hasher::default(), content };
+        write(&mut section)?;
+        let checksum = section.checksum.finish();
+        self.table.push(Section { kind, range: start..start + length, checksum });
+        let end = self.target.length() as usize;
+        self.target.append(&[0; PAGE][..end.next_multiple_of(PAGE) - end])
     }
+}
 
-    /// The page behind the last section, the first behind the header.
-    fn end(&self) -> usize {
-        self.0.last().map_or(PAGE, |(_, range)| range.end.next_multiple_of(PAGE))
-    }
+/// The section that is being written.
+struct OpenSection<'a> {
+    target: &'a mut Target,
+    checksum: Hasher,
+    content: Option<&'a mut ContentHasher>,
+}
 
-    /// The header of a file whose sections are in their places.
-    fn header(&self, bytes: &[u8]) -> Vec<u8> {
-        let table = || {
-            let section = |(kind, range): &(SectionKind, Range<usize>)| {
-                let checksum = checksum(&bytes[range.clone()]);
-                Section { kind: *kind, range: range.clone(), checksum }
-            };
-            self.0.par_iter().map(section).collect::<Vec<_>>()
-        };
-        let content = || {
-            let mut content = ContentHasher::default();
-            for (kind, range) in self.0.iter().filter(|(kind, _)| kind.is_content()) {
-                content.begin(*kind, range.len() as u64);
-                content.update(&bytes[range.clone()]);
+impl OpenSection<'_> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), BakeError> {
+        let Self { target, checksum, content } = self;
+        let hash_content = || {
+            if let Some(content) = content {
+                content.update(bytes);
             }
-            content.finish()
         };
-        let (table, content) = rayon::join(table, content);
-        write_header(bytes.len() as u64, content, &table)
+        let hash = || rayon::join(|| checksum.update(bytes), hash_content);
+        rayon::join(|| target.append(bytes), hash).0
     }
 }

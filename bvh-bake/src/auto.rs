@@ -9,7 +9,7 @@
 //! are seeded by constants: equal meshes get equal choices.
 
 use crate::options::Options;
-use crate::prepare::Corners;
+use crate::soup::Corners;
 use bvh_format::kdop::{DIRECTIONS, DirectionSet, Kdop};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
@@ -42,11 +42,49 @@ const LARGE_BYTES: u64 = 256 << 20;
 const PLAIN_BYTES: u64 = 52;
 const TRIALS: usize = 400;
 
-/// Chooses what the options leave open.
-pub(crate) fn choose(triangles: &[Corners], options: &Options) -> Choice {
+/// Triangles of the longest patch.
+pub(crate) const LONGEST_PATCH: u64 = 64;
+
+/// Two patches, the first triangle and the number of triangles of each, and how one is put beside the other.
+pub(crate) struct Trial {
+    patches: [(u64, u64); 2],
+    rotation: [[f64; 3]; 3],
+    away: [f64; 3],
+    gap: f64,
+}
+
+/// The trials for an object of so many triangles; none if there is nothing to choose by them.
+pub(crate) fn trials(triangles: u64, options: &Options) -> Vec<Trial> {
+    if options.profile.is_some() {
+        return Vec::new();
+    }
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut trial = |number: usize| {
+        let run = [1, 8, LONGEST_PATCH][number % 3].min(triangles);
+        let patches = [(); 2].map(|()| (random.below(triangles - run + 1), run));
+        Trial { patches, rotation: random.rotation(), away: random.direction(), gap: random.unit() }
+    };
+    (0..TRIALS).map(&mut trial).collect()
+}
+
+/// The patches that trials ask for, ascending, each once.
+pub(crate) fn patches(trials: &[Trial]) -> Vec<(u64, u64)> {
+    let mut patches: Vec<_> = trials.iter().flat_map(|trial| trial.patches).collect();
+    patches.sort_unstable();
+    patches.dedup();
+    patches
+}
+
+/// Chooses what the options leave open for an object of so many triangles. `corners` are those of the patches.
+pub(crate) fn choose(
+    triangles: u64,
+    trials: &[Trial],
+    corners: &[Vec<Corners>],
+    options: &Options,
+) -> Choice {
     let mut reasons = Vec::new();
     let encoding = options.triangles.unwrap_or_else(|| {
-        let bytes = triangles.len() as u64 * PLAIN_BYTES;
+        let bytes = triangles * PLAIN_BYTES;
         let (encoding, why) = if bytes > LARGE_BYTES {
             (TriangleEncoding::Packed, "more than")
         } else {
@@ -67,15 +105,15 @@ pub(crate) fn choose(triangles: &[Corners], options: &Options) -> Choice {
             Some(TriangleEncoding::Packed) => &SMALL,
             Some(TriangleEncoding::Quantized) => &SMALL[..2],
         };
-        let (profile, reason) = cheapest(triangles, candidates);
+        let (profile, reason) = cheapest(trials, corners, candidates);
         reasons.push(reason);
         profile
     });
     Choice { profile, encoding, reason: reasons.join("; ") }
 }
 
-fn cheapest(triangles: &[Corners], candidates: &[(Profile, f64)]) -> (Profile, String) {
-    let rates = overlap_rates(triangles);
+fn cheapest(trials: &[Trial], corners: &[Vec<Corners>], candidates: &[(Profile, f64)]) -> (Profile, String) {
+    let rates = overlap_rates(trials, corners);
     let cost = |(profile, nanoseconds): &(Profile, f64)| {
         let widened = if *profile == Profile::Dop26U4 { U4_TESTS } else { 1.0 };
         rates[profile.directions() as usize] * widened * nanoseconds
@@ -91,22 +129,22 @@ fn cheapest(triangles: &[Corners], candidates: &[(Profile, f64)]) -> (Profile, S
 }
 
 /// How often patches that are apart overlap in the k-DOPs of each direction set.
-fn overlap_rates(triangles: &[Corners]) -> [f64; 3] {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+fn overlap_rates(trials: &[Trial], corners: &[Vec<Corners>]) -> [f64; 3] {
+    let patches = patches(trials);
     let mut overlaps = [0u32; 3];
-    for trial in 0..TRIALS {
-        let run = [1, 8, 64][trial % 3].min(triangles.len());
-        let mut patch = || {
-            let start = random.below(triangles.len() - run + 1);
-            centred(&triangles[start..start + run])
+    for trial in trials {
+        let points = |patch| {
+            let place = patches.binary_search(&patch).unwrap_or_default();
+            centred(corners.get(place).map_or(&[], |corners| corners))
         };
-        let (points_a, points_b) = (patch(), patch());
-        let rotation = random.rotation();
-        let away = random.direction();
-        let gap = random.unit();
-        for (counter, overlap) in
-            overlaps.iter_mut().zip(trial_overlaps(&points_a, &points_b, &rotation, away, gap))
-        {
+        let [points_a, points_b] = trial.patches.map(points);
+        for (counter, overlap) in overlaps.iter_mut().zip(trial_overlaps(
+            &points_a,
+            &points_b,
+            &trial.rotation,
+            trial.away,
+            trial.gap,
+        )) {
             *counter += u32::from(overlap);
         }
     }
@@ -178,8 +216,8 @@ impl Random {
         self.0 >> 33
     }
 
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() % count as u64) as usize
+    fn below(&mut self, count: u64) -> u64 {
+        self.next() % count
     }
 
     /// From 0 to 1.
@@ -226,22 +264,29 @@ mod tests {
             .collect()
     }
 
+    fn chosen(triangles: &[Corners], options: &Options) -> (Choice, [f64; 3]) {
+        let count = triangles.len() as u64;
+        let trials = trials(count, options);
+        let patch = |&(start, length): &(u64, u64)| triangles[start as usize..][..length as usize].to_vec();
+        let corners: Vec<Vec<Corners>> = patches(&trials).iter().map(patch).collect();
+        (choose(count, &trials, &corners, options), overlap_rates(&trials, &corners))
+    }
+
     #[test]
     fn more_directions_overlap_less_and_the_choice_is_reproducible() {
         let triangles = bars();
-        let rates = overlap_rates(&triangles);
+        let (choice, rates) = chosen(&triangles, &Options::default());
         assert!(rates[0] >= rates[1] && rates[1] >= rates[2], "{rates:?}");
-        assert_eq!(rates, overlap_rates(&triangles));
-        let choice = choose(&triangles, &Options::default());
+        assert_eq!(rates, chosen(&triangles, &Options::default()).1);
         assert_eq!(choice.encoding, TriangleEncoding::F32);
         assert!(choice.reason.contains(choice.profile.name()), "{}", choice.reason);
         let small = Options { triangles: Some(TriangleEncoding::Packed), ..Options::default() };
-        assert_eq!(choose(&triangles, &small).profile.treelet_bytes(), 64);
+        assert_eq!(chosen(&triangles, &small).0.profile.treelet_bytes(), 64);
     }
 
     #[test]
     fn a_point_has_a_choice() {
         let point = vec![[[1.0f32, 2.0, 3.0]; 3]];
-        assert!(!choose(&point, &Options::default()).reason.is_empty());
+        assert!(!chosen(&point, &Options::default()).0.reason.is_empty());
     }
 }

@@ -1,24 +1,26 @@
 //! The way from a mesh to the bytes of a file, stage by stage.
 
-use crate::arena::Arena;
 use crate::assemble::{Contents, assemble};
 use crate::auto;
-use crate::build::Bricks;
-use crate::encode::Encoder;
+use crate::brick::{Drafted, draft};
+use crate::build::{Aabb, Bricks};
+use crate::encode::Style;
 use crate::error::BakeError;
-use crate::mesh::{self, Mesh};
+use crate::means::Means;
+use crate::mesh::Mesh;
 use crate::options::Options;
-use crate::pages;
-use crate::prepare::{Corners, box_and_sphere, prepare};
-use crate::prove::{prove_bounds, validate_in_parallel};
+use crate::pages::order::arrange;
+use crate::prepare::{Prepared, measure, survey};
+use crate::prove::prove;
 use crate::report::BakeReport;
+use crate::sorter::Sorter;
+use crate::soup::Kept;
 use crate::summary::FileSummary;
-use crate::treelets::{Child, ChildKind, Cutter, packet};
+use crate::target::Target;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
 use bvh_format::page::MAX_PAGES;
-use bvh_format::profile::Profile;
-use std::ops::Range;
+use std::borrow::Cow;
 use std::time::Instant;
 use zerocopy::FromZeros;
 
@@ -27,9 +29,9 @@ use zerocopy::FromZeros;
 pub enum Stage {
     /// Origins, rounding, duplicates.
     Prepare,
-    /// The binary tree.
+    /// Bricks, their trees and the drafts of their pages.
     Build,
-    /// Treelets and pages.
+    /// Pages with their numbers, sections, checksums.
     Encode,
     /// The proof of the finished bytes.
     Prove,
@@ -40,8 +42,8 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Prepare => "preparing",
-            Self::Build => "building the tree",
-            Self::Encode => "encoding pages",
+            Self::Build => "building bricks",
+            Self::Encode => "putting pages together",
             Self::Prove => "proving bounds",
         }
     }
@@ -74,38 +76,52 @@ pub fn to_bytes_with(
 ) -> Result<(Vec<u8>, BakeReport), BakeError> {
     let start = Instant::now();
     mesh.check()?;
-    let merged;
-    let objects = if options.split_objects || mesh.objects.len() == 1 {
-        &mesh.objects
+    let means = Means::unlimited();
+    let mut target = Target::Memory(Vec::new());
+    let mesh = if options.split_objects || mesh.objects.len() == 1 {
+        Cow::Borrowed(mesh)
     } else {
-        merged = mesh.clone().merged();
-        &merged.objects
+        Cow::Owned(mesh.clone().merged())
     };
-    let largest_id = mesh.objects.iter().flat_map(|object| &object.triangle_ids).max();
-    let id_count = largest_id.map_or(0, |&id| u64::from(id) + 1);
-    let mut baker = Baker::new(options, id_count);
-    for object in objects.iter().filter(|object| !object.triangles.is_empty()) {
-        baker.add(object, progress)?;
-    }
-    let bytes = assemble(baker.contents, options.ids, provenance);
-    progress(Stage::Prove);
-    let layout = validate_in_parallel(&bytes).map_err(BakeError::Unproved)?;
-    let inflation = prove_bounds(&layout, &bytes).map_err(BakeError::Unproved)?;
-    let report = BakeReport {
-        file: FileSummary::new(&layout, bytes.len() as u64),
-        reason: baker.reason.unwrap_or_default(),
-        vertices: baker.vertices,
-        width_inflation: inflation.mean_width(),
-        volume_inflation: inflation.mean_volume(),
-        mean_children: baker.children as f64 / baker.treelets as f64,
-        seconds: start.elapsed().as_secs_f64(),
-    };
+    let mut report = of_objects(mesh, options, provenance, &means, &mut target, progress)?;
+    report.seconds = start.elapsed().as_secs_f64();
+    let Target::Memory(bytes) = target else { return Ok((Vec::new(), report)) };
     Ok((bytes, report))
 }
 
+/// Bakes each object of a mesh that has been checked.
+pub(crate) fn of_objects(
+    mesh: Cow<Mesh>,
+    options: &Options,
+    provenance: &str,
+    means: &Means,
+    target: &mut Target,
+    progress: &mut dyn FnMut(Stage),
+) -> Result<BakeReport, BakeError> {
+    let largest_id = mesh.objects.iter().flat_map(|object| &object.triangle_ids).max();
+    let id_count = largest_id.map_or(0, |&id| u64::from(id) + 1);
+    let mut baker = Baker::new(options, id_count, means);
+    for number in (0..mesh.objects.len()).filter(|&number| !mesh.objects[number].triangles.is_empty()) {
+        progress(Stage::Prepare);
+        let spill = means.scratch.spill();
+        let object = &mesh.objects[number];
+        baker
+            .add(Prepared::of_object(object, |diagonal| grid_error(options, diagonal), &spill)?, progress)?;
+    }
+    drop(mesh);
+    baker.finish(provenance, target, progress)
+}
+
+/// The largest move that quantisation may make in an object of this diagonal, `None` for none.
+pub(crate) fn grid_error(options: &Options, diagonal: f64) -> Option<f64> {
+    let quantized = options.triangles == Some(TriangleEncoding::Quantized);
+    quantized.then(|| options.max_error.unwrap_or(1e-5 * diagonal)).filter(|&error| error > 0.0)
+}
+
 /// Gathers the objects of a file.
-struct Baker<'a> {
+pub(crate) struct Baker<'a> {
     options: &'a Options,
+    means: &'a Means,
     /// One more than the largest triangle id.
     id_count: u64,
     contents: Contents,
@@ -117,111 +133,116 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(options: &'a Options, id_count: u64) -> Self {
-        let contents = Contents::default();
-        Self { options, id_count, contents, reason: None, vertices: 0, children: 0, treelets: 0 }
+    pub(crate) fn new(options: &'a Options, id_count: u64, means: &'a Means) -> Self {
+        let contents = Contents {
+            records: Vec::new(),
+            drafts: Vec::new(),
+            duplicates: Sorter::of_runs(means.sorted_at_once::<[u32; 2]>(id_count)),
+            spill: means.scratch.spill(),
+        };
+        Self { options, means, id_count, contents, reason: None, vertices: 0, children: 0, treelets: 0 }
     }
 
-    fn add(&mut self, object: &mesh::Object, progress: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
-        progress(Stage::Prepare);
-        let quantized = self.options.triangles == Some(TriangleEncoding::Quantized);
-        let grid_error = quantized.then(|| self.options.max_error.unwrap_or_else(|| 1e-5 * diagonal(object)));
-        let prepared = prepare(object, grid_error.filter(|&error| error > 0.0));
-        let choice = auto::choose(&prepared.triangles, self.options);
+    /// Bakes an object up to its pages.
+    pub(crate) fn add(
+        &mut self,
+        prepared: Prepared,
+        progress: &mut dyn FnMut(Stage),
+    ) -> Result<(), BakeError> {
+        let Self { options, means, .. } = *self;
+        let Prepared { name, origin, soup, moved, vertices } = prepared;
+        let Contents { duplicates, spill, .. } = &mut self.contents;
+        let before = duplicates.count();
+        let measured = measure(&soup, means, |pair| duplicates.extend(&[pair], spill))?;
+        let left_out = duplicates.count() - before;
+        let moved = moved.joined(measured.moved).rounded_up();
+        let kept = Kept::new(&soup, &measured.dropped);
+        let trials = auto::trials(kept.count(), options);
+        let mut surveyed = survey(&kept, &measured, &trials)?;
+        let choice = auto::choose(kept.count(), &trials, &surveyed.patches, options);
         progress(Stage::Build);
-        let (profile, encoding) = (choice.profile, choice.encoding);
-        let (arena, bricks) = plant(&prepared.triangles, profile, self.options);
-        let (bounds, centre, radius) = box_and_sphere(&prepared.triangles);
-        progress(Stage::Encode);
-        let plan = pages::plan(&arena, &bricks, profile, self.options.ablation.pages);
-        let first_page = self.contents.ends.pages;
-        if (first_page + plan.pages.len()) as u64 > MAX_PAGES {
+        let f16_exponent = f16_exponent(&measured.bounds);
+        let style = Style {
+            profile: choice.profile,
+            encoding: choice.encoding,
+            f16_scale: 2f32.powi(f16_exponent),
+            ids: options.ids,
+        };
+        let (width, splits) = (choice.profile.width(), options.ablation.splits);
+        let bricks = Bricks::divide(&kept, surveyed.grid.take(), width, options.effort, splits, means)?;
+        let triangles = kept.count();
+        drop(soup);
+        let Drafted { mut drafts, children } = draft(bricks, style, means)?;
+        if options.ablation.pages != Default::default() {
+            drafts.order = Some(arrange(&drafts.links()?, options.ablation.pages));
+        }
+        let (first_page, pages) = (self.contents.page_count(), drafts.page_count());
+        if (first_page + pages) as u64 > MAX_PAGES {
             return Err(BakeError::Limit("2^26 pages".into()));
         }
-        let f16_exponent = f16_exponent(&bounds);
-        let encoder = Encoder {
-            arena: &arena,
-            plan: &plan,
-            prepared: &prepared,
-            profile,
-            encoding,
-            f16_scale: 2f32.powi(f16_exponent),
-            ids: self.options.ids,
-            first_page: first_page as u32,
-        };
-        let (mut pages, totals) = encoder.encode(&mut self.contents.ends);
-        if totals.packets >= 1 << 30 {
+        let packets: u64 = drafts.drafts.iter().map(|draft| draft.packets).sum();
+        let treelets: u64 = drafts.drafts.iter().map(|draft| draft.treelets).sum();
+        if packets >= 1 << 30 {
             return Err(BakeError::Limit("2^30 leaf packets".into()));
         }
         let record = ObjectRecord {
-            origin: prepared.origin.map(Into::into),
-            box_lo: [0, 1, 2].map(|a| bounds.lo[a].into()),
-            box_hi: [0, 1, 2].map(|a| bounds.hi[a].into()),
-            triangles: (prepared.triangles.len() as u64).into(),
-            packets: totals.packets.into(),
-            treelets: totals.treelets.into(),
+            origin: origin.map(Into::into),
+            box_lo: [0, 1, 2].map(|a| measured.bounds.lo(a).into()),
+            box_hi: [0, 1, 2].map(|a| measured.bounds.hi(a).into()),
+            triangles: triangles.into(),
+            packets: packets.into(),
+            treelets: treelets.into(),
             first_page: (first_page as u32).into(),
-            pages: (plan.pages.len() as u32).into(),
-            max_vertex_rounding: prepared.max_rounding.into(),
-            max_quantization_error: prepared.max_quantization.into(),
+            pages: (pages as u32).into(),
+            max_vertex_rounding: moved.rounding.into(),
+            max_quantization_error: moved.quantization.into(),
             input_triangles: self.id_count.into(),
-            degenerate: prepared.degenerate.into(),
-            duplicates: (prepared.duplicates.len() as u64).into(),
+            degenerate: surveyed.degenerate.into(),
+            duplicates: left_out.into(),
             f16_exponent: f16_exponent.into(),
-            profile: profile.number(),
-            triangle_encoding: encoding as u8,
-            sphere_centre: centre.map(Into::into),
-            sphere_radius: radius.into(),
+            profile: choice.profile.number(),
+            triangle_encoding: choice.encoding as u8,
+            sphere_centre: surveyed.centre.map(Into::into),
+            sphere_radius: surveyed.radius.into(),
             ..ObjectRecord::new_zeroed()
         };
         self.reason.get_or_insert(choice.reason);
-        self.vertices += prepared.vertices;
-        self.children += arena.treelets.iter().map(|t| t.children.len() as u64).sum::<u64>();
-        self.treelets += totals.treelets;
-        self.contents.pages.append(&mut pages);
-        self.contents.duplicates.extend(prepared.duplicates);
-        self.contents.records.push((prepared.name, record));
+        self.vertices += vertices;
+        self.children += children;
+        self.treelets += treelets;
+        self.contents.drafts.push(drafts);
+        self.contents.records.push((name, record));
         Ok(())
     }
-}
 
-/// The treelets of an object, and those of each brick if there is more than one.
-fn plant(triangles: &[Corners], profile: Profile, options: &Options) -> (Arena, Vec<Range<usize>>) {
-    let (width, slabs) = (profile.width(), profile.directions().slabs());
-    let cutter = Cutter { width, slabs, leaf: |leaf| packet(triangles, leaf) };
-    let grow = |tree| {
-        let root = cutter.cut(tree);
-        (root.kdop(slabs), Arena::flatten(root))
-    };
-    let bricks = Bricks::divide(triangles, width, options.effort, options.ablation.splits);
-    let (mut bricks, top) = bricks.build(triangles, grow);
-    if bricks.len() == 1
-        && let Some((_, arena)) = bricks.pop()
-    {
-        return (arena, Vec::new());
+    /// Writes the file and proves it.
+    pub(crate) fn finish(
+        self,
+        provenance: &str,
+        target: &mut Target,
+        progress: &mut dyn FnMut(Stage),
+    ) -> Result<BakeReport, BakeError> {
+        progress(Stage::Encode);
+        assemble(self.contents, self.options.ids, provenance, target)?;
+        progress(Stage::Prove);
+        let (layout, inflation) = prove(target.source())?;
+        Ok(BakeReport {
+            file: FileSummary::new(&layout, target.length()),
+            reason: self.reason.unwrap_or_default(),
+            vertices: self.vertices,
+            width_inflation: inflation.mean_width(),
+            volume_inflation: inflation.mean_volume(),
+            mean_children: self.children as f64 / self.treelets as f64,
+            scratch: self.means.scratch.traffic(),
+            seconds: 0.0,
+        })
     }
-    let brick = |brick: u32| Child { kdop: bricks[brick as usize].0, kind: ChildKind::Brick(brick) };
-    let top = Arena::flatten(Cutter { width, slabs, leaf: brick }.cut(top));
-    Arena::join(top, bricks.into_iter().map(|(_, arena)| arena).collect())
-}
-
-/// The diagonal of the box of the vertices in use, in mesh units.
-fn diagonal(object: &mesh::Object) -> f64 {
-    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &index in object.triangles.iter().flatten() {
-        for axis in 0..3 {
-            let value = object.positions[index as usize][axis];
-            lo[axis] = lo[axis].min(value);
-            hi[axis] = hi[axis].max(value);
-        }
-    }
-    (0..3).map(|a| (hi[a] - lo[a]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The power of two that f16 residuals count, such that the object's largest slab stays below half
 /// of f16's range.
-fn f16_exponent(bounds: &bvh_format::kdop::Kdop) -> i32 {
-    let widest = (0..3).map(|a| f64::from(bounds.hi[a]) - f64::from(bounds.lo[a])).sum::<f64>();
+fn f16_exponent(bounds: &Aabb) -> i32 {
+    let widest = (0..3).map(|a| f64::from(bounds.hi(a)) - f64::from(bounds.lo(a))).sum::<f64>();
     if widest == 0.0 {
         return 0;
     }

@@ -14,17 +14,29 @@ mod reinsert;
 mod swept;
 
 use crate::ablation::SplitRule;
+use crate::error::BakeError;
+use crate::means::Means;
 use crate::options::Effort;
-use crate::prepare::Corners;
+use crate::scratch::Stream;
+use crate::soup::{Kept, Triangle};
+pub(crate) use boxes::Aabb;
 use boxes::Reference;
-use rayon::prelude::*;
+use bricks::Division;
+pub(crate) use bricks::Grid;
 use reinsert::Pass;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Triangles in a leaf packet.
 const PACKET: usize = bvh_format::leaf::PACKET;
 
 /// Triangles in a brick, at most. The bytes of a file depend on it.
-const BRICK: usize = 1 << 18;
+pub(crate) const BRICK: usize = 1 << 18;
+
+/// Whether so many triangles are in one brick.
+pub(crate) fn is_one_brick(triangles: u64) -> bool {
+    triangles <= BRICK as u64
+}
 
 /// Most children of a treelet, in any profile.
 pub(crate) const MOST_CHILDREN: usize = 8;
@@ -64,13 +76,13 @@ impl<L> Node<L> {
     }
 
     /// Puts a tree in the place of each leaf, from left to right.
-    fn replace_leaves<M>(self, tree: &mut impl FnMut(L) -> Node<M>) -> Node<M> {
+    fn replace_leaves<M, E>(self, tree: &mut impl FnMut(L) -> Result<Node<M>, E>) -> Result<Node<M>, E> {
         match self {
             Self::Leaf(leaf) => tree(leaf),
             Self::Inner(inner) => {
-                let left = inner.left.replace_leaves(tree);
-                let right = inner.right.replace_leaves(tree);
-                Node::above(left, right, inner.size)
+                let left = inner.left.replace_leaves(tree)?;
+                let right = inner.right.replace_leaves(tree)?;
+                Ok(Node::above(left, right, inner.size))
             }
         }
     }
@@ -85,7 +97,7 @@ pub(crate) struct PacketTriangles {
 
 impl PacketTriangles {
     /// At most a packet of numbers.
-    fn new(numbers: impl Iterator<Item = u32>) -> Self {
+    pub(crate) fn new(numbers: impl Iterator<Item = u32>) -> Self {
         let mut packet = Self { numbers: [0; PACKET], count: 0 };
         for (slot, number) in packet.numbers.iter_mut().zip(numbers) {
             *slot = number;
@@ -102,35 +114,65 @@ impl PacketTriangles {
 
 /// The bricks of an object and the tree above them.
 pub(crate) struct Bricks {
-    bricks: Vec<Vec<Reference>>,
-    pub(crate) top: Node<u32>,
+    bricks: Vec<Stream<Triangle>>,
+    top: Node<u32>,
     builder: Builder,
 }
 
 impl Bricks {
-    /// Divides triangles into bricks, for treelets of `width` children.
-    pub(crate) fn divide(triangles: &[Corners], width: usize, effort: Effort, splits: SplitRule) -> Self {
-        let references = triangles.par_iter().enumerate();
-        let references = references.map(|(index, corners)| Reference::new(index as u32, corners)).collect();
+    /// Divides triangles into bricks, for treelets of `width` children. `grid` is that of all of them, if they are more
+    /// than a brick has.
+    pub(crate) fn divide(
+        triangles: &Kept,
+        grid: Option<Grid>,
+        width: usize,
+        effort: Effort,
+        splits: SplitRule,
+        means: &Means,
+    ) -> Result<Self, BakeError> {
         let builder = Builder::new(width, effort, splits);
-        let mut bricks = Vec::new();
-        let top = bricks::divide(references, &builder, &mut bricks);
-        Self { bricks, top, builder }
+        let spill = means.scratch.spill();
+        let mut division = Division { builder: &builder, means, spill: &spill, bricks: Vec::new() };
+        let top = division.divide(triangles, triangles.count(), grid)?;
+        let bricks = division.bricks;
+        Ok(Self { bricks, top, builder })
     }
 
-    /// Builds the tree of each brick and makes something of it, in parallel; also returns the tree above.
+    /// Builds the tree of each brick and makes something of it, some bricks side by side; also returns the tree above.
+    /// Packets number the triangles of their brick.
     pub(crate) fn build<T: Send>(
         self,
-        triangles: &[Corners],
-        make: impl Fn(Node<PacketTriangles>) -> T + Sync,
-    ) -> (Vec<T>, Node<u32>) {
-        let build = |mut references: Vec<Reference>| {
-            let mut scratch = references.clone();
-            let tree = self.builder.brick(&mut references, &mut scratch);
-            drop((references, scratch));
-            make(reinsert::optimise(tree, self.builder.passes, triangles))
+        means: &Means,
+        make: impl Fn(Node<PacketTriangles>, &[Triangle]) -> Result<T, BakeError> + Sync,
+    ) -> Result<(Vec<T>, Node<u32>), BakeError> {
+        let Self { bricks, top, builder } = self;
+        let count = bricks.len();
+        let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
+        let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
+        let lock = |mutex: &Mutex<Option<Stream<Triangle>>>| match mutex.lock() {
+            Ok(mut brick) => brick.take(),
+            Err(_) => None,
         };
-        (self.bricks.into_par_iter().map(build).collect(), self.top)
+        let next = AtomicUsize::new(0);
+        let work = || {
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                let Some(brick) = bricks.get(number).and_then(lock) else { break };
+                let result = brick.take().and_then(|triangles| make(builder.tree(&triangles), &triangles));
+                if result.is_err() {
+                    // The others need not go on.
+                    next.fetch_add(count, Ordering::Relaxed);
+                }
+                if let Ok(mut made) = made[number].lock() {
+                    *made = Some(result);
+                }
+            }
+        };
+        // As many loops as bricks side by side: a thread that waits for another may take up a second loop, but nothing
+        // starts a brick besides the loops.
+        rayon::scope(|scope| (0..means.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
+        let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
+        Ok((results.collect::<Result<_, _>>()?, top))
     }
 }
 
@@ -155,5 +197,16 @@ impl Builder {
             Effort::High => (swept::MOST, &[Pass { one_in: 1 }; 3]),
         };
         Self { treelet: PACKET * width, brick: BRICK, sweep, passes, splits }
+    }
+
+    /// The tree of a brick.
+    fn tree(&self, triangles: &[Triangle]) -> Node<PacketTriangles> {
+        let references =
+            triangles.iter().zip(0..).map(|(triangle, number)| Reference::new(number, &triangle.corners));
+        let mut references: Vec<Reference> = references.collect();
+        let mut scratch = references.clone();
+        let tree = self.brick(&mut references, &mut scratch);
+        drop((references, scratch));
+        reinsert::optimise(tree, self.passes, triangles)
     }
 }

@@ -30,9 +30,9 @@ pub enum BakeError {
         /// The output.
         path: PathBuf,
     },
-    /// The bake is expected to need more memory than it may use.
+    /// The bake needs more memory than it may use, whatever goes to scratch files.
     #[error(
-        "{}: expected a mesh that bakes in at most {budget} bytes of memory, found {} that would take about \
+        "{}: expected a mesh that bakes in at most {budget} bytes of memory, found {} that takes at least \
          {needed}", input.display(), counted(*triangles)
     )]
     Memory {
@@ -40,10 +40,20 @@ pub enum BakeError {
         input: PathBuf,
         /// Its triangles and those of the other inputs; 0 if they were not even read.
         triangles: u64,
-        /// Bytes that a bake is expected to need.
+        /// Bytes that a bake needs.
         needed: u64,
         /// Bytes that it may use.
         budget: u64,
+    },
+    /// There is too little room for scratch files and the output.
+    #[error("{}: expected room for {needed} bytes of scratch files and output, found {found}", directory.display())]
+    Room {
+        /// Where they go.
+        directory: PathBuf,
+        /// Bytes that they take.
+        needed: u64,
+        /// Bytes that are free.
+        found: u64,
     },
     /// A build script's function was called outside a build script.
     #[error("expected the environment variable OUT_DIR of a build script, found none")]
@@ -53,7 +63,7 @@ pub enum BakeError {
     Limit(String),
     /// The result failed its own proof: a defect of the baker, never of the input.
     #[error("the baked bytes fail their proof, please report this: {0}")]
-    Unproved(FormatError),
+    Unproved(#[from] FormatError),
 }
 
 fn counted(triangles: u64) -> String {

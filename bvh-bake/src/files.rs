@@ -6,19 +6,25 @@
 
 mod atomic;
 mod provenance;
+mod room;
 
-pub use atomic::write_atomically;
+pub(crate) use atomic::Temporary;
+pub use atomic::{discard_unfinished, write_atomically};
 
-use crate::bake::{Stage, to_bytes_with};
+use crate::bake::{self, Baker, Stage};
 use crate::error::BakeError;
+use crate::gather::Gatherer;
 use crate::io::{self, MeshFormat, ReadError};
+use crate::means::Means;
 use crate::mesh::Mesh;
 use crate::options::Options;
 use crate::report::BakeReport;
 use crate::summary::FileSummary;
-use atomic::Temporary;
+use crate::target::Target;
 use bvh_format::checksum::{Hasher, checksum};
 use provenance::Provenance;
+use std::borrow::Cow;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -27,8 +33,12 @@ use std::time::Instant;
 pub struct FileOptions {
     /// Bake even if the output is up to date.
     pub force: bool,
-    /// The most memory that a bake may be expected to need, in bytes; `None` for no limit.
+    /// The most memory that the whole process may have resident, in bytes; `None` for no limit. What does not fit
+    /// goes to scratch files. glTF files are read into memory, other inputs piece by piece.
     pub max_memory: Option<u64>,
+    /// The directory for scratch files; `None` for the output's. They have no names there: nothing of them is left,
+    /// however the process ends.
+    pub scratch: Option<PathBuf>,
 }
 
 /// A step of [`bake_files`], for those who show progress.
@@ -62,17 +72,9 @@ pub enum Outcome {
     UpToDate(FileSummary),
 }
 
-/// Bytes of memory a triangle at the peak of a bake, less the input files' bytes. Measured as peak resident
-/// size on x86-64 Linux, 2026-11-21: 158 to 223 over profiles and encodings on a sphere of 5.0 million
-/// triangles, 203 to 263 where no two triangles share a vertex.
-const BYTES_A_TRIANGLE: u64 = 300;
-/// Bytes that any bake needs: the program, its threads and what is allocated page by page.
-const BYTES_AT_LEAST: u64 = 8 << 20;
-
-/// Bytes of memory that baking a mesh of so many triangles is expected to need at most, its input files of
-/// `input_bytes` bytes included.
-pub fn estimate_memory(triangles: u64, input_bytes: u64) -> u64 {
-    triangles.saturating_mul(BYTES_A_TRIANGLE).saturating_add(input_bytes).saturating_add(BYTES_AT_LEAST)
+/// Bytes of memory that baking a mesh of so many triangles within a budget needs at least. The rest goes to files.
+pub fn least_memory(triangles: u64) -> u64 {
+    Means::least(triangles)
 }
 
 /// Bakes mesh files into one `.cbvh` file.
@@ -81,13 +83,16 @@ pub fn estimate_memory(triangles: u64, input_bytes: u64) -> u64 {
 /// on from each file to the next. The output appears whole under its name or not at all: it is written
 /// beside it, synchronised and renamed. What was there before stays until then.
 ///
-/// Cost: that of [`crate::to_bytes`], and reading all inputs. If the output is up to date, reading
-/// inputs and output.
+/// The bytes of the output do not depend on the budget of memory, nor on the number of threads.
+///
+/// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, twice, and up to 200 bytes of scratch a
+/// triangle, each written and read two to three times. If the output is up to date, reading inputs and output.
 ///
 /// # Errors
 /// [`BakeError::Read`] if an input cannot be read or is wrong; [`BakeError::OutputIsInput`];
-/// [`BakeError::Memory`] if the budget is too small; [`BakeError::Write`] if the system refuses the
-/// output; and those of [`crate::to_bytes`]. After any of them the output is as it was.
+/// [`BakeError::Memory`] if the budget is too small; [`BakeError::Room`] if there is too little room for scratch
+/// files and output; [`BakeError::Write`] if the system refuses the output or scratch files; and those of
+/// [`crate::to_bytes`]. After any of them the output is as it was, and nothing else is left.
 pub fn bake_files(
     inputs: &[PathBuf],
     output: &Path,
@@ -97,45 +102,137 @@ pub fn bake_files(
 ) -> Result<Outcome, BakeError> {
     progress(Step::Read);
     refuse_output(inputs, output)?;
-    let input_bytes = file_lengths(inputs);
-    let within = |triangles: u64| {
-        let needed = estimate_memory(triangles, input_bytes);
-        match file_options.max_memory {
-            Some(budget) if needed > budget => {
-                let input = inputs.first().cloned().unwrap_or_default();
-                Err(BakeError::Memory { input, triangles, needed, budget })
-            }
-            _ => Ok(()),
+    let job = Job { inputs, output, options, file_options };
+    match file_options.max_memory {
+        Some(budget) => job.within(budget, progress),
+        None => job.in_memory(progress),
+    }
+}
+
+/// A bake from files to a file.
+struct Job<'a> {
+    inputs: &'a [PathBuf],
+    output: &'a Path,
+    options: &'a Options,
+    file_options: &'a FileOptions,
+}
+
+impl Job<'_> {
+    fn in_memory(&self, progress: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
+        let mut sources = Sources::default();
+        let mut provenance = Provenance::new(self.inputs, self.options);
+        for input in self.inputs {
+            sources.add(input)?;
         }
-    };
-    // What certainly does not fit is not even read.
-    within(0)?;
-    let mut sources = Sources::default();
-    let mut provenance = Provenance::new(inputs, options);
-    for input in inputs {
-        sources.add(input)?;
+        provenance.checksums(&sources.file_checksums, &sources.mesh_checksums);
+        if let Some(summary) = self.up_to_date(&provenance) {
+            return Ok(Outcome::UpToDate(summary));
+        }
+        let mut mesh = sources.into_mesh()?;
+        let parsed = Instant::now();
+        if !self.options.split_objects {
+            mesh = mesh.merged();
+        }
+        let mut target = Target::beside(self.output)?;
+        let means = Means::unlimited();
+        let mut stage = |stage| progress(Step::Bake(stage));
+        let (mesh, text) = (Cow::Owned(mesh), provenance.to_text());
+        let report = bake::of_objects(mesh, self.options, &text, &means, &mut target, &mut stage)?;
+        self.close(report, target, parsed, progress)
     }
-    provenance.checksums(&sources.file_checksums, &sources.mesh_checksums);
-    if !file_options.force
-        && let Some(summary) = provenance::up_to_date(output, &provenance)
-    {
-        return Ok(Outcome::UpToDate(summary));
+
+    fn within(&self, budget: u64, progress: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
+        // What certainly does not fit is not even read.
+        self.check_budget(budget, 0, Means::least(0))?;
+        let mut provenance = Provenance::new(self.inputs, self.options);
+        let (mut formats, mut files, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
+        for input in self.inputs {
+            let failed = |source| ReadError::Io { path: input.clone(), source };
+            let (format, length) = format_of(input)?;
+            files.push(provenance::file_checksum(input).map_err(failed)?);
+            if format == MeshFormat::Gltf {
+                self.check_budget(
+                    budget,
+                    0,
+                    Means::least(0).saturating_add(length.saturating_mul(GLTF_BYTES)),
+                )?;
+                meshes.push(mesh_checksum(&io::read(input)?));
+            }
+            formats.push(format);
+        }
+        provenance.checksums(&files, &meshes);
+        if let Some(summary) = self.up_to_date(&provenance) {
+            return Ok(Outcome::UpToDate(summary));
+        }
+        // Fails before the work, where the output cannot be written.
+        drop(Target::beside(self.output)?);
+        let parsed = Instant::now();
+        let scratch = self.file_options.scratch.as_deref();
+        let scratch = scratch.unwrap_or_else(|| atomic::directory_of(self.output));
+        room::check(&[(scratch, file_lengths(self.inputs))])?;
+        let means = Means::within(budget, scratch);
+        let mut gatherer = Gatherer::new(&means, self.options.split_objects);
+        for (input, format) in self.inputs.iter().zip(formats) {
+            match format {
+                MeshFormat::Gltf => gatherer.add_mesh(&io::read(input)?)?,
+                format => gatherer.read(input, format)?,
+            }
+        }
+        let triangles = gatherer.triangles();
+        self.check_budget(budget, triangles, Means::least(triangles))?;
+        let bytes = |each: u64| triangles.saturating_mul(each);
+        let output = atomic::directory_of(self.output);
+        room::check(&[(scratch, bytes(room::SCRATCH_A_TRIANGLE)), (output, bytes(room::OUTPUT_A_TRIANGLE))])?;
+        let mut stage = |stage| progress(Step::Bake(stage));
+        let mut baker = Baker::new(self.options, triangles, &means);
+        for prepared in gatherer.finish(|diagonal| bake::grid_error(self.options, diagonal))? {
+            stage(Stage::Prepare);
+            baker.add(prepared, &mut stage)?;
+        }
+        let mut target = Target::beside(self.output)?;
+        let report = baker.finish(&provenance.to_text(), &mut target, &mut stage)?;
+        self.close(report, target, parsed, progress)
     }
-    let mut mesh = sources.into_mesh()?;
-    let parsed = Instant::now();
-    within(mesh.triangle_count())?;
-    // Fails before the work, where the output cannot be written.
-    drop(Temporary::beside(output)?);
-    if !options.split_objects {
-        mesh = mesh.merged();
+
+    fn check_budget(&self, budget: u64, triangles: u64, needed: u64) -> Result<(), BakeError> {
+        if needed <= budget {
+            return Ok(());
+        }
+        let input = self.inputs.first().cloned().unwrap_or_default();
+        Err(BakeError::Memory { input, triangles, needed, budget })
     }
-    let mut stage = |stage| progress(Step::Bake(stage));
-    let (bytes, mut report) = to_bytes_with(&mesh, options, &provenance.to_text(), &mut stage)?;
-    drop(mesh);
-    progress(Step::Write);
-    write_atomically(output, &bytes)?;
-    report.seconds = parsed.elapsed().as_secs_f64();
-    Ok(Outcome::Baked(Box::new(report)))
+
+    fn up_to_date(&self, provenance: &Provenance) -> Option<FileSummary> {
+        if self.file_options.force { None } else { provenance::up_to_date(self.output, provenance) }
+    }
+
+    /// Gives the output its name.
+    fn close(
+        &self,
+        mut report: BakeReport,
+        target: Target,
+        parsed: Instant,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<Outcome, BakeError> {
+        progress(Step::Write);
+        target.rename()?;
+        report.seconds = parsed.elapsed().as_secs_f64();
+        Ok(Outcome::Baked(Box::new(report)))
+    }
+}
+
+/// Bytes of memory a byte of a glTF file, at least.
+const GLTF_BYTES: u64 = 8;
+
+/// A file's format and length.
+fn format_of(input: &Path) -> Result<(MeshFormat, u64), BakeError> {
+    let failed = |source| ReadError::Io { path: input.to_owned(), source };
+    let mut file = std::fs::File::open(input).map_err(failed)?;
+    let length = file.metadata().map_err(failed)?.len();
+    let mut head = Vec::new();
+    file.by_ref().take(4096).read_to_end(&mut head).map_err(failed)?;
+    let format = MeshFormat::from_extension(input).or_else(|| MeshFormat::from_head(&head, length));
+    Ok((format.ok_or_else(|| io::unknown_format(input))?, length))
 }
 
 /// Reads mesh files as [`bake_files`] does: objects one file after the other, ids running on.
@@ -315,7 +412,7 @@ mod tests {
         let input = directory.path().join("in.obj");
         fs::write(&input, TRIANGLE).unwrap();
         let output = directory.path().join("out.cbvh");
-        for budget in [0, 10, estimate_memory(1, TRIANGLE.len() as u64) - 1] {
+        for budget in [0, 10, least_memory(1) - 1] {
             let options = FileOptions { max_memory: Some(budget), ..FileOptions::default() };
             let inputs = std::slice::from_ref(&input);
             let refused = bake_files(inputs, &output, &Options::default(), &options, &mut |_| ());

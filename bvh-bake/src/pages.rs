@@ -9,15 +9,12 @@
 //! Each brick is planned by itself, up to a rest of half a page at most. The rests and the tree above the bricks
 //! are planned last, and come first in the file; bricks follow one after the other.
 
-mod order;
+pub(crate) mod order;
 
-use crate::ablation::PageOrder;
 use crate::arena::{Arena, TreeletIndex};
 use bvh_format::page::{PAGE, fits};
 use bvh_format::profile::Profile;
-use rayon::prelude::*;
 use std::collections::VecDeque;
-use std::ops::Range;
 
 /// Pages that are filled side by side; more fill better and scatter neighbours.
 const OPEN_PAGES: usize = 24;
@@ -38,10 +35,11 @@ pub(crate) struct Place {
     pub(crate) slot: u8,
 }
 
-/// The pages of an object in the order of the file, and where each treelet is.
+/// The pages of a brick, counted from its first.
 pub(crate) struct Plan {
     pub(crate) pages: Vec<PagePlan>,
-    pub(crate) places: Vec<Place>,
+    /// Which treelets are in them.
+    pub(crate) taken: Vec<bool>,
 }
 
 /// Room that a subtree takes in a page.
@@ -71,32 +69,20 @@ impl Load {
     }
 }
 
-/// Plans the pages of an object. Each of `bricks` is a run of treelets below its first.
-pub(crate) fn plan(arena: &Arena, bricks: &[Range<usize>], profile: Profile, order: PageOrder) -> Plan {
-    let count = arena.treelets.len();
-    let mut whole = Region::new(arena, profile, 0..count);
-    let mut pages = Vec::new();
-    let plan_brick = |brick: &Range<usize>| {
-        let mut region = Region::new(arena, profile, brick.clone());
-        (region.plan(Until::HalfAPage), region.taken)
-    };
-    let planned: Vec<_> = bricks.par_iter().map(plan_brick).collect();
-    for (brick, (brick_pages, taken)) in bricks.iter().zip(planned) {
-        pages.extend(brick_pages);
-        whole.taken[brick.clone()].copy_from_slice(&taken);
-    }
-    let mut all = whole.plan(Until::Nothing);
-    all.extend(pages);
-    let mut places = places(&all, count);
-    if order != PageOrder::Levels {
-        all = order::arrange(all, &places, order);
-        places = self::places(&all, count);
-    }
-    Plan { pages: all, places }
+/// Plans the pages of a brick, all but a rest of half a page at most.
+pub(crate) fn plan_brick(arena: &Arena, profile: Profile) -> Plan {
+    let mut region = Region::new(arena, profile, vec![false; arena.treelets.len()]);
+    let pages = region.plan(Until::HalfAPage);
+    Plan { pages, taken: region.taken }
+}
+
+/// Plans the pages of all treelets but those that are taken.
+pub(crate) fn plan_rest(arena: &Arena, profile: Profile, taken: Vec<bool>) -> Vec<PagePlan> {
+    Region::new(arena, profile, taken).plan(Until::Nothing)
 }
 
 /// Where each of `count` treelets is.
-fn places(pages: &[PagePlan], count: usize) -> Vec<Place> {
+pub(crate) fn places(pages: &[PagePlan], count: usize) -> Vec<Place> {
     let mut places = vec![Place::default(); count];
     for (page, plan) in pages.iter().enumerate() {
         for (slot, &treelet) in plan.slots.iter().enumerate() {
@@ -106,6 +92,9 @@ fn places(pages: &[PagePlan], count: usize) -> Vec<Place> {
     places
 }
 
+/// The treelet that all others are below.
+const ROOT: TreeletIndex = 0;
+
 /// How much of a region may be left.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Until {
@@ -113,11 +102,10 @@ enum Until {
     Nothing,
 }
 
-/// A run of treelets below its first, of which the lower ones are gradually put into pages.
+/// A tree of treelets, of which the lower ones are gradually put into pages.
 struct Region<'a> {
     arena: &'a Arena,
     profile: Profile,
-    treelets: Range<usize>,
     /// Which of the treelets are in a page.
     taken: Vec<bool>,
     /// Room that is left for each of the others and what is below it.
@@ -125,21 +113,17 @@ struct Region<'a> {
 }
 
 impl<'a> Region<'a> {
-    fn new(arena: &'a Arena, profile: Profile, treelets: Range<usize>) -> Self {
-        let (taken, loads) = (vec![false; treelets.len()], vec![Load::default(); treelets.len()]);
-        Self { arena, profile, treelets, taken, loads }
-    }
-
-    fn root(&self) -> TreeletIndex {
-        self.treelets.start as u32
+    fn new(arena: &'a Arena, profile: Profile, taken: Vec<bool>) -> Self {
+        let loads = vec![Load::default(); taken.len()];
+        Self { arena, profile, taken, loads }
     }
 
     fn is_taken(&self, index: TreeletIndex) -> bool {
-        self.taken[index as usize - self.treelets.start]
+        self.taken[index as usize]
     }
 
     fn load(&self, index: TreeletIndex) -> Load {
-        Load { roots: 1, ..self.loads[index as usize - self.treelets.start] }
+        Load { roots: 1, ..self.loads[index as usize] }
     }
 
     /// Treelets among a treelet's children that are in no page yet.
@@ -150,9 +134,9 @@ impl<'a> Region<'a> {
     /// Plans level by level; returns pages in the order of the file.
     fn plan(&mut self, until: Until) -> Vec<PagePlan> {
         let mut levels = Vec::new();
-        while !self.is_taken(self.root()) {
+        while !self.is_taken(ROOT) {
             self.update_loads();
-            if until == Until::HalfAPage && self.is_small(self.root()) {
+            if until == Until::HalfAPage && self.is_small(ROOT) {
                 break;
             }
             levels.push(self.plan_level());
@@ -171,11 +155,11 @@ impl<'a> Region<'a> {
         let profile = self.profile;
         let mut pages: Vec<(Load, Vec<TreeletIndex>)> = Vec::new();
         let mut open: VecDeque<usize> = VecDeque::new();
-        let mut stack = vec![self.root()];
+        let mut stack = vec![ROOT];
         let mut roots = Vec::new();
-        let all_in_one = self.load(self.root()).fits(profile);
+        let all_in_one = self.load(ROOT).fits(profile);
         while let Some(index) = stack.pop() {
-            let alone = index == self.root() && all_in_one;
+            let alone = index == ROOT && all_in_one;
             if !alone && !self.is_small(index) {
                 stack.extend(self.left_below(index).rev());
                 continue;
@@ -203,8 +187,8 @@ impl<'a> Region<'a> {
 
     /// Sums up the room of what is left, from the leaves up.
     fn update_loads(&mut self) {
-        for index in self.treelets.clone().rev() {
-            if self.taken[index - self.treelets.start] {
+        for index in (0..self.taken.len()).rev() {
+            if self.taken[index] {
                 continue;
             }
             let mut load = Load { treelets: 1, ..Load::default() };
@@ -212,10 +196,10 @@ impl<'a> Region<'a> {
                 if self.is_taken(child) {
                     load.remotes += 1;
                 } else {
-                    load = load.with(self.loads[child as usize - self.treelets.start]);
+                    load = load.with(self.loads[child as usize]);
                 }
             }
-            self.loads[index - self.treelets.start] = load;
+            self.loads[index] = load;
         }
     }
 
@@ -236,7 +220,7 @@ impl<'a> Region<'a> {
         let mut stack = vec![root];
         while let Some(index) = stack.pop() {
             stack.extend(self.left_below(index));
-            self.taken[index as usize - self.treelets.start] = true;
+            self.taken[index as usize] = true;
         }
     }
 }

@@ -3,13 +3,16 @@
 //! Works on the finished bytes with the reference decoder, so that it trusts nothing of the baker.
 //! Part of every bake, in release builds too.
 
-use bvh_format::bounds::{Inflation, check_bounds};
-use bvh_format::kdop::Kdop;
-use bvh_format::object::Object;
-use bvh_format::page::{Page, RootRef};
+mod backward;
+
+use crate::error::BakeError;
+use crate::target::Source;
+use bvh_format::bounds::Inflation;
 use bvh_format::validate::{validate_counts, validate_links, validate_page, validate_sections};
-use bvh_format::{FormatError, Layout, Rule};
+use bvh_format::{FormatError, Layout};
 use rayon::prelude::*;
+
+pub(crate) use backward::prove;
 
 /// `bvh_format::validate::validate` with the pages checked in parallel.
 ///
@@ -48,59 +51,12 @@ fn first_error<T: Send>(
 pub fn prove_bounds(layout: &Layout, bytes: &[u8]) -> Result<Inflation, FormatError> {
     let mut inflation = Inflation::default();
     for object in &layout.objects {
-        inflation.join(&prove_object(layout, bytes, object)?);
-    }
-    Ok(inflation)
-}
-
-fn prove_object(layout: &Layout, bytes: &[u8], object: &Object) -> Result<Inflation, FormatError> {
-    let first = object.record.first_page.get();
-    let end = first + object.record.pages.get();
-    let page = |number: u32| {
-        let at = layout.page_offset(number);
-        let bytes = layout.page_bytes(bytes, number);
-        let missing = || FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section");
-        Ok::<_, FormatError>(Page::new(bytes.ok_or_else(missing)?, object.profile))
-    };
-    // Runs of pages from the end whose remote links all lead behind the run are independent.
-    let mut inflation = Inflation::default();
-    let mut done: Vec<Vec<Kdop>> = vec![Vec::new(); (end - first) as usize];
-    let mut stop = end;
-    while stop > first {
-        let mut start = stop;
-        while start > first {
-            let page = page(start - 1)?;
-            let mut targets = (0..page.header().remotes).map(|link| page.remote(link).page());
-            if targets.any(|target| target < stop) {
-                break;
-            }
-            start -= 1;
+        match backward::prove_object(layout, Source::Memory(bytes), object, false) {
+            Ok(sums) => inflation.join(&sums),
+            Err(BakeError::Unproved(error)) => return Err(error),
+            // Memory is read without fail.
+            Err(_) => {}
         }
-        // A link to an earlier page is refused by the structural checks; a hostile one ends here.
-        if start == stop {
-            let at = layout.page_offset(stop - 1);
-            return Err(FormatError::new(Rule::RemoteLinks, at, "links to later pages", "another"));
-        }
-        let below = |root: RootRef| {
-            let roots = done.get((root.page() - first) as usize);
-            roots.and_then(|roots| roots.get(usize::from(root.root()))).copied().unwrap_or(Kdop::EMPTY)
-        };
-        let results = (start..stop).into_par_iter();
-        let results =
-            first_error(results.map(|number| check_bounds(layout, bytes, object, &page(number)?, below)))?;
-        for (number, (roots, sums)) in (start..stop).zip(results) {
-            done[(number - first) as usize] = roots;
-            inflation.join(&sums);
-        }
-        stop = start;
-    }
-    let record = &object.record;
-    let root = done.first().and_then(|roots| roots.first()).copied().unwrap_or(Kdop::EMPTY);
-    let inside = (0..3).all(|a| record.box_lo[a].get() <= root.lo[a] && root.hi[a] <= record.box_hi[a].get());
-    if !inside {
-        let at = layout.page_offset(first);
-        let expected = "the object's box to contain its triangles";
-        return Err(FormatError::new(Rule::BoundContains, at, expected, format!("{record:?}")));
     }
     Ok(inflation)
 }

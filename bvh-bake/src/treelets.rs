@@ -7,7 +7,7 @@
 //! is taken. The tree above bricks is cut in the same way, with bricks for leaves.
 
 use crate::build::{Inner, MOST_CHILDREN, Node, PacketTriangles};
-use crate::prepare::Corners;
+use crate::soup::Triangle;
 use bvh_format::kdop::Kdop;
 use rayon::prelude::*;
 
@@ -171,7 +171,7 @@ fn open<L>(inner: Inner<L>, share: u8, places: usize, closed: &mut Vec<Node<L>>)
 }
 
 /// The child that is a leaf packet.
-pub(crate) fn packet(triangles: &[Corners], packet: PacketTriangles) -> Child {
-    let corners = packet.numbers().iter().flat_map(|&triangle| triangles[triangle as usize]);
+pub(crate) fn packet(triangles: &[Triangle], packet: PacketTriangles) -> Child {
+    let corners = packet.numbers().iter().flat_map(|&triangle| triangles[triangle as usize].corners);
     Child { kdop: Kdop::of_points(corners), kind: ChildKind::Leaf(packet) }
 }

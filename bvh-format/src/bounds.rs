@@ -38,11 +38,21 @@ pub fn visit_bounds(
     object: &Object,
     page: &Page,
     below: impl Fn(RootRef) -> Kdop,
+    visit: impl FnMut(Bound) -> Result<(), FormatError>,
+) -> Result<Vec<Kdop>, FormatError> {
+    visit_bounds_of(object, page, layout.leaf_block(bytes, page.header()), below, visit)
+}
+
+/// [`visit_bounds`] of a page and its leaf block, wherever they are.
+fn visit_bounds_of(
+    object: &Object,
+    page: &Page,
+    block: &[u8],
+    below: impl Fn(RootRef) -> Kdop,
     mut visit: impl FnMut(Bound) -> Result<(), FormatError>,
 ) -> Result<Vec<Kdop>, FormatError> {
     let header = page.header();
     let slabs = object.profile.directions().slabs();
-    let block = layout.leaf_block(bytes, header);
     let treelets = usize::from(header.treelets);
     // Children have higher slots: tight bounds go up from the last slot, decoded ones down.
     let mut tight = vec![Kdop::EMPTY; treelets];
@@ -97,10 +107,25 @@ pub fn check_bounds(
     page: &Page,
     below: impl Fn(RootRef) -> Kdop,
 ) -> Result<(Vec<Kdop>, Inflation), FormatError> {
+    check_bounds_of(layout, object, page, layout.leaf_block(bytes, page.header()), below)
+}
+
+/// [`check_bounds`] of a page and its leaf block, wherever they are: for those who go through a file piece by
+/// piece.
+///
+/// # Errors
+/// As [`check_bounds`].
+pub fn check_bounds_of(
+    layout: &Layout,
+    object: &Object,
+    page: &Page,
+    leaf_block: &[u8],
+    below: impl Fn(RootRef) -> Kdop,
+) -> Result<(Vec<Kdop>, Inflation), FormatError> {
     let slabs = object.profile.directions().slabs();
     let at = layout.page_offset(page.header().page_number.get());
     let mut inflation = Inflation::default();
-    let tight = visit_bounds(layout, bytes, object, page, below, |bound| {
+    let tight = visit_bounds_of(object, page, leaf_block, below, |bound| {
         let Bound { slot, child, decoded, tight } = bound;
         ensure(decoded.contains(&tight, slabs), Rule::BoundContains, at, || {
             let place =

@@ -153,6 +153,11 @@ pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section
 /// # Errors
 /// The first of rules 1 to 9 that does not hold.
 pub fn read_header(bytes: &[u8]) -> Result<(Header, Vec<Section>), FormatError> {
+    read_header_of(bytes, bytes.len() as u64)
+}
+
+/// [`read_header`] of a file of `length` bytes that starts with `bytes`.
+pub(crate) fn read_header_of(bytes: &[u8], length: u64) -> Result<(Header, Vec<Section>), FormatError> {
     let shown = &bytes[..bytes.len().min(8)];
     ensure(shown == MAGIC, Rule::Magic, 0, || (format!("{MAGIC:02x?}"), format!("{shown:02x?}")))?;
     let found = bytes.len();
@@ -166,12 +171,12 @@ pub fn read_header(bytes: &[u8]) -> Result<(Header, Vec<Section>), FormatError> 
     let mut zeroed = page.to_vec();
     zeroed[32..40].fill(0);
     require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(checksum(&zeroed)))?;
-    require(Rule::FileLength, 16, header.file_length.get(), bytes.len() as u64)?;
+    require(Rule::FileLength, 16, header.file_length.get(), length)?;
     let count = header.sections.get() as usize;
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
     let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)
         .map_err(|_| FormatError::new(Rule::SectionCount, 12, "a table within the page", count))?;
-    let sections = read_entries(entries, bytes.len())?;
+    let sections = read_entries(entries, usize::try_from(length).unwrap_or(usize::MAX))?;
     Ok((header, sections))
 }
 

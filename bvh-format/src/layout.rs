@@ -3,7 +3,7 @@
 use crate::checksum::hex;
 use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
-use crate::header::{Section, SectionKind, read_header};
+use crate::header::{Header, Section, SectionKind, read_header_of};
 use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
@@ -35,7 +35,31 @@ impl Layout {
     /// # Errors
     /// The first of rules 1 to 9 and 11 to 14 that does not hold, or rule 10 for the object table.
     pub fn read(bytes: &[u8]) -> Result<Self, FormatError> {
-        let (header, sections) = read_header(bytes)?;
+        Self::read_with(bytes.len() as u64, |range| Ok(&bytes[range]))
+    }
+
+    /// Opens a file of `length` bytes of which `read` gives those that are asked for: the header page, or what there
+    /// is of it, then the object section. No range goes beyond `length`.
+    ///
+    /// # Errors
+    /// As [`Layout::read`], and what `read` returns.
+    pub fn read_with<B: AsRef<[u8]>, E: From<FormatError>>(
+        length: u64,
+        mut read: impl FnMut(Range<usize>) -> Result<B, E>,
+    ) -> Result<Self, E> {
+        let head = read(0..length.min(PAGE as u64) as usize)?;
+        let (header, sections) = read_header_of(head.as_ref(), length)?;
+        let objects = sections.iter().find(|section| section.kind == SectionKind::Objects);
+        let table = read(objects.map_or(0..0, |section| section.range.clone()))?;
+        Ok(Self::from_tables(&header, sections, table.as_ref())?)
+    }
+
+    /// The layout of checked sections and the bytes of the object section.
+    fn from_tables(
+        header: &Header,
+        sections: Vec<Section>,
+        object_table: &[u8],
+    ) -> Result<Self, FormatError> {
         let find = |kind| {
             let section = sections.iter().find(|section: &&Section| section.kind == kind);
             section.map(|section| section.range.clone())
@@ -46,7 +70,7 @@ impl Layout {
         // Origins and exponents have no page checksum to guard them.
         let stated = sections.iter().find(|section| section.kind == SectionKind::Objects);
         let stated = stated.map_or(0, |section| section.checksum);
-        let found = checksum(&bytes[table.clone()]);
+        let found = checksum(object_table);
         require(Rule::SectionChecksum, table.start as u64, hex(stated), hex(found))?;
         ensure(nodes.len() % PAGE == 0, Rule::ObjectPages, nodes.start as u64, || {
             (format!("whole pages of {PAGE} bytes"), nodes.len().to_string())
@@ -55,7 +79,7 @@ impl Layout {
         ensure(pages <= MAX_PAGES, Rule::ObjectPages, nodes.start as u64, || {
             (format!("at most {MAX_PAGES} pages"), pages.to_string())
         })?;
-        let objects = read_objects(&bytes[table.clone()], table.start as u64, pages)?;
+        let objects = read_objects(object_table, table.start as u64, pages)?;
         Ok(Self {
             version: (header.major.get(), header.minor.get()),
             content_checksum: header.content_checksum.get(),
@@ -133,9 +157,16 @@ impl Layout {
     /// # Errors
     /// Rules 26 to 28.
     pub fn check_leaf_block(&self, bytes: &[u8], page: &Page, object: &Object) -> Result<(), FormatError> {
+        self.check_leaf_bytes(self.leaf_block(bytes, page.header()), page, object)
+    }
+
+    /// [`Layout::check_leaf_block`] of a block wherever it is; empty stands for one outside the section.
+    ///
+    /// # Errors
+    /// Rules 26 to 28.
+    pub fn check_leaf_bytes(&self, block: &[u8], page: &Page, object: &Object) -> Result<(), FormatError> {
         let header = page.header();
         let at = self.page_offset(header.page_number.get());
-        let block = self.leaf_block(bytes, header);
         let lines = header.leaf_lines.get() as usize;
         let packets = usize::from(header.packets.get());
         let there = |needed: usize| {
@@ -172,9 +203,16 @@ impl Layout {
     /// # Errors
     /// Rules 31 and 32.
     pub fn check_id_block(&self, bytes: &[u8], page: &Page) -> Result<(), FormatError> {
+        self.check_id_bytes(self.id_block(bytes, page.header()), page)
+    }
+
+    /// [`Layout::check_id_block`] of a block wherever it is; empty stands for one outside the section.
+    ///
+    /// # Errors
+    /// Rules 31 and 32.
+    pub fn check_id_bytes(&self, block: &[u8], page: &Page) -> Result<(), FormatError> {
         let header = page.header();
         let at = self.page_offset(header.page_number.get());
-        let block = self.id_block(bytes, header);
         let words = header.id_words.get() as usize;
         if !self.has_ids() || header.packets.get() == 0 {
             return require(Rule::IdPlace, at + 52, 0, words);

@@ -73,13 +73,29 @@ pub fn validate_page(
     number: u32,
 ) -> Result<Counts, FormatError> {
     let page = page_of(layout, bytes, object, number)?;
+    let blocks = [layout.leaf_block(bytes, page.header()), layout.id_block(bytes, page.header())];
+    validate_page_of(layout, object, number, &page, blocks)
+}
+
+/// [`validate_page`] of a page with its leaf block and its id block, wherever they are: for those who go through a file
+/// piece by piece. A block that is not within its section is given as empty.
+///
+/// # Errors
+/// As [`validate_page`].
+pub fn validate_page_of(
+    layout: &Layout,
+    object: &Object,
+    number: u32,
+    page: &Page,
+    blocks: [&[u8]; 2],
+) -> Result<Counts, FormatError> {
     check_page(page.bytes(), number, object, layout.page_offset(number))?;
     let header = page.header();
     Ok(Counts {
         first_packet: header.first_packet.get().into(),
         treelets: header.treelets.into(),
         packets: header.packets.get().into(),
-        triangles: check_leaves(layout, bytes, object, &page)?,
+        triangles: check_leaves(layout, object, page, blocks)?,
         roots: header.roots.into(),
         remotes: header.remotes.into(),
     })
@@ -111,24 +127,69 @@ pub fn validate_links(
 pub fn validate_counts(layout: &Layout, object: &Object, pages: &[Counts]) -> Result<(), FormatError> {
     let mut sum = Counts::default();
     for (number, counts) in object.pages().zip(pages) {
-        let at = layout.page_offset(number);
-        require(Rule::Counts, at + 40, sum.packets, counts.first_packet)?;
-        sum.treelets += counts.treelets;
-        sum.packets += counts.packets;
-        sum.triangles += counts.triangles;
-        sum.roots += counts.roots;
-        sum.remotes += counts.remotes;
+        require(Rule::Counts, layout.page_offset(number) + 40, sum.packets, counts.first_packet)?;
+        sum.add(counts);
     }
-    let record = &object.record;
-    let at = layout.page_offset(record.first_page.get());
-    // Each link has been followed to a root that names it back: no two share a root, so that equal
-    // numbers leave no root without a way to it.
-    require(Rule::Counts, at, sum.remotes + 1, sum.roots)?;
-    let found = [sum.treelets, sum.packets, sum.triangles];
-    let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
-    ensure(found == stated, Rule::Counts, at, || {
-        (format!("treelets, packets, triangles {stated:?}"), format!("{found:?}"))
-    })
+    sum.check(layout, object)
+}
+
+/// Checks the same sums for those who go through an object's pages from the last to the first.
+#[derive(Debug, Default)]
+pub struct CountsFromEnd {
+    sum: Counts,
+    /// `first_packet` of the page added last, with its number.
+    next: Option<(u32, u64)>,
+}
+
+impl CountsFromEnd {
+    /// Adds the page before the one added last.
+    ///
+    /// # Errors
+    /// Rule 34.
+    pub fn add(&mut self, layout: &Layout, number: u32, counts: &Counts) -> Result<(), FormatError> {
+        if let Some((page, first)) = self.next {
+            let expected = counts.first_packet + counts.packets;
+            require(Rule::Counts, layout.page_offset(page) + 40, expected, first)?;
+        }
+        self.next = Some((number, counts.first_packet));
+        self.sum.add(counts);
+        Ok(())
+    }
+
+    /// After the first page of the object.
+    ///
+    /// # Errors
+    /// Rule 34.
+    pub fn finish(self, layout: &Layout, object: &Object) -> Result<(), FormatError> {
+        if let Some((page, first)) = self.next {
+            require(Rule::Counts, layout.page_offset(page) + 40, 0, first)?;
+        }
+        self.sum.check(layout, object)
+    }
+}
+
+impl Counts {
+    fn add(&mut self, page: &Counts) {
+        self.treelets += page.treelets;
+        self.packets += page.packets;
+        self.triangles += page.triangles;
+        self.roots += page.roots;
+        self.remotes += page.remotes;
+    }
+
+    /// Compares the sum over an object's pages with its record.
+    fn check(&self, layout: &Layout, object: &Object) -> Result<(), FormatError> {
+        let record = &object.record;
+        let at = layout.page_offset(record.first_page.get());
+        // Each link has been followed to a root that names it back: no two share a root, so that equal
+        // numbers leave no root without a way to it.
+        require(Rule::Counts, at, self.remotes + 1, self.roots)?;
+        let found = [self.treelets, self.packets, self.triangles];
+        let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
+        ensure(found == stated, Rule::Counts, at, || {
+            (format!("treelets, packets, triangles {stated:?}"), format!("{found:?}"))
+        })
+    }
 }
 
 /// A page, not checked.
@@ -145,12 +206,16 @@ fn page_of<'a>(
 }
 
 /// Checks a page's leaf and id blocks value by value; returns the number of its triangles.
-fn check_leaves(layout: &Layout, bytes: &[u8], object: &Object, page: &Page) -> Result<u64, FormatError> {
-    layout.check_leaf_block(bytes, page, object)?;
-    layout.check_id_block(bytes, page)?;
+fn check_leaves(
+    layout: &Layout,
+    object: &Object,
+    page: &Page,
+    [block, ids]: [&[u8]; 2],
+) -> Result<u64, FormatError> {
+    layout.check_leaf_bytes(block, page, object)?;
+    layout.check_id_bytes(ids, page)?;
     let header = page.header();
     let at = layout.page_offset(header.page_number.get());
-    let (block, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
     let origin = object.record.origin.map(|o| o.get());
     let mut triangles = 0;
     for (packet, count) in packets(page) {

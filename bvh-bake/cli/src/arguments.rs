@@ -44,8 +44,9 @@ Several inputs are baked as one mesh: triangle ids run on from file to file. The
 all. It is left alone if it is up to date: same inputs, same options, same version, undamaged; --force bakes it all \
 the same.
 
---max-memory: a bake works in memory. If it is expected to need more than SIZE, it is refused with exit code 4 \
-before the work begins; baking in parts to fit a budget is not there yet.";
+--max-memory: the whole process stays within SIZE, whatever the size of the mesh. OBJ, STL and PLY are read piece by \
+piece, and up to 200 bytes a triangle go to scratch files, which have no names and vanish however the process ends. \
+The output is the same to the byte. A SIZE that is too small for any way is refused with exit code 4.";
 
 /// What `bake` takes.
 #[derive(Debug, Args)]
@@ -65,9 +66,12 @@ pub(crate) struct BakeArguments {
     /// How far a vertex may move, in mesh units; only with --triangles quantized [default: 1e-5 of the diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) max_error: Option<f64>,
-    /// Refuse a bake that is expected to need more memory than this, such as 512MiB or 2GB
+    /// Stay within this much memory, such as 512MiB or 2GB; what does not fit goes to scratch files
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub(crate) max_memory: Option<u64>,
+    /// Where scratch files go, with --max-memory [default: beside the output]
+    #[arg(long, value_name = "DIR", requires = "max_memory")]
+    pub(crate) scratch: Option<PathBuf>,
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) jobs: Option<u16>,

@@ -3,11 +3,12 @@
 use crate::arguments::{BakeArguments, LayoutArguments};
 use crate::error::Failure;
 use crate::output::{self, hex};
-use crate::resident;
-use bvh_bake::{FileOptions, Options, Outcome, bake_files};
+use crate::{resident, signals};
+use bvh_bake::{FileOptions, Options, Outcome, Stage, Step, bake_files};
 use bvh_format::leaf::TriangleEncoding;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -28,16 +29,24 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         ids: !arguments.no_ids,
         ..options(&arguments.layout)
     };
-    let file_options = FileOptions { force: arguments.force, max_memory: arguments.max_memory };
+    let file_options = FileOptions {
+        force: arguments.force,
+        max_memory: arguments.max_memory,
+        scratch: arguments.scratch.clone(),
+    };
     let inputs = names(&arguments.inputs);
     let spinner = spinner(arguments.quiet);
+    signals::leave_nothing().map_err(|error| Failure::System(format!("cannot wait for signals: {error}")))?;
+    let mut clock = StageClock::default();
     let outcome = bake_files(&arguments.inputs, &arguments.output, &options, &file_options, &mut |step| {
         spinner.set_message(step.name());
+        clock.begin(step);
     });
     spinner.finish_and_clear();
     let outcome = outcome.map_err(|error| Failure::from_bake(&inputs, &error))?;
     let output = arguments.output.display().to_string();
-    let report = Report::new(inputs, output, &outcome, start.elapsed().as_secs_f64());
+    let mut report = Report::new(inputs, output, &outcome, start.elapsed().as_secs_f64());
+    report.stage_seconds = Some(clock.finish()).filter(|_| !report.skipped);
     if arguments.json {
         output::json(&report)
     } else if arguments.quiet {
@@ -71,6 +80,36 @@ pub(crate) fn spinner(quiet: bool) -> ProgressBar {
     spinner
 }
 
+/// How long the stages take. Those of several objects add up.
+#[derive(Default)]
+struct StageClock {
+    seconds: BTreeMap<&'static str, f64>,
+    open: Option<(&'static str, Instant)>,
+}
+
+impl StageClock {
+    fn begin(&mut self, step: Step) {
+        let name = match step {
+            Step::Read => "read",
+            Step::Bake(Stage::Prepare) => "prepare",
+            Step::Bake(Stage::Build) => "build",
+            Step::Bake(Stage::Encode) => "assemble",
+            Step::Bake(Stage::Prove) => "prove",
+            Step::Write => "write",
+        };
+        if let Some((last, since)) = self.open.replace((name, Instant::now())) {
+            *self.seconds.entry(last).or_default() += since.elapsed().as_secs_f64();
+        }
+    }
+
+    fn finish(mut self) -> BTreeMap<&'static str, f64> {
+        if let Some((last, since)) = self.open.take() {
+            *self.seconds.entry(last).or_default() += since.elapsed().as_secs_f64();
+        }
+        self.seconds
+    }
+}
+
 /// What `--json` prints. Fields that a skipped bake does not know are null.
 #[derive(Serialize)]
 struct Report {
@@ -98,6 +137,10 @@ struct Report {
     mean_children: Option<f64>,
     bake_seconds: Option<f64>,
     seconds: f64,
+    stage_seconds: Option<BTreeMap<&'static str, f64>>,
+    scratch_bytes: Option<u64>,
+    scratch_written_bytes: Option<u64>,
+    scratch_read_bytes: Option<u64>,
     peak_rss_bytes: Option<u64>,
     content_xxh3: String,
     skipped: bool,
@@ -135,6 +178,10 @@ impl Report {
             mean_children: baked.map(|baked| baked.mean_children),
             bake_seconds: baked.map(|baked| baked.seconds),
             seconds,
+            stage_seconds: None,
+            scratch_bytes: baked.map(|baked| baked.scratch.most),
+            scratch_written_bytes: baked.map(|baked| baked.scratch.written),
+            scratch_read_bytes: baked.map(|baked| baked.scratch.read),
             peak_rss_bytes: resident::peak_bytes(),
             content_xxh3: hex(file.content_xxh3),
             skipped: baked.is_none(),
@@ -181,7 +228,19 @@ impl Report {
             Some(bytes) => format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0),
             None => String::new(),
         };
-        line("took", format!("{:.2} s{memory}", self.seconds));
+        if let (Some(most @ 1..), Some(written), Some(read)) =
+            (self.scratch_bytes, self.scratch_written_bytes, self.scratch_read_bytes)
+        {
+            let [most, written, read] = [most, written, read].map(|bytes| bytes as f64 / 1048576.0);
+            line("scratch", format!("{most:.0} MiB at most; {written:.0} MiB written, {read:.0} MiB read"));
+        }
+        let stages: Vec<String> = self
+            .stage_seconds
+            .iter()
+            .flatten()
+            .map(|(stage, seconds)| format!("{stage} {seconds:.2}"))
+            .collect();
+        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages.join(", ")));
         text
     }
 }

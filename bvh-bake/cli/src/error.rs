@@ -67,7 +67,7 @@ impl Failure {
             BakeError::Read(_) => Self::Invalid(error.to_string()),
             BakeError::Input(input) if input.is_limit() => Self::Limit(named),
             BakeError::Input(_) => Self::Invalid(named),
-            BakeError::Write { .. } => Self::System(error.to_string()),
+            BakeError::Write { .. } | BakeError::Room { .. } => Self::System(error.to_string()),
             BakeError::OutputIsInput { .. } => Self::Usage(error.to_string()),
             BakeError::Memory { .. } => Self::Limit(error.to_string()),
             BakeError::Limit(_) => Self::Limit(named),

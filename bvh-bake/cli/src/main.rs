@@ -13,6 +13,7 @@ mod output;
 mod query;
 mod report;
 mod resident;
+mod signals;
 mod validate;
 mod verify;
 

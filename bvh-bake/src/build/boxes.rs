@@ -1,25 +1,31 @@
 //! Boxes and references to triangles in eight lanes, which compilers join in two vector instructions.
 
 use crate::ablation::SplitRule;
-use crate::prepare::Corners;
+use crate::soup::Corners;
 use bytemuck::{Pod, Zeroable};
 
 /// A box: the lower ends and the negated upper ends of three axes, each with a spare lane, so that boxes are
 /// joined by the lesser of all lanes.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-pub(super) struct Aabb([f32; 8]);
+pub(crate) struct Aabb([f32; 8]);
 
 impl Aabb {
-    pub(super) const EMPTY: Self = Self([f32::INFINITY; 8]);
+    pub(crate) const EMPTY: Self = Self([f32::INFINITY; 8]);
 
-    pub(super) fn of_point(point: [f32; 4]) -> Self {
+    pub(crate) fn of_point(point: [f32; 4]) -> Self {
         let [x, y, z, w] = point;
         Self([x, y, z, w, -x, -y, -z, -w])
     }
 
+    /// The box of a triangle.
     #[inline(always)]
-    pub(super) fn join(&mut self, other: &Self) {
+    pub(crate) fn of_triangle(corners: &Corners) -> Self {
+        Reference::new(0, corners).aabb()
+    }
+
+    #[inline(always)]
+    pub(crate) fn join(&mut self, other: &Self) {
         for lane in 0..8 {
             // `min` without its care for NaN, which there is none of here.
             let (mine, its) = (self.0[lane], other.0[lane]);
@@ -27,8 +33,13 @@ impl Aabb {
         }
     }
 
-    pub(super) fn lo(&self, axis: usize) -> f32 {
+    pub(crate) fn lo(&self, axis: usize) -> f32 {
         self.0[axis]
+    }
+
+    pub(crate) fn hi(&self, axis: usize) -> f32 {
+        // Zeros are positive in files.
+        0.0 - self.0[axis + 4]
     }
 
     /// The extent along an axis; coordinates of at most 2^120 do not overflow, nor do twice as large ones.
@@ -39,7 +50,7 @@ impl Aabb {
 
     /// Twice the centre, and a spare lane.
     #[inline(always)]
-    pub(super) fn centre(&self) -> [f32; 4] {
+    pub(crate) fn centre(&self) -> [f32; 4] {
         std::array::from_fn(|axis| self.0[axis] - self.0[axis + 4])
     }
 
@@ -71,6 +82,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
+    #[inline(always)]
     pub(super) fn new(triangle: u32, corners: &Corners) -> Self {
         let end = |lesser: fn(f32, f32) -> f32, axis: usize| {
             lesser(lesser(corners[0][axis], corners[1][axis]), corners[2][axis])

@@ -9,10 +9,13 @@
 //! until a part has no more than 2^18 triangles. A single cell that has more is divided by a grid of its own.
 //! Two passes over the triangles thus do for any mesh that is not crowded into a few spots.
 
-use super::boxes::{Aabb, Binning, Cost, Reference};
+use super::boxes::{Aabb, Binning, Cost};
 use super::{Builder, Node};
 use crate::ablation::SplitRule;
-use rayon::prelude::*;
+use crate::error::BakeError;
+use crate::means::Means;
+use crate::scratch::{Spill, Stream};
+use crate::soup::{Grouped, InStream, Triangle, Triangles, distribute, fold};
 
 /// Cells of the grid along an axis.
 const CELLS: usize = 64;
@@ -30,73 +33,132 @@ struct Cell {
     bounds: Aabb,
 }
 
-/// Divides references, adding to the bricks found so far; returns the tree above those added.
-pub(super) fn divide(
-    references: Vec<Reference>,
-    builder: &Builder,
-    bricks: &mut Vec<Vec<Reference>>,
-) -> Node<BrickIndex> {
-    if references.len() <= builder.brick {
-        bricks.push(references);
-        return Node::Leaf(bricks.len() as u32 - 1);
+/// Divides triangles, adding to the bricks found so far; returns the tree above those added.
+pub(super) struct Division<'a> {
+    pub(super) builder: &'a Builder,
+    pub(super) means: &'a Means,
+    pub(super) spill: &'a Spill,
+    pub(super) bricks: Vec<Stream<Triangle>>,
+}
+
+impl Division<'_> {
+    /// Divides `count` triangles. `grid` is theirs, if there are more than a brick has.
+    pub(super) fn divide(
+        &mut self,
+        triangles: &impl Triangles,
+        count: u64,
+        grid: Option<Grid>,
+    ) -> Result<Node<BrickIndex>, BakeError> {
+        let Some(grid) = grid.filter(|_| count > self.builder.brick as u64) else {
+            let mut brick = self.means.streams(&[count]);
+            distribute(
+                triangles.parts(),
+                |part| Ok(Grouped::new(&triangles.part(part)?, 1, |_, _| 0)),
+                &mut brick,
+                self.spill,
+            )?;
+            self.bricks.append(&mut brick);
+            return Ok(Node::Leaf(self.bricks.len() as u32 - 1));
+        };
+        let mut cells = grid.cells();
+        if let [cell] = cells[..] {
+            // Equal centres, or too close to tell apart: halves in the order of the input.
+            let mut halves = self.halves(triangles, count)?.into_iter();
+            let mut next = || self.divide_stream(halves.next());
+            let (left, right) = (next()?, next()?);
+            return Ok(Node::above(left, right, cell.bounds.squared_girth()));
+        }
+        let mut parts = Parts { of_cell: vec![0; CELLS * CELLS * CELLS], counts: Vec::new() };
+        let tree = split(&mut cells, self.builder, &mut parts, 0);
+        let mut streams = self.means.streams(&parts.counts);
+        let make = |part: usize| {
+            let group = |_: usize, triangle: &Triangle| {
+                parts.of_cell[grid.cell(Aabb::of_triangle(&triangle.corners).centre())]
+            };
+            Ok(Grouped::new(&triangles.part(part)?, parts.counts.len(), group))
+        };
+        distribute(triangles.parts(), make, &mut streams, self.spill)?;
+        drop((grid, parts));
+        let mut streams = streams.into_iter();
+        // In the order in which the parts were numbered.
+        tree.replace_leaves(&mut |_| self.divide_stream(streams.next()))
     }
-    let grid = Grid::of(&references);
-    let mut cells = grid.cells();
-    if let [cell] = cells[..] {
-        // Equal centres, or too close to tell apart: halves in the order of the input.
-        let mut left = references;
-        let right = left.split_off(left.len() / 2);
-        let [left, right] = [left, right].map(|side| divide(side, builder, bricks));
-        return Node::above(left, right, cell.bounds.squared_girth());
+
+    fn divide_stream(&mut self, stream: Option<Stream<Triangle>>) -> Result<Node<BrickIndex>, BakeError> {
+        let stream = stream.unwrap_or_else(|| Stream::of_pieces(1));
+        if stream.count() <= self.builder.brick as u64 {
+            self.bricks.push(stream);
+            return Ok(Node::Leaf(self.bricks.len() as u32 - 1));
+        }
+        let triangles = InStream::new(&stream);
+        let grid = Grid::of(&triangles)?;
+        self.divide(&triangles, stream.count(), Some(grid))
     }
-    let mut parts = Parts { of_cell: vec![0; CELLS * CELLS * CELLS], counts: Vec::new() };
-    let tree = split(&mut cells, builder, &mut parts, 0);
-    let parts = parts.distribute(&grid, &references);
-    drop(references);
-    let mut parts = parts.into_iter();
-    // In the order in which the parts were numbered.
-    tree.replace_leaves(&mut |_| divide(parts.next().unwrap_or_default(), builder, bricks))
+
+    /// The first half of the triangles and the rest.
+    fn halves(&self, triangles: &impl Triangles, count: u64) -> Result<Vec<Stream<Triangle>>, BakeError> {
+        let half = count / 2;
+        let mut firsts = vec![0];
+        for part in 0..triangles.parts() {
+            let length = triangles.part(part)?.len() as u64;
+            firsts.push(firsts[part] + length);
+        }
+        let mut halves = self.means.streams(&[half, count - half]);
+        let make = |part: usize| {
+            let right = |place: usize, _: &Triangle| u32::from(firsts[part] + place as u64 >= half);
+            Ok(Grouped::new(&triangles.part(part)?, 2, right))
+        };
+        distribute(triangles.parts(), make, &mut halves, self.spill)?;
+        Ok(halves)
+    }
 }
 
 /// Counts and boxes of all cells.
-struct Grid {
+pub(crate) struct Grid {
     binning: Binning<CELLS>,
     counts: Vec<u32>,
     bounds: Vec<Aabb>,
 }
 
 impl Grid {
-    fn of(references: &[Reference]) -> Self {
-        let centres = |chunk: &[Reference]| {
-            chunk.iter().fold(Aabb::EMPTY, |mut centres, reference| {
-                centres.join(&Aabb::of_point(reference.aabb().centre()));
-                centres
-            })
-        };
-        let joined = |mut a: Aabb, b: Aabb| {
-            a.join(&b);
-            a
-        };
-        let chunks = references.par_chunks(chunk_of(references));
-        let binning = Binning::new(&chunks.clone().map(centres).reduce(|| Aabb::EMPTY, joined));
-        let count = |chunk: &[Reference]| {
-            let size = CELLS * CELLS * CELLS;
-            let mut grid = Self { binning, counts: vec![0; size], bounds: vec![Aabb::EMPTY; size] };
-            for reference in chunk {
-                let bounds = reference.aabb();
-                let cell = grid.cell(bounds.centre());
-                grid.counts[cell] += 1;
-                grid.bounds[cell].join(&bounds);
+    /// An empty grid over the box of all triangles' centres, twice as large.
+    pub(crate) fn empty(centres: &Aabb) -> Self {
+        let size = CELLS * CELLS * CELLS;
+        Self { binning: Binning::new(centres), counts: vec![0; size], bounds: vec![Aabb::EMPTY; size] }
+    }
+
+    /// Adds a triangle's box.
+    #[inline]
+    pub(crate) fn add(&mut self, bounds: &Aabb) {
+        let cell = self.cell(bounds.centre());
+        self.counts[cell] += 1;
+        self.bounds[cell].join(bounds);
+    }
+
+    /// Adds the cells of another grid over the same box.
+    pub(crate) fn merged(mut self, other: &Self) -> Self {
+        self.counts.iter_mut().zip(&other.counts).for_each(|(a, b)| *a += b);
+        self.bounds.iter_mut().zip(&other.bounds).for_each(|(a, b)| a.join(b));
+        self
+    }
+
+    /// The grid of some triangles.
+    fn of(triangles: &impl Triangles) -> Result<Self, BakeError> {
+        let join_centres = |centres: &mut Aabb, part: usize| {
+            for triangle in triangles.part(part)?.iter() {
+                centres.join(&Aabb::of_point(Aabb::of_triangle(&triangle.corners).centre()));
             }
-            grid
+            Ok(())
         };
-        let merge = |mut a: Self, b: Self| {
-            a.counts.iter_mut().zip(&b.counts).for_each(|(a, b)| *a += b);
-            a.bounds.iter_mut().zip(&b.bounds).for_each(|(a, b)| a.join(b));
-            a
+        let mut centres = Aabb::EMPTY;
+        fold(triangles.parts(), || Aabb::EMPTY, join_centres)?.iter().for_each(|some| centres.join(some));
+        let count = |grid: &mut Self, part: usize| {
+            let triangles = triangles.part(part)?;
+            triangles.iter().for_each(|triangle| grid.add(&Aabb::of_triangle(&triangle.corners)));
+            Ok(())
         };
-        let empty = || Self { binning, counts: Vec::new(), bounds: Vec::new() };
-        chunks.map(count).reduce_with(merge).unwrap_or_else(empty)
+        let grids = fold(triangles.parts(), || Self::empty(&centres), count)?;
+        Ok(grids.into_iter().reduce(|a, b| a.merged(&b)).unwrap_or_else(|| Self::empty(&centres)))
     }
 
     fn cell(&self, centre: [f32; 4]) -> usize {
@@ -116,15 +178,10 @@ impl Grid {
     }
 }
 
-/// One chunk for each thread; results do not depend on it.
-fn chunk_of(references: &[Reference]) -> usize {
-    references.len().div_ceil(rayon::current_num_threads()).max(1)
-}
-
 /// Which cells make which part, parts numbered from the left of the tree.
 struct Parts {
     of_cell: Vec<u32>,
-    counts: Vec<usize>,
+    counts: Vec<u64>,
 }
 
 impl Parts {
@@ -134,27 +191,8 @@ impl Parts {
             let [x, y, z] = cell.at.map(usize::from);
             self.of_cell[(x * CELLS + y) * CELLS + z] = number;
         }
-        self.counts.push(cells.iter().map(|cell| cell.count as usize).sum());
+        self.counts.push(cells.iter().map(|cell| u64::from(cell.count)).sum());
         Node::Leaf(number)
-    }
-
-    /// The references of each part, in the order of the input.
-    fn distribute(&self, grid: &Grid, references: &[Reference]) -> Vec<Vec<Reference>> {
-        let chunks = references.par_chunks(chunk_of(references)).map(|chunk| {
-            let mut parts = vec![Vec::new(); self.counts.len()];
-            for reference in chunk {
-                let part = self.of_cell[grid.cell(reference.aabb().centre())];
-                parts[part as usize].push(*reference);
-            }
-            parts
-        });
-        let chunks: Vec<Vec<Vec<Reference>>> = chunks.collect();
-        let gather = |part: usize| {
-            let mut all = Vec::with_capacity(self.counts[part]);
-            chunks.iter().for_each(|chunk| all.extend_from_slice(&chunk[part]));
-            all
-        };
-        (0..self.counts.len()).into_par_iter().map(gather).collect()
     }
 }
 
@@ -209,7 +247,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb, splits: SplitRule) -> Option<(usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::prepare::Corners;
+    use crate::soup::Corners;
 
     const BUILDER: Builder =
         Builder { treelet: 16, brick: 100, sweep: 64, passes: &[], splits: SplitRule::Reach };
@@ -229,10 +267,16 @@ mod tests {
     }
 
     fn divided(triangles: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Node<BrickIndex>) {
-        let references = triangles.iter().zip(0..).map(|(corners, i)| Reference::new(i, corners)).collect();
-        let mut bricks = Vec::new();
-        let top = divide(references, builder, &mut bricks);
-        (bricks.iter().map(|brick| brick.iter().map(|r| r.triangle).collect()).collect(), top)
+        let means = Means::unlimited();
+        let spill = means.scratch.spill();
+        let mut all = Stream::of_pieces(1000);
+        let triangles = triangles.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
+        all.append(&spill, &triangles.collect::<Vec<_>>()).unwrap();
+        all.finish(&spill).unwrap();
+        let mut division = Division { builder, means: &means, spill: &spill, bricks: Vec::new() };
+        let top = division.divide_stream(Some(all)).unwrap();
+        let bricks = division.bricks.into_iter().map(|brick| brick.take().unwrap());
+        (bricks.map(|brick| brick.iter().map(|triangle| triangle.id).collect()).collect(), top)
     }
 
     fn leaves(node: &Node<BrickIndex>, found: &mut Vec<BrickIndex>) {

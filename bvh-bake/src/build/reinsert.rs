@@ -12,7 +12,7 @@
 
 use super::boxes::{Aabb, Reference};
 use super::{Node, PacketTriangles};
-use crate::prepare::Corners;
+use crate::soup::Triangle;
 
 /// Nodes looked at for one subtree, at most; hardly any search comes near. It bounds the time for meshes of which
 /// every part overlaps every other.
@@ -37,7 +37,7 @@ const NONE: Index = Index::MAX;
 pub(super) fn optimise(
     node: Node<PacketTriangles>,
     passes: &[Pass],
-    triangles: &[Corners],
+    triangles: &[Triangle],
 ) -> Node<PacketTriangles> {
     if passes.is_empty() || node.leaves() < 4 {
         return node;
@@ -78,13 +78,13 @@ enum Content {
 
 impl Tree {
     /// Adds a node and all below it, parents first.
-    fn add(&mut self, node: Node<PacketTriangles>, parent: Index, triangles: &[Corners]) -> Index {
+    fn add(&mut self, node: Node<PacketTriangles>, parent: Index, triangles: &[Triangle]) -> Index {
         let index = self.nodes.len() as Index;
         match node {
             Node::Leaf(packet) => {
                 let mut bounds = Aabb::EMPTY;
                 for &number in packet.numbers() {
-                    bounds.join(&Reference::new(number, &triangles[number as usize]).aabb());
+                    bounds.join(&Reference::new(number, &triangles[number as usize].corners).aabb());
                 }
                 let content = Content::Packet(packet);
                 self.nodes.push(Flat { bounds, size: bounds.squared_girth(), parent, content });
@@ -252,8 +252,9 @@ impl Tree {
 mod tests {
     use super::*;
     use crate::ablation::SplitRule;
-    use crate::build::Bricks;
+    use crate::build::Builder;
     use crate::options::Effort;
+    use crate::soup::Corners;
 
     /// Long thin triangles in all directions, some far out.
     fn sticks(count: usize) -> Vec<Corners> {
@@ -298,22 +299,19 @@ mod tests {
     #[test]
     fn passes_lower_the_cost_and_keep_all_packets() {
         for triangles in [sticks(3000), sticks(30), vec![[[1.0, 2.0, 3.0]; 3]; 500]] {
-            let (trees, _) =
-                Bricks::divide(&triangles, 4, Effort::Fast, SplitRule::Reach).build(&triangles, |tree| {
-                    let mut flat = Tree { nodes: Vec::new(), root: 0 };
-                    flat.add(tree, NONE, &triangles);
-                    flat
-                });
-            for mut tree in trees {
-                let kept = packets(&tree);
-                for one_in in [10, 1, 1] {
-                    let before = cost(&tree);
-                    tree.run(Pass { one_in });
-                    assert_eq!(check(&tree, tree.root, NONE), tree.nodes.len());
-                    assert!(cost(&tree) <= before, "{} > {before}", cost(&tree));
-                    assert_eq!(packets(&tree), kept);
-                    assert!(tree.depth() < MOST_DEPTH);
-                }
+            let triangles: Vec<Triangle> =
+                triangles.into_iter().zip(0..).map(|(corners, id)| Triangle { corners, id }).collect();
+            let built = Builder::new(4, Effort::Fast, SplitRule::Reach).tree(&triangles);
+            let mut flat = Tree { nodes: Vec::new(), root: 0 };
+            flat.add(built, NONE, &triangles);
+            let kept = packets(&flat);
+            for one_in in [10, 1, 1] {
+                let before = cost(&flat);
+                flat.run(Pass { one_in });
+                assert_eq!(check(&flat, flat.root, NONE), flat.nodes.len());
+                assert!(cost(&flat) <= before, "{} > {before}", cost(&flat));
+                assert_eq!(packets(&flat), kept);
+                assert!(flat.depth() < MOST_DEPTH);
             }
         }
     }

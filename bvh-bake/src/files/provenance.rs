@@ -2,9 +2,12 @@
 
 use crate::options::Options;
 use crate::summary::FileSummary;
+use crate::target::Source;
 use bvh_format::Layout;
-use bvh_format::checksum::checksum;
-use bvh_format::header::{MAJOR, MINOR, SectionKind};
+use bvh_format::checksum::{Hasher, checksum};
+use bvh_format::header::{MAJOR, MINOR, Section, SectionKind};
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Raised whenever a bake of the same mesh with the same options gives other bytes, so that files of
@@ -68,12 +71,43 @@ fn plain(text: &str) -> String {
 
 /// What an existing output says of itself, if a bake with this provenance would give the same content.
 pub(super) fn up_to_date(output: &Path, provenance: &Provenance) -> Option<FileSummary> {
-    let bytes = std::fs::read(output).ok()?;
-    let layout = Layout::read(&bytes).ok()?;
+    let file = File::open(output).ok()?;
+    let length = file.metadata().ok()?.len();
+    let source = Source::File { file: &file, path: output, length };
+    let layout = Layout::read_with(length, |range| source.read(range)).ok()?;
     let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance)?;
-    let text = std::str::from_utf8(&bytes[section.range.clone()]).ok()?;
-    let same = layout.version == (MAJOR, MINOR) && provenance.matches(text);
-    // A damaged file is baked again. The bytes are in memory, so this costs little.
-    let whole = || layout.sections.iter().all(|s| checksum(&bytes[s.range.clone()]) == s.checksum);
-    (same && whole()).then(|| FileSummary::new(&layout, bytes.len() as u64))
+    // Those that are baked here are short.
+    let range = section.range.start..section.range.end.min(section.range.start + MOST_TEXT);
+    let text = source.read(range).ok()?;
+    let same = layout.version == (MAJOR, MINOR) && provenance.matches(std::str::from_utf8(&text).ok()?);
+    // A damaged file is baked again.
+    let whole = |section: &Section| {
+        let mut hasher = Hasher::default();
+        section.range.clone().step_by(READ_BYTES).try_for_each(|start| {
+            hasher.update(&source.read(start..(start + READ_BYTES).min(section.range.end)).ok()?);
+            Some(())
+        })?;
+        (hasher.finish() == section.checksum).then_some(())
+    };
+    (same && layout.sections.iter().all(|section| whole(section).is_some()))
+        .then(|| FileSummary::new(&layout, length))
+}
+
+/// The most bytes of a provenance text that are read.
+const MOST_TEXT: usize = 1 << 20;
+/// Bytes that are read at a time.
+const READ_BYTES: usize = 1 << 20;
+
+/// The checksum of a file's bytes, which are not kept.
+pub(super) fn file_checksum(path: &Path) -> io::Result<u64> {
+    let mut file = File::open(path)?;
+    let (mut hasher, mut bytes) = (Hasher::default(), vec![0; READ_BYTES]);
+    loop {
+        match file.read(&mut bytes) {
+            Ok(0) => return Ok(hasher.finish()),
+            Ok(count) => hasher.update(&bytes[..count]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! What can go wrong when a mesh file is read, told in one line.
 
+use crate::error::BakeError;
 use crate::mesh::InputError;
 use std::borrow::Cow;
 use std::fmt;
@@ -88,6 +89,39 @@ impl ReadError {
             ReadError::Limit { .. } => true,
             ReadError::Mesh { source, .. } => source.is_limit(),
             _ => false,
+        }
+    }
+}
+
+/// Why reading stopped.
+#[derive(Debug)]
+pub(crate) enum Halt {
+    /// The file is wrong.
+    Fault(Fault),
+    /// The system refused to give the file's bytes.
+    Io(io::Error),
+    /// What was read could not be kept.
+    Bake(Box<BakeError>),
+}
+
+impl From<Fault> for Halt {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+impl From<BakeError> for Halt {
+    fn from(error: BakeError) -> Self {
+        Self::Bake(Box::new(error))
+    }
+}
+
+impl Halt {
+    pub(crate) fn in_file(self, path: &Path) -> BakeError {
+        match self {
+            Self::Fault(fault) => fault.in_file(path).into(),
+            Self::Io(source) => ReadError::Io { path: path.to_owned(), source }.into(),
+            Self::Bake(error) => *error,
         }
     }
 }

@@ -8,18 +8,20 @@
 //! stay, and -0.0 is read as 0.0.
 
 mod error;
+mod feed;
 mod gltf;
-mod obj;
-mod ply;
-mod polygon;
-mod stl;
+pub(crate) mod obj;
+pub(crate) mod ply;
+pub(crate) mod polygon;
+pub(crate) mod stl;
 mod text;
 
-pub(crate) use error::excerpt;
+pub(crate) use error::{Fault, Halt, excerpt};
 pub use error::{Place, ReadError};
+pub(crate) use feed::Feed;
 
+use crate::error::BakeError;
 use crate::mesh::Mesh;
-use error::Fault;
 use std::path::Path;
 
 /// A format of mesh files.
@@ -53,6 +55,11 @@ impl MeshFormat {
 
     /// Tells the format from the beginning of a file.
     pub fn from_content(bytes: &[u8]) -> Option<MeshFormat> {
+        Self::from_head(bytes, bytes.len() as u64)
+    }
+
+    /// Tells the format from the first bytes of a file of `length` bytes; 4096 do.
+    pub(crate) fn from_head(bytes: &[u8], length: u64) -> Option<MeshFormat> {
         let head = &bytes[..bytes.len().min(4096)];
         let trimmed = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
         let is_statement = |line: &[u8]| {
@@ -62,7 +69,7 @@ impl MeshFormat {
             Some(MeshFormat::Ply)
         } else if head.starts_with(b"glTF") || trimmed.starts_with(b"{") {
             Some(MeshFormat::Gltf)
-        } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes) {
+        } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes, length) {
             Some(MeshFormat::Stl)
         } else if !head.contains(&0) && text::Lines::new(head).any(is_statement) {
             Some(MeshFormat::Obj)
@@ -81,14 +88,16 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     let bytes =
         std::fs::read(path).map_err(|source| Fault::Io { path: path.to_owned(), source }.in_file(path))?;
     let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
-    let Some(format) = format else {
-        let found = match path.extension() {
-            Some(extension) => format!("an unsupported format, .{}", excerpt(extension.as_encoded_bytes())),
-            None => "content of no known format".to_owned(),
-        };
-        return Err(Fault::new(Place::File, KNOWN, found).in_file(path));
+    read_bytes(&bytes, format.ok_or_else(|| unknown_format(path))?, path)
+}
+
+/// What is said of a file of no known format.
+pub(crate) fn unknown_format(path: &Path) -> ReadError {
+    let found = match path.extension() {
+        Some(extension) => format!("an unsupported format, .{}", excerpt(extension.as_encoded_bytes())),
+        None => "content of no known format".to_owned(),
     };
-    read_bytes(&bytes, format, path)
+    Fault::new(Place::File, KNOWN, found).in_file(path)
 }
 
 /// Reads a mesh from the bytes of a file. `source` names the file in errors; the files that a glTF file
@@ -98,12 +107,16 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
 /// As [`read`].
 pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
     let mesh = match format {
-        MeshFormat::Obj => obj::read(bytes),
+        MeshFormat::Obj => obj::read(bytes).map_err(Halt::from),
         MeshFormat::Stl => stl::read(bytes),
         MeshFormat::Ply => ply::read(bytes),
-        MeshFormat::Gltf => gltf::read(bytes, source),
+        MeshFormat::Gltf => gltf::read(bytes, source).map_err(Halt::from),
     };
-    let mut mesh = mesh.map_err(|fault| fault.in_file(source))?;
+    let mut mesh = mesh.map_err(|halt| match halt.in_file(source) {
+        BakeError::Read(error) => error,
+        // Nothing is kept elsewhere.
+        other => ReadError::Io { path: source.to_owned(), source: std::io::Error::other(other.to_string()) },
+    })?;
     mesh.objects.retain(|object| !object.triangles.is_empty());
     mesh.drop_negative_zeros();
     mesh.check().map_err(|error| ReadError::Mesh { path: source.to_owned(), source: error })?;
@@ -123,4 +136,4 @@ fn next_ids(next: &mut u32, count: usize) -> Result<Vec<u32>, Fault> {
 }
 
 /// What a coordinate has to be, for messages.
-const COORDINATE: &str = "a finite coordinate of at most 2^120 in magnitude";
+pub(crate) const COORDINATE: &str = "a finite coordinate of at most 2^120 in magnitude";

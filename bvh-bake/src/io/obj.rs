@@ -13,6 +13,9 @@
 //! are one object.
 
 mod clean;
+mod stream;
+
+pub(crate) use stream::{Statements, misfit, stream};
 
 use super::error::{Fault, Place};
 use super::{next_ids, polygon};
@@ -31,7 +34,7 @@ pub(super) fn read(text: &[u8]) -> Result<Mesh, Fault> {
         parsed.map_err(|error| Fault::new(Place::File, "statements that tobj reads", error.to_string()))?;
 
     let mut objects: Vec<Object> =
-        cleaner.names.iter().map(|name| Object { name: name.clone(), ..Object::default() }).collect();
+        cleaner.names.names.iter().map(|name| Object { name: name.clone(), ..Object::default() }).collect();
     let mut next_id = 0;
     for tobj::Model { mesh, name } in models {
         if mesh.indices.is_empty() {

@@ -4,20 +4,47 @@
 //! the element `face`; the rest is read and dropped. Numbers of every type are exact in f64, so that is how
 //! all are read. Text is read word by word, wherever its lines end. What follows the last element is ignored.
 
-use super::error::{Fault, Place, excerpt};
+use super::error::{Fault, Halt, Place, excerpt};
+use super::feed::{Feed, Words};
 use super::polygon::{self, MAX_CORNERS};
-use super::text::{Lines, Words, words};
+use super::text::words;
 use super::{COORDINATE, next_ids};
 use crate::mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, Object, coordinate_fits};
+use std::io::Read;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let (header, mut body) = Header::read(bytes)?;
+/// Takes the vertices and faces of a file in order. Either may come first.
+pub(crate) trait Faces {
+    /// Vertices taken.
+    fn vertices(&self) -> u64;
+    /// The next vertex.
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt>;
+    /// The next vertex has a coordinate that the format can't hold, which stands in that place.
+    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt>;
+    /// The next face, of vertices that may be yet to come.
+    fn face(&mut self, corners: &[u32]) -> Result<(), Halt>;
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Halt> {
     let mut parts = Parts::default();
-    for element in &header.elements {
+    stream(Feed::of_bytes(bytes), &mut parts)?;
+    Ok(parts.finish()?)
+}
+
+/// Reads a file from its beginning to its end.
+pub(crate) fn stream<R: Read>(feed: Feed<R>, faces: &mut impl Faces) -> Result<(), Halt> {
+    let mut words = Words::new(feed);
+    let header = match Header::read(&mut words) {
+        Ok(header) => header,
+        Err(fault) => return words.feed.finish(Err(fault.into())),
+    };
+    let format = header.format;
+    let mut body = Body { words, format };
+    let mut reader = Reader { faces, corners: Vec::new(), triangles: 0 };
+    let result = header.elements.iter().try_for_each(|element| {
         body.expect_room(element)?;
-        parts.read_element(element, &mut body)?;
-    }
-    parts.finish()
+        reader.read_element(element, &mut body)
+    });
+    body.words.feed.finish(result)
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -80,22 +107,24 @@ struct Element {
 
 struct Header {
     elements: Vec<Element>,
+    format: Format,
 }
 
 impl Header {
-    fn read(bytes: &[u8]) -> Result<(Header, Body<'_>), Fault> {
-        let mut lines = Lines::new(bytes);
-        if lines.next() != Some(b"ply") {
-            return Err(Fault::new(Place::Line(1), "ply", excerpt(&bytes[..bytes.len().min(16)])));
+    fn read<R: Read>(words_of_file: &mut Words<R>) -> Result<Header, Fault> {
+        let lines = words_of_file;
+        let head = lines.feed.peek(16).to_vec();
+        if lines.line().is_none_or(|(line, _)| line != b"ply") {
+            return Err(Fault::new(Place::Line(1), "ply", excerpt(&head)));
         }
-        let only_returns = bytes.get(3..5).is_some_and(|ending| ending[0] == b'\r' && ending[1] != b'\n');
+        let only_returns = head.get(3..5).is_some_and(|ending| ending[0] == b'\r' && ending[1] != b'\n');
         let mut elements: Vec<Element> = Vec::new();
         let mut format = None;
-        loop {
-            let Some(line) = lines.next() else {
-                return Err(Fault::new(Place::Line(lines.number), "end_header", "the end of the file"));
+        let ended_by_both = loop {
+            let Some((line, both)) = lines.line() else {
+                return Err(Fault::new(lines.place(), "end_header", "the end of the file"));
             };
-            let place = Place::Line(lines.number);
+            let (line, place) = (&line[..], lines.place());
             let invalid = |expected: &'static str| Fault::new(place, expected, excerpt(line));
             // No statement is longer, and a list has five words.
             let mut parts: [&[u8]; 6] = [b""; 6];
@@ -124,12 +153,11 @@ impl Header {
                         .properties
                         .push(property.ok_or_else(|| invalid("property [list COUNT] TYPE NAME"))?);
                 }
-                [b"end_header", ..] => break,
+                [b"end_header", ..] => break both,
                 _ => return Err(invalid("format 1.0, comment, element, property or end_header")),
             }
-        }
-        let format = format
-            .ok_or_else(|| Fault::new(Place::Line(lines.number), "a format above end_header", "none"))?;
+        };
+        let format = format.ok_or_else(|| Fault::new(lines.place(), "a format above end_header", "none"))?;
         for (name, roles) in [
             ("vertex", &[Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)][..]),
             ("face", &[Role::Corners]),
@@ -139,17 +167,14 @@ impl Header {
             if !roles.iter().all(has) {
                 let expected =
                     "an element vertex with x, y and z, and an element face with a list vertex_indices";
-                return Err(Fault::new(Place::Line(lines.number), expected, format!("no such {name}")));
+                return Err(Fault::new(lines.place(), expected, format!("no such {name}")));
             }
         }
-        let start = bytes.len() - lines.rest().len();
-        let body = match format {
-            Format::Ascii => Body::Text(Words::new(lines)),
-            // Where lines end in CR alone, an LF behind the last belongs to the body.
-            _ if only_returns && bytes[..start].ends_with(b"\r\n") => Body::binary(bytes, start - 1, format),
-            _ => Body::binary(bytes, start, format),
-        };
-        Ok((Header { elements }, body))
+        // Where lines end in CR alone, an LF behind the last belongs to the body.
+        if format != Format::Ascii && only_returns && ended_by_both {
+            lines.feed.step_back();
+        }
+        Ok(Header { elements, format })
     }
 }
 
@@ -179,43 +204,32 @@ fn read_property(element: &str, words: &[&[u8]; 5]) -> Option<Property> {
 }
 
 /// What follows the header.
-enum Body<'a> {
-    Text(Words<'a>),
-    Binary { bytes: &'a [u8], at: usize, big: bool },
+struct Body<R> {
+    words: Words<R>,
+    format: Format,
 }
 
-impl<'a> Body<'a> {
-    fn binary(bytes: &'a [u8], at: usize, format: Format) -> Self {
-        Body::Binary { bytes, at, big: format == Format::BigEndian }
-    }
-
+impl<R: Read> Body<R> {
     /// Where the next number stands (in text, the line of the last one).
     fn place(&self) -> Place {
-        match self {
-            Body::Text(words) => words.place(),
-            Body::Binary { at, .. } => Place::Byte(*at as u64),
-        }
-    }
-
-    fn bytes_left(&self) -> usize {
-        match self {
-            Body::Text(words) => words.bytes_left(),
-            Body::Binary { bytes, at, .. } => bytes.len() - at,
+        match self.format {
+            Format::Ascii => self.words.place(),
+            _ => Place::Byte(self.words.feed.position()),
         }
     }
 
     /// Refuses an element that declares more rows than the file can hold.
     fn expect_room(&self, element: &Element) -> Result<(), Fault> {
-        let least: u64 = match self {
+        let least: u64 = match self.format {
             // A character and a blank for each number, but for the last blank.
-            Body::Text(_) => 2 * element.properties.len() as u64,
-            Body::Binary { .. } => element
+            Format::Ascii => 2 * element.properties.len() as u64,
+            _ => element
                 .properties
                 .iter()
                 .map(|property| property.count.unwrap_or(property.kind).bytes() as u64)
                 .sum(),
         };
-        let left = self.bytes_left() as u64 + 1;
+        let left = self.words.feed.bytes_left() + 1;
         if element.count.saturating_mul(least) > left {
             let expected = format!(
                 "at most {} rows of element {}, which is what fits the file",
@@ -229,24 +243,30 @@ impl<'a> Body<'a> {
 
     #[inline]
     fn number(&mut self, kind: Kind) -> Result<f64, Fault> {
-        match self {
-            Body::Text(words) => words.number(),
-            Body::Binary { bytes, at, big } => {
-                let number = match kind {
-                    Kind::I8 => take(bytes, *at, *big).map(|b| f64::from(i8::from_le_bytes(b))),
-                    Kind::U8 => take(bytes, *at, *big).map(|b| f64::from(u8::from_le_bytes(b))),
-                    Kind::I16 => take(bytes, *at, *big).map(|b| f64::from(i16::from_le_bytes(b))),
-                    Kind::U16 => take(bytes, *at, *big).map(|b| f64::from(u16::from_le_bytes(b))),
-                    Kind::I32 => take(bytes, *at, *big).map(|b| f64::from(i32::from_le_bytes(b))),
-                    Kind::U32 => take(bytes, *at, *big).map(|b| f64::from(u32::from_le_bytes(b))),
-                    Kind::F32 => take(bytes, *at, *big).map(|b| f64::from(f32::from_le_bytes(b))),
-                    Kind::F64 => take(bytes, *at, *big).map(f64::from_le_bytes),
-                };
-                let place = Place::Byte(*at as u64);
-                *at += kind.bytes();
-                number.ok_or_else(|| Fault::new(place, "a number", "the end of the file"))
-            }
+        if self.format == Format::Ascii {
+            return self.words.number();
         }
+        let number = match kind {
+            Kind::I8 => self.take().map(|b| f64::from(i8::from_le_bytes(b))),
+            Kind::U8 => self.take().map(|b| f64::from(u8::from_le_bytes(b))),
+            Kind::I16 => self.take().map(|b| f64::from(i16::from_le_bytes(b))),
+            Kind::U16 => self.take().map(|b| f64::from(u16::from_le_bytes(b))),
+            Kind::I32 => self.take().map(|b| f64::from(i32::from_le_bytes(b))),
+            Kind::U32 => self.take().map(|b| f64::from(u32::from_le_bytes(b))),
+            Kind::F32 => self.take().map(|b| f64::from(f32::from_le_bytes(b))),
+            Kind::F64 => self.take().map(f64::from_le_bytes),
+        };
+        number.ok_or_else(|| Fault::new(self.place(), "a number", "the end of the file"))
+    }
+
+    /// The next `N` bytes, in little-endian order.
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let mut taken: [u8; N] = self.words.feed.take()?;
+        if self.format == Format::BigEndian {
+            taken.reverse();
+        }
+        Some(taken)
     }
 
     /// A whole number from 0 to `most`.
@@ -256,34 +276,21 @@ impl<'a> Body<'a> {
         if number >= 0.0 && number <= most as f64 && number.fract() == 0.0 {
             return Ok(number as u32);
         }
-        let place = if let Body::Text(words) = self { words.place() } else { before };
+        let place = if self.format == Format::Ascii { self.place() } else { before };
         Err(Fault::new(place, format!("{what} from 0 to {most}"), number.to_string()))
     }
 }
 
-/// The next `N` bytes, in little-endian order.
-#[inline]
-fn take<const N: usize>(bytes: &[u8], at: usize, big: bool) -> Option<[u8; N]> {
-    let mut taken: [u8; N] = bytes.get(at..at.checked_add(N)?)?.try_into().ok()?;
-    if big {
-        taken.reverse();
-    }
-    Some(taken)
-}
-
-/// What the wanted properties held.
-#[derive(Default)]
-struct Parts {
-    positions: Vec<[f64; 3]>,
+/// Reads the elements of a body.
+struct Reader<'a, F> {
+    faces: &'a mut F,
+    /// Of the face at hand.
     corners: Vec<u32>,
-    arities: Vec<u32>,
-    /// Places in `positions` that the format can't hold, and where they stood in the file.
-    misfits: Vec<(u32, Place, f64)>,
     triangles: u64,
 }
 
-impl Parts {
-    fn read_element(&mut self, element: &Element, body: &mut Body) -> Result<(), Fault> {
+impl<F: Faces> Reader<'_, F> {
+    fn read_element<R: Read>(&mut self, element: &Element, body: &mut Body<R>) -> Result<(), Halt> {
         if element.properties.is_empty() {
             return Ok(());
         }
@@ -302,8 +309,8 @@ impl Parts {
                     (None, Role::Coordinate(axis)) => {
                         position[axis] = body.number(property.kind)?;
                         if !coordinate_fits(position[axis]) {
-                            let place = if let Body::Text(words) = body { words.place() } else { place };
-                            self.misfits.push((self.positions.len() as u32, place, position[axis]));
+                            let place = if body.format == Format::Ascii { body.place() } else { place };
+                            self.faces.misfit(place, position[axis])?;
                         }
                     }
                     (None, _) => {
@@ -312,43 +319,85 @@ impl Parts {
                 }
             }
             if is_vertex {
-                if self.positions.len() as u64 == MAX_VERTICES {
-                    return Err(Fault::Limit { place: body.place(), most: MAX_VERTICES, what: "vertices" });
+                if self.faces.vertices() == MAX_VERTICES {
+                    let (place, most) = (body.place(), MAX_VERTICES);
+                    return Err(Fault::Limit { place, most, what: "vertices" }.into());
                 }
-                self.positions.push(position);
+                self.faces.vertex(position)?;
             }
         }
         Ok(())
     }
 
-    fn read_face(&mut self, count: Kind, kind: Kind, body: &mut Body) -> Result<(), Fault> {
+    fn read_face<R: Read>(&mut self, count: Kind, kind: Kind, body: &mut Body<R>) -> Result<(), Halt> {
         let place = body.place();
         let arity = body.whole(count, u64::from(u32::MAX), "a number of corners")?;
         if arity < 3 {
-            return Err(Fault::new(place, "a face of at least three vertices", arity.to_string()));
+            return Err(Fault::new(place, "a face of at least three vertices", arity.to_string()).into());
         }
         if arity as usize > MAX_CORNERS {
-            return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" });
+            return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" }.into());
         }
         self.triangles += u64::from(arity) - 2;
         if self.triangles > MAX_TRIANGLES {
-            return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" });
+            return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" }.into());
         }
         // Where the vertices come first, a wrong number is reported where it stands.
-        let vertices = self.positions.len() as u64;
+        let vertices = self.faces.vertices();
         let last = if vertices > 0 { vertices - 1 } else { MAX_VERTICES - 1 };
+        self.corners.clear();
         for _ in 0..arity {
             self.corners.push(body.whole(kind, last, "a vertex number")?);
         }
-        self.arities.push(arity);
+        self.faces.face(&self.corners)
+    }
+}
+
+/// What a vertex number beyond the last is told as.
+pub(crate) fn out_of_range(vertices: u64, corner: u32) -> Fault {
+    Fault::new(Place::File, format!("vertex numbers below {vertices}"), corner.to_string())
+}
+
+/// A whole file in memory.
+#[derive(Default)]
+struct Parts {
+    positions: Vec<[f64; 3]>,
+    corners: Vec<u32>,
+    arities: Vec<u32>,
+    /// Places in `positions` that the format can't hold, and where the first such coordinate stood in the file.
+    misfits: Vec<(u32, Place, f64)>,
+}
+
+impl Faces for Parts {
+    fn vertices(&self) -> u64 {
+        self.positions.len() as u64
+    }
+
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt> {
+        self.positions.push(position);
         Ok(())
     }
 
+    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt> {
+        let vertex = self.positions.len() as u32;
+        if self.misfits.last().is_none_or(|last| last.0 != vertex) {
+            self.misfits.push((vertex, place, found));
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, corners: &[u32]) -> Result<(), Halt> {
+        self.corners.extend_from_slice(corners);
+        self.arities.push(corners.len() as u32);
+        Ok(())
+    }
+}
+
+impl Parts {
     fn finish(self) -> Result<Mesh, Fault> {
         let vertices = self.positions.len();
         if let Some(corner) = self.corners.iter().find(|&&corner| corner as usize >= vertices) {
-            let expected = format!("vertex numbers below {vertices}");
-            return Err(Fault::new(Place::File, expected, corner.to_string()));
+            return Err(out_of_range(vertices as u64, *corner));
         }
         if !self.misfits.is_empty() {
             let misfit = |corner| self.misfits.binary_search_by_key(corner, |misfit| misfit.0).ok();

@@ -56,7 +56,7 @@ pub(crate) fn triangulate(
 
 /// Scratch memory for cutting one polygon after another.
 #[derive(Default)]
-struct Cutter {
+pub(crate) struct Cutter {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     ears: Vec<u32>,
@@ -64,6 +64,22 @@ struct Cutter {
 }
 
 impl Cutter {
+    /// Cuts a polygon given by the positions of its corners, and gives the triangles one after the other, as places
+    /// among the corners.
+    pub(crate) fn cut_polygon<E>(
+        &mut self,
+        corners: &[[f64; 3]],
+        mut give: impl FnMut([usize; 3]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        if corners.len() == 3 {
+            return give([0, 1, 2]);
+        }
+        let polygon: Vec<u32> = (0..corners.len() as u32).collect();
+        let mut triangles = Vec::new();
+        self.cut(corners, &polygon, &mut triangles);
+        triangles.into_iter().try_for_each(|triangle| give(triangle.map(|corner| corner as usize)))
+    }
+
     fn cut(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
         match *polygon {
             [] | [_] | [_, _] => {}

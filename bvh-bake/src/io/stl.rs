@@ -6,31 +6,60 @@
 //! ignored, since exporters write some; a file shorter than its count, or text that ends inside a solid, is
 //! refused. Normals are ignored.
 
-use super::error::{Fault, Place, excerpt};
-use super::text::{Lines, Words};
-use super::{COORDINATE, next_ids};
+use super::error::{Fault, Halt, Place, excerpt};
+use super::feed::{Feed, Words};
+use super::text::Lines;
+use super::{COORDINATE, next_ids, text};
 use crate::mesh::{MAX_VERTICES, Mesh, Object, coordinate_fits};
 use std::hash::BuildHasher;
+use std::io::Read;
 
 /// Bytes of a binary file before its first triangle: 80 of header, 4 of count.
 const HEAD: usize = 84;
 /// Bytes of a binary triangle: normal, three vertices, two bytes of attributes.
 const TRIANGLE: usize = 50;
+/// Bytes that tell text from binary.
+const TELLING: usize = 1024;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Fault> {
-    if is_ascii(bytes) && !is_exact_binary(bytes) { read_ascii(bytes) } else { read_binary(bytes) }
+/// Takes the solids of a file in order.
+pub(crate) trait Solids {
+    /// A solid begins, of about so many triangles.
+    fn begin(&mut self, name: String, expected: usize) -> Result<(), Halt>;
+    /// The next triangle of the solid.
+    fn triangle(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Halt>;
+    /// The solid is complete.
+    fn end(&mut self) -> Result<(), Halt>;
 }
 
-/// Whether the file is as long as a binary STL of its count is.
-pub(super) fn is_exact_binary(bytes: &[u8]) -> bool {
-    binary_count(bytes)
-        .is_some_and(|count| HEAD as u64 + u64::from(count) * TRIANGLE as u64 == bytes.len() as u64)
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Halt> {
+    let mut joined = Joined::default();
+    stream(Feed::of_bytes(bytes), &mut joined)?;
+    Ok(joined.mesh)
+}
+
+/// Reads a file from its beginning to its end.
+pub(crate) fn stream<R: Read>(mut feed: Feed<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+    let length = feed.length();
+    let head = feed.peek(TELLING);
+    if is_ascii(head) && !is_exact_binary(head, length) {
+        let mut words = Words::new(feed);
+        let result = read_ascii(&mut words, solids);
+        words.feed.finish(result)
+    } else {
+        let result = read_binary(&mut feed, solids);
+        feed.finish(result)
+    }
+}
+
+/// Whether a file that starts with `head` and has `length` bytes is as long as a binary STL of its count is.
+pub(super) fn is_exact_binary(head: &[u8], length: u64) -> bool {
+    binary_count(head).is_some_and(|count| HEAD as u64 + u64::from(count) * TRIANGLE as u64 == length)
 }
 
 /// Whether the file starts like STL text.
 pub(super) fn is_ascii(bytes: &[u8]) -> bool {
-    let head = &bytes[..bytes.len().min(1024)];
-    let first = Words::new(Lines::new(head)).next();
+    let head = &bytes[..bytes.len().min(TELLING)];
+    let first = Lines::new(head).find_map(|line| text::words(line).next());
     !head.contains(&0) && first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
@@ -39,66 +68,72 @@ fn binary_count(bytes: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(count.try_into().ok()?))
 }
 
-fn read_binary(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let Some(count) = binary_count(bytes) else {
-        let found = format!("{} bytes", bytes.len());
-        return Err(Fault::new(Place::File, "STL text, or at least 84 bytes of binary STL", found));
+fn read_binary<R: Read>(feed: &mut Feed<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+    let Some(count) = binary_count(feed.peek(HEAD)) else {
+        let found = format!("{} bytes", feed.length());
+        return Err(Fault::new(Place::File, "STL text, or at least 84 bytes of binary STL", found).into());
     };
-    let body = &bytes[HEAD..];
-    let triangles = body.as_chunks::<TRIANGLE>().0;
-    let Some(triangles) = triangles.get(..count as usize) else {
-        let room = format!("a count of at most {} triangles, which is what fits the file", triangles.len());
-        return Err(Fault::new(Place::Byte(HEAD as u64 - 4), room, count.to_string()));
-    };
-    let mut solid = Solid::new(String::new(), triangles.len());
-    for (place, triangle) in triangles.iter().enumerate() {
+    let room = (feed.length() - HEAD as u64) / TRIANGLE as u64;
+    if u64::from(count) > room {
+        let expected = format!("a count of at most {room} triangles, which is what fits the file");
+        return Err(Fault::new(Place::Byte(HEAD as u64 - 4), expected, count.to_string()).into());
+    }
+    feed.skip(HEAD);
+    solids.begin(String::new(), count as usize)?;
+    for place in 0..u64::from(count) {
+        let Some(triangle) = feed.take::<TRIANGLE>() else {
+            let byte = HEAD as u64 + place * TRIANGLE as u64;
+            return Err(Fault::new(Place::Byte(byte), "a triangle", "the end of the file").into());
+        };
         let corners = triangle[12..48].as_chunks::<4>().0;
         for (corner, at) in corners.iter().zip(0..) {
             let value = f32::from_le_bytes(*corner);
             if !coordinate_fits(value.into()) {
-                let byte = HEAD + place * TRIANGLE + 12 + 4 * at;
-                return Err(Fault::new(Place::Byte(byte as u64), COORDINATE, value.to_string()));
+                let byte = HEAD as u64 + place * TRIANGLE as u64 + 12 + 4 * at;
+                return Err(Fault::new(Place::Byte(byte), COORDINATE, value.to_string()).into());
             }
         }
         let at =
             |corner: usize| [0, 1, 2].map(|axis| f64::from(f32::from_le_bytes(corners[3 * corner + axis])));
-        solid.push([at(0), at(1), at(2)])?;
+        solids.triangle([at(0), at(1), at(2)])?;
     }
-    Ok(Mesh { objects: vec![solid.finish(&mut 0)?] })
+    solids.end()
 }
 
-fn read_ascii(bytes: &[u8]) -> Result<Mesh, Fault> {
+fn read_ascii<R: Read>(words: &mut Words<R>, solids: &mut impl Solids) -> Result<(), Halt> {
     const SOLID: &str = "facet or endsolid";
-    let mut words = Words::new(Lines::new(bytes));
-    let mut mesh = Mesh::default();
-    let mut next_id = 0;
     while let Some(word) = words.next() {
+        let word = words.text(word);
         if !word.eq_ignore_ascii_case(b"solid") {
-            return Err(Fault::new(words.place(), "solid", excerpt(word)));
+            return Err(Fault::new(words.place(), "solid", excerpt(word)).into());
         }
-        let mut solid = Solid::new(String::from_utf8_lossy(words.rest_of_line()).into_owned(), 0);
+        let name = words.rest_of_line();
+        let name = name.map(|name| String::from_utf8_lossy(words.text(name).trim_ascii()).into_owned());
+        solids.begin(name.unwrap_or_default(), 0)?;
         loop {
             let word = words.expect(SOLID)?;
+            let word = words.text(word);
             if word.eq_ignore_ascii_case(b"endsolid") {
                 words.rest_of_line();
                 break;
             } else if !word.eq_ignore_ascii_case(b"facet") {
-                return Err(Fault::new(words.place(), SOLID, excerpt(word)));
+                return Err(Fault::new(words.place(), SOLID, excerpt(word)).into());
             }
-            solid.push(read_facet(&mut words)?)?;
+            solids.triangle(read_facet(words)?)?;
         }
-        mesh.objects.push(solid.finish(&mut next_id)?);
+        solids.end()?;
     }
-    Ok(mesh)
+    Ok(())
 }
 
 /// Reads from behind `facet` to behind `endfacet`.
-fn read_facet(words: &mut Words) -> Result<[[f64; 3]; 3], Fault> {
+fn read_facet<R: Read>(words: &mut Words<R>) -> Result<[[f64; 3]; 3], Fault> {
     keyword(words, "normal")?;
     // Whatever stands for the normal is skipped, three numbers or not.
     let mut skipped = 0;
     loop {
         let word = words.expect("outer loop")?;
+        let word = words.text(word);
         if word.eq_ignore_ascii_case(b"outer") {
             break;
         }
@@ -123,12 +158,40 @@ fn read_facet(words: &mut Words) -> Result<[[f64; 3]; 3], Fault> {
     Ok(corners)
 }
 
-fn keyword(words: &mut Words, expected: &'static str) -> Result<(), Fault> {
+fn keyword<R: Read>(words: &mut Words<R>, expected: &'static str) -> Result<(), Fault> {
     let word = words.expect(expected)?;
+    let word = words.text(word);
     if word.eq_ignore_ascii_case(expected.as_bytes()) {
         Ok(())
     } else {
         Err(Fault::new(words.place(), expected, excerpt(word)))
+    }
+}
+
+/// Makes a mesh of which equal vertices are one.
+#[derive(Default)]
+struct Joined {
+    mesh: Mesh,
+    solid: Option<Solid>,
+    next_id: u32,
+}
+
+impl Solids for Joined {
+    fn begin(&mut self, name: String, expected: usize) -> Result<(), Halt> {
+        self.solid = Some(Solid::new(name, expected));
+        Ok(())
+    }
+
+    fn triangle(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Halt> {
+        self.solid.as_mut().map_or(Ok(()), |solid| solid.push(corners))?;
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), Halt> {
+        if let Some(solid) = self.solid.take() {
+            self.mesh.objects.push(solid.finish(&mut self.next_id)?);
+        }
+        Ok(())
     }
 }
 

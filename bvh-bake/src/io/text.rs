@@ -1,9 +1,7 @@
-//! Lines and words of a text file, with the line numbers that errors need.
+//! Lines and words of a text in memory, with the line numbers that errors need.
 //!
 //! A line ends at LF, CR LF or a CR alone: some files use the last, and the others never hold a CR inside a
 //! line.
-
-use super::error::{Fault, Place, excerpt};
 
 /// Blanks separate words within a line.
 pub(crate) fn is_blank(byte: u8) -> bool {
@@ -33,9 +31,9 @@ impl<'a> Lines<'a> {
         Lines { rest: text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text), number: 0 }
     }
 
-    /// What follows the line last given.
-    pub(crate) fn rest(&self) -> &'a [u8] {
-        self.rest
+    /// A text that goes on behind so many lines.
+    pub(crate) fn continued(text: &'a [u8], number: u64) -> Self {
+        Lines { rest: text, number }
     }
 }
 
@@ -56,57 +54,6 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// Walks the words of a file across lines.
-pub(crate) struct Words<'a> {
-    lines: Lines<'a>,
-    line: &'a [u8],
-}
-
-impl<'a> Words<'a> {
-    pub(crate) fn new(lines: Lines<'a>) -> Self {
-        Words { lines, line: &[] }
-    }
-
-    /// The line of the word last given.
-    pub(crate) fn place(&self) -> Place {
-        Place::Line(self.lines.number)
-    }
-
-    /// The rest of the current line, blanks trimmed; it counts as read.
-    pub(crate) fn rest_of_line(&mut self) -> &'a [u8] {
-        std::mem::take(&mut self.line).trim_ascii()
-    }
-
-    /// The bytes that are left.
-    pub(crate) fn bytes_left(&self) -> usize {
-        self.line.len() + self.lines.rest().len()
-    }
-
-    /// The next word.
-    pub(crate) fn next(&mut self) -> Option<&'a [u8]> {
-        loop {
-            if let Some(start) = self.line.iter().position(|&byte| !is_blank(byte)) {
-                let line = &self.line[start..];
-                let end = line.iter().position(|&byte| is_blank(byte)).unwrap_or(line.len());
-                self.line = &line[end..];
-                return Some(&line[..end]);
-            }
-            self.line = self.lines.next()?;
-        }
-    }
-
-    /// The next word, or a fault that says what should have come.
-    pub(crate) fn expect(&mut self, expected: &'static str) -> Result<&'a [u8], Fault> {
-        self.next().ok_or_else(|| Fault::new(self.place(), expected, "the end of the file"))
-    }
-
-    /// The next word as a number.
-    pub(crate) fn number(&mut self) -> Result<f64, Fault> {
-        let word = self.expect("a number")?;
-        number(word).ok_or_else(|| Fault::new(self.place(), "a number", excerpt(word)))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,13 +64,5 @@ mod tests {
         let all: Vec<_> = lines.by_ref().collect();
         assert_eq!(all, [&b"a"[..], b"b", b"c", b"", b"d"]);
         assert_eq!(lines.number, 5);
-    }
-
-    #[test]
-    fn words_cross_lines() {
-        let mut all = Words::new(Lines::new(b" a  b\n\n\tc \r\nd"));
-        let read: Vec<_> = std::iter::from_fn(|| all.next().map(|word| (word[0], all.place()))).collect();
-        let line = Place::Line;
-        assert_eq!(read, [(b'a', line(1)), (b'b', line(1)), (b'c', line(3)), (b'd', line(4))]);
     }
 }

@@ -4,23 +4,21 @@
 //! to its first root; the tree this gives is laid out as wished, and then pages are taken in that order, but
 //! each only after all pages that link to it.
 
-use super::{PagePlan, Place};
 use crate::ablation::PageOrder;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
-/// The pages in the order wished for; the first stays the root's.
-pub(super) fn arrange(pages: Vec<PagePlan>, places: &[Place], order: PageOrder) -> Vec<PagePlan> {
-    let tree = PageTree::new(&pages, places);
+/// Puts pages into the order wished for; returns their numbers. The first stays the root's. For each page `links` has
+/// the page and the root that each of its links leads to.
+pub(crate) fn arrange(links: &[Vec<(usize, u8)>], order: PageOrder) -> Vec<usize> {
+    let tree = PageTree::new(links);
     let wished = match order {
-        PageOrder::Levels => return pages,
+        PageOrder::Levels => return (0..links.len()).collect(),
         PageOrder::DepthFirst => tree.depth_first(),
         PageOrder::BreadthFirst => tree.breadth_first(),
         PageOrder::VanEmdeBoas => tree.van_emde_boas(),
     };
-    let order = tree.parents_first(&wished);
-    let mut pages: Vec<Option<PagePlan>> = pages.into_iter().map(Some).collect();
-    order.into_iter().filter_map(|page| pages[page].take()).collect()
+    tree.parents_first(&wished)
 }
 
 struct PageTree {
@@ -31,15 +29,12 @@ struct PageTree {
 }
 
 impl PageTree {
-    fn new(pages: &[PagePlan], places: &[Place]) -> Self {
-        let mut tree = Self { links: Vec::new(), children: vec![Vec::new(); pages.len()] };
-        for (number, page) in pages.iter().enumerate() {
-            let to = page.remotes.iter().map(|&treelet| places[treelet as usize]);
-            let first = to.clone().filter(|place| place.slot == 0);
-            tree.children[number].extend(first.map(|place| place.page as usize));
-            tree.links.push(to.map(|place| place.page as usize).collect());
-        }
-        tree
+    fn new(links: &[Vec<(usize, u8)>]) -> Self {
+        let first = |links: &Vec<(usize, u8)>| {
+            links.iter().filter(|(_, root)| *root == 0).map(|(page, _)| *page).collect()
+        };
+        let pages = |links: &Vec<(usize, u8)>| links.iter().map(|(page, _)| *page).collect();
+        Self { links: links.iter().map(pages).collect(), children: links.iter().map(first).collect() }
     }
 
     fn depth_first(&self) -> Vec<usize> {

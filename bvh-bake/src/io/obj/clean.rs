@@ -38,9 +38,8 @@ pub(super) struct Cleaner<'a> {
     triangles: u64,
     /// The statement that names objects: `o` if there is one in the file, else `g`.
     naming: u8,
-    /// The names of the objects, by number.
-    pub(super) names: Vec<String>,
-    numbers: HashMap<Vec<u8>, usize>,
+    /// The names of the objects.
+    pub(super) names: Names,
     /// Whether the current object has been announced.
     announced: bool,
     /// What is wrong with the file; then the parser is told that reading failed.
@@ -51,7 +50,7 @@ impl<'a> Cleaner<'a> {
     pub(super) fn new(text: &'a [u8]) -> Self {
         Cleaner {
             text,
-            statements: Statements::new(text),
+            statements: Statements::new(Lines::new(text)),
             pass: Pass::Vertices,
             clean: Vec::with_capacity(2 * BLOCK),
             taken: 0,
@@ -60,8 +59,7 @@ impl<'a> Cleaner<'a> {
             misfits: Vec::new(),
             triangles: 0,
             naming: b'g',
-            names: Vec::new(),
-            numbers: HashMap::new(),
+            names: Names::default(),
             announced: false,
             fault: None,
         }
@@ -78,7 +76,7 @@ impl<'a> Cleaner<'a> {
                 (Pass::Vertices, None) => {
                     self.all_vertices = self.vertices;
                     self.vertices = 0;
-                    self.statements = Statements::new(self.text);
+                    self.statements = Statements::new(Lines::new(self.text));
                     self.pass = Pass::Faces;
                 }
                 (Pass::Faces, None) => {
@@ -101,23 +99,13 @@ impl<'a> Cleaner<'a> {
 
     /// Passes on the first three numbers of a vertex. A fourth is a weight or the first of a colour.
     fn vertex(&mut self) -> Result<(), Fault> {
-        const EXPECTED: &str = "three numbers after v";
         let line = self.statements.number;
         if self.vertices == MAX_VERTICES {
             return Err(Fault::Limit { place: Place::Line(line), most: MAX_VERTICES, what: "vertices" });
         }
-        let mut coordinates = words(self.statements.operands());
-        let mut fits = true;
+        let (words, fits) = read_vertex(self.statements.operands(), line)?;
         self.clean.push(b'v');
-        for given in 0..3 {
-            let Some(word) = coordinates.next() else {
-                return Err(Fault::new(Place::Line(line), EXPECTED, given.to_string()));
-            };
-            if !is_plain_number(word) {
-                let value =
-                    number(word).ok_or_else(|| Fault::new(Place::Line(line), EXPECTED, excerpt(word)))?;
-                fits &= coordinate_fits(value);
-            }
+        for word in words {
             self.clean.push(b' ');
             self.clean.extend_from_slice(word);
         }
@@ -139,17 +127,7 @@ impl<'a> Cleaner<'a> {
         self.clean.push(b'f');
         let mut corners: u64 = 0;
         for word in words(self.statements.operands()).take_while(|word| word[0] != b'#') {
-            let index = Index::parse(word).ok_or_else(|| {
-                Fault::new(Place::Line(line), "vertex numbers such as 7, 7/1 or 7//1", excerpt(word))
-            })?;
-            let vertex = index.resolve(self.vertices).filter(|&vertex| vertex < self.all_vertices);
-            let Some(vertex) = vertex else {
-                let expected = match index.number {
-                    ..0 => format!("a number that counts back over at most {} vertices", self.vertices),
-                    _ => format!("a vertex number from 1 to {}", self.all_vertices),
-                };
-                return Err(Fault::new(Place::Line(line), expected, excerpt(word)));
-            };
+            let (index, vertex) = read_corner(word, line, self.vertices, self.all_vertices)?;
             if !self.misfits.is_empty()
                 && let Ok(place) = self.misfits.binary_search_by_key(&vertex, |misfit| misfit.0)
             {
@@ -167,22 +145,7 @@ impl<'a> Cleaner<'a> {
             corners += 1;
         }
         self.clean.push(b'\n');
-        if corners < 3 {
-            return Err(Fault::new(
-                Place::Line(line),
-                "a face of at least three vertices",
-                corners.to_string(),
-            ));
-        }
-        if corners > MAX_CORNERS as u64 {
-            let most = MAX_CORNERS as u64;
-            return Err(Fault::Limit { place: Place::Line(line), most, what: "vertices in a face" });
-        }
-        self.triangles += corners - 2;
-        if self.triangles > MAX_TRIANGLES {
-            return Err(Fault::Limit { place: Place::Line(line), most: MAX_TRIANGLES, what: "triangles" });
-        }
-        Ok(())
+        check_face(corners, line, &mut self.triangles)
     }
 
     fn quote_line(&self, number: u64) -> String {
@@ -197,17 +160,81 @@ impl<'a> Cleaner<'a> {
 
     /// Makes the object of this name the current one; objects are passed on by number.
     fn enter(&mut self, name: &[u8]) {
-        let next = self.names.len();
-        let number = match self.numbers.get(name) {
-            Some(&number) => number,
-            None => {
-                self.names.push(String::from_utf8_lossy(name).into_owned());
-                self.numbers.insert(name.to_vec(), next);
-                next
-            }
-        };
+        let number = self.names.number(name);
         let _ = writeln!(self.clean, "o {number}");
         self.announced = true;
+    }
+}
+
+/// The first three words behind `v`, which are numbers, and whether the format can hold them.
+pub(super) fn read_vertex(operands: &[u8], line: u64) -> Result<([&[u8]; 3], bool), Fault> {
+    const EXPECTED: &str = "three numbers after v";
+    let mut coordinates = words(operands);
+    let mut read: [&[u8]; 3] = [b""; 3];
+    let mut fits = true;
+    for given in 0..3 {
+        let Some(word) = coordinates.next() else {
+            return Err(Fault::new(Place::Line(line), EXPECTED, given.to_string()));
+        };
+        if !is_plain_number(word) {
+            let value = number(word).ok_or_else(|| Fault::new(Place::Line(line), EXPECTED, excerpt(word)))?;
+            fits &= coordinate_fits(value);
+        }
+        read[given] = word;
+    }
+    Ok((read, fits))
+}
+
+/// A corner of a face with `above` vertices above it, of `all`: as written, and its vertex, counted from 0.
+pub(super) fn read_corner(word: &[u8], line: u64, above: u64, all: u64) -> Result<(Index<'_>, u64), Fault> {
+    let index = Index::parse(word).ok_or_else(|| {
+        Fault::new(Place::Line(line), "vertex numbers such as 7, 7/1 or 7//1", excerpt(word))
+    })?;
+    match index.resolve(above).filter(|&vertex| vertex < all) {
+        Some(vertex) => Ok((index, vertex)),
+        None => {
+            let expected = match index.number {
+                ..0 => format!("a number that counts back over at most {above} vertices"),
+                _ => format!("a vertex number from 1 to {all}"),
+            };
+            Err(Fault::new(Place::Line(line), expected, excerpt(word)))
+        }
+    }
+}
+
+/// Checks the number of corners of a face, and that of all triangles, which it adds to.
+pub(super) fn check_face(corners: u64, line: u64, triangles: &mut u64) -> Result<(), Fault> {
+    let place = Place::Line(line);
+    if corners < 3 {
+        return Err(Fault::new(place, "a face of at least three vertices", corners.to_string()));
+    }
+    if corners > MAX_CORNERS as u64 {
+        return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" });
+    }
+    *triangles += corners - 2;
+    if *triangles > MAX_TRIANGLES {
+        return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" });
+    }
+    Ok(())
+}
+
+/// The names of objects, each with the number of its first mention.
+#[derive(Default)]
+pub(super) struct Names {
+    /// By number.
+    pub(super) names: Vec<String>,
+    numbers: HashMap<Vec<u8>, usize>,
+}
+
+impl Names {
+    /// The number of a name, a new one if it is new.
+    pub(super) fn number(&mut self, name: &[u8]) -> usize {
+        if let Some(&number) = self.numbers.get(name) {
+            return number;
+        }
+        self.names.push(String::from_utf8_lossy(name).into_owned());
+        self.numbers.insert(name.to_vec(), self.names.len() - 1);
+        self.names.len() - 1
     }
 }
 
@@ -238,7 +265,7 @@ impl BufRead for Cleaner<'_> {
 
 /// The statements that matter.
 #[derive(Clone, Copy, PartialEq)]
-enum Keyword {
+pub(super) enum Keyword {
     Vertex,
     Face,
     Object,
@@ -246,27 +273,32 @@ enum Keyword {
 }
 
 /// Walks the statements, each of one line or of several joined by `\`.
-struct Statements<'a> {
+pub(super) struct Statements<'a> {
     lines: Lines<'a>,
     /// The line on which the current statement starts.
-    number: u64,
+    pub(super) number: u64,
     line: &'a [u8],
     joined: Vec<u8>,
     is_joined: bool,
 }
 
 impl<'a> Statements<'a> {
-    fn new(text: &'a [u8]) -> Self {
-        Statements { lines: Lines::new(text), number: 0, line: &[], joined: Vec::new(), is_joined: false }
+    pub(super) fn new(lines: Lines<'a>) -> Self {
+        Statements { lines, number: 0, line: &[], joined: Vec::new(), is_joined: false }
+    }
+
+    /// The line last read.
+    pub(super) fn line_number(&self) -> u64 {
+        self.lines.number
     }
 
     /// What follows the keyword.
-    fn operands(&self) -> &[u8] {
+    pub(super) fn operands(&self) -> &[u8] {
         if self.is_joined { &self.joined } else { self.line }
     }
 
     /// Goes to the next statement that matters.
-    fn advance(&mut self) -> Option<Keyword> {
+    pub(super) fn advance(&mut self) -> Option<Keyword> {
         loop {
             let line = self.lines.next()?;
             let start = line.iter().position(|&byte| !is_blank(byte)).unwrap_or(line.len());
@@ -309,7 +341,7 @@ impl<'a> Statements<'a> {
 }
 
 /// A corner of a face: its position number as written, without texture coordinates and normals.
-struct Index<'a> {
+pub(super) struct Index<'a> {
     digits: &'a [u8],
     number: i64,
 }

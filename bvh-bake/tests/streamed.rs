@@ -1,0 +1,187 @@
+//! Meshes that are read piece by piece: the same file, the same counts and the same errors as of meshes in memory.
+
+use bvh_bake::{BakeReport, FileOptions, Options, Outcome, bake_files};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The file's bytes and its vertices, or what is said of the input.
+type Told = Result<(Vec<u8>, u64), String>;
+
+fn bake(inputs: &[PathBuf], output: &Path, options: &Options, max_memory: Option<u64>) -> Told {
+    let file_options = FileOptions { force: true, max_memory, ..FileOptions::default() };
+    match bake_files(inputs, output, options, &file_options, &mut |_| ()) {
+        Ok(Outcome::Baked(report)) => {
+            let BakeReport { vertices, .. } = *report;
+            Ok((fs::read(output).unwrap(), vertices))
+        }
+        Ok(Outcome::UpToDate(_)) => unreachable!("every bake is forced"),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// Bakes a file both ways, apart and as one, and compares.
+    #[track_caller]
+    fn compare(&self, name: &str, bytes: &[u8]) -> Told {
+        let input = self.0.path().join(name);
+        fs::write(&input, bytes).unwrap();
+        let mut told = Err(String::new());
+        for split_objects in [false, true] {
+            let options = Options { split_objects, ..Options::default() };
+            let output = self.0.path().join("out.cbvh");
+            let inputs = std::slice::from_ref(&input);
+            let in_memory = bake(inputs, &output, &options, None);
+            told = bake(inputs, &output, &options, Some(100 << 20));
+            let text = String::from_utf8_lossy(&bytes[..bytes.len().min(300)]).into_owned();
+            assert!(told == in_memory, "{name}: {:?} {:?}\n{text}", told.err(), in_memory.err());
+        }
+        assert_eq!(fs::read_dir(self.0.path()).unwrap().count(), if told.is_ok() { 2 } else { 1 });
+        let _ = fs::remove_file(self.0.path().join("out.cbvh"));
+        fs::remove_file(input).unwrap();
+        told
+    }
+}
+
+const OBJ: &str = "# a comment\nv 0 0 0\nv 1 0 0 \\\r\n1\nv 1 1 0.1\rv 0 1 -0.0\nv 0.5 3 0\no a\nf 1 2 3 4\nf -5 -4 -2 -1\ng x\n\
+    o b\nf 1/2/3 2//1 3/4\no a\nf 1 2 3\nf 1 2 3\n\nv 7 7 7\nf 6 1 2 # end\nf 3 2 1 5 4\n";
+const STL: &str = "solid one two\nfacet normal 0 0 1 outer loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e-1 0\nendloop\nendfacet\n\
+    facet normal nan outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1e-1 5 endloop endfacet\nendsolid x\n\
+    solid\nFACET normal outer loop vertex 9 -0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid\n";
+const PLY: &str = "ply\nformat ascii 1.0\ncomment x\nelement vertex 5\nproperty float x\nproperty double y\nproperty float z\n\
+    property uchar red\nelement face 3\nproperty list uchar int vertex_indices\nend_header\n\
+    0 0 0 1\n1 0 0 2\n1 1.1 0 3 0 1 0\n4\n0.5 0.5 nan 5\n3 0 1 2\n4 0 1 2 3\n3 0 2 3\n";
+const PLY_FACES_FIRST: &str = "ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int vertex_index\n\
+    element vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+    3 0 1 2\n4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 1e3\n";
+
+fn binary_stl(triangles: u32) -> Vec<u8> {
+    let mut bytes = vec![b'x'; 80];
+    bytes.extend(triangles.to_le_bytes());
+    for i in 0..triangles {
+        bytes.extend([0; 12]);
+        let at = |k: u32| ((i * 7 + k * 13) % 11) as f32 * 0.37;
+        (0..9).for_each(|k| bytes.extend(at(k).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+#[test]
+fn good_files_bake_alike() {
+    let folder = Folder::new();
+    for (name, text) in
+        [("a.obj", OBJ), ("a.stl", STL), ("a.ply", PLY), ("b.ply", PLY_FACES_FIRST), ("a", PLY)]
+    {
+        folder.compare(name, text.as_bytes()).unwrap();
+        let crlf = text.replace('\r', "").replace('\n', "\r\n");
+        let _ = folder.compare(name, crlf.as_bytes());
+        let _ = folder.compare(name, text.replace('\n', "\r").as_bytes());
+        let _ = folder.compare(name, format!("\u{feff}{text}").as_bytes());
+    }
+    // A corner in the place of another, which cutting may leave out.
+    let twice = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 2 2 0\nv 1 3 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
+    folder.compare("d.obj", twice.as_bytes()).unwrap();
+    // Duplicates, too: all 11 kinds of triangles occur many times.
+    folder.compare("c.stl", &binary_stl(500)).unwrap();
+}
+
+#[test]
+fn long_files_bake_alike() {
+    let folder = Folder::new();
+    // Blocks of the readers end all over it, and vertices of all blocks meet in faces.
+    let count = 60_000;
+    let mut text = String::new();
+    let value = |i: u32| f64::from(i.wrapping_mul(0x9e37_79b9) >> 12) / 1000.0;
+    (0..count).for_each(|i| text += &format!("v {} {} {}\r\n", value(i), value(i + 1), value(3 * i)));
+    for i in 0..count / 2 {
+        if i % 10_000 == 0 {
+            text += &format!("o part{}\n", i / 20_000);
+        }
+        let at = |k: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(k * 77)) % count + 1;
+        text += &format!("f {} \\\n {} {}\n", at(0), at(1), -i64::from(at(2)));
+    }
+    let (_, vertices) = folder.compare("long.obj", text.as_bytes()).unwrap();
+    assert!(vertices > 50_000);
+    let broken = text + "f 1 2 99999999\n";
+    let line = broken.lines().count();
+    assert!(folder.compare("long.obj", broken.as_bytes()).unwrap_err().contains(&format!("line {line}:")));
+}
+
+#[test]
+fn bad_files_are_told_alike() {
+    let folder = Folder::new();
+    let cases: [(&str, &str); 26] = [
+        ("a.obj", ""),
+        ("a.obj", "v 0 0 0\n"),
+        ("a.obj", "v 0 0\nf 1 1 1"),
+        ("a.obj", "v 0 0 x\nf 1 1 1"),
+        ("a.obj", "v 0 0 0\nf 1 1"),
+        ("a.obj", "v 0 0 0\nf 1 1 2"),
+        ("a.obj", "v 0 0 0\nf 1 1 -2"),
+        ("a.obj", "v 0 0 0\nf 1 1 a"),
+        ("a.obj", "v 0 0 0\n v 1e39 0 0 # far\nv nan 0 0\nf 1 1 1\nf 1 1 3\nf 1 2 7"),
+        ("a.obj", "v 0 0 0\nv 1e300 0 0\nf 1 1 2 x"),
+        ("a.obj", "v 0 0 0\nv 1e300 0 0\nf 1 2"),
+        ("a.obj", "v 0 0 0\nv 1e300 0 0\nf 1 x 2"),
+        ("a.stl", ""),
+        ("a.stl", "solid\n"),
+        ("a.stl", "solid\nendsolid\n"),
+        ("a.stl", "solid\nfacet normal 0 0 0 0 outer loop"),
+        ("a.stl", "solid\nfacet normal 0 0 0\nouter loop\nvertex 1 2 1e99 vertex"),
+        ("a.stl", "solid a\nfacet normal 0 0 0\nouter loop\nvertex 1 2 3 vertex x"),
+        ("a.stl", "solid a\nendsolid\nliquid"),
+        ("a.ply", ""),
+        ("a.ply", "ply\n"),
+        ("a.ply", "ply\nformat ascii 1.0\nend_header\n"),
+        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9999999\nproperty float x\nend_header\n"),
+        ("a.gltf", "{}"),
+        ("a.xyz", "0 0 0"),
+        ("a", "nothing known"),
+    ];
+    for (name, text) in cases {
+        assert!(folder.compare(name, text.as_bytes()).is_err(), "{name}: {text}");
+    }
+    for (from, to) in [("3 0 2 3", "3 0 2 4"), ("3 0 2 3", "3 0 2 5"), ("3 0 2 3", "2 0 2"), ("nan 5", "nan")]
+    {
+        assert!(folder.compare("a.ply", PLY.replace(from, to).as_bytes()).is_err(), "{to}");
+    }
+    let faces_first = PLY_FACES_FIRST.replace("1 1 0\n", "1 nan inf\n");
+    assert!(folder.compare("a.ply", faces_first.as_bytes()).unwrap_err().contains("line 14"));
+    assert!(folder.compare("a.ply", PLY_FACES_FIRST.replace("4 0 1 2 3", "4 0 9 2 8").as_bytes()).is_err());
+}
+
+/// Files cut short and with changed bytes.
+#[test]
+fn damaged_files_are_told_alike() {
+    let folder = Folder::new();
+    let stl = binary_stl(5);
+    let files: [(&str, &[u8]); 5] = [
+        ("a.obj", OBJ.as_bytes()),
+        ("a.stl", STL.as_bytes()),
+        ("a.ply", PLY.as_bytes()),
+        ("b.ply", PLY_FACES_FIRST.as_bytes()),
+        ("b.stl", &stl),
+    ];
+    let mut state = 1u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as usize
+    };
+    for (name, bytes) in files {
+        for _ in 0..30 {
+            let _ = folder.compare(name, &bytes[..random() % bytes.len()]);
+            let mut changed = bytes.to_vec();
+            for _ in 0..1 + random() % 3 {
+                let at = random() % changed.len();
+                changed[at] = b"0 9-\n\r\\.ex\0\xff"[random() % 12];
+            }
+            let _ = folder.compare(name, &changed);
+        }
+    }
+}
