@@ -30,7 +30,7 @@ pub(super) const STYLE: &str = "\
 .plot .packed { stroke: #b35a00; } .plot .packed.front { fill: #b35a00; }
 .plot .quantized { stroke: #00805c; } .plot .quantized.front { fill: #00805c; }
 @media (prefers-color-scheme: dark) {
-.plot text { fill: #eaeaea; } .plot .paper, .plot .line { fill: none; stroke-width: 1.2; } .plot .mark { fill: #16181b; }
+.plot text { fill: #eaeaea; } .plot .paper, .plot .mark { fill: #16181b; }
 .plot .frame, .plot .tick { stroke: #444; } .plot .front-line { stroke: #eaeaea; }
 .plot .f32 { stroke: #56b4e9; } .plot .f32.front { fill: #56b4e9; }
 .plot .packed { stroke: #e69f00; } .plot .packed.front { fill: #e69f00; }
