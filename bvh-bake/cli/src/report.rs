@@ -1,6 +1,7 @@
-//! `cbvh report`: speed against error over all layouts, or questions whose answers are known.
+//! `cbvh report`: speed against error over all layouts, speed against size, or questions whose answers are known.
 
 mod answers;
+mod axes;
 mod cold;
 mod csv;
 mod files;
@@ -15,6 +16,7 @@ mod pareto;
 mod pin;
 mod plot;
 mod row;
+mod scaling;
 mod scatter;
 mod source;
 mod speed;
@@ -27,6 +29,7 @@ use crate::error::Failure;
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
     match &arguments.pairs {
         Some(pairs) => speed::run(pairs, arguments),
+        None if arguments.scaling => scaling::run(arguments),
         // The command line has made sure of --hard.
         None => hard::run(&arguments.out, arguments.peers.as_deref()),
     }

@@ -63,6 +63,7 @@ fn wrong_usage_is_1() {
         &["query", "cube.obj", "cube.obj", ","],
         &["report"],
         &["report", "--hard"],
+        &["report", "--scaling"],
         &["report", "--out", "r"],
     ];
     for case in cases {

@@ -2,9 +2,9 @@
 
 mod common;
 
+use common::documents::{elements, number, same_figures};
 use common::{cbvh_in, names, poses, torus};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -15,58 +15,6 @@ const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
     command.arg("report").args(arguments).current_dir(directory).env_remove("CBVH_ISA").output().unwrap()
-}
-
-/// Lines of comma-separated values, each as a map by name. No field here has a comma.
-fn rows_of(csv: &str) -> Vec<BTreeMap<String, String>> {
-    let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    let header = lines.next().unwrap();
-    lines
-        .map(|fields| {
-            assert_eq!(fields.len(), header.len(), "{fields:?}");
-            header.iter().cloned().zip(fields).collect()
-        })
-        .collect()
-}
-
-/// An element: its name and attributes.
-type Element = (String, BTreeMap<String, String>);
-
-/// The elements of a document, all of which must be closed as XML wants it.
-fn elements(document: &str) -> Vec<Element> {
-    let (mut all, mut open) = (Vec::new(), Vec::new());
-    let mut rest = document;
-    while let Some(start) = rest.find('<') {
-        let end = start + rest[start..].find('>').expect("an end of the tag");
-        let tag = &rest[start + 1..end];
-        rest = &rest[end + 1..];
-        if tag.starts_with('!') {
-            continue;
-        }
-        if let Some(name) = tag.strip_prefix('/') {
-            assert_eq!(open.pop().as_deref(), Some(name), "closed out of order");
-            continue;
-        }
-        let (tag, is_closed) = tag.strip_suffix('/').map_or((tag, false), |tag| (tag, true));
-        let (name, mut attributes) = tag.split_once(' ').unwrap_or((tag, ""));
-        let mut found = BTreeMap::new();
-        while let Some((key, after)) = attributes.split_once("=\"") {
-            let (value, after) = after.split_once('"').expect("an end of the attribute");
-            assert!(found.insert(key.trim().to_owned(), value.to_owned()).is_none(), "{tag}");
-            attributes = after;
-        }
-        assert_eq!(attributes.trim(), "", "{tag}");
-        if !is_closed {
-            open.push(name.to_owned());
-        }
-        all.push((name.to_owned(), found));
-    }
-    assert!(open.is_empty(), "{open:?} left open");
-    all
-}
-
-fn number(value: &Value, field: &str) -> Option<f64> {
-    value[field].as_f64()
 }
 
 #[test]
@@ -98,21 +46,9 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let rows = json["rows"].as_array().unwrap();
     // Of each pair: 30 layouts, 3 splits and 4 orders with 5 questions, and 12 models with 2.
     assert_eq!(rows.len(), 2 * (37 * 5 + 12 * 2));
-    let table = rows_of(&csv);
-    assert_eq!(table.len(), rows.len());
-    for (line, row) in table.iter().zip(rows) {
-        let row = row.as_object().unwrap();
-        assert!(line.keys().eq(row.keys()), "the same names");
-        for (name, value) in row {
-            let cell = &line[name];
-            match value {
-                Value::Null => assert_eq!(cell, "", "{name}"),
-                Value::String(text) => assert_eq!(cell, text),
-                Value::Bool(flag) => assert_eq!(cell == "1", *flag),
-                value => assert_eq!(cell.parse::<f64>().unwrap(), value.as_f64().unwrap(), "{name}"),
-            }
-        }
-        check(&Value::Object(row.clone()));
+    same_figures(&csv, rows);
+    for row in rows {
+        check(row);
     }
 
     let find = |pair: &str, group: &str, variant: &str, question: &str, rel_err: f64| {
@@ -230,6 +166,12 @@ fn what_is_wrong_is_told_in_one_line_before_the_work() {
     fails(1, &["good.txt", "--hard", "--out", "o"], &["--hard"]);
     fails(1, &["good.txt", "--peers", "p", "--out", "o"], &["--peers"]);
     fails(1, &["--hard", "--quick", "--out", "o"], &["--quick"]);
+    fails(1, &["good.txt", "--scaling", "--out", "o"], &["--scaling"]);
+    fails(1, &["--hard", "--scaling", "--out", "o"], &["--scaling"]);
+    fails(1, &["good.txt", "--largest", "3000", "--out", "o"], &["--largest"]);
+    fails(1, &["--scaling", "--largest", "999", "--out", "o"], &["--largest", "999"]);
+    fails(1, &["--scaling", "--meshes", "m", "--out", "o"], &["--meshes"]);
+    fails(2, &["--scaling", "--out", "one.obj"], &["one.obj", "expected a folder"]);
     fails(1, &["good.txt", "--out", "o", "--isa", "mmx"], &["mmx"]);
     fails(1, &["good.txt", "--out", "o", "--rounds", "0"], &["--rounds"]);
     fails(2, &["missing.txt", "--out", "o"], &["missing.txt"]);

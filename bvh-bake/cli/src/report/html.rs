@@ -9,6 +9,7 @@ use super::plot;
 use std::fmt::Write;
 
 pub(super) use findings::findings;
+pub(super) use text::{count, machine};
 
 const STYLE: &str = "\
 :root { color-scheme: light dark; --ink: #1a1a1a; --paper: #fff; --faint: #d5d5d5; --band: #f4f5f7; --link: #0059a8; }
@@ -28,12 +29,7 @@ td:first-child, th:first-child { text-align: left; } thead { border-bottom: 1px 
 
 /// The page.
 pub(super) fn page(report: &Report) -> String {
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: speed against error</title>\n\
-         <style>{STYLE}{}</style>\n</head>\n<body>\n<h1>cbvh: speed against error</h1>\n",
-        plot::STYLE
-    );
+    let mut page = head("cbvh: speed against error");
     page.push_str(&text::opening(report));
     for pair in &report.pairs {
         let _ = writeln!(page, "<h2 id=\"{0}\">{0}</h2>", escape(&pair.name));
@@ -47,8 +43,21 @@ pub(super) fn page(report: &Report) -> String {
         page.push_str(&tables::all(report, &pair.name));
     }
     page.push_str(&text::methods(report));
-    page + "</body>\n</html>\n"
+    page + FOOT
 }
+
+/// A page up to what stands below its title.
+pub(super) fn head(title: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n\
+         <style>{STYLE}{}</style>\n</head>\n<body>\n<h1>{title}</h1>\n",
+        plot::STYLE
+    )
+}
+
+/// How a page ends.
+pub(super) const FOOT: &str = "</body>\n</html>\n";
 
 /// Text as an element or attribute may hold it.
 pub(super) fn escape(text: &str) -> String {

@@ -67,6 +67,24 @@ pub(super) struct Machine {
     pub(super) caches: Vec<Cache>,
 }
 
+impl Machine {
+    /// This one, as far as the system tells.
+    pub(super) fn here() -> Self {
+        Self {
+            processor: machine::processor(),
+            processors: std::thread::available_parallelism().map_or(1, usize::from),
+            is_virtual: machine::is_virtual(),
+            system: machine::system(),
+            caches: machine::caches(),
+        }
+    }
+}
+
+/// Major and minor version of the format.
+pub(super) fn format_version() -> String {
+    format!("{}.{}", bvh_format::header::MAJOR, bvh_format::header::MINOR)
+}
+
 /// A side of a pair.
 #[derive(Debug, Serialize)]
 pub(super) struct SideRecord {
@@ -142,20 +160,13 @@ pub(super) struct Report {
 
 impl Report {
     pub(super) fn new(settings: Settings) -> Self {
-        let (major, minor) = (bvh_format::header::MAJOR, bvh_format::header::MINOR);
         Self {
             tool: "cbvh",
             version: env!("CARGO_PKG_VERSION"),
-            format_version: format!("{major}.{minor}"),
+            format_version: format_version(),
             unoptimised: cfg!(debug_assertions),
             date: machine::today(),
-            machine: Machine {
-                processor: machine::processor(),
-                processors: std::thread::available_parallelism().map_or(1, usize::from),
-                is_virtual: machine::is_virtual(),
-                system: machine::system(),
-                caches: machine::caches(),
-            },
+            machine: Machine::here(),
             settings,
             questions: vec![Question::Collide.name(), Question::Distance(0.0).name()],
             pairs: Vec::new(),
@@ -194,8 +205,8 @@ impl Report {
     }
 }
 
-/// `report.json`.
-pub(super) fn text(report: &Report) -> Result<String, Failure> {
+/// A report as one JSON object.
+pub(super) fn text(report: &impl Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(report).map_err(|e| Failure::System(format!("JSON: {e}")))?;
     Ok(text + "\n")
 }

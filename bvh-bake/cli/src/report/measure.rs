@@ -101,8 +101,8 @@ pub(super) fn rounds(
     Ok(all)
 }
 
-/// One turn.
-fn turn_of(
+/// One turn: all poses after a few that are not timed.
+pub(super) fn turn_of(
     question: Question,
     querier: &mut Querier,
     bake: &Baked,

@@ -91,11 +91,11 @@ pub(super) enum Cell {
 
 impl Cell {
     /// A number if there is one and it is finite.
-    fn number(value: Option<f64>) -> Self {
+    pub(super) fn number(value: Option<f64>) -> Self {
         value.filter(|value| value.is_finite()).map_or(Self::Absent, Self::Number)
     }
 
-    fn flag(value: Option<bool>) -> Self {
+    pub(super) fn flag(value: Option<bool>) -> Self {
         value.map_or(Self::Absent, Self::Flag)
     }
 
@@ -190,11 +190,19 @@ impl Row {
 
 /// `report.csv`: a line a row.
 pub(super) fn table(rows: &[Row]) -> String {
-    let Some(first) = rows.first() else { return String::new() };
-    let header: Vec<String> = first.cells().into_iter().map(|(name, _)| name.to_owned()).collect();
-    let lines = rows.iter().map(|row| {
-        let fields: Vec<String> = row.cells().iter().map(|(_, cell)| cell.text()).collect();
-        super::csv::line(&fields)
-    });
-    std::iter::once(super::csv::line(&header)).chain(lines).collect()
+    lines(rows.iter().map(Row::cells))
+}
+
+/// Cells with the same names in each row, as a line of names and a line a row.
+pub(super) fn lines(rows: impl Iterator<Item = Vec<(&'static str, Cell)>>) -> String {
+    let mut text = String::new();
+    for row in rows {
+        let (names, fields): (Vec<String>, Vec<String>) =
+            row.iter().map(|(name, cell)| ((*name).to_owned(), cell.text())).unzip();
+        if text.is_empty() {
+            text = super::csv::line(&names);
+        }
+        text += &super::csv::line(&fields);
+    }
+    text
 }

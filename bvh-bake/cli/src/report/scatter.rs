@@ -9,40 +9,84 @@ use bvh_query::{Bvh, Pose, Querier, QueryError};
 /// Gaps in fractions of A's diagonal, in turn; 0 stands for overlap.
 pub(super) const GAPS: [f64; 5] = [0.0, 1e-6, 0.005, 0.01, 0.05];
 /// How much of a gap may be left to go.
-const CLOSE: f64 = 0.01;
+pub(super) const CLOSE: f64 = 0.01;
 /// Steps before a pose is taken as it is.
 const STEPS: usize = 100;
 
 /// So many poses.
 pub(super) fn poses(querier: &mut Querier, a: &Bvh, b: &Bvh, count: usize) -> Result<Vec<Pose>, QueryError> {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let (centre_a, radius_a) = sphere(a);
-    let (centre_b, radius_b) = sphere(b);
+    let mut random = Random::new();
     let mut poses = Vec::new();
     for number in 0..count {
-        let (rotation, away) = (random.rotation(), random.direction());
+        let approach = Approach::new(a, b, random.rotation(), random.direction());
+        poses.push(match GAPS[number % GAPS.len()] {
+            0.0 => approach.overlapping(),
+            gap => approach.at(approach.reach(querier, gap)?),
+        });
+    }
+    Ok(poses)
+}
+
+/// So many poses with this gap, in fractions of A's diagonal. Turns and directions are the same for all meshes and gaps.
+pub(super) fn apart(
+    querier: &mut Querier,
+    a: &Bvh,
+    b: &Bvh,
+    gap: f64,
+    count: usize,
+) -> Result<Vec<Pose>, QueryError> {
+    let mut random = Random::new();
+    let mut pose = || {
+        let approach = Approach::new(a, b, random.rotation(), random.direction());
+        Ok(approach.at(approach.reach(querier, gap)?))
+    };
+    (0..count).map(|_| pose()).collect()
+}
+
+/// A line along which B, turned, comes to A from outside.
+pub(super) struct Approach<'a> {
+    a: &'a Bvh,
+    b: &'a Bvh,
+    rotation: [[f64; 3]; 3],
+    /// From A to B, of length 1.
+    away: [f64; 3],
+    centre_a: [f64; 3],
+    /// The centre of B, turned.
+    turned: [f64; 3],
+    radii: [f64; 2],
+}
+
+impl<'a> Approach<'a> {
+    pub(super) fn new(a: &'a Bvh, b: &'a Bvh, rotation: [[f64; 3]; 3], away: [f64; 3]) -> Self {
+        let ((centre_a, radius_a), (centre_b, radius_b)) = (sphere(a), sphere(b));
         let turned = rotation.map(|row| dot(row, centre_b));
-        let at = |t: f64| {
-            let translation = [0, 1, 2].map(|i| centre_a[i] + t * away[i] - turned[i]);
-            Pose::new(rotation, translation).unwrap_or(Pose::IDENTITY)
-        };
-        let gap = GAPS[number % GAPS.len()] * diagonal(a);
-        let mut t = radius_a + radius_b + 2.0 * gap;
-        if gap == 0.0 {
-            // The smaller sphere is then all within the larger, or both share a good part of their space.
-            poses.push(at(0.5 * radius_a.max(radius_b)));
-            continue;
-        }
+        Self { a, b, rotation, away, centre_a, turned, radii: [radius_a, radius_b] }
+    }
+
+    /// The pose in which the centres are so far apart, mesh units.
+    pub(super) fn at(&self, t: f64) -> Pose {
+        let translation = [0, 1, 2].map(|i| self.centre_a[i] + t * self.away[i] - self.turned[i]);
+        Pose::new(self.rotation, translation).unwrap_or(Pose::IDENTITY)
+    }
+
+    /// The smaller sphere is then all within the larger, or both share a good part of their space.
+    fn overlapping(&self) -> Pose {
+        self.at(0.5 * self.radii[0].max(self.radii[1]))
+    }
+
+    /// How far apart the centres are with this gap, in fractions of A's diagonal.
+    pub(super) fn reach(&self, querier: &mut Querier, gap: f64) -> Result<f64, QueryError> {
+        let gap = gap * diagonal(self.a);
+        let mut t = self.radii[0] + self.radii[1] + 2.0 * gap;
         for _ in 0..STEPS {
-            let more = querier.distance(a, b, &at(t))?.distance - gap;
+            let more = querier.distance(self.a, self.b, &self.at(t))?.distance - gap;
             if more <= CLOSE * gap || t < 0.0 {
                 break;
             }
             t -= more;
         }
-        poses.push(at(t));
+        Ok(t)
     }
-    Ok(poses)
 }
 
 /// The sphere around the first object, mesh units.
@@ -60,21 +104,26 @@ pub(super) fn diagonal(bvh: &Bvh) -> f64 {
     (0..3).map(|a| (f64::from(hi[a].get()) - f64::from(lo[a].get())).powi(2)).sum::<f64>().sqrt()
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// A linear congruential generator: quality is no matter here, reproducibility is.
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
+    /// Always the same numbers.
+    pub(super) fn new() -> Self {
+        Self(0x9e37_79b9_7f4a_7c15)
+    }
+
     /// From -1 to 1.
     fn signed(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as f64 / (1u64 << 30) as f64 - 1.0
     }
 
-    fn direction(&mut self) -> [f64; 3] {
+    pub(super) fn direction(&mut self) -> [f64; 3] {
         loop {
             let v = [(); 3].map(|()| self.signed());
             let length = dot(v, v).sqrt();
@@ -84,7 +133,7 @@ impl Random {
         }
     }
 
-    fn rotation(&mut self) -> [[f64; 3]; 3] {
+    pub(super) fn rotation(&mut self) -> [[f64; 3]; 3] {
         let x = self.direction();
         loop {
             let other = self.direction();

@@ -21,6 +21,12 @@ impl Spread {
         Some(Self { median: at(0.5), quartiles: [at(0.25), at(0.75)], p90: at(0.9) })
     }
 
+    /// Of what each value is the sum of so many of.
+    pub(super) fn over(self, count: usize) -> Self {
+        let each = |value: f64| value / count as f64;
+        Self { median: each(self.median), quartiles: self.quartiles.map(each), p90: each(self.p90) }
+    }
+
     /// Of rounds: median and quartiles are those of the rounds' medians, and `p90` is the median of theirs. So
     /// the quartiles tell how far rounds differ, not how far poses do.
     pub(super) fn of_rounds(rounds: &[Vec<u64>]) -> Option<Self> {

@@ -1,6 +1,8 @@
 //! Runs the command and makes small meshes.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod documents;
+
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -1,27 +1,21 @@
 //! The words around figures and tables: what was measured, where, how, and what to mind.
 
 use super::escape;
-use crate::report::json::{PairRecord, Report};
+use crate::report::json::{Machine, PairRecord, Report};
 
 /// What the page is about, and whether answers were right.
 pub(super) fn opening(report: &Report) -> String {
-    let machine = &report.machine;
     let names: Vec<String> =
         report.pairs.iter().map(|pair| format!("<a href=\"#{0}\">{0}</a>", escape(&pair.name))).collect();
     let mut text = format!(
         "<p>How fast cbvh {} answers queries between triangle meshes, in every layout of its files (format {}), and \
-         how exact the answers are. Pairs: {}. Measured on {} with the backend {}.</p>\n<p>{} ({}{}), {}, \
-         {}.</p>\n",
+         how exact the answers are. Pairs: {}. Measured on {} with the backend {}.</p>\n{}",
         report.version,
         report.format_version,
         names.join(", "),
         report.date,
         report.settings.isa,
-        escape(&machine.processor),
-        count(machine.processors, "processor"),
-        if machine.is_virtual { " of a virtual machine" } else { "" },
-        escape(&machine.system),
-        caches(report)
+        machine(&report.machine)
     );
     if report.wrong.is_empty() {
         text += "<p>All layouts gave the same answers about contact, and the same distances to the bit for the same \
@@ -54,16 +48,29 @@ pub(super) fn opening(report: &Report) -> String {
     text
 }
 
-fn count(number: usize, what: &str) -> String {
+/// Where it was measured.
+pub(in crate::report) fn machine(machine: &Machine) -> String {
+    format!(
+        "<p>{} ({}{}), {}, {}.</p>\n",
+        escape(&machine.processor),
+        count(machine.processors, "processor"),
+        if machine.is_virtual { " of a virtual machine" } else { "" },
+        escape(&machine.system),
+        caches(machine)
+    )
+}
+
+/// A number with what it counts.
+pub(in crate::report) fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
-fn caches(report: &Report) -> String {
+fn caches(machine: &Machine) -> String {
     let show = |bytes: u64| {
         if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{} KiB", bytes >> 10) }
     };
     let each: Vec<String> =
-        report.machine.caches.iter().map(|cache| format!("L{} {}", cache.level, show(cache.bytes))).collect();
+        machine.caches.iter().map(|cache| format!("L{} {}", cache.level, show(cache.bytes))).collect();
     if each.is_empty() { "caches unknown".to_owned() } else { format!("caches {}", each.join(", ")) }
 }
 

@@ -1,0 +1,76 @@
+//! What reports are written in: tables, JSON and documents after XML's rules.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Lines of comma-separated values, each as a map by name. No field here has a comma.
+pub(crate) fn rows_of(csv: &str) -> Vec<BTreeMap<String, String>> {
+    let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    lines
+        .map(|fields| {
+            assert_eq!(fields.len(), header.len(), "{fields:?}");
+            header.iter().cloned().zip(fields).collect()
+        })
+        .collect()
+}
+
+/// An element: its name and attributes.
+pub(crate) type Element = (String, BTreeMap<String, String>);
+
+/// The elements of a document, all of which must be closed as XML wants it.
+pub(crate) fn elements(document: &str) -> Vec<Element> {
+    let (mut all, mut open) = (Vec::new(), Vec::new());
+    let mut rest = document;
+    while let Some(start) = rest.find('<') {
+        let end = start + rest[start..].find('>').expect("an end of the tag");
+        let tag = &rest[start + 1..end];
+        rest = &rest[end + 1..];
+        if tag.starts_with('!') {
+            continue;
+        }
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop().as_deref(), Some(name), "closed out of order");
+            continue;
+        }
+        let (tag, is_closed) = tag.strip_suffix('/').map_or((tag, false), |tag| (tag, true));
+        let (name, mut attributes) = tag.split_once(' ').unwrap_or((tag, ""));
+        let mut found = BTreeMap::new();
+        while let Some((key, after)) = attributes.split_once("=\"") {
+            let (value, after) = after.split_once('"').expect("an end of the attribute");
+            assert!(found.insert(key.trim().to_owned(), value.to_owned()).is_none(), "{tag}");
+            attributes = after;
+        }
+        assert_eq!(attributes.trim(), "", "{tag}");
+        if !is_closed {
+            open.push(name.to_owned());
+        }
+        all.push((name.to_owned(), found));
+    }
+    assert!(open.is_empty(), "{open:?} left open");
+    all
+}
+
+pub(crate) fn number(value: &Value, field: &str) -> Option<f64> {
+    value[field].as_f64()
+}
+
+/// The table has the rows, with the same figures under the same names.
+#[track_caller]
+pub(crate) fn same_figures(csv: &str, rows: &[Value]) {
+    let table = rows_of(csv);
+    assert_eq!(table.len(), rows.len());
+    for (line, row) in table.iter().zip(rows) {
+        let row = row.as_object().unwrap();
+        assert!(line.keys().eq(row.keys()), "the same names");
+        for (name, value) in row {
+            let cell = &line[name];
+            match value {
+                Value::Null => assert_eq!(cell, "", "{name}"),
+                Value::String(text) => assert_eq!(cell, text),
+                Value::Bool(flag) => assert_eq!(cell == "1", *flag),
+                value => assert_eq!(cell.parse::<f64>().unwrap(), value.as_f64().unwrap(), "{name}"),
+            }
+        }
+    }
+}
