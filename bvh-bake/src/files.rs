@@ -34,7 +34,8 @@ pub struct FileOptions {
     /// Bake even if the output is up to date.
     pub force: bool,
     /// The most memory that the whole process may have resident, in bytes; `None` for no limit. What does not fit
-    /// goes to scratch files. glTF files are read into memory, other inputs piece by piece.
+    /// goes to scratch files. glTF files are read into memory, other inputs piece by piece. An allocator that keeps
+    /// much of what is freed, as that of the GNU C library does, is to be told not to: see its `mallopt`.
     pub max_memory: Option<u64>,
     /// The directory for scratch files; `None` for the output's. They have no names there: nothing of them is left,
     /// however the process ends.

@@ -34,6 +34,9 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         max_memory: arguments.max_memory,
         scratch: arguments.scratch.clone(),
     };
+    if arguments.max_memory.is_some() {
+        resident::give_back();
+    }
     let inputs = names(&arguments.inputs);
     let spinner = spinner(arguments.quiet);
     signals::leave_nothing().map_err(|error| Failure::System(format!("cannot wait for signals: {error}")))?;
