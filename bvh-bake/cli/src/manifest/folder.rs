@@ -28,6 +28,11 @@ pub(super) fn read(folder: &Path, output: &Path, options: &Options) -> Result<Ve
             }
         }
     }
+    if inputs.is_empty() {
+        // Most likely a wrong name.
+        let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf or .glb, found none";
+        return Err(Failure::System(format!("{}: {what}", shown(folder))));
+    }
     inputs.sort();
     let asset = |(line, input): (u64, PathBuf)| {
         let below = input.strip_prefix(folder).unwrap_or(&input);
