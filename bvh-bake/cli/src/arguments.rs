@@ -46,18 +46,46 @@ the same.
 
 --max-memory: the whole process stays within SIZE, whatever the size of the mesh. OBJ, STL and PLY are read piece by \
 piece, and up to 200 bytes a triangle go to scratch files, which have no names and vanish however the process ends. \
-The output is the same to the byte. A SIZE that is too small for any way is refused with exit code 4.";
+The output is the same to the byte. A SIZE that is too small for any way is refused with exit code 4.
+
+Many assets:
+  cbvh bake meshes -o baked --jobs 8
+  cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
+
+A line of in.jsonl is {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"} and may have profile, triangles, max_error, \
+effort, split_objects and ids, for which the options given here are the defaults. Paths are relative to the manifest, \
+folders of outputs are made. Assets are baked side by side within --jobs and --max-memory, and one that fails does not \
+stop the others. out.jsonl has a line for each asset in the order of the input: its line, exit_code, and the fields of \
+--json or an error; until it is whole, lines are in out.jsonl.part as assets are done. --json prints one object with \
+counts and sums, which add up over shards. The exit code is 3 if an input is invalid, else 4 if a limit was reached, \
+else 2 if the system is to blame, else 1 if an output is its own input, else 0. A manifest with a wrong line, and two \
+assets with one output, are refused before the work with exit code 3.";
 
 /// What `bake` takes.
 #[derive(Debug, Args)]
 #[command(after_help = BAKE_HELP)]
 pub(crate) struct BakeArguments {
-    /// Meshes: OBJ, STL, PLY, glTF
-    #[arg(required = true, value_name = "IN")]
+    /// Meshes: OBJ, STL, PLY, glTF; or one folder, whose meshes are baked each by itself
+    #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "IN")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The file to write
-    #[arg(short, long, value_name = "OUT.cbvh")]
-    pub(crate) output: PathBuf,
+    /// The file to write, or for a folder of meshes the folder to write to
+    #[arg(
+        short,
+        long,
+        value_name = "OUT.cbvh",
+        required_unless_present = "manifest",
+        conflicts_with = "manifest"
+    )]
+    pub(crate) output: Option<PathBuf>,
+    /// Bake many assets: a JSON object a line, with "input", "output" and, if they differ, options
+    #[arg(long, value_name = "IN.jsonl", requires = "out_manifest")]
+    pub(crate) manifest: Option<PathBuf>,
+    /// What came of each asset, a JSON object a line, with --manifest or a folder
+    #[arg(long, value_name = "OUT.jsonl")]
+    pub(crate) out_manifest: Option<PathBuf>,
+    /// Only the I-th of N parts of the assets, I from 1 to N: every N-th asset, from the I-th on
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
     /// Time for a better tree: fast, default, or high, which takes about twice as long. Answers are the same
@@ -358,7 +386,7 @@ impl Mode {
     }
 }
 
-fn profile(name: &str) -> Result<Choice<Profile>, String> {
+pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
     if name == "auto" {
         return Ok(Choice::Auto);
     }
@@ -366,7 +394,7 @@ fn profile(name: &str) -> Result<Choice<Profile>, String> {
     Profile::from_name(name).map(Choice::Named).ok_or_else(|| format!("expected auto, {}", names.join(", ")))
 }
 
-fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
+pub(crate) fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
     if name == "auto" {
         return Ok(Choice::Auto);
     }
@@ -374,7 +402,29 @@ fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
     encoding.map(Choice::Named).ok_or_else(|| "expected auto, f32, packed or quantized".to_owned())
 }
 
-fn effort(name: &str) -> Result<Effort, String> {
+/// Every `count`-th asset, from number `index` on, which is 1 to `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shard {
+    pub(crate) index: u64,
+    pub(crate) count: u64,
+}
+
+impl Shard {
+    /// Whether the asset with this number, from 0 on, belongs to it.
+    pub(crate) fn has(self, number: u64) -> bool {
+        number % self.count == self.index - 1
+    }
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let parsed = text.split_once('/').and_then(|(index, count)| {
+        let shard = Shard { index: index.parse().ok()?, count: count.parse().ok()? };
+        (1..=shard.count).contains(&shard.index).then_some(shard)
+    });
+    parsed.ok_or_else(|| "expected I/N with I from 1 to N, such as 1/4".to_owned())
+}
+
+pub(crate) fn effort(name: &str) -> Result<Effort, String> {
     Effort::from_name(name).ok_or_else(|| "expected fast, default or high".to_owned())
 }
 
@@ -419,6 +469,17 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn shards_are_numbered_from_one() {
+        assert_eq!(shard("3/16"), Ok(Shard { index: 3, count: 16 }));
+        for wrong in ["", "1", "0/4", "5/4", "1/0", "-1/4", "1/4/2", "a/b", "1/99999999999999999999"] {
+            assert!(shard(wrong).is_err(), "{wrong}");
+        }
+        let of = |index| (0..10).filter(move |&number| Shard { index, count: 3 }.has(number));
+        assert_eq!(of(1).collect::<Vec<_>>(), [0, 3, 6, 9]);
+        assert_eq!((1..=3).map(|index| of(index).count()).sum::<usize>(), 10);
     }
 
     #[test]

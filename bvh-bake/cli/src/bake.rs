@@ -1,21 +1,19 @@
 //! `cbvh bake`: meshes into a file.
 
-use crate::arguments::{BakeArguments, LayoutArguments};
+use crate::arguments::{BakeArguments, Choice, LayoutArguments};
 use crate::error::Failure;
 use crate::output::{self, hex};
-use crate::{resident, signals};
-use bvh_bake::{FileOptions, Options, Outcome, Stage, Step, bake_files};
+use crate::{manifest, resident, signals};
+use bvh_bake::{BakeError, FileOptions, Options, Outcome, Stage, Step, bake_files};
 use bvh_format::leaf::TriangleEncoding;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
-    let start = Instant::now();
-    let quantized = arguments.layout.triangles.named() == Some(TriangleEncoding::Quantized);
-    if arguments.max_error.is_some() && !quantized {
+    if arguments.max_error.is_some() && !is_quantized(arguments.layout.triangles) {
         return Err(Failure::Usage("--max-error goes with --triangles quantized only (see --help)".into()));
     }
     if let Some(jobs) = arguments.jobs {
@@ -37,19 +35,24 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     if arguments.max_memory.is_some() {
         resident::give_back();
     }
-    let inputs = names(&arguments.inputs);
+    if manifest::is_asked(arguments) {
+        return manifest::run(arguments, &options, &file_options);
+    }
+    let Some(output) = &arguments.output else {
+        return Err(Failure::Usage("expected --output <OUT.cbvh>, found none (see --help)".into()));
+    };
+    if arguments.shard.is_some() || arguments.out_manifest.is_some() {
+        return Err(Failure::Usage(
+            "--shard and --out-manifest go with --manifest or one folder only (see --help)".into(),
+        ));
+    }
     let spinner = spinner(arguments.quiet);
-    signals::leave_nothing().map_err(|error| Failure::System(format!("cannot wait for signals: {error}")))?;
-    let mut clock = StageClock::default();
-    let outcome = bake_files(&arguments.inputs, &arguments.output, &options, &file_options, &mut |step| {
+    leave_nothing()?;
+    let baked = bake(&arguments.inputs, output, &options, &file_options, &mut |step| {
         spinner.set_message(step.name());
-        clock.begin(step);
     });
     spinner.finish_and_clear();
-    let outcome = outcome.map_err(|error| Failure::from_bake(&inputs, &error))?;
-    let output = arguments.output.display().to_string();
-    let mut report = Report::new(inputs, output, &outcome, start.elapsed().as_secs_f64());
-    report.stage_seconds = Some(clock.finish()).filter(|_| !report.skipped);
+    let report = baked.map_err(|error| Failure::from_bake(&names(&arguments.inputs), &error))?;
     if arguments.json {
         output::json(&report)
     } else if arguments.quiet {
@@ -57,6 +60,36 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     } else {
         output::text(&report.to_text())
     }
+}
+
+/// Bakes meshes into one file, and reports on it.
+pub(crate) fn bake(
+    inputs: &[PathBuf],
+    output: &Path,
+    options: &Options,
+    file_options: &FileOptions,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Report, BakeError> {
+    let start = Instant::now();
+    let mut clock = StageClock::default();
+    let outcome = bake_files(inputs, output, options, file_options, &mut |step| {
+        progress(step);
+        clock.begin(step);
+    })?;
+    let mut report =
+        Report::new(names(inputs), output.display().to_string(), &outcome, start.elapsed().as_secs_f64());
+    report.stage_seconds = Some(clock.finish()).filter(|_| !report.skipped);
+    Ok(report)
+}
+
+/// From now on a signal that ends the process leaves nothing half-written.
+pub(crate) fn leave_nothing() -> Result<(), Failure> {
+    signals::leave_nothing().map_err(|error| Failure::System(format!("cannot wait for signals: {error}")))
+}
+
+/// Whether vertices may move, and `max_error` has a meaning.
+pub(crate) fn is_quantized(triangles: Choice<TriangleEncoding>) -> bool {
+    triangles.named() == Some(TriangleEncoding::Quantized)
 }
 
 /// The part of the options that `query` has too.
@@ -115,20 +148,20 @@ impl StageClock {
 
 /// What `--json` prints. Fields that a skipped bake does not know are null.
 #[derive(Serialize)]
-struct Report {
-    input: String,
-    output: String,
+pub(crate) struct Report {
+    pub(crate) input: String,
+    pub(crate) output: String,
     format_version: String,
     profile: &'static str,
     triangle_encoding: &'static str,
     reason: String,
-    triangles_in: u64,
-    triangles: u64,
-    degenerate: u64,
-    duplicates: u64,
+    pub(crate) triangles_in: u64,
+    pub(crate) triangles: u64,
+    pub(crate) degenerate: u64,
+    pub(crate) duplicates: u64,
     vertices: Option<u64>,
     objects: u64,
-    file_bytes: u64,
+    pub(crate) file_bytes: u64,
     node_bytes: u64,
     triangle_bytes: u64,
     id_bytes: u64,
@@ -139,14 +172,14 @@ struct Report {
     volume_inflation: Option<f64>,
     mean_children: Option<f64>,
     bake_seconds: Option<f64>,
-    seconds: f64,
+    pub(crate) seconds: f64,
     stage_seconds: Option<BTreeMap<&'static str, f64>>,
     scratch_bytes: Option<u64>,
     scratch_written_bytes: Option<u64>,
     scratch_read_bytes: Option<u64>,
     peak_rss_bytes: Option<u64>,
     content_xxh3: String,
-    skipped: bool,
+    pub(crate) skipped: bool,
 }
 
 impl Report {

@@ -78,16 +78,21 @@ impl Failure {
 
     /// The code to exit with, after the line on standard error.
     pub(crate) fn tell(self) -> ExitCode {
+        let Some((code, line)) = self.line() else { return ExitCode::SUCCESS };
+        tell_line(&line);
+        ExitCode::from(code)
+    }
+
+    /// The exit code and the line, if there is something to tell.
+    pub(crate) fn line(self) -> Option<(u8, String)> {
         let (code, text) = match self {
-            Self::Nothing => return ExitCode::SUCCESS,
+            Self::Nothing => return None,
             Self::Usage(text) => (1, text),
             Self::System(text) => (2, text),
             Self::Invalid(text) => (3, text),
             Self::Limit(text) => (4, text),
         };
-        // If nobody listens there is nobody to tell.
-        let _ = writeln!(io::stderr().lock(), "cbvh: {}", one_line(&text));
-        ExitCode::from(code)
+        Some((code, one_line(&text)))
     }
 }
 
@@ -120,6 +125,11 @@ impl Failure {
             _ => Self::invalid(path, error),
         }
     }
+}
+
+/// Writes a line on standard error. If nobody listens there is nobody to tell.
+pub(crate) fn tell_line(line: &str) {
+    let _ = writeln!(io::stderr().lock(), "cbvh: {line}");
 }
 
 /// A message without line breaks or other control characters, which names of files may hold.
