@@ -234,7 +234,7 @@ impl Alignment {
         self.set = set;
     }
 
-    /// The ends of four nodes of B along the first `slabs` directions of A, outward.
+    /// The ends of four nodes of B along the directions `to` of A, outward.
     #[inline(always)]
     pub(crate) fn align<I: Isa>(&self, isa: I, to: DirectionSet, group: &Group, aligned: &mut Group) {
         match self.set {
