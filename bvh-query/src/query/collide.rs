@@ -1,6 +1,6 @@
 //! Do the meshes touch? Also the first contact in the order of the trees.
 
-use super::{Found, Querier, QueryStats, Scene, Traversal, boxes_apart, each_pair, sphere_gap};
+use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, surely_apart};
 use crate::bvh::Shape;
 use crate::error::QueryError;
 use crate::isa::Isa;
@@ -11,7 +11,7 @@ use crate::leaf::queue::{Candidate, Queue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
 use crate::traverse::opened::Leaf;
-use crate::traverse::pair::{Measure, Order, Pair, Visitor};
+use crate::traverse::pair::{Measure, Order, Visitor};
 use std::ops::ControlFlow;
 
 impl Querier {
@@ -52,8 +52,7 @@ impl Querier {
         order: Order,
     ) -> Result<Option<Candidate>, QueryError> {
         self.stack.visit()?;
-        let Pair { placement, object_a, object_b, .. } = scene.pair;
-        if sphere_gap(placement, object_a, object_b) > 0.0 || boxes_apart(placement, object_a, object_b) {
+        if surely_apart(&scene.pair) {
             return Ok(None);
         }
         self.queue.clear();

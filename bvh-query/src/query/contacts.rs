@@ -1,13 +1,13 @@
 //! All pairs of triangles in contact.
 
 use super::collide::Contacts;
-use super::{Contact, Querier, QueryStats, Scene, Traversal, boxes_apart, each_pair, sphere_gap};
+use super::{Contact, Querier, QueryStats, Scene, Traversal, each_pair, surely_apart};
 use crate::bvh::{Bvh, Shape, TrianglePlace};
 use crate::error::QueryError;
 use crate::leaf::decoded::Decoded;
 use crate::leaf::queue::Candidate;
 use crate::pose::Pose;
-use crate::traverse::pair::{Order, Pair};
+use crate::traverse::pair::Order;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
@@ -74,8 +74,7 @@ impl Querier {
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<Option<Candidate>, QueryError> {
         self.stack.visit()?;
-        let Pair { placement, object_a, object_b, .. } = scene.pair;
-        if sphere_gap(placement, object_a, object_b) > 0.0 || boxes_apart(placement, object_a, object_b) {
+        if surely_apart(&scene.pair) {
             return Ok(None);
         }
         self.queue.clear();
