@@ -86,6 +86,11 @@ fn largest_code(encoding: Encoding, gap: f32, unit: f32, fits: impl Fn(u16) -> b
         }
         Encoding::F32 => return 0,
     };
+    search(guess, last, fits)
+}
+
+/// The last code that fits.
+fn search(guess: u16, last: u16, fits: impl Fn(u16) -> bool) -> u16 {
     let mut code = guess;
     while code > 0 && !fits(code) {
         code -= 1;
@@ -99,6 +104,37 @@ fn largest_code(encoding: Encoding, gap: f32, unit: f32, fits: impl Fn(u16) -> b
 /// The integer part of a quotient, 0 where there is none (0 / 0), at most `last`.
 fn saturated(quotient: f32, last: u16) -> u16 {
     (quotient as u16).min(last)
+}
+
+/// The codes of four lower ends at a time, as `encode_min_outward` gives them, for integer codes up to `last`; those
+/// of upper ends, if these and the parent's come negated. Needs `parent <= ends` in each lane.
+pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], unit: [f32; 4]) -> [u16; 4] {
+    /// Added, it leaves the nearest whole number.
+    const WHOLE: f32 = 8_388_608.0;
+    let most = f32::from(last);
+    let mut codes = [0; 4];
+    let mut unsettled = [0u32; 4];
+    // No branches: compilers take the lanes at once.
+    for lane in 0..4 {
+        let fits = |code: f32| parent[lane] + code * unit[lane] <= ends[lane];
+        let quotient = (ends[lane] - parent[lane]) / unit[lane];
+        // Where nothing is divided by nothing, every code fits.
+        let guess = (if quotient < most { quotient } else { most }) + WHOLE - WHOLE;
+        let code = if fits(guess) { guess } else { guess - 1.0 };
+        let next_fits = u32::from(fits(code + 1.0)) & u32::from(code < most);
+        unsettled[lane] = u32::from(!fits(code)) | next_fits;
+        // The last bits of the sum.
+        codes[lane] = (code + WHOLE).to_bits() as u16;
+    }
+    if unsettled != [0; 4] {
+        // Rounding of large ends moved a guess by more than one.
+        let fits = |lane: usize, code: u16| parent[lane] + f32::from(code) * unit[lane] <= ends[lane];
+        codes = std::array::from_fn(|lane| {
+            let gap = ends[lane] - parent[lane];
+            search(saturated(gap / unit[lane], last), last, |code| fits(lane, code))
+        });
+    }
+    codes
 }
 
 #[cfg(test)]
@@ -124,6 +160,14 @@ mod tests {
                 let unit = residual_unit(encoding, parent_lo, parent_hi, scale * 2f32.powi(-14));
                 let code_lo = encode_min_outward(encoding, lo, parent_lo, unit);
                 let code_hi = encode_max_outward(encoding, hi, parent_hi, unit);
+                if let Encoding::U4 | Encoding::U8 = encoding {
+                    let last = if encoding == Encoding::U4 { 15 } else { 255 };
+                    let (ends, parent) = ([lo, -hi, hi, parent_hi], [parent_lo, -parent_hi, lo, parent_hi]);
+                    let four = encode_four_outward(last, ends, parent, [unit; 4]);
+                    let third = encode_min_outward(encoding, hi, lo, unit);
+                    let fourth = encode_min_outward(encoding, parent_hi, parent_hi, unit);
+                    assert_eq!(four, [code_lo, code_hi, third, fourth]);
+                }
                 assert!(decode_min(encoding, code_lo, parent_lo, unit) <= lo);
                 assert!(decode_max(encoding, code_hi, parent_hi, unit) >= hi);
                 // One code further would cut, unless the codes end there.
@@ -158,6 +202,9 @@ mod tests {
             let hi = lo + (seed.wrapping_mul(0x85eb_ca6b) as f32) * 2f32.powi(seed as i32 % 70 - 65);
             for (encoding, last) in [(Encoding::U8, 255u16), (Encoding::U4, 15)] {
                 let unit = residual_unit(encoding, lo, hi, 7.0);
+                let ends = [0.3, 0.6, 0.999, 1.0].map(|share| (lo + share * (hi - lo)).clamp(lo, hi));
+                let one_by_one = ends.map(|end| encode_min_outward(encoding, end, lo, unit));
+                assert_eq!(encode_four_outward(last, ends, [lo; 4], [unit; 4]), one_by_one, "{lo:e} {hi:e}");
                 assert_eq!([decode_min(encoding, 0, lo, unit), decode_max(encoding, 0, hi, unit)], [lo, hi]);
                 // Off by a few roundings, and then rounded up to 16 bits.
                 let width = f64::from(hi) - f64::from(lo);

@@ -18,7 +18,7 @@
 
 use crate::kdop::Kdop;
 use crate::profile::{Encoding, Profile};
-use crate::quantize::{encode_max_outward, encode_min_outward, residual_unit};
+use crate::quantize::{encode_four_outward, encode_max_outward, encode_min_outward, residual_unit};
 use crate::slabs::{Group, NodeSlabs, row};
 
 /// One child of a treelet.
@@ -197,29 +197,54 @@ pub fn encode_slabs(
     treelet: &mut [u8],
 ) {
     let encoding = profile.encoding();
-    for slab in 0..profile.directions().slabs() {
-        let (parent_lo, parent_hi) = (parent.lo[row(slab)], parent.hi[row(slab)]);
-        let unit = residual_unit(encoding, parent_lo, parent_hi, object_scale);
-        for (index, child) in children.iter().enumerate() {
+    let slabs = profile.directions().slabs();
+    let mut units = [0.0; 16];
+    for slab in 0..slabs {
+        units[slab] = residual_unit(encoding, parent.lo[row(slab)], parent.hi[row(slab)], object_scale);
+    }
+    for (index, child) in children.iter().enumerate() {
+        let mut put = |slab: usize, code_lo: u16, code_hi: u16| {
             let Place { lo, hi } = place(profile, index, slab);
-            if encoding == Encoding::F32 {
-                treelet[lo..lo + 4].copy_from_slice(&child.lo[slab].to_le_bytes());
-                treelet[hi..hi + 4].copy_from_slice(&child.hi[slab].to_le_bytes());
-                continue;
-            }
-            let code_lo = encode_min_outward(encoding, child.lo[slab], parent_lo, unit);
-            let code_hi = encode_max_outward(encoding, child.hi[slab], parent_hi, unit);
             match encoding {
                 Encoding::U4 => treelet[lo] = (code_lo | code_hi << 4) as u8,
+                Encoding::U8 => (treelet[lo], treelet[hi]) = (code_lo as u8, code_hi as u8),
                 Encoding::F16 => {
                     treelet[lo..lo + 2].copy_from_slice(&code_lo.to_le_bytes());
                     treelet[hi..hi + 2].copy_from_slice(&code_hi.to_le_bytes());
                 }
-                _ => {
-                    treelet[lo] = code_lo as u8;
-                    treelet[hi] = code_hi as u8;
+                Encoding::F32 => {
+                    treelet[lo..lo + 4].copy_from_slice(&child.lo[slab].to_le_bytes());
+                    treelet[hi..hi + 4].copy_from_slice(&child.hi[slab].to_le_bytes());
                 }
             }
+        };
+        match encoding {
+            Encoding::U4 | Encoding::U8 => {
+                let last = if encoding == Encoding::U4 { 15 } else { 255 };
+                for first in (0..slabs).step_by(4) {
+                    // Behind the last slab any other stands in.
+                    let four: [usize; 4] = std::array::from_fn(|lane| (first + lane).min(slabs - 1));
+                    let unit = four.map(|slab| units[slab]);
+                    let (ends, parents) =
+                        (four.map(|slab| child.lo[slab]), four.map(|slab| parent.lo[row(slab)]));
+                    let codes_lo = encode_four_outward(last, ends, parents, unit);
+                    let (ends, parents) =
+                        (four.map(|slab| -child.hi[slab]), four.map(|slab| -parent.hi[row(slab)]));
+                    let codes_hi = encode_four_outward(last, ends, parents, unit);
+                    for lane in 0..4.min(slabs - first) {
+                        put(four[lane], codes_lo[lane], codes_hi[lane]);
+                    }
+                }
+            }
+            Encoding::F16 => {
+                for slab in 0..slabs {
+                    let (parent_lo, parent_hi) = (parent.lo[row(slab)], parent.hi[row(slab)]);
+                    let code_lo = encode_min_outward(encoding, child.lo[slab], parent_lo, units[slab]);
+                    let code_hi = encode_max_outward(encoding, child.hi[slab], parent_hi, units[slab]);
+                    put(slab, code_lo, code_hi);
+                }
+            }
+            Encoding::F32 => (0..slabs).for_each(|slab| put(slab, 0, 0)),
         }
     }
 }

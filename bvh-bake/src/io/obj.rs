@@ -13,6 +13,7 @@
 //! are one object.
 
 mod clean;
+mod relay;
 mod stream;
 
 pub(crate) use stream::{Statements, misfit, stream};
@@ -21,11 +22,23 @@ use super::error::{Fault, Place};
 use super::{next_ids, polygon};
 use crate::mesh::{Mesh, Object};
 use clean::Cleaner;
+use std::io::BufRead;
+
+/// Bytes of a file that is filtered on a thread beside the one that parses.
+const LARGE: usize = 1 << 20;
+
+fn parse(clean: &mut impl BufRead) -> tobj::LoadResult {
+    // No option is set: one index a corner, polygons as they are.
+    tobj::load_obj_buf(clean, &tobj::LoadOptions::default(), |_| Ok(Default::default()))
+}
 
 pub(super) fn read(text: &[u8]) -> Result<Mesh, Fault> {
     let mut cleaner = Cleaner::new(text);
-    // No option is set: one index a corner, polygons as they are.
-    let parsed = tobj::load_obj_buf(&mut cleaner, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
+    let parsed = if text.len() >= LARGE && rayon::current_num_threads() > 1 {
+        relay::beside(&mut cleaner, parse)
+    } else {
+        parse(&mut cleaner)
+    };
     if let Some(fault) = cleaner.fault.take() {
         return Err(fault);
     }

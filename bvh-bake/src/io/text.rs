@@ -3,6 +3,8 @@
 //! A line ends at LF, CR LF or a CR alone: some files use the last, and the others never hold a CR inside a
 //! line.
 
+use memchr::memchr2;
+
 /// Blanks separate words within a line.
 pub(crate) fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
@@ -45,8 +47,7 @@ impl<'a> Iterator for Lines<'a> {
             return None;
         }
         self.number += 1;
-        let end =
-            self.rest.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(self.rest.len());
+        let end = memchr2(b'\n', b'\r', self.rest).unwrap_or(self.rest.len());
         let (line, after) = self.rest.split_at(end);
         let ending = if after.starts_with(b"\r\n") { 2 } else { after.len().min(1) };
         self.rest = &after[ending..];
