@@ -2,7 +2,7 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::leaf::decoded::Decoded;
-use crate::mapped;
+use crate::mapped::{self, ReadAhead};
 use crate::traverse::opened::Leaf;
 use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
 use bvh_format::object::Object;
@@ -24,6 +24,8 @@ pub struct Bvh {
     /// What has been checked of each page.
     checked: Box<[AtomicU8]>,
     duplicates_checked: AtomicBool,
+    /// Whether the system is told to read each block at once.
+    reads_blocks: bool,
     /// No other one of this process has it, open or closed.
     identity: u64,
 }
@@ -74,9 +76,18 @@ impl Bvh {
     /// # Errors
     /// If the system refuses the file, or its header or object table break the format.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        Self::open_with(path, ReadAhead::Usual)
+    }
+
+    /// Maps a file, and tells the system how to read it: see [`ReadAhead`]. Answers do not depend on it.
+    ///
+    /// # Errors
+    /// As [`Bvh::open`].
+    pub fn open_with(path: impl AsRef<Path>, read_ahead: ReadAhead) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        let map = mapped::map(path).map_err(|source| OpenError::io(path, source))?;
-        Self::new(Bytes::Mapped(map)).map_err(|source| OpenError::format(path, source))
+        let map = mapped::map(path, read_ahead).map_err(|source| OpenError::io(path, source))?;
+        let opened = Self::new(Bytes::Mapped(map)).map_err(|source| OpenError::format(path, source))?;
+        Ok(Self { reads_blocks: read_ahead == ReadAhead::Sparse, ..opened })
     }
 
     /// Reads a whole file into memory: a copy, so that it does not matter what becomes of the file.
@@ -114,7 +125,8 @@ impl Bvh {
         let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { bytes, layout, checked, duplicates_checked: AtomicBool::new(false), identity })
+        let duplicates_checked = AtomicBool::new(false);
+        Ok(Self { bytes, layout, checked, duplicates_checked, reads_blocks: false, identity })
     }
 
     /// Where everything is in the file.
@@ -232,9 +244,21 @@ impl Bvh {
 
     #[cold]
     fn check_leaves(&self, object: &Object, page: &Page, number: u32) -> Result<(), QueryError> {
+        self.ahead(self.layout.leaf_block(self.bytes(), page.header()));
         self.layout.check_leaf_block(self.bytes(), page, object)?;
         self.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
         Ok(())
+    }
+
+    /// Tells the system of a block that is about to be checked, if it asked to be told.
+    fn ahead(&self, block: &[u8]) {
+        if let Bytes::Mapped(map) = &self.bytes
+            && self.reads_blocks
+            && !block.is_empty()
+        {
+            let start = block.as_ptr() as usize - map.as_ptr() as usize;
+            mapped::ahead(map, start..start + block.len());
+        }
     }
 
     /// The id block of a checked page, checked if it never was; empty without ids.
@@ -242,6 +266,7 @@ impl Bvh {
         let number = page.header().page_number.get();
         let flags = self.checked.get(number as usize).ok_or_else(|| self.no_page(number))?;
         if flags.load(Ordering::Acquire) & IDS_CHECKED == 0 {
+            self.ahead(self.layout.id_block(self.bytes(), page.header()));
             self.layout.check_id_block(self.bytes(), page)?;
             flags.fetch_or(IDS_CHECKED, Ordering::Release);
         }

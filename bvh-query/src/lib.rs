@@ -50,6 +50,7 @@ mod traverse;
 pub use bvh::{Bvh, Shape};
 pub use error::{OpenError, QueryError};
 pub use isa::{Backend, BackendError};
+pub use mapped::ReadAhead;
 pub use pose::{Pose, PoseError};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;

@@ -220,7 +220,12 @@ Examples:
 A pose file has 12 numbers a line, the rows of a 3x4 matrix that places B in A's frame; # starts a comment. Each \
 pose file gives one JSON line. --out writes one line a query: 0 or 1, a count, or a distance, then nanoseconds; %s \
 stands for the pose file's name. answers_xxh3 is the same for every --isa and --jobs; it is null if the budget cut \
-the run short, or if --rel-err or --abs-err leave a choice of answers.";
+the run short, or if --rel-err or --abs-err leave a choice of answers.
+
+With --cold, both sides being .cbvh files, the line also has the means over the queries of: open_ns_mean; disk_faults_mean, \
+faults that waited for the disk; read_bytes_mean, what the disk was asked for; resident_bytes_mean, whole pages of \
+both files in memory after the answer; and touched_bytes_mean, whole pages that the same query touches when asked again. \
+What the system does not tell is null.";
 
 /// What `query` takes.
 #[derive(Debug, Args)]
@@ -268,12 +273,40 @@ pub(crate) struct QueryArguments {
     /// Ask only the first N poses of each file; 0 asks all
     #[arg(long, value_name = "N", default_value = "0")]
     pub(crate) limit: usize,
+    /// Ask about files that are in memory nowhere: before each query the system is asked to forget them, and the time
+    /// is that of opening them and of the first answer
+    #[arg(long, conflicts_with_all = ["pose", "jobs", "warm"])]
+    pub(crate) cold: bool,
+    /// How the system reads .cbvh files from their disk
+    #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
+    pub(crate) read_ahead: ReadAhead,
     /// One pose instead of files, as 12 numbers; the answer is for a person
     #[arg(long, value_name = "12 NUMBERS", allow_hyphen_values = true)]
     pub(crate) pose: Option<String>,
     /// With --pose and --mode distance: write the closest points' segment and both triangles as OBJ
     #[arg(long, value_name = "OBJ")]
     pub(crate) witness: Option<PathBuf>,
+}
+
+/// How a file is read from its disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ReadAhead {
+    /// As the system does: around each page that is touched
+    Usual,
+    /// No more than queries touch
+    Sparse,
+    /// All of it, in the background
+    Whole,
+}
+
+impl From<ReadAhead> for bvh_query::ReadAhead {
+    fn from(how: ReadAhead) -> Self {
+        match how {
+            ReadAhead::Usual => Self::Usual,
+            ReadAhead::Sparse => Self::Sparse,
+            ReadAhead::Whole => Self::Whole,
+        }
+    }
 }
 
 const REPORT_HELP: &str = "\

@@ -8,6 +8,7 @@ mod arguments;
 mod bake;
 mod dump;
 mod error;
+mod from_disk;
 mod manifest;
 mod opened;
 mod output;

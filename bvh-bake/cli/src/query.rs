@@ -1,5 +1,6 @@
 //! `cbvh query`: asks two meshes about poses, timed like the peers of the benchmark kit, or about one pose.
 
+mod cold;
 pub(crate) mod number;
 mod once;
 pub(crate) mod poses;
@@ -12,8 +13,8 @@ use crate::error::Failure;
 use crate::output;
 use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, QueryError, QueryStats, Shape};
 use record::Record;
-use runner::{Answer, Limits};
-use side::Side;
+use runner::{Answer, Limits, Run};
+use side::{How, Side, is_baked};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -62,6 +63,30 @@ fn run_files(
         }
         all.push((stem(&file), poses));
     }
+    if arguments.cold {
+        for path in [&arguments.a, &arguments.b] {
+            if !is_baked(path)? {
+                let path = path.display();
+                return Err(Failure::Usage(format!(
+                    "--cold: expected .cbvh files, found {path} (see --help)"
+                )));
+            }
+        }
+    }
+    if arguments.cold {
+        let paths = [&*arguments.a, &*arguments.b];
+        for (stem, poses) in &all {
+            let (run, means) = cold::run(paths, &how(arguments), poses, question, backend, arguments.budget)?;
+            // Open only now: what a process maps the system does not forget.
+            let (a, b) = sides(arguments)?;
+            tell(
+                arguments,
+                &Record::new(&Sides { a: &a, b: &b }, question, backend, stem, &run, Some(means)),
+                &run,
+            )?;
+        }
+        return Ok(());
+    }
     let (mut a, mut b) = sides(arguments)?;
     a.check()?;
     b.check()?;
@@ -69,15 +94,20 @@ fn run_files(
     let limits = Limits { jobs: usize::from(arguments.jobs), warm: arguments.warm, budget: arguments.budget };
     for (stem, poses) in &all {
         let run = runner::run(&sides, poses, question, backend, &limits).map_err(|e| sides.blame(e))?;
-        if let Some(out) = &arguments.out {
-            let path = PathBuf::from(out.replacen("%s", stem, 1));
-            let raw = record::raw(&run.answers);
-            bvh_bake::write_atomically(&path, raw.as_bytes())
-                .map_err(|error| Failure::System(error.to_string()))?;
-        }
-        output::json(&Record::new(&sides, question, backend, stem, &run))?;
+        tell(arguments, &Record::new(&sides, question, backend, stem, &run, None), &run)?;
     }
     Ok(())
+}
+
+/// Writes the raw answers of a pose file, if asked to, and then its line.
+fn tell(arguments: &QueryArguments, record: &Record, run: &Run) -> Result<(), Failure> {
+    if let Some(out) = &arguments.out {
+        let path = PathBuf::from(out.replacen("%s", record.poses(), 1));
+        let raw = record::raw(&run.answers);
+        bvh_bake::write_atomically(&path, raw.as_bytes())
+            .map_err(|error| Failure::System(error.to_string()))?;
+    }
+    output::json(record)
 }
 
 /// The backend of `--isa`; what it does not decide, `CBVH_ISA` may.
@@ -90,9 +120,15 @@ pub(crate) fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// How both sides are made ready.
+fn how(arguments: &QueryArguments) -> How<'_> {
+    let (layout, object) = (&arguments.layout, arguments.object.as_deref());
+    How { layout, object, read_ahead: arguments.read_ahead.into() }
+}
+
 fn sides(arguments: &QueryArguments) -> Result<(Side, Side), Failure> {
-    let load = |path: &Path| Side::load(path, &arguments.layout, arguments.object.as_deref());
-    let (a, b) = (load(&arguments.a)?, load(&arguments.b)?);
+    let how = how(arguments);
+    let (a, b) = (Side::load(&arguments.a, &how)?, Side::load(&arguments.b, &how)?);
     if let Some(name) = &arguments.object
         && a.object.is_none()
         && b.object.is_none()

@@ -1,5 +1,6 @@
 //! What a run comes to: the JSON line, the raw lines and the hash of the answers.
 
+use super::cold::Means;
 use super::number::significant;
 use super::runner::{Answer, Run, Timed};
 use super::{Question, Side, Sides};
@@ -45,6 +46,8 @@ pub(crate) struct Record {
     exact_tests: u64,
     file_bytes_per_tri: f64,
     jobs: usize,
+    #[serde(flatten)]
+    cold: Option<Means>,
 }
 
 impl Record {
@@ -54,6 +57,7 @@ impl Record {
         backend: Backend,
         stem: &str,
         run: &Run,
+        cold: Option<Means>,
     ) -> Self {
         let answers = &run.answers;
         let mut times: Vec<u64> = answers.iter().map(|&(_, nanoseconds)| nanoseconds).collect();
@@ -98,7 +102,15 @@ impl Record {
             exact_tests: run.stats.exact_tests,
             file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
             jobs: run.jobs,
+            cold,
         }
+    }
+}
+
+impl Record {
+    /// The name of the pose file.
+    pub(super) fn poses(&self) -> &str {
+        &self.poses
     }
 }
 

@@ -3,13 +3,22 @@
 use crate::arguments::LayoutArguments;
 use crate::bake::options;
 use crate::error::Failure;
-use crate::opened;
 use bvh_bake::{BakeError, Options, io, to_bytes};
 use bvh_format::header::MAGIC;
-use bvh_query::{Bvh, Shape};
+use bvh_query::{Bvh, ReadAhead, Shape};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// How sides are made ready.
+#[derive(Clone, Copy)]
+pub(crate) struct How<'a> {
+    /// For meshes that are baked.
+    pub(crate) layout: &'a LayoutArguments,
+    /// The object to ask about.
+    pub(crate) object: Option<&'a str>,
+    pub(crate) read_ahead: ReadAhead,
+}
 
 /// A side, ready to be asked about.
 pub(crate) struct Side {
@@ -23,16 +32,24 @@ pub(crate) struct Side {
 
 impl Side {
     /// Opens a `.cbvh` file or bakes a mesh. The mesh's objects are one tree, unless `object` names one.
-    pub(crate) fn load(path: &Path, layout: &LayoutArguments, object: Option<&str>) -> Result<Self, Failure> {
-        let (bvh, build_seconds) = if is_baked(path)? {
-            let start = Instant::now();
-            let bvh = opened::open(path)?;
-            (bvh, start.elapsed().as_secs_f64())
-        } else {
-            bake(path, &options(layout), object)?
-        };
-        let object = object.and_then(|name| bvh.find(name));
-        Ok(Self { path: path.to_owned(), bvh, object, build_seconds })
+    pub(crate) fn load(path: &Path, how: &How) -> Result<Self, Failure> {
+        if is_baked(path)? {
+            return Self::open(path, how);
+        }
+        let (bvh, build_seconds) = bake(path, &options(how.layout), how.object)?;
+        Ok(Self::new(path, bvh, how, build_seconds))
+    }
+
+    /// Opens a `.cbvh` file.
+    pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let bvh = Bvh::open_with(path, how.read_ahead)?;
+        Ok(Self::new(path, bvh, how, start.elapsed().as_secs_f64()))
+    }
+
+    fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {
+        let object = how.object.and_then(|name| bvh.find(name));
+        Self { path: path.to_owned(), bvh, object, build_seconds }
     }
 
     /// Checks all pages before queries are timed, as a part of building: no query pays for a first

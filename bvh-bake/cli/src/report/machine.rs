@@ -82,13 +82,6 @@ pub(super) fn is_virtual() -> bool {
     text.lines().any(|line| line.starts_with("flags") && line.split_whitespace().any(|f| f == "hypervisor"))
 }
 
-/// Page faults of this process so far that had to wait for a disk; `None` where the system does not tell.
-pub(super) fn disk_faults() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name, in brackets, may hold anything; the twelfth field of all is the tenth behind it.
-    text.rsplit(')').next()?.split_whitespace().nth(9)?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -69,6 +69,12 @@ pub(super) struct Row {
     /// The first query of files that are on disk only, and faults that wait for the disk.
     pub(super) disk: Option<Spread>,
     pub(super) disk_faults: Option<f64>,
+    /// The same where no more is read than the query touches; bytes in memory then, in whole pages of both files, and
+    /// bytes touched when it is asked again.
+    pub(super) sparse: Option<Spread>,
+    pub(super) sparse_faults: Option<f64>,
+    pub(super) resident_bytes: Option<f64>,
+    pub(super) touched_bytes: Option<f64>,
     pub(super) work: Work,
     pub(super) modelled: Modelled,
     pub(super) size: Size,
@@ -155,6 +161,7 @@ impl Row {
             (["warm_ns_median", "warm_ns_q1", "warm_ns_q3", "warm_ns_p90"], self.warm),
             (["cold_ns_median", "cold_ns_q1", "cold_ns_q3", "cold_ns_p90"], self.cold),
             (["disk_ns_median", "disk_ns_q1", "disk_ns_q3", "disk_ns_p90"], self.disk),
+            (["sparse_ns_median", "sparse_ns_q1", "sparse_ns_q3", "sparse_ns_p90"], self.sparse),
         ] {
             let values = spread.map(|s| [s.median, s.quartiles[0], s.quartiles[1], s.p90]);
             for (place, name) in names.into_iter().enumerate() {
@@ -163,6 +170,9 @@ impl Row {
         }
         let numbers = [
             ("disk_faults", self.disk_faults),
+            ("sparse_faults", self.sparse_faults),
+            ("resident_bytes", self.resident_bytes),
+            ("touched_bytes", self.touched_bytes),
             ("node_tests", self.work.node_tests),
             ("packet_tests", self.work.packet_tests),
             ("exact_tests", self.work.exact_tests),

@@ -9,12 +9,13 @@ use super::{answers, cold, files, html, json, pairs, pareto, pin, plot, row, sca
 use crate::arguments::ReportArguments;
 use crate::bake::spinner;
 use crate::error::Failure;
+use crate::from_disk::FromDisk;
 use crate::output;
 use crate::query::{self, poses};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, BakeReport, to_bytes};
 use bvh_format::profile::{Encoding, Profile};
-use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
+use bvh_query::{Backend, Bvh, Pose, Querier, QueryError, ReadAhead};
 use json::{PairRecord, Report, Settings};
 use pairs::Pair;
 use rayon::prelude::*;
@@ -180,9 +181,21 @@ impl Subject<'_> {
 
     fn ask_disk(&self, bake: &Baked, question: Question, poses: &[Pose], row: &mut Row) {
         let poses = some_of(poses, self.settings.disk_poses);
-        if let Some(found) = files::first_queries(bake, question, &poses, self.backend, self.out) {
-            row.disk_faults = Some(found.faults.iter().sum::<u64>() as f64 / found.faults.len() as f64);
-            row.disk = Spread::of(found.times);
+        let ask =
+            |read_ahead| files::first_queries(bake, question, &poses, (self.backend, read_ahead), self.out);
+        let times = |found: &[FromDisk<f64>]| Spread::of(found.iter().map(|one| one.total).collect());
+        let mean = |found: &[FromDisk<f64>], of: fn(&FromDisk<f64>) -> Option<u64>| {
+            Some(found.iter().map(of).sum::<Option<u64>>()? as f64 / found.len() as f64)
+        };
+        if let Some(found) = ask(ReadAhead::Usual) {
+            row.disk = times(&found);
+            row.disk_faults = mean(&found, |one| Some(one.faults));
+        }
+        if let Some(found) = ask(ReadAhead::Sparse) {
+            row.sparse = times(&found);
+            row.sparse_faults = mean(&found, |one| Some(one.faults));
+            row.resident_bytes = mean(&found, |one| one.resident_bytes);
+            row.touched_bytes = mean(&found, |one| one.touched_bytes);
         }
     }
 
@@ -202,6 +215,10 @@ impl Subject<'_> {
             cold: None,
             disk: None,
             disk_faults: None,
+            sparse: None,
+            sparse_faults: None,
+            resident_bytes: None,
+            touched_bytes: None,
             work: Work::default(),
             modelled: Modelled::default(),
             size: size.clone(),

@@ -92,17 +92,21 @@ const SPLITS: [Column; 10] = [
     column("node bytes", "collide", "node_bytes_per_tri", tenths),
 ];
 
-const PAGES: [Column; 10] = [
+const PAGES: [Column; 14] = [
     column("collide", "collide", "warm_ns_median", micro),
     column("cold", "collide", "cold_ns_median", micro),
     column("from disk", "collide", "disk_ns_median", micro),
-    column("faults", "collide", "disk_faults", tenths),
+    column("sparse", "collide", "sparse_ns_median", micro),
+    column("faults", "collide", "sparse_faults", tenths),
+    column("KiB brought in", "collide", "resident_bytes", kibibytes),
+    column("touched", "collide", "touched_bytes", kibibytes),
     column("distance", "distance", "warm_ns_median", micro),
     column("cold", "distance", "cold_ns_median", micro),
-    column("cold from", "distance", "cold_ns_q1", micro),
-    column("to", "distance", "cold_ns_q3", micro),
     column("from disk", "distance", "disk_ns_median", micro),
-    column("faults", "distance", "disk_faults", tenths),
+    column("sparse", "distance", "sparse_ns_median", micro),
+    column("faults", "distance", "sparse_faults", tenths),
+    column("KiB brought in", "distance", "resident_bytes", kibibytes),
+    column("touched", "distance", "touched_bytes", kibibytes),
 ];
 
 const MODELLED: [Column; 9] = [
@@ -174,7 +178,8 @@ pub(super) fn all(report: &Report, pair: &str) -> String {
     );
     text += &rows.table(
         "Order of pages (dop14-u8, f32 triangles). Microseconds; from disk: opening both files and the first query, \
-         with page faults that waited for the disk.",
+         as the system reads ahead and sparse, with page faults that waited for the disk, what was brought into memory, \
+         and what the same query touches when asked again, in whole pages of 4 KiB.",
         Group::Pages,
         &named(Group::Pages),
         &PAGES,
@@ -274,6 +279,10 @@ impl Rows<'_> {
 
 fn tenths(value: f64) -> String {
     format!("{value:.1}")
+}
+
+fn kibibytes(value: f64) -> String {
+    format!("{:.0}", value / 1024.0)
 }
 
 fn thousandths(value: f64) -> String {

@@ -108,7 +108,8 @@ pub(super) fn methods(report: &Report) -> String {
          once. Medians are over poses. Code stays warm, and pages had been checked.</li>\n\
          <li><strong>From disk</strong>: the system was asked to forget both files, which were then opened and asked \
          once, {} each. Reading ahead is the system's: where it reads more than the file at once, the order of pages \
-         cannot show.</li>\n\
+         cannot show. <strong>Sparse</strong>: it was told to read no more than is touched; what a first touch \
+         checks is whole pages of nodes and their blocks of triangles.</li>\n\
          <li><strong>Errors</strong> are against the distance that dop14-f32 with f32 triangles and no allowed error \
          gives, over the poses that are apart. That distance is exact to within a few roundings of f64. Quantised \
          triangles have moved by as much as the table says, 1e-5 of the diagonal at most unless told otherwise, and \

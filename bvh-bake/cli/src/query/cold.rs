@@ -1,0 +1,72 @@
+//! Asks about every pose files that are in memory nowhere.
+
+use super::runner::{Answer, Run};
+use super::side::{How, Side};
+use super::{Question, Sides, add};
+use crate::error::Failure;
+use crate::from_disk::{self, FromDisk};
+use bvh_query::{Backend, Pose, Querier, QueryStats};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Means over the queries, for the JSON line.
+#[derive(Serialize)]
+pub(crate) struct Means {
+    cold: bool,
+    open_ns_mean: Option<f64>,
+    disk_faults_mean: Option<f64>,
+    read_bytes_mean: Option<f64>,
+    resident_bytes_mean: Option<f64>,
+    touched_bytes_mean: Option<f64>,
+}
+
+/// Asks about the poses in order until `budget`, in seconds, is spent. Times are those of opening and the first answer.
+pub(super) fn run(
+    paths: [&Path; 2],
+    how: &How<'_>,
+    poses: &[Pose],
+    question: &Question,
+    backend: Backend,
+    budget: Option<f64>,
+) -> Result<(Run, Means), Failure> {
+    let mut querier = Querier::with_backend(backend);
+    let mut found: Vec<FromDisk<Answer>> = Vec::new();
+    let mut stats = QueryStats::default();
+    let start = Instant::now();
+    for pose in poses {
+        let ask = |a: &Side, b: &Side| {
+            let sides = Sides { a, b };
+            question.ask(&mut querier, &sides, pose).map_err(|error| sides.blame(error))
+        };
+        let Some(one) = from_disk::ask(paths, |path| Side::open(path, how), ask)? else {
+            let text = "--cold: this system cannot forget files or count page faults";
+            return Err(Failure::System(text.into()));
+        };
+        add(&mut stats, querier.stats());
+        found.push(one);
+        if budget.is_some_and(|budget| start.elapsed().as_secs_f64() > budget) {
+            break;
+        }
+    }
+    let mean = |of: fn(&FromDisk<Answer>) -> Option<u64>| {
+        let sum = found.iter().map(of).sum::<Option<u64>>()?;
+        (!found.is_empty()).then(|| sum as f64 / found.len() as f64)
+    };
+    let means = Means {
+        cold: true,
+        open_ns_mean: mean(|one| Some(one.open)),
+        disk_faults_mean: mean(|one| Some(one.faults)),
+        read_bytes_mean: mean(|one| one.read_bytes),
+        resident_bytes_mean: mean(|one| one.resident_bytes),
+        touched_bytes_mean: mean(|one| one.touched_bytes),
+    };
+    let run = Run {
+        answers: found.iter().map(|one| (one.answer, one.total)).collect(),
+        requested: poses.len(),
+        jobs: 1,
+        total_seconds: start.elapsed().as_secs_f64(),
+        stats,
+    };
+    Ok((run, means))
+}

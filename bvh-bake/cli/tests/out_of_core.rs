@@ -1,0 +1,191 @@
+//! Queries of files that are not in memory, or not all of them: the same answers, and what is read for them.
+#![cfg(target_os = "linux")]
+
+mod common;
+
+use common::{cbvh_in, cube, poses, torus};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A folder on a disk: what is in a file system in memory cannot be forgotten.
+fn folder_on_disk() -> tempfile::TempDir {
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
+}
+
+/// Writes a sheet of `side` by `side` squares with small waves, as binary STL, and bakes it as `sheet.cbvh`; and a
+/// torus as `torus.cbvh`, with poses above the sheet and in it.
+fn bake(directory: &Path, side: u32) {
+    let height = |x: u32, y: u32| ((x * 7 + y * 13) % 32) as f32 / 64.0;
+    let mut stl = vec![b' '; 80];
+    stl.extend((2 * side * side).to_le_bytes());
+    for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+        for corners in [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]] {
+            stl.extend([0; 12]);
+            for (i, j) in corners {
+                let at = [(x + i) as f32, (y + j) as f32, height(x + i, y + j)];
+                at.iter().for_each(|value| stl.extend(value.to_le_bytes()));
+            }
+            stl.extend([0; 2]);
+        }
+    }
+    fs::write(directory.join("sheet.stl"), stl).unwrap();
+    fs::write(directory.join("torus.obj"), torus(40, 30)).unwrap();
+    for (mesh, file) in [("sheet.stl", "sheet.cbvh"), ("torus.obj", "torus.cbvh")] {
+        cbvh_in(directory, &["bake", mesh, "-o", file, "-q"]).done();
+    }
+    let place = |at: u32, z: f64| {
+        let (x, y) = (f64::from(at * 37 % side), f64::from(at * 101 % side));
+        format!("1 0 0 {x:?} 0 1 0 {y:?} 0 0 1 {z:?}\n")
+    };
+    let lines = (0..6).map(|at| place(at, if at % 2 == 0 { 0.125 } else { 1.5 }));
+    fs::write(directory.join("poses.txt"), lines.collect::<String>()).unwrap();
+}
+
+fn query(directory: &Path, mode: &str, more: &[&str]) -> Value {
+    let arguments = [&["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--mode", mode], more].concat();
+    cbvh_in(directory, &arguments).done().json()
+}
+
+#[test]
+fn cold_queries_have_the_same_answers_and_say_what_they_read() {
+    let folder = folder_on_disk();
+    let directory = folder.path();
+    bake(directory, 400);
+    let both = ["sheet.cbvh", "torus.cbvh"];
+    let length: u64 = both.iter().map(|name| fs::metadata(directory.join(name)).unwrap().len()).sum();
+    for mode in ["collide", "distance", "contacts"] {
+        let warm = query(directory, mode, &[]);
+        assert!(warm.get("cold").is_none(), "{warm}");
+        assert!((1..6).contains(&warm["positives"].as_u64().unwrap()), "{warm}");
+        for how in ["usual", "sparse", "whole"] {
+            let read_ahead = query(directory, mode, &["--read-ahead", how]);
+            let cold = query(directory, mode, &["--cold", "--read-ahead", how]);
+            for other in [&read_ahead, &cold] {
+                for field in ["answers_xxh3", "sum", "positives", "node_tests", "triangle_tests"] {
+                    assert_eq!(other[field], warm[field], "{mode} {how} {field}");
+                }
+            }
+            assert_eq!(cold["cold"], true);
+            let mean = |field: &str| cold[field].as_f64();
+            assert!(mean("open_ns_mean") < mean("ns_mean"), "{cold}");
+            let (Some(read), Some(resident), Some(touched)) =
+                (mean("read_bytes_mean"), mean("resident_bytes_mean"), mean("touched_bytes_mean"))
+            else {
+                println!("not all figures: this system does not tell {cold}");
+                continue;
+            };
+            assert!(resident <= length as f64 + 8192.0, "{cold}");
+            if read == 0.0 {
+                println!("no bytes: this system does not forget files {cold}");
+            } else if how == "sparse" {
+                // Each page is asked for by itself or with its block, and none in vain; pages that a query
+                // touches are among those that the first one did.
+                assert!(read <= 1.02 * resident && resident <= 1.02 * read, "{cold}");
+                assert!(touched >= 8192.0 && touched <= resident, "{cold}");
+                assert!(resident < 0.1 * length as f64, "{cold}");
+            }
+        }
+    }
+}
+
+#[test]
+fn cold_is_about_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("poses.txt"), poses(3, 0.0, 1.0)).unwrap();
+    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh", "-q"]).done();
+    let ask =
+        |a, b, more: &[&str]| cbvh_in(directory, &[&["query", a, b, "poses.txt", "--cold"], more].concat());
+    ask("cube.cbvh", "cube.obj", &[]).failed(1, &["--cold", "expected .cbvh files", "cube.obj"]);
+    ask("cube.cbvh", "none.cbvh", &[]).failed(2, &["none.cbvh"]);
+    ask("cube.cbvh", "cube.cbvh", &["--jobs", "2"]).failed(1, &["--cold", "--jobs"]);
+    ask("cube.cbvh", "cube.cbvh", &["--read-ahead", "all"]).failed(1, &["usual", "sparse", "whole"]);
+    let same = ask("cube.cbvh", "cube.cbvh", &["--budget", "0"]).done().json();
+    assert_eq!((&same["queries"], &same["requested"]), (&1.into(), &3.into()));
+}
+
+/// A group of processes that may have so much memory together, pages of files included.
+struct Limited {
+    group: PathBuf,
+    /// The file with the most that the group had.
+    peak: &'static str,
+}
+
+impl Limited {
+    /// `None` where this process may not make one.
+    fn new(bytes: u64) -> Option<Self> {
+        let name = format!("cbvh-test-{}", std::process::id());
+        let second = Path::new("/sys/fs/cgroup").join(&name);
+        let first = Path::new("/sys/fs/cgroup/memory").join(&name);
+        for (group, limit, peak) in [
+            (first, "memory.limit_in_bytes", "memory.max_usage_in_bytes"),
+            (second, "memory.max", "memory.peak"),
+        ] {
+            if !group.parent().unwrap().is_dir() || fs::create_dir(&group).is_err() {
+                continue;
+            }
+            let made = Self { group, peak };
+            if fs::write(made.group.join(limit), bytes.to_string()).is_ok() {
+                return Some(made);
+            }
+        }
+        None
+    }
+
+    /// Runs the command in the group.
+    fn cbvh_in(&self, directory: &Path, arguments: &[&str]) -> Value {
+        let command = "echo $$ > \"$0\"/cgroup.procs && exec \"$@\"";
+        let output = Command::new("sh")
+            .args(["-c", command])
+            .arg(&self.group)
+            .arg(env!("CARGO_BIN_EXE_cbvh"))
+            .args(arguments)
+            .current_dir(directory)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    fn peak(&self) -> u64 {
+        fs::read_to_string(self.group.join(self.peak)).unwrap().trim().parse().unwrap()
+    }
+}
+
+impl Drop for Limited {
+    fn drop(&mut self) {
+        // It is empty: the commands have ended.
+        let _ = fs::remove_dir(&self.group);
+    }
+}
+
+#[test]
+fn a_file_larger_than_memory_is_queried_rightly() {
+    const MOST: u64 = 24 << 20;
+    let folder = folder_on_disk();
+    let directory = folder.path();
+    bake(directory, 900);
+    let length = fs::metadata(directory.join("sheet.cbvh")).unwrap().len();
+    assert!(length > 3 * MOST, "{length}");
+    let Some(limited) = Limited::new(MOST) else {
+        println!("skipped: this process may not make a group of limited memory");
+        return;
+    };
+    for mode in ["collide", "distance", "contacts"] {
+        let free = query(directory, mode, &[]);
+        // What others have read counts as theirs: it has to be forgotten, which the first of these does.
+        for more in [&["--cold", "--read-ahead", "sparse"][..], &["--cold"], &["--read-ahead", "sparse"], &[]]
+        {
+            let asked = ["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--mode", mode];
+            let held = limited.cbvh_in(directory, &[&asked, more].concat());
+            for field in ["answers_xxh3", "sum", "positives", "queries"] {
+                assert_eq!(held[field], free[field], "{mode} {more:?} {field}");
+            }
+        }
+    }
+    let peak = limited.peak();
+    assert!(peak <= MOST, "{peak}");
+}
