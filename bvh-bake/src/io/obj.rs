@@ -20,10 +20,12 @@ pub(crate) use stream::{Statements, misfit, stream};
 use super::error::{Fault, Place};
 use super::{next_ids, polygon};
 use crate::mesh::{Mesh, Object};
+use crate::progress::Tally;
 use clean::Cleaner;
 
-pub(super) fn read(text: &[u8]) -> Result<Mesh, Fault> {
-    let mut cleaner = Cleaner::new(text);
+/// `tally` is over the bytes of the text, twice.
+pub(super) fn read(text: &[u8], tally: Tally) -> Result<Mesh, Fault> {
+    let mut cleaner = Cleaner::new(text, tally);
     // No option is set: one index a corner, polygons as they are.
     let parsed = tobj::load_obj_buf(&mut cleaner, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
     if let Some(fault) = cleaner.fault.take() {
