@@ -8,7 +8,7 @@ mod atomic;
 mod provenance;
 mod room;
 
-pub(crate) use atomic::Temporary;
+pub(crate) use atomic::{Temporary, remove_stale_of};
 pub use atomic::{discard_unfinished, write_atomically};
 
 use crate::bake::{self, Baker, Stage};
@@ -20,6 +20,7 @@ use crate::mesh::Mesh;
 use crate::options::Options;
 use crate::progress::{Progress, Step};
 use crate::report::BakeReport;
+use crate::scratch;
 use crate::summary::FileSummary;
 use crate::target::Target;
 use bvh_format::checksum::{Hasher, checksum};
@@ -87,6 +88,7 @@ pub fn bake_files(
     refuse_output(inputs, output)?;
     progress.expect_bytes(file_lengths(inputs));
     let job = Job { inputs, output, options, file_options, progress };
+    scratch::remove_stale(job.scratch());
     match file_options.max_memory {
         Some(budget) => job.within(budget, begin),
         None => job.in_memory(begin),

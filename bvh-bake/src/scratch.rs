@@ -10,7 +10,7 @@
 mod file;
 mod stream;
 
-pub(crate) use file::{read_exact_at, write_all_at};
+pub(crate) use file::{read_exact_at, remove_stale, write_all_at};
 pub(crate) use stream::Stream;
 
 use crate::error::BakeError;

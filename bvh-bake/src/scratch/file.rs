@@ -1,7 +1,7 @@
 //! A file without a name that grows at its end and is read anywhere.
 
 use crate::error::BakeError;
-use crate::files::Temporary;
+use crate::files::{Temporary, remove_stale_of};
 use crate::progress::Progress;
 use std::fs::File;
 use std::io;
@@ -17,6 +17,11 @@ pub(crate) struct ScratchFile {
     directory: PathBuf,
     end: AtomicU64,
     progress: Progress,
+}
+
+/// Removes what processes that were killed just as they opened a scratch file have left in a directory.
+pub(crate) fn remove_stale(directory: &Path) {
+    remove_stale_of(directory, NAME.as_ref());
 }
 
 impl ScratchFile {
