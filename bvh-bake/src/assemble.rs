@@ -1,7 +1,9 @@
 //! Puts the parts of a file together, section by section from the first to the last.
 
+use crate::bake::Stage;
 use crate::draft::{Drafts, Ends, Run};
 use crate::error::BakeError;
+use crate::progress::{Progress, Step, Tally, WHOLE};
 use crate::scratch::Spill;
 use crate::sorter::Sorter;
 use crate::target::Target;
@@ -40,6 +42,7 @@ pub(crate) fn assemble(
     with_ids: bool,
     provenance: &str,
     target: &mut Target,
+    progress: &Progress,
 ) -> Result<(), BakeError> {
     let Contents { records, drafts, duplicates, .. } = contents;
     let runs: Vec<Vec<Run>> = drafts.iter().map(Drafts::runs).collect();
@@ -48,9 +51,12 @@ pub(crate) fn assemble(
     let lengths =
         [objects.len(), sum(|d| d.page_count() * PAGE), sum(Drafts::leaf_bytes), sum(Drafts::id_bytes)];
     let rest = duplicates.count() as usize * 8 + provenance.len() + 7 * PAGE;
-    target.expect((lengths.iter().sum::<usize>() + rest) as u64);
+    let expected = (lengths.iter().sum::<usize>() + rest) as u64;
+    target.expect(expected);
     target.append(&[0; PAGE])?;
-    let mut file = Sections { target, table: Vec::new(), content: ContentHasher::default() };
+    let triangles = records.iter().map(|(_, record)| record.triangles.get()).sum();
+    let tally = progress.tally(Step::Bake(Stage::Encode), WHOLE, triangles, expected);
+    let mut file = Sections { target, table: Vec::new(), content: ContentHasher::default(), tally };
     file.section(SectionKind::Objects, lengths[0], |section| section.write(&objects))?;
     file.section(SectionKind::Nodes, lengths[1], |section| {
         let mut ends = Ends::default();
@@ -122,6 +128,8 @@ struct Sections<'a> {
     target: &'a mut Target,
     table: Vec<Section>,
     content: ContentHasher,
+    /// Over the bytes of the sections.
+    tally: Tally<'a>,
 }
 
 impl Sections<'_> {
@@ -137,7 +145,8 @@ impl Sections<'_> {
             self.content.begin(kind, length as u64);
         }
         let content = kind.is_content().then_some(&mut self.content);
-        let mut section = OpenSection { target: self.target, checksum: Hasher::default(), content };
+        let (target, tally) = (&mut *self.target, &self.tally);
+        let mut section = OpenSection { target, checksum: Hasher::default(), content, tally };
         write(&mut section)?;
         let checksum = section.checksum.finish();
         self.table.push(Section { kind, range: start..start + length, checksum });
@@ -151,11 +160,13 @@ struct OpenSection<'a> {
     target: &'a mut Target,
     checksum: Hasher,
     content: Option<&'a mut ContentHasher>,
+    tally: &'a Tally<'a>,
 }
 
 impl OpenSection<'_> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), BakeError> {
-        let Self { target, checksum, content } = self;
+        let Self { target, checksum, content, tally } = self;
+        tally.add(bytes.len() as u64);
         let hash_content = || {
             if let Some(content) = content {
                 content.update(bytes);

@@ -11,6 +11,7 @@ use crate::mesh::Mesh;
 use crate::options::Options;
 use crate::pages::order::arrange;
 use crate::prepare::{Prepared, measure, survey};
+use crate::progress::{Progress, Step};
 use crate::prove::prove;
 use crate::report::BakeReport;
 use crate::sorter::Sorter;
@@ -25,7 +26,7 @@ use std::time::Instant;
 use zerocopy::FromZeros;
 
 /// A stage of a bake, for those who show progress.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// Origins, rounding, duplicates.
     Prepare,
@@ -43,7 +44,7 @@ impl Stage {
         match self {
             Self::Prepare => "preparing",
             Self::Build => "building bricks",
-            Self::Encode => "putting pages together",
+            Self::Encode => "assembling",
             Self::Prove => "proving bounds",
         }
     }
@@ -64,7 +65,7 @@ pub fn to_bytes(mesh: &Mesh, options: &Options) -> Result<(Vec<u8>, BakeReport),
 }
 
 /// `to_bytes` with a provenance text (lines `key=value`, kept out of the content) and a callback at
-/// the start of each stage.
+/// the beginning of each stage.
 ///
 /// # Errors
 /// As `to_bytes`.
@@ -72,18 +73,18 @@ pub fn to_bytes_with(
     mesh: &Mesh,
     options: &Options,
     provenance: &str,
-    progress: &mut dyn FnMut(Stage),
+    begin: &mut dyn FnMut(Stage),
 ) -> Result<(Vec<u8>, BakeReport), BakeError> {
     let start = Instant::now();
     mesh.check()?;
-    let means = Means::unlimited();
+    let means = Means::unlimited(&Progress::default());
     let mut target = Target::Memory(Vec::new());
     let mesh = if options.split_objects || mesh.objects.len() == 1 {
         Cow::Borrowed(mesh)
     } else {
         Cow::Owned(mesh.clone().merged())
     };
-    let mut report = of_objects(mesh, options, provenance, &means, &mut target, progress)?;
+    let mut report = of_objects(mesh, options, provenance, &means, &mut target, begin)?;
     report.seconds = start.elapsed().as_secs_f64();
     let Target::Memory(bytes) = target else { return Ok((Vec::new(), report)) };
     Ok((bytes, report))
@@ -96,20 +97,20 @@ pub(crate) fn of_objects(
     provenance: &str,
     means: &Means,
     target: &mut Target,
-    progress: &mut dyn FnMut(Stage),
+    begin: &mut dyn FnMut(Stage),
 ) -> Result<BakeReport, BakeError> {
+    means.progress.expect(mesh.triangle_count());
     let largest_id = mesh.objects.iter().flat_map(|object| &object.triangle_ids).max();
     let id_count = largest_id.map_or(0, |&id| u64::from(id) + 1);
     let mut baker = Baker::new(options, id_count, means);
     for number in (0..mesh.objects.len()).filter(|&number| !mesh.objects[number].triangles.is_empty()) {
-        progress(Stage::Prepare);
-        let spill = means.scratch.spill();
+        begin(Stage::Prepare);
         let object = &mesh.objects[number];
-        baker
-            .add(Prepared::of_object(object, |diagonal| grid_error(options, diagonal), &spill)?, progress)?;
+        let prepared = Prepared::of_object(object, |diagonal| grid_error(options, diagonal), means)?;
+        baker.add(prepared, begin)?;
     }
     drop(mesh);
-    baker.finish(provenance, target, progress)
+    baker.finish(provenance, target, begin)
 }
 
 /// The largest move that quantisation may make in an object of this diagonal, `None` for none.
@@ -130,6 +131,9 @@ pub(crate) struct Baker<'a> {
     vertices: u64,
     children: u64,
     treelets: u64,
+    /// Triangles of the objects so far, and those of them that are stored.
+    triangles: u64,
+    kept: u64,
 }
 
 impl<'a> Baker<'a> {
@@ -140,15 +144,22 @@ impl<'a> Baker<'a> {
             duplicates: Sorter::of_runs(means.sorted_at_once::<[u32; 2]>(id_count)),
             spill: means.scratch.spill(),
         };
-        Self { options, means, id_count, contents, reason: None, vertices: 0, children: 0, treelets: 0 }
+        Self {
+            options,
+            means,
+            id_count,
+            contents,
+            reason: None,
+            vertices: 0,
+            children: 0,
+            treelets: 0,
+            triangles: 0,
+            kept: 0,
+        }
     }
 
     /// Bakes an object up to its pages.
-    pub(crate) fn add(
-        &mut self,
-        prepared: Prepared,
-        progress: &mut dyn FnMut(Stage),
-    ) -> Result<(), BakeError> {
+    pub(crate) fn add(&mut self, prepared: Prepared, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
         let Self { options, means, .. } = *self;
         let Prepared { name, origin, soup, moved, vertices } = prepared;
         let Contents { duplicates, spill, .. } = &mut self.contents;
@@ -158,9 +169,12 @@ impl<'a> Baker<'a> {
         let moved = moved.joined(measured.moved).rounded_up();
         let kept = Kept::new(&soup, &measured.dropped);
         let trials = auto::trials(kept.count(), options);
-        let mut surveyed = survey(&kept, &measured, &trials)?;
+        let mut surveyed = survey(&kept, &measured, &trials, means)?;
         let choice = auto::choose(kept.count(), &trials, &surveyed.patches, options);
-        progress(Stage::Build);
+        self.triangles += soup.count;
+        means.progress.leave_out(left_out);
+        means.progress.reach(Step::Bake(Stage::Prepare), self.triangles);
+        begin(Stage::Build);
         let f16_exponent = f16_exponent(&measured.bounds);
         let style = Style {
             profile: choice.profile,
@@ -173,6 +187,8 @@ impl<'a> Baker<'a> {
         let triangles = kept.count();
         drop(soup);
         let Drafted { mut drafts, children } = draft(bricks, style, means)?;
+        self.kept += triangles;
+        means.progress.reach(Step::Bake(Stage::Build), self.kept);
         if options.ablation.pages != Default::default() {
             drafts.order = Some(arrange(&drafts.links()?, options.ablation.pages));
         }
@@ -220,12 +236,15 @@ impl<'a> Baker<'a> {
         self,
         provenance: &str,
         target: &mut Target,
-        progress: &mut dyn FnMut(Stage),
+        begin: &mut dyn FnMut(Stage),
     ) -> Result<BakeReport, BakeError> {
-        progress(Stage::Encode);
-        assemble(self.contents, self.options.ids, provenance, target)?;
-        progress(Stage::Prove);
-        let (layout, inflation) = prove(target.source())?;
+        let progress = &self.means.progress;
+        begin(Stage::Encode);
+        assemble(self.contents, self.options.ids, provenance, target, progress)?;
+        progress.reach(Step::Bake(Stage::Encode), self.kept);
+        begin(Stage::Prove);
+        let (layout, inflation) = prove(target.source(), progress)?;
+        progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
             file: FileSummary::new(&layout, target.length()),
             reason: self.reason.unwrap_or_default(),
@@ -233,7 +252,7 @@ impl<'a> Baker<'a> {
             width_inflation: inflation.mean_width(),
             volume_inflation: inflation.mean_volume(),
             mean_children: self.children as f64 / self.treelets as f64,
-            scratch: self.means.scratch.traffic(),
+            traffic: progress.traffic(),
             seconds: 0.0,
         })
     }

@@ -14,9 +14,11 @@ mod reinsert;
 mod swept;
 
 use crate::ablation::SplitRule;
+use crate::bake::Stage;
 use crate::error::BakeError;
 use crate::means::Means;
 use crate::options::Effort;
+use crate::progress::{Step, Tally, WHOLE};
 use crate::scratch::Stream;
 use crate::soup::{Kept, Triangle};
 pub(crate) use boxes::Aabb;
@@ -29,6 +31,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Triangles in a leaf packet.
 const PACKET: usize = bvh_format::leaf::PACKET;
+
+/// What passes over the triangles are worth: dividing them into bricks, and building the bricks' trees. The rest is what
+/// is made of these.
+const DIVIDE: u64 = 2;
+const TREES: u64 = 9;
 
 /// Triangles in a brick, at most. The bytes of a file depend on it.
 pub(crate) const BRICK: usize = 1 << 18;
@@ -132,7 +139,9 @@ impl Bricks {
     ) -> Result<Self, BakeError> {
         let builder = Builder::new(width, effort, splits);
         let spill = means.scratch.spill();
-        let mut division = Division { builder: &builder, means, spill: &spill, bricks: Vec::new() };
+        let tally = tally(means, DIVIDE, triangles.count());
+        let mut division =
+            Division { builder: &builder, means, spill: &spill, tally: &tally, bricks: Vec::new() };
         let top = division.divide(triangles, triangles.count(), grid)?;
         let bricks = division.bricks;
         Ok(Self { bricks, top, builder })
@@ -147,6 +156,8 @@ impl Bricks {
     ) -> Result<(Vec<T>, Node<u32>), BakeError> {
         let Self { bricks, top, builder } = self;
         let count = bricks.len();
+        let triangles = bricks.iter().map(Stream::count).sum();
+        let (trees, rest) = (tally(means, TREES, triangles), tally(means, WHOLE - DIVIDE - TREES, triangles));
         let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
         let lock = |mutex: &Mutex<Option<Stream<Triangle>>>| match mutex.lock() {
@@ -158,7 +169,13 @@ impl Bricks {
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
                 let Some(brick) = bricks.get(number).and_then(lock) else { break };
-                let result = brick.take().and_then(|triangles| make(builder.tree(&triangles), &triangles));
+                let result = brick.take().and_then(|triangles| {
+                    let tree = builder.tree(&triangles);
+                    trees.add(triangles.len() as u64);
+                    let made = make(tree, &triangles)?;
+                    rest.add(triangles.len() as u64);
+                    Ok(made)
+                });
                 if result.is_err() {
                     // The others need not go on.
                     next.fetch_add(count, Ordering::Relaxed);
@@ -174,6 +191,11 @@ impl Bricks {
         let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
         Ok((results.collect::<Result<_, _>>()?, top))
     }
+}
+
+/// Counts a pass over so many triangles.
+fn tally(means: &Means, weight: u64, triangles: u64) -> Tally<'_> {
+    means.progress.tally(Step::Bake(Stage::Build), weight, triangles, triangles)
 }
 
 struct Builder {

@@ -3,6 +3,7 @@
 use crate::error::BakeError;
 use crate::files::{FileOptions, bake_files};
 use crate::options::Options;
+use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 
 /// Bakes a mesh file into the directory of a build script's outputs, with default options, and tells
@@ -27,8 +28,8 @@ pub fn bake(input: impl AsRef<Path>, output_name: impl AsRef<Path>) -> Result<Pa
     tell_cargo(&format!("rerun-if-changed={}", input.display()));
     let directory = std::env::var_os("OUT_DIR").ok_or(BakeError::NoOutDir)?;
     let output = Path::new(&directory).join(output_name);
-    let options = Options::default();
-    bake_files(&[input.to_owned()], &output, &options, &FileOptions::default(), &mut |_| ())?;
+    let (options, file_options) = (Options::default(), FileOptions::default());
+    bake_files(&[input.to_owned()], &output, &options, &file_options, &Progress::default(), &mut |_| ())?;
     Ok(output)
 }
 

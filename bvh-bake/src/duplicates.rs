@@ -4,6 +4,7 @@
 //! mesh can be made of which a triangle is taken for another's duplicate.
 
 use crate::error::BakeError;
+use crate::progress::Tally;
 use crate::scratch::Spill;
 use crate::sorter::Sorter;
 use crate::soup::{Corners, PART, Soup, Triangles};
@@ -31,17 +32,24 @@ fn canonical(triangle: &Corners) -> [[u32; 3]; 3] {
 
 /// Of all triangles' hashes finds the places of duplicates, a bit for each triangle (none at all without
 /// duplicates), and gives `found` the pairs (kept id, id of an equal triangle). `run` records are sorted at a time.
+/// `tally` is over the triangles.
 pub(crate) fn find(
     soup: &Soup,
     hashes: Sorter<Hashed>,
     run: usize,
     spill: &Spill,
+    tally: &Tally,
     mut found: impl FnMut([u32; 2]) -> Result<(), BakeError>,
 ) -> Result<Vec<u64>, BakeError> {
     let words = soup.count.div_ceil(64) as usize;
     let mut shared: Vec<u64> = Vec::new();
     let mut last: Option<Hashed> = None;
+    let mut visited = 0;
     hashes.visit(|hashed| {
+        visited += 1;
+        if visited % PART == 0 {
+            tally.add(PART as u64);
+        }
         if let Some(last) = last.filter(|last| last[..2] == hashed[..2]) {
             shared.resize(words, 0);
             [last[2], hashed[2]].into_iter().for_each(|place| set(&mut shared, place));

@@ -8,23 +8,24 @@ mod atomic;
 mod provenance;
 mod room;
 
-pub(crate) use atomic::Temporary;
+pub(crate) use atomic::{Temporary, remove_stale_of};
 pub use atomic::{discard_unfinished, write_atomically};
 
 use crate::bake::{self, Baker, Stage};
 use crate::error::BakeError;
 use crate::gather::Gatherer;
-use crate::io::{self, MeshFormat, ReadError};
+use crate::io::{self, Input, MeshFormat, ReadError};
 use crate::means::Means;
 use crate::mesh::Mesh;
 use crate::options::Options;
+use crate::progress::{Progress, Step};
 use crate::report::BakeReport;
+use crate::scratch;
 use crate::summary::FileSummary;
 use crate::target::Target;
 use bvh_format::checksum::{Hasher, checksum};
 use provenance::Provenance;
 use std::borrow::Cow;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -40,28 +41,6 @@ pub struct FileOptions {
     /// The directory for scratch files; `None` for the output's. They have no names there: nothing of them is left,
     /// however the process ends.
     pub scratch: Option<PathBuf>,
-}
-
-/// A step of [`bake_files`], for those who show progress.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
-    /// Reading inputs and looking at what the output already is.
-    Read,
-    /// A stage of the bake.
-    Bake(Stage),
-    /// Writing the output.
-    Write,
-}
-
-impl Step {
-    /// The step's name for people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Read => "reading",
-            Self::Bake(stage) => stage.name(),
-            Self::Write => "writing",
-        }
-    }
 }
 
 /// What came of [`bake_files`].
@@ -89,6 +68,9 @@ pub fn least_memory(triangles: u64) -> u64 {
 /// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, twice, and up to 200 bytes of scratch a
 /// triangle, each written and read two to three times. If the output is up to date, reading inputs and output.
 ///
+/// How far it is, and what has been read and written, can be seen in `progress` at any time, from any thread. `begin` is
+/// called when a step begins, and what the step before has done is in `progress` then.
+///
 /// # Errors
 /// [`BakeError::Read`] if an input cannot be read or is wrong; [`BakeError::OutputIsInput`];
 /// [`BakeError::Memory`] if the budget is too small; [`BakeError::Room`] if there is too little room for scratch
@@ -99,14 +81,17 @@ pub fn bake_files(
     output: &Path,
     options: &Options,
     file_options: &FileOptions,
-    progress: &mut dyn FnMut(Step),
+    progress: &Progress,
+    begin: &mut dyn FnMut(Step),
 ) -> Result<Outcome, BakeError> {
-    progress(Step::Read);
+    begin(Step::Read);
     refuse_output(inputs, output)?;
-    let job = Job { inputs, output, options, file_options };
+    progress.expect_bytes(file_lengths(inputs));
+    let job = Job { inputs, output, options, file_options, progress };
+    scratch::remove_stale(job.scratch());
     match file_options.max_memory {
-        Some(budget) => job.within(budget, progress),
-        None => job.in_memory(progress),
+        Some(budget) => job.within(budget, begin),
+        None => job.in_memory(begin),
     }
 }
 
@@ -116,11 +101,12 @@ struct Job<'a> {
     output: &'a Path,
     options: &'a Options,
     file_options: &'a FileOptions,
+    progress: &'a Progress,
 }
 
 impl Job<'_> {
-    fn in_memory(&self, progress: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
-        let mut sources = Sources::default();
+    fn in_memory(&self, begin: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
+        let mut sources = Sources::new(self.progress);
         let mut provenance = Provenance::new(self.inputs, self.options);
         for input in self.inputs {
             sources.add(input)?;
@@ -134,30 +120,31 @@ impl Job<'_> {
         if !self.options.split_objects {
             mesh = mesh.merged();
         }
-        let mut target = Target::beside(self.output)?;
-        let means = Means::unlimited();
-        let mut stage = |stage| progress(Step::Bake(stage));
+        let mut target = Target::beside(self.output, self.progress)?;
+        let means = Means::unlimited(self.progress);
+        let mut stage = |stage| begin(Step::Bake(stage));
         let (mesh, text) = (Cow::Owned(mesh), provenance.to_text());
         let report = bake::of_objects(mesh, self.options, &text, &means, &mut target, &mut stage)?;
-        self.close(report, target, parsed, progress)
+        self.close(report, target, parsed, begin)
     }
 
-    fn within(&self, budget: u64, progress: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
+    fn within(&self, budget: u64, begin: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
         // What certainly does not fit is not even read.
         self.check_budget(budget, 0, Means::least(0))?;
         let mut provenance = Provenance::new(self.inputs, self.options);
+        let progress = self.progress;
         let (mut formats, mut files, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for input in self.inputs {
             let failed = |source| ReadError::Io { path: input.clone(), source };
-            let (format, length) = format_of(input)?;
-            files.push(provenance::file_checksum(input).map_err(failed)?);
+            let (format, length) = format_of(input, progress)?;
+            files.push(provenance::file_checksum(input, progress, CHECKSUM).map_err(failed)?);
             if format == MeshFormat::Gltf {
                 self.check_budget(
                     budget,
                     0,
                     Means::least(0).saturating_add(length.saturating_mul(GLTF_BYTES)),
                 )?;
-                meshes.push(mesh_checksum(&io::read(input)?));
+                meshes.push(mesh_checksum(&io::read_counted(input, progress, GLTF)?));
             }
             formats.push(format);
         }
@@ -166,16 +153,15 @@ impl Job<'_> {
             return Ok(Outcome::UpToDate(summary));
         }
         // Fails before the work, where the output cannot be written.
-        drop(Target::beside(self.output)?);
+        drop(Target::beside(self.output, progress)?);
         let parsed = Instant::now();
-        let scratch = self.file_options.scratch.as_deref();
-        let scratch = scratch.unwrap_or_else(|| atomic::directory_of(self.output));
+        let scratch = self.scratch();
         room::check(&[(scratch, file_lengths(self.inputs))])?;
-        let means = Means::within(budget, scratch);
+        let means = Means::within(budget, scratch, progress);
         let mut gatherer = Gatherer::new(&means, self.options.split_objects);
         for (input, format) in self.inputs.iter().zip(formats) {
             match format {
-                MeshFormat::Gltf => gatherer.add_mesh(&io::read(input)?)?,
+                MeshFormat::Gltf => gatherer.read_gltf(input)?,
                 format => gatherer.read(input, format)?,
             }
         }
@@ -184,15 +170,23 @@ impl Job<'_> {
         let bytes = |each: u64| triangles.saturating_mul(each);
         let output = atomic::directory_of(self.output);
         room::check(&[(scratch, bytes(room::SCRATCH_A_TRIANGLE)), (output, bytes(room::OUTPUT_A_TRIANGLE))])?;
-        let mut stage = |stage| progress(Step::Bake(stage));
+        let prepared = gatherer.finish(|diagonal| bake::grid_error(self.options, diagonal))?;
+        progress.expect(triangles);
+        let mut stage = |stage| begin(Step::Bake(stage));
         let mut baker = Baker::new(self.options, triangles, &means);
-        for prepared in gatherer.finish(|diagonal| bake::grid_error(self.options, diagonal))? {
+        for prepared in prepared {
             stage(Stage::Prepare);
             baker.add(prepared, &mut stage)?;
         }
-        let mut target = Target::beside(self.output)?;
+        let mut target = Target::beside(self.output, progress)?;
         let report = baker.finish(&provenance.to_text(), &mut target, &mut stage)?;
-        self.close(report, target, parsed, progress)
+        self.close(report, target, parsed, begin)
+    }
+
+    /// The directory for scratch files.
+    fn scratch(&self) -> &Path {
+        let scratch = self.file_options.scratch.as_deref();
+        scratch.unwrap_or_else(|| atomic::directory_of(self.output))
     }
 
     fn check_budget(&self, budget: u64, triangles: u64, needed: u64) -> Result<(), BakeError> {
@@ -204,7 +198,11 @@ impl Job<'_> {
     }
 
     fn up_to_date(&self, provenance: &Provenance) -> Option<FileSummary> {
-        if self.file_options.force { None } else { provenance::up_to_date(self.output, provenance) }
+        if self.file_options.force {
+            None
+        } else {
+            provenance::up_to_date(self.output, provenance, self.progress)
+        }
     }
 
     /// Gives the output its name.
@@ -213,10 +211,11 @@ impl Job<'_> {
         mut report: BakeReport,
         target: Target,
         parsed: Instant,
-        progress: &mut dyn FnMut(Step),
+        begin: &mut dyn FnMut(Step),
     ) -> Result<Outcome, BakeError> {
-        progress(Step::Write);
+        begin(Step::Write);
         target.rename()?;
+        self.progress.reach(Step::Write, report.file.triangles);
         report.seconds = parsed.elapsed().as_secs_f64();
         Ok(Outcome::Baked(Box::new(report)))
     }
@@ -225,13 +224,18 @@ impl Job<'_> {
 /// Bytes of memory a byte of a glTF file, at least.
 const GLTF_BYTES: u64 = 8;
 
+/// What passes over an input's bytes are worth in memory: reading, parsing.
+const IN_MEMORY: [u64; 2] = [3, 13];
+/// Within a budget: the checksum of the bytes, and of a glTF file that of the mesh. Then comes the gatherer.
+const CHECKSUM: u64 = 2;
+const GLTF: u64 = 7;
+
 /// A file's format and length.
-fn format_of(input: &Path) -> Result<(MeshFormat, u64), BakeError> {
+fn format_of(input: &Path, progress: &Progress) -> Result<(MeshFormat, u64), BakeError> {
     let failed = |source| ReadError::Io { path: input.to_owned(), source };
-    let mut file = std::fs::File::open(input).map_err(failed)?;
-    let length = file.metadata().map_err(failed)?.len();
-    let mut head = Vec::new();
-    file.by_ref().take(4096).read_to_end(&mut head).map_err(failed)?;
+    let mut file = Input::open(input, progress, 0).map_err(failed)?;
+    let length = file.length();
+    let head = file.read_up_to(4096).map_err(failed)?;
     let format = MeshFormat::from_extension(input).or_else(|| MeshFormat::from_head(&head, length));
     Ok((format.ok_or_else(|| io::unknown_format(input))?, length))
 }
@@ -262,11 +266,11 @@ fn append(joined: &mut Mesh, mut mesh: Mesh) -> Result<(), BakeError> {
 }
 
 /// Inputs that have been read into memory; text is parsed only once it is known that it has to be.
-#[derive(Default)]
-struct Sources {
+struct Sources<'a> {
     files: Vec<Source>,
     file_checksums: Vec<u64>,
     mesh_checksums: Vec<u64>,
+    progress: &'a Progress,
 }
 
 enum Source {
@@ -274,22 +278,27 @@ enum Source {
     Mesh(Mesh),
 }
 
-impl Sources {
+impl<'a> Sources<'a> {
+    fn new(progress: &'a Progress) -> Self {
+        Self { files: Vec::new(), file_checksums: Vec::new(), mesh_checksums: Vec::new(), progress }
+    }
+
     fn add(&mut self, input: &Path) -> Result<(), BakeError> {
         let failed = |source| ReadError::Io { path: input.to_owned(), source };
-        let bytes = std::fs::read(input).map_err(failed)?;
+        let [reading, parsing] = IN_MEMORY;
+        let whole = Input::open(input, self.progress, reading).and_then(|mut file| file.read_all());
+        let bytes = whole.map_err(failed)?;
         self.file_checksums.push(checksum(&bytes));
         let format = MeshFormat::from_extension(input).or_else(|| MeshFormat::from_content(&bytes));
         self.files.push(match format {
             // A glTF file may name others, which its own bytes say nothing of: what is read counts.
             Some(MeshFormat::Gltf) => {
-                let mesh = io::read_bytes(&bytes, MeshFormat::Gltf, input)?;
+                let mesh = io::parse(&bytes, MeshFormat::Gltf, input, self.progress, parsing)?;
                 self.mesh_checksums.push(mesh_checksum(&mesh));
                 Source::Mesh(mesh)
             }
             Some(format) => Source::Bytes(input.to_owned(), bytes, format),
-            // Of no known format: the reader says so.
-            None => Source::Mesh(io::read(input)?),
+            None => return Err(io::unknown_format(input).into()),
         });
         Ok(())
     }
@@ -298,9 +307,12 @@ impl Sources {
         let mut joined = Mesh::default();
         for source in self.files {
             let mesh = match source {
-                Source::Bytes(input, bytes, format) => io::read_bytes(&bytes, format, &input)?,
+                Source::Bytes(input, bytes, format) => {
+                    io::parse(&bytes, format, &input, self.progress, IN_MEMORY[1])?
+                }
                 Source::Mesh(mesh) => mesh,
             };
+            self.progress.find(mesh.triangle_count());
             append(&mut joined, mesh)?;
         }
         Ok(joined)
@@ -344,7 +356,7 @@ mod tests {
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
     fn bake(inputs: &[PathBuf], output: &Path, options: &Options) -> Result<Outcome, BakeError> {
-        bake_files(inputs, output, options, &FileOptions::default(), &mut |_| ())
+        bake_files(inputs, output, options, &FileOptions::default(), &Progress::default(), &mut |_| ())
     }
 
     fn names(directory: &Path) -> Vec<String> {
@@ -416,7 +428,8 @@ mod tests {
         for budget in [0, 10, least_memory(1) - 1] {
             let options = FileOptions { max_memory: Some(budget), ..FileOptions::default() };
             let inputs = std::slice::from_ref(&input);
-            let refused = bake_files(inputs, &output, &Options::default(), &options, &mut |_| ());
+            let (how, progress) = (Options::default(), Progress::default());
+            let refused = bake_files(inputs, &output, &how, &options, &progress, &mut |_| ());
             assert!(matches!(refused, Err(BakeError::Memory { .. })), "{refused:?}");
         }
         assert_eq!(names(directory.path()), ["in.obj"]);

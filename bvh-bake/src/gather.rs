@@ -8,17 +8,26 @@ mod faces;
 mod solids;
 
 use crate::error::BakeError;
-use crate::io::{self, Fault, Feed, Halt, MeshFormat, Place, ReadError};
+use crate::io::{self, Fault, Feed, Halt, Input, MeshFormat, Place, ReadError};
 use crate::means::Means;
-use crate::mesh::{InputError, MAX_TRIANGLES, Mesh};
+use crate::mesh::{InputError, MAX_TRIANGLES};
 use crate::placement::{Extent, Moved, Placement};
 use crate::prepare::Prepared;
+use crate::progress::{Progress, Step};
 use crate::scratch::{Piece, Spill};
 use crate::soup::{PART, Part, Soup, Triangle, WideTriangle};
 use faces::{Indexed, Misfit};
 use solids::Solids;
-use std::fs::File;
+use std::cell::Cell;
 use std::path::Path;
+
+/// What passes over a file's bytes are worth: reading STL; reading PLY, and looking up the corners of its faces; reading
+/// OBJ for vertices and for faces, which is one weight, and looking up.
+const STL: u64 = 14;
+const PLY: [u64; 2] = [6, 8];
+const OBJ: [u64; 2] = [4, 6];
+/// Reading glTF.
+const GLTF: u64 = 7;
 
 /// The objects found so far.
 pub(crate) struct Gatherer<'a> {
@@ -54,8 +63,9 @@ impl Gathering {
     }
 
     /// Makes a part of what is in memory.
-    fn close_part(&mut self, spill: &Spill) -> Result<(), BakeError> {
+    fn close_part(&mut self, spill: &Spill, progress: &Progress) -> Result<(), BakeError> {
         let open = std::mem::take(&mut self.open);
+        progress.find(open.len() as u64);
         let fits = |triangle: &WideTriangle| {
             triangle.corners.as_flattened().iter().all(|&value| f64::from(value as f32) == value)
         };
@@ -93,15 +103,16 @@ impl<'a> Gatherer<'a> {
         Ok(())
     }
 
-    /// Adds a mesh that has been checked.
-    pub(crate) fn add_mesh(&mut self, mesh: &Mesh) -> Result<(), BakeError> {
+    /// Reads a glTF file, whole.
+    pub(crate) fn read_gltf(&mut self, path: &Path) -> Result<(), BakeError> {
+        let mesh = io::read_counted(path, &self.means.progress, GLTF)?;
         for object in &mesh.objects {
             let number = self.object(object.name.clone());
             let mut used = vec![false; object.positions.len()];
             for &triangle in &object.triangles {
                 triangle.iter().for_each(|&vertex| used[vertex as usize] = true);
                 let corners = triangle.map(|vertex| object.positions[vertex as usize]);
-                self.add(number, corners).map_err(|halt| halt.in_file(Path::new("glTF")))?;
+                self.add(number, corners).map_err(|halt| halt.in_file(path))?;
             }
             self.add_vertices(number, used.iter().filter(|&&used| used).count() as u64);
         }
@@ -109,20 +120,25 @@ impl<'a> Gatherer<'a> {
     }
 
     fn read_as(&mut self, path: &Path, format: MeshFormat) -> Result<(), Halt> {
+        let means = self.means;
+        let feed = |weight| feed(path, &means.progress, weight);
         match format {
-            MeshFormat::Stl => io::stl::stream(feed(path)?, &mut Solids::new(self)),
+            MeshFormat::Stl => io::stl::stream(feed(STL)?, &mut Solids::new(self)),
             MeshFormat::Ply => {
                 let mut faces = Indexed::new(self.means);
-                io::ply::stream(feed(path)?, &mut faces)?;
+                let file = feed(PLY[0])?;
+                let length = file.length();
+                io::ply::stream(file, &mut faces)?;
                 faces.finish()?;
                 let first = faces.first_out_of_range()?;
                 if let Some(corner) = first {
                     return Err(io::ply::out_of_range(faces.vertex_count(), corner).into());
                 }
                 let object = self.object(String::new());
-                faces.resolve(|_| object, Some(self))?.map_or(Ok(()), |misfit| {
+                let tally = means.progress.tally(Step::Read, PLY[1], length, faces.corner_count());
+                faces.resolve(|_| object, Some(self), &tally)?.map_or(Ok(()), |misfit| {
                     // What is wrong is met again where it stands.
-                    io::ply::stream(feed(path)?, &mut faces::Probe::new(misfit))
+                    io::ply::stream(feed(0)?, &mut faces::Probe::new(misfit))
                 })
             }
             MeshFormat::Obj => self.read_obj(path),
@@ -132,22 +148,27 @@ impl<'a> Gatherer<'a> {
 
     fn read_obj(&mut self, path: &Path) -> Result<(), Halt> {
         let mut faces = Indexed::new(self.means);
-        let read = io::obj::stream(|| feed(path), &mut faces);
+        let progress = &self.means.progress;
+        let feed = |weight| feed(path, progress, weight);
+        let length = Cell::new(0);
+        let walk = || feed(OBJ[0]).inspect(|file| length.set(file.length()));
+        let read = io::obj::stream(walk, &mut faces);
         faces.finish()?;
+        let tally = progress.tally(Step::Read, OBJ[1], length.get(), faces.corner_count());
         // A vertex that the format cannot hold is wrong at the first face that uses it, before what is wrong further down.
         let names = match read {
             Ok(names) => names,
             Err(halt) => {
-                let misfit = faces.resolve(|_| 0, None)?;
-                return Err(misfit.map_or(Ok(halt), |Misfit(vertex)| io::obj::misfit(feed(path)?, vertex))?);
+                let misfit = faces.resolve(|_| 0, None, &tally)?;
+                return Err(misfit.map_or(Ok(halt), |Misfit(vertex)| io::obj::misfit(feed(0)?, vertex))?);
             }
         };
         let first = self.names.len();
         for name in names {
             self.object(name);
         }
-        let misfit = faces.resolve(|run| first + run.object as usize, Some(self))?;
-        misfit.map_or(Ok(()), |Misfit(vertex)| Err(io::obj::misfit(feed(path)?, vertex)?))
+        let misfit = faces.resolve(|run| first + run.object as usize, Some(self), &tally)?;
+        misfit.map_or(Ok(()), |Misfit(vertex)| Err(io::obj::misfit(feed(0)?, vertex)?))
     }
 
     /// The number of a new object.
@@ -189,7 +210,7 @@ impl<'a> Gatherer<'a> {
         gathering.count += 1;
         self.next_id += 1;
         if gathering.open.len() == PART {
-            gathering.close_part(&self.spill)?;
+            gathering.close_part(&self.spill, &self.means.progress)?;
         }
         Ok(())
     }
@@ -207,7 +228,7 @@ impl<'a> Gatherer<'a> {
 
     /// All objects with triangles, ready to be baked.
     pub(crate) fn finish(self, grid_error: impl Fn(f64) -> Option<f64>) -> Result<Vec<Prepared>, BakeError> {
-        let Self { names, bodies, spill, split, .. } = self;
+        let Self { means, names, bodies, spill, split, .. } = self;
         let mut names = names.into_iter().filter(|(_, found)| *found).map(|(name, _)| name);
         let mut prepared = Vec::new();
         for mut body in bodies.into_iter().filter(|body| body.count > 0) {
@@ -215,7 +236,7 @@ impl<'a> Gatherer<'a> {
                 body.open = parked.take()?;
             }
             if !body.open.is_empty() {
-                body.close_part(&spill)?;
+                body.close_part(&spill, &means.progress)?;
             }
             let name = names.next().unwrap_or_default();
             // One object alone keeps its name; several that are joined have none.
@@ -237,9 +258,9 @@ impl<'a> Gatherer<'a> {
     }
 }
 
-/// A file from its beginning.
-fn feed(path: &Path) -> Result<Feed<File>, Halt> {
-    let file = File::open(path).map_err(Halt::Io)?;
-    let length = file.metadata().map_err(Halt::Io)?.len();
-    Ok(Feed::new(file, length))
+/// A file from its beginning, reading which is a pass of so much weight.
+fn feed<'a>(path: &Path, progress: &'a Progress, weight: u64) -> Result<Feed<Input<'a>>, Halt> {
+    let input = Input::open(path, progress, weight).map_err(Halt::Io)?;
+    let length = input.length();
+    Ok(Feed::new(input, length))
 }

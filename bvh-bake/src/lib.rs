@@ -22,6 +22,7 @@ mod options;
 mod pages;
 mod placement;
 mod prepare;
+mod progress;
 mod prove;
 mod report;
 mod scratch;
@@ -37,11 +38,11 @@ pub use ablation::{Ablation, PageOrder, SplitRule};
 pub use bake::{Stage, to_bytes, to_bytes_with};
 pub use error::BakeError;
 pub use files::{
-    FileOptions, Outcome, Step, bake_files, discard_unfinished, least_memory, read_meshes, write_atomically,
+    FileOptions, Outcome, bake_files, discard_unfinished, least_memory, read_meshes, write_atomically,
 };
 pub use options::{Effort, Options};
+pub use progress::{Progress, Step, Traffic};
 pub use prove::{prove_bounds, validate_in_parallel};
 pub use report::BakeReport;
-pub use scratch::Traffic;
 pub use summary::FileSummary;
 pub use verify::{VerifyError, VerifyReport, verify};

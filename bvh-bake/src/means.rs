@@ -1,6 +1,7 @@
 //! What a bake may use: the memory for its stages, divided among them, and the scratch files.
 
 use crate::build::BRICK;
+use crate::progress::Progress;
 use crate::scratch::{Scratch, Stream};
 use bytemuck::Pod;
 use std::path::Path;
@@ -13,9 +14,10 @@ const BRICK_BYTES_A_TRIANGLE: u64 = 300;
 /// Bytes of the records that wait for their piece of a file to fill up, and of a run that is sorted at once.
 const BUFFER_BYTES: u64 = 16 << 20;
 
-/// The memory and the files of a bake.
+/// The memory and the files of a bake, and where it counts what it does.
 pub(crate) struct Means {
     pub(crate) scratch: Arc<Scratch>,
+    pub(crate) progress: Progress,
     /// Bricks that are built side by side, at most.
     pub(crate) bricks: usize,
     /// Bytes of buffers; `None` where all is in memory.
@@ -24,20 +26,26 @@ pub(crate) struct Means {
 
 impl Means {
     /// As much memory as it takes.
-    pub(crate) fn unlimited() -> Self {
-        Self { scratch: Scratch::in_memory(), bricks: rayon::current_num_threads(), buffers: None }
+    pub(crate) fn unlimited(progress: &Progress) -> Self {
+        Self {
+            scratch: Scratch::in_memory(progress),
+            progress: progress.clone(),
+            bricks: rayon::current_num_threads(),
+            buffers: None,
+        }
     }
 
     /// Within `budget` bytes of memory for the whole process; what does not fit goes to files in `directory`.
-    pub(crate) fn within(budget: u64, directory: &Path) -> Self {
+    pub(crate) fn within(budget: u64, directory: &Path, progress: &Progress) -> Self {
         let threads = rayon::current_num_threads() as u64;
         let brick = BRICK as u64 * BRICK_BYTES_A_TRIANGLE;
         let fixed = BYTES_AT_LEAST + 2 * BUFFER_BYTES;
         let bricks = (budget.saturating_sub(fixed) / brick).clamp(1, threads);
         let left = budget.saturating_sub(fixed + bricks * brick);
         // Half of it: what has been freed is not always given back.
-        let scratch = Scratch::in_directory(directory, left / 2);
-        Self { scratch, bricks: bricks as usize, buffers: Some(BUFFER_BYTES) }
+        let scratch = Scratch::in_directory(directory, left / 2, progress);
+        let progress = progress.clone();
+        Self { scratch, progress, bricks: bricks as usize, buffers: Some(BUFFER_BYTES) }
     }
 
     /// Bytes of memory without which `triangles` triangles cannot be baked, whatever goes to files.

@@ -4,16 +4,24 @@
 //! triangles that are kept.
 
 use crate::auto::{self, Trial};
+use crate::bake::Stage;
 use crate::build::{Aabb, Grid, is_one_brick};
 use crate::duplicates::{self, Hashed};
 use crate::error::BakeError;
 use crate::means::Means;
 use crate::mesh;
 use crate::placement::{Extent, Moved, Placement};
-use crate::scratch::Spill;
+use crate::progress::Step;
 use crate::sorter::Sorter;
 use crate::soup::{Corners, Kept, PART, Part, Soup, Triangle, Triangles, fold};
 use rayon::prelude::*;
+
+/// What passes over the triangles are worth: making a soup of an object in memory, measuring, finding duplicates, and
+/// surveying.
+const SOUP: u64 = 2;
+const MEASURE: u64 = 6;
+const DUPLICATES: u64 = 4;
+const SURVEY: u64 = 4;
 
 /// What a bake takes of an object.
 pub(crate) struct Prepared {
@@ -32,8 +40,11 @@ impl Prepared {
     pub(crate) fn of_object(
         object: &mesh::Object,
         grid_error: impl Fn(f64) -> Option<f64>,
-        spill: &Spill,
+        means: &Means,
     ) -> Result<Self, BakeError> {
+        let spill = means.scratch.spill();
+        let count = object.triangles.len() as u64;
+        let tally = means.progress.tally(Step::Bake(Stage::Prepare), SOUP, count, count);
         let used = used_vertices(object);
         let positions = || object.positions.par_iter().zip(&used).filter(|(_, used)| **used);
         let extent = positions()
@@ -59,13 +70,14 @@ impl Prepared {
                 corners: corners.map(|index| vertices[index as usize]),
                 id,
             };
+            tally.add(triangles.len() as u64);
             spill.put(triangles.iter().zip(ids).map(triangle).collect()).map(Part::Narrow)
         };
         let parts = triangles.map(part).collect::<Result<_, _>>()?;
         Ok(Self {
             name: object.name.clone(),
             origin: placement.origin(),
-            soup: Soup { parts, count: object.triangles.len() as u64, placement: None },
+            soup: Soup { parts, count, placement: None },
             moved,
             vertices: used.par_iter().filter(|&&used| used).count() as u64,
         })
@@ -99,6 +111,8 @@ pub(crate) fn measure(
     let mut hashes = Sorter::of_runs(means.sorted_at_once::<Hashed>(soup.count));
     let mut moved = Moved::default();
     let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
+    let tally = |weight| means.progress.tally(Step::Bake(Stage::Prepare), weight, soup.count, soup.count);
+    let measuring = tally(MEASURE);
     let batch = 4 * rayon::current_num_threads();
     for start in (0..soup.parts()).step_by(batch) {
         let parts = (start..(start + batch).min(soup.parts())).into_par_iter();
@@ -112,6 +126,7 @@ pub(crate) fn measure(
                 centres.join(&Aabb::of_point(own.centre()));
                 hashes.push(duplicates::hashed(&triangle.corners, place));
             }
+            measuring.add(triangles.len() as u64);
             Ok((moved, bounds, centres, hashes))
         };
         let parts: Vec<_> = parts.map(of_part).collect::<Result<_, BakeError>>()?;
@@ -123,7 +138,7 @@ pub(crate) fn measure(
         }
     }
     let run = means.sorted_at_once::<[u32; 13]>(soup.count);
-    let dropped = duplicates::find(soup, hashes, run, &spill, found)?;
+    let dropped = duplicates::find(soup, hashes, run, &spill, &tally(DUPLICATES), found)?;
     Ok(Measured { moved, bounds, centres, dropped })
 }
 
@@ -140,7 +155,13 @@ pub(crate) struct Surveyed {
 }
 
 /// The second pass. `trials` are those of the choice of a profile, empty if there is none to choose.
-pub(crate) fn survey(kept: &Kept, measured: &Measured, trials: &[Trial]) -> Result<Surveyed, BakeError> {
+pub(crate) fn survey(
+    kept: &Kept,
+    measured: &Measured,
+    trials: &[Trial],
+    means: &Means,
+) -> Result<Surveyed, BakeError> {
+    let tally = means.progress.tally(Step::Bake(Stage::Prepare), SURVEY, kept.count(), kept.count());
     let bounds = &measured.bounds;
     let centre = [0, 1, 2].map(|a| ((f64::from(bounds.lo(a)) + f64::from(bounds.hi(a))) / 2.0) as f32);
     let wanted = auto::patches(trials);
@@ -184,6 +205,7 @@ pub(crate) fn survey(kept: &Kept, measured: &Measured, trials: &[Trial]) -> Resu
                 sum.patches.push((number, some.iter().map(|triangle| triangle.corners).collect()));
             }
         }
+        tally.add(triangles.len() as u64);
         Ok(())
     };
     let mut all = Surveyed { centre, radius: 0.0, degenerate: 0, grid: None, patches: Vec::new() };

@@ -6,6 +6,7 @@
 mod backward;
 
 use crate::error::BakeError;
+use crate::progress::Progress;
 use crate::target::Source;
 use bvh_format::bounds::Inflation;
 use bvh_format::validate::{validate_counts, validate_links, validate_page, validate_sections};
@@ -50,8 +51,9 @@ fn first_error<T: Send>(
 /// Rule 35, with the page and slot.
 pub fn prove_bounds(layout: &Layout, bytes: &[u8]) -> Result<Inflation, FormatError> {
     let mut inflation = Inflation::default();
+    let progress = Progress::default();
     for object in &layout.objects {
-        match backward::prove_object(layout, Source::Memory(bytes), object, false) {
+        match backward::prove_object(layout, Source::Memory(bytes), object, false, &progress) {
             Ok(sums) => inflation.join(&sums),
             Err(BakeError::Unproved(error)) => return Err(error),
             // Memory is read without fail.

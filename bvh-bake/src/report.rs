@@ -1,6 +1,6 @@
 //! What a bake did: the file it made, and what the file does not say.
 
-use crate::scratch::Traffic;
+use crate::progress::Traffic;
 use crate::summary::FileSummary;
 
 /// The outcome of a bake.
@@ -18,8 +18,8 @@ pub struct BakeReport {
     pub volume_inflation: f64,
     /// Mean number of children of a treelet.
     pub mean_children: f64,
-    /// What went through scratch files; nothing without a budget of memory.
-    pub scratch: Traffic,
+    /// What was read and written of files.
+    pub traffic: Traffic,
     /// Seconds from the parsed mesh, or within a budget from the start of reading, to the finished bytes, or to the closed file where one is written.
     pub seconds: f64,
 }

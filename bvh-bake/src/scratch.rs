@@ -10,10 +10,11 @@
 mod file;
 mod stream;
 
-pub(crate) use file::{read_exact_at, write_all_at};
+pub(crate) use file::{read_exact_at, remove_stale, write_all_at};
 pub(crate) use stream::Stream;
 
 use crate::error::BakeError;
+use crate::progress::Progress;
 use bytemuck::Pod;
 use file::ScratchFile;
 use std::borrow::Cow;
@@ -22,17 +23,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Bytes that go through the scratch files of a bake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Traffic {
-    /// Bytes written.
-    pub written: u64,
-    /// Bytes read, some several times.
-    pub read: u64,
-    /// The most bytes that scratch files had at one time.
-    pub most: u64,
-}
-
 /// The memory and the scratch files that a bake may use.
 pub(crate) struct Scratch {
     /// Where files go; `None` where all fits in memory.
@@ -40,42 +30,28 @@ pub(crate) struct Scratch {
     /// Bytes of pieces that may be in memory.
     allowance: u64,
     kept: AtomicU64,
-    counters: Arc<Counters>,
-}
-
-#[derive(Default)]
-struct Counters {
-    written: AtomicU64,
-    read: AtomicU64,
-    held: AtomicU64,
-    most: AtomicU64,
+    /// Counts what goes through files.
+    progress: Progress,
 }
 
 impl Scratch {
     /// Keeps everything in memory.
-    pub(crate) fn in_memory() -> Arc<Self> {
-        Self::new(None, u64::MAX)
+    pub(crate) fn in_memory(progress: &Progress) -> Arc<Self> {
+        Self::new(None, u64::MAX, progress)
     }
 
     /// Keeps `allowance` bytes in memory and the rest in files of a directory.
-    pub(crate) fn in_directory(directory: &Path, allowance: u64) -> Arc<Self> {
-        Self::new(Some(directory.to_owned()), allowance)
+    pub(crate) fn in_directory(directory: &Path, allowance: u64, progress: &Progress) -> Arc<Self> {
+        Self::new(Some(directory.to_owned()), allowance, progress)
     }
 
-    fn new(directory: Option<PathBuf>, allowance: u64) -> Arc<Self> {
-        Arc::new(Self { directory, allowance, kept: AtomicU64::new(0), counters: Arc::default() })
+    fn new(directory: Option<PathBuf>, allowance: u64, progress: &Progress) -> Arc<Self> {
+        Arc::new(Self { directory, allowance, kept: AtomicU64::new(0), progress: progress.clone() })
     }
 
     /// A place for the pieces of one stage, which share a file.
     pub(crate) fn spill(self: &Arc<Self>) -> Spill {
         Spill { scratch: self.clone(), file: Mutex::new(None) }
-    }
-
-    /// What went through files so far.
-    pub(crate) fn traffic(&self) -> Traffic {
-        let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        let Counters { written, read, most, .. } = &*self.counters;
-        Traffic { written: of(written), read: of(read), most: of(most) }
     }
 
     /// Room in memory for so many bytes, if there is.
@@ -123,7 +99,7 @@ impl Spill {
             return Ok(file.clone());
         }
         let directory = self.scratch.directory.clone().unwrap_or_else(std::env::temp_dir);
-        let made = Arc::new(ScratchFile::create(&directory, &self.scratch.counters)?);
+        let made = Arc::new(ScratchFile::create(&directory, &self.scratch.progress)?);
         *file = Some(made.clone());
         Ok(made)
     }
@@ -177,13 +153,14 @@ mod tests {
     #[test]
     fn pieces_go_to_files_when_memory_is_full_and_leave_nothing() {
         let directory = tempfile::tempdir().unwrap();
-        let scratch = Scratch::in_directory(directory.path(), 4000);
+        let progress = Progress::default();
+        let scratch = Scratch::in_directory(directory.path(), 4000, &progress);
         let spill = scratch.spill();
         let pieces: Vec<Piece<u32>> =
             (0..4).map(|i| spill.put((0..500).map(|j| i * 1000 + j).collect()).unwrap()).collect();
         let in_memory = |piece: &Piece<u32>| matches!(piece, Piece::Memory { .. });
         assert_eq!(pieces.iter().filter(|piece| in_memory(piece)).count(), 2);
-        assert_eq!(scratch.traffic().written, 4000);
+        assert_eq!(progress.traffic().scratch_written, 4000);
         for (i, piece) in (0..).zip(&pieces) {
             assert!(piece.all().unwrap().iter().copied().eq(i * 1000..i * 1000 + 500));
             assert_eq!(*piece.range(7..9).unwrap(), [i * 1000 + 7, i * 1000 + 8]);
@@ -192,12 +169,14 @@ mod tests {
         drop(pieces);
         assert!(in_memory(&spill.put(vec![0u32; 1000]).unwrap()), "room is given back");
         drop(spill);
-        assert_eq!(scratch.counters.held.load(Ordering::Relaxed), 0);
+        let traffic = progress.traffic();
+        assert_eq!((traffic.scratch_most, traffic.scratch_read), (4000, 2 * (2000 + 8)));
+        assert_eq!(progress.scratch_held(), 0);
     }
 
     #[test]
     fn a_directory_that_is_not_there_is_an_error() {
-        let scratch = Scratch::in_directory(Path::new("/no/such/place"), 0);
+        let scratch = Scratch::in_directory(Path::new("/no/such/place"), 0, &Progress::default());
         let refused = scratch.spill().put(vec![1u8]).err().unwrap();
         assert!(refused.to_string().starts_with("/no/such/place: cannot create scratch"), "{refused}");
     }

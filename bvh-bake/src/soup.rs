@@ -5,6 +5,7 @@
 
 use crate::error::BakeError;
 use crate::placement::{Moved, Placement};
+use crate::progress::Tally;
 use crate::scratch::{Piece, Spill, Stream};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -92,12 +93,13 @@ impl<T: Pod> Grouped<T> {
 }
 
 /// Adds what `make` gives for each part to the streams, a group to each, in the order of the parts; then finishes the
-/// streams.
+/// streams. `tally` is over the records.
 pub(crate) fn distribute<T: Pod + Send + Sync>(
     parts: usize,
     make: impl Fn(usize) -> Result<Grouped<T>, BakeError> + Sync,
     streams: &mut [Stream<T>],
     spill: &Spill,
+    tally: &Tally,
 ) -> Result<(), BakeError> {
     // A few parts at a time are in memory.
     let batch = 4 * rayon::current_num_threads();
@@ -107,6 +109,7 @@ pub(crate) fn distribute<T: Pod + Send + Sync>(
         streams.par_iter_mut().enumerate().try_for_each(|(group, stream)| {
             made.iter().try_for_each(|part| stream.append(spill, part.group(group)))
         })?;
+        tally.add(made.iter().map(|part| part.records.len() as u64).sum());
     }
     streams.par_iter_mut().try_for_each(|stream| stream.finish(spill))
 }

@@ -2,6 +2,7 @@
 
 use crate::error::BakeError;
 use crate::files::Temporary;
+use crate::progress::Progress;
 use crate::scratch::{read_exact_at, write_all_at};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,13 +11,14 @@ use std::path::{Path, PathBuf};
 /// Bytes that are written from the first to the last.
 pub(crate) enum Target {
     Memory(Vec<u8>),
-    File { file: Temporary, output: PathBuf, length: u64 },
+    File { file: Temporary, output: PathBuf, length: u64, progress: Progress },
 }
 
 impl Target {
-    /// A new file beside `output`.
-    pub(crate) fn beside(output: &Path) -> Result<Self, BakeError> {
-        Ok(Self::File { file: Temporary::beside(output)?, output: output.to_owned(), length: 0 })
+    /// A new file beside `output`. What is written and read of it is counted.
+    pub(crate) fn beside(output: &Path, progress: &Progress) -> Result<Self, BakeError> {
+        let (file, output) = (Temporary::beside(output)?, output.to_owned());
+        Ok(Self::File { file, output, length: 0, progress: progress.clone() })
     }
 
     /// Bytes written.
@@ -38,7 +40,8 @@ impl Target {
     pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<(), BakeError> {
         match self {
             Self::Memory(all) => all.extend_from_slice(bytes),
-            Self::File { file, output, length } => {
+            Self::File { file, output, length, progress } => {
+                progress.add_output_written(bytes.len() as u64);
                 write_all_at(file.file(), bytes, *length).map_err(|error| failed(output, "write", error))?;
                 *length += bytes.len() as u64;
             }
@@ -50,7 +53,8 @@ impl Target {
     pub(crate) fn replace_first(&mut self, bytes: &[u8]) -> Result<(), BakeError> {
         match self {
             Self::Memory(all) => all[..bytes.len()].copy_from_slice(bytes),
-            Self::File { file, output, .. } => {
+            Self::File { file, output, progress, .. } => {
+                progress.add_output_written(bytes.len() as u64);
                 write_all_at(file.file(), bytes, 0).map_err(|error| failed(output, "write", error))?;
             }
         }
@@ -69,8 +73,8 @@ impl Target {
     pub(crate) fn source(&self) -> Source<'_> {
         match self {
             Self::Memory(bytes) => Source::Memory(bytes),
-            Self::File { file, output, length } => {
-                Source::File { file: file.file(), path: output, length: *length }
+            Self::File { file, output, length, progress } => {
+                Source::File { file: file.file(), path: output, length: *length, progress }
             }
         }
     }
@@ -84,7 +88,7 @@ fn failed(path: &Path, action: &'static str, source: std::io::Error) -> BakeErro
 #[derive(Clone, Copy)]
 pub(crate) enum Source<'a> {
     Memory(&'a [u8]),
-    File { file: &'a std::fs::File, path: &'a Path, length: u64 },
+    File { file: &'a std::fs::File, path: &'a Path, length: u64, progress: &'a Progress },
 }
 
 impl<'a> Source<'a> {
@@ -99,7 +103,8 @@ impl<'a> Source<'a> {
     pub(crate) fn read(&self, range: Range<usize>) -> Result<Cow<'a, [u8]>, BakeError> {
         match self {
             Self::Memory(bytes) => Ok(Cow::Borrowed(&bytes[range])),
-            Self::File { file, path, .. } => {
+            Self::File { file, path, progress, .. } => {
+                progress.add_output_read(range.len() as u64);
                 let mut bytes = vec![0; range.len()];
                 read_exact_at(file, &mut bytes, range.start as u64)
                     .map_err(|error| failed(path, "read back what was written to", error))?;

@@ -1,6 +1,6 @@
 //! Meshes that are read piece by piece: the same file, the same counts and the same errors as of meshes in memory.
 
-use bvh_bake::{BakeReport, FileOptions, Options, Outcome, bake_files};
+use bvh_bake::{BakeReport, FileOptions, Options, Outcome, Progress, bake_files};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ type Told = Result<(Vec<u8>, u64), String>;
 
 fn bake(inputs: &[PathBuf], output: &Path, options: &Options, max_memory: Option<u64>) -> Told {
     let file_options = FileOptions { force: true, max_memory, ..FileOptions::default() };
-    match bake_files(inputs, output, options, &file_options, &mut |_| ()) {
+    match bake_files(inputs, output, options, &file_options, &Progress::default(), &mut |_| ()) {
         Ok(Outcome::Baked(report)) => {
             let BakeReport { vertices, .. } = *report;
             Ok((fs::read(output).unwrap(), vertices))

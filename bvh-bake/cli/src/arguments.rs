@@ -48,6 +48,13 @@ the same.
 piece, and up to 200 bytes a triangle go to scratch files, which have no names and vanish however the process ends. \
 The output is the same to the byte. A SIZE that is too small for any way is refused with exit code 4.
 
+On a terminal a line on standard error shows the stage, how much of it is done, triangles a second, bytes spilled to \
+scratch files, the time so far and about how much is left. --json prints one object on standard output, and, unless \
+-q is given, on standard error an object a line as stages end: read, prepare, build, assemble, prove, write. These \
+lines have stage, seconds, triangles, triangles_per_second, bytes_read, bytes_written, spilled_bytes (those written \
+to scratch files), resident_bytes and peak_rss_bytes; seconds and bytes add up to stage_seconds, bytes_read, \
+bytes_written and scratch_written_bytes of the object. A bake that is up to date, and many assets, have none.
+
 Many assets:
   cbvh bake meshes -o baked --jobs 8
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
@@ -112,7 +119,7 @@ pub(crate) struct BakeArguments {
     /// Bake even if the output is up to date
     #[arg(long)]
     pub(crate) force: bool,
-    /// Print one JSON object
+    /// Print one JSON object, and one for each stage on standard error
     #[arg(long)]
     pub(crate) json: bool,
     /// Print nothing but errors (and what --json asks for)

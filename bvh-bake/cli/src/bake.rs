@@ -1,16 +1,21 @@
 //! `cbvh bake`: meshes into a file.
 
+mod screen;
+mod stages;
+
 use crate::arguments::{BakeArguments, Choice, LayoutArguments};
-use crate::error::Failure;
+use crate::error::{self, Failure};
 use crate::output::{self, hex};
 use crate::{manifest, resident, signals};
-use bvh_bake::{BakeError, FileOptions, Options, Outcome, Stage, Step, bake_files};
+use bvh_bake::{BakeError, FileOptions, Options, Outcome, Progress, Step, bake_files};
 use bvh_format::leaf::TriangleEncoding;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use screen::Screen;
+pub(crate) use screen::spinner;
 use serde::Serialize;
+use stages::{StageLine, Stages};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     if arguments.max_error.is_some() && !is_quantized(arguments.layout.triangles) {
@@ -46,12 +51,17 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
             "--shard and --out-manifest go with --manifest or one folder only (see --help)".into(),
         ));
     }
-    let spinner = spinner(arguments.quiet);
+    let progress = Progress::default();
+    let screen = Screen::new(&progress, arguments.quiet);
+    let tells_stages = arguments.json && !arguments.quiet;
     leave_nothing()?;
-    let baked = bake(&arguments.inputs, output, &options, &file_options, &mut |step| {
-        spinner.set_message(step.name());
-    });
-    spinner.finish_and_clear();
+    let baked =
+        bake(&arguments.inputs, output, &options, &file_options, &progress, &mut |event| match event {
+            Event::Begins(step) => screen.begin(step, &progress),
+            Event::Ended(line) if tells_stages => screen.suspend(|| error::tell_json(line)),
+            Event::Ended(_) => {}
+        });
+    screen.clear();
     let report = baked.map_err(|error| Failure::from_bake(&names(&arguments.inputs), &error))?;
     if arguments.json {
         output::json(&report)
@@ -62,24 +72,35 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     }
 }
 
+/// What is to be seen of a bake while it goes on.
+pub(crate) enum Event<'a> {
+    /// A step begins.
+    Begins(Step),
+    /// A stage has ended for all objects.
+    Ended(&'a StageLine),
+}
+
 /// Bakes meshes into one file, and reports on it.
 pub(crate) fn bake(
     inputs: &[PathBuf],
     output: &Path,
     options: &Options,
     file_options: &FileOptions,
-    progress: &mut dyn FnMut(Step),
+    progress: &Progress,
+    watch: &mut dyn FnMut(Event),
 ) -> Result<Report, BakeError> {
     let start = Instant::now();
-    let mut clock = StageClock::default();
-    let outcome = bake_files(inputs, output, options, file_options, &mut |step| {
-        progress(step);
-        clock.begin(step);
+    let mut stages = Stages::new(progress);
+    let outcome = bake_files(inputs, output, options, file_options, progress, &mut |step| {
+        watch(Event::Begins(step));
+        stages.begin(step, &mut |line| watch(Event::Ended(line)));
     })?;
-    let mut report =
-        Report::new(names(inputs), output.display().to_string(), &outcome, start.elapsed().as_secs_f64());
-    report.stage_seconds = Some(clock.finish()).filter(|_| !report.skipped);
-    Ok(report)
+    let stages = match outcome {
+        Outcome::Baked(_) => stages.finish(&mut |line| watch(Event::Ended(line))),
+        Outcome::UpToDate(_) => Vec::new(),
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    Ok(Report::new(names(inputs), output.display().to_string(), &outcome, stages, seconds))
 }
 
 /// From now on a signal that ends the process leaves nothing half-written.
@@ -101,49 +122,6 @@ pub(crate) fn options(layout: &LayoutArguments) -> Options {
 pub(crate) fn names(paths: &[PathBuf]) -> String {
     let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     names.join(", ")
-}
-
-/// Shows the stage on standard error, if that is a terminal.
-pub(crate) fn spinner(quiet: bool) -> ProgressBar {
-    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let spinner = ProgressBar::with_draw_target(None, target);
-    if !spinner.is_hidden() {
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-            spinner.set_style(style);
-        }
-        spinner.enable_steady_tick(Duration::from_millis(100));
-    }
-    spinner
-}
-
-/// How long the stages take. Those of several objects add up.
-#[derive(Default)]
-struct StageClock {
-    seconds: BTreeMap<&'static str, f64>,
-    open: Option<(&'static str, Instant)>,
-}
-
-impl StageClock {
-    fn begin(&mut self, step: Step) {
-        let name = match step {
-            Step::Read => "read",
-            Step::Bake(Stage::Prepare) => "prepare",
-            Step::Bake(Stage::Build) => "build",
-            Step::Bake(Stage::Encode) => "assemble",
-            Step::Bake(Stage::Prove) => "prove",
-            Step::Write => "write",
-        };
-        if let Some((last, since)) = self.open.replace((name, Instant::now())) {
-            *self.seconds.entry(last).or_default() += since.elapsed().as_secs_f64();
-        }
-    }
-
-    fn finish(mut self) -> BTreeMap<&'static str, f64> {
-        if let Some((last, since)) = self.open.take() {
-            *self.seconds.entry(last).or_default() += since.elapsed().as_secs_f64();
-        }
-        self.seconds
-    }
 }
 
 /// What `--json` prints. Fields that a skipped bake does not know are null.
@@ -174,21 +152,32 @@ pub(crate) struct Report {
     bake_seconds: Option<f64>,
     pub(crate) seconds: f64,
     stage_seconds: Option<BTreeMap<&'static str, f64>>,
-    scratch_bytes: Option<u64>,
-    scratch_written_bytes: Option<u64>,
+    #[serde(skip)]
+    stages: Vec<StageLine>,
+    /// Of all files: the sum of the three by file.
+    bytes_read: Option<u64>,
+    input_read_bytes: Option<u64>,
     scratch_read_bytes: Option<u64>,
+    output_read_bytes: Option<u64>,
+    /// To all files: the sum of the two by file.
+    bytes_written: Option<u64>,
+    scratch_written_bytes: Option<u64>,
+    output_written_bytes: Option<u64>,
+    /// The most at one time.
+    scratch_bytes: Option<u64>,
     peak_rss_bytes: Option<u64>,
     content_xxh3: String,
     pub(crate) skipped: bool,
 }
 
 impl Report {
-    fn new(input: String, output: String, outcome: &Outcome, seconds: f64) -> Self {
+    fn new(input: String, output: String, outcome: &Outcome, stages: Vec<StageLine>, seconds: f64) -> Self {
         let (file, baked) = match outcome {
             Outcome::Baked(report) => (&report.file, Some(report)),
             Outcome::UpToDate(file) => (file, None),
         };
         let (major, minor) = file.version;
+        let traffic = baked.map(|baked| baked.traffic);
         Self {
             input,
             output,
@@ -214,10 +203,16 @@ impl Report {
             mean_children: baked.map(|baked| baked.mean_children),
             bake_seconds: baked.map(|baked| baked.seconds),
             seconds,
-            stage_seconds: None,
-            scratch_bytes: baked.map(|baked| baked.scratch.most),
-            scratch_written_bytes: baked.map(|baked| baked.scratch.written),
-            scratch_read_bytes: baked.map(|baked| baked.scratch.read),
+            stage_seconds: baked.map(|_| stages::seconds(&stages)),
+            stages,
+            bytes_read: traffic.map(|traffic| traffic.read()),
+            input_read_bytes: traffic.map(|traffic| traffic.input_read),
+            scratch_read_bytes: traffic.map(|traffic| traffic.scratch_read),
+            output_read_bytes: traffic.map(|traffic| traffic.output_read),
+            bytes_written: traffic.map(|traffic| traffic.written()),
+            scratch_written_bytes: traffic.map(|traffic| traffic.scratch_written),
+            output_written_bytes: traffic.map(|traffic| traffic.output_written),
+            scratch_bytes: traffic.map(|traffic| traffic.scratch_most),
             peak_rss_bytes: resident::peak_bytes(),
             content_xxh3: hex(file.content_xxh3),
             skipped: baked.is_none(),
@@ -264,19 +259,18 @@ impl Report {
             Some(bytes) => format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0),
             None => String::new(),
         };
-        if let (Some(most @ 1..), Some(written), Some(read)) =
-            (self.scratch_bytes, self.scratch_written_bytes, self.scratch_read_bytes)
-        {
-            let [most, written, read] = [most, written, read].map(|bytes| bytes as f64 / 1048576.0);
-            line("scratch", format!("{most:.0} MiB at most; {written:.0} MiB written, {read:.0} MiB read"));
+        let mebibytes = |bytes: Option<u64>| bytes.unwrap_or(0) as f64 / 1048576.0;
+        let [inputs, scratch, output] =
+            [self.input_read_bytes, self.scratch_read_bytes, self.output_read_bytes].map(mebibytes);
+        let all = mebibytes(self.bytes_read);
+        line("read", format!("{all:.1} MiB: inputs {inputs:.1}, scratch {scratch:.1}, output {output:.1}"));
+        let [scratch, output] = [self.scratch_written_bytes, self.output_written_bytes].map(mebibytes);
+        let all = mebibytes(self.bytes_written);
+        line("written", format!("{all:.1} MiB: scratch {scratch:.1}, output {output:.1}"));
+        if let Some(most @ 1..) = self.scratch_bytes {
+            line("scratch", format!("{:.1} MiB at most", mebibytes(Some(most))));
         }
-        let stages: Vec<String> = self
-            .stage_seconds
-            .iter()
-            .flatten()
-            .map(|(stage, seconds)| format!("{stage} {seconds:.2}"))
-            .collect();
-        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages.join(", ")));
+        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages::to_text(&self.stages)));
         text
     }
 }

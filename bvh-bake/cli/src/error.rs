@@ -2,6 +2,7 @@
 
 use bvh_bake::{BakeError, VerifyError};
 use bvh_query::{BackendError, OpenError};
+use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
@@ -130,6 +131,13 @@ impl Failure {
 /// Writes a line on standard error. If nobody listens there is nobody to tell.
 pub(crate) fn tell_line(line: &str) {
     let _ = writeln!(io::stderr().lock(), "cbvh: {line}");
+}
+
+/// Writes a JSON object and a line feed on standard error. If nobody listens there is nobody to tell.
+pub(crate) fn tell_json(value: &impl Serialize) {
+    if let Ok(line) = serde_json::to_string(value) {
+        let _ = writeln!(io::stderr().lock(), "{line}");
+    }
 }
 
 /// A message without line breaks or other control characters, which names of files may hold.

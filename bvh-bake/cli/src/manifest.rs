@@ -15,7 +15,7 @@ use crate::bake::{self, Report};
 use crate::error::{self, Failure};
 use crate::output;
 use asset::Asset;
-use bvh_bake::{BakeError, FileOptions, Options};
+use bvh_bake::{BakeError, FileOptions, Options, Progress};
 use indicatif::ProgressBar;
 use journal::Journal;
 use serde::Serialize;
@@ -164,7 +164,8 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Run<'a, T> {
         }
         let file_options = FileOptions { max_memory, ..self.file_options.clone() };
         let inputs = std::slice::from_ref(&asset.input);
-        bake::bake(inputs, &asset.output, &asset.options, &file_options, &mut |_| ())
+        let progress = Progress::default();
+        bake::bake(inputs, &asset.output, &asset.options, &file_options, &progress, &mut |_| ())
     }
 
     /// Counts an asset, notes its line and tells what is wrong with it.

@@ -1,9 +1,26 @@
 //! How much memory this process holds, and how to hold less.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The largest size told so far: the system's sums are rough, and its largest one may shrink again by a few pages.
+static MOST: AtomicU64 = AtomicU64::new(0);
+
 /// The largest resident size so far in bytes; `None` where the system does not tell it in `/proc`.
 pub(crate) fn peak_bytes() -> Option<u64> {
+    let peak = status_bytes("VmHWM:")?;
+    Some(MOST.fetch_max(peak, Ordering::Relaxed).max(peak))
+}
+
+/// The resident size now in bytes; `None` where the system does not tell it in `/proc`.
+pub(crate) fn current_bytes() -> Option<u64> {
+    let current = status_bytes("VmRSS:")?;
+    MOST.fetch_max(current, Ordering::Relaxed);
+    Some(current)
+}
+
+fn status_bytes(label: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix(label))?;
     let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
     Some(kibibytes * 1024)
 }

@@ -107,7 +107,8 @@ fn a_bake_is_skipped_only_if_nothing_changed() {
     let input = directory.join("t.obj");
     fs::write(&input, torus(12, 9)).unwrap();
     let skipped = |more: &[&str]| {
-        let bake = cbvh_in(directory, &[&["bake", "t.obj", "-o", "t.cbvh", "--json"][..], more].concat());
+        let bake =
+            cbvh_in(directory, &[&["bake", "t.obj", "-o", "t.cbvh", "--json", "-q"][..], more].concat());
         bake.done().json()["skipped"] == true
     };
     assert!(!skipped(&[]));
@@ -145,7 +146,7 @@ fn content_depends_on_neither_threads_nor_names() {
     fs::write(directory.join("a.obj"), torus(90, 60)).unwrap();
     fs::write(directory.join("b.obj"), torus(90, 60)).unwrap();
     let content = |input: &str, jobs: &str| {
-        let bake = ["bake", input, "-o", "o.cbvh", "--force", "--json", "--jobs", jobs];
+        let bake = ["bake", input, "-o", "o.cbvh", "--force", "--json", "-q", "--jobs", jobs];
         cbvh_in(directory, &bake).done().json()["content_xxh3"].clone()
     };
     let one = content("a.obj", "1");
@@ -160,7 +161,7 @@ fn several_inputs_are_baked_as_one() {
     let directory = folder.path();
     fs::write(directory.join("cube.obj"), cube()).unwrap();
     fs::write(directory.join("torus.obj"), torus(10, 8)).unwrap();
-    let bake = ["bake", "cube.obj", "torus.obj", "-o", "both.cbvh", "--json"];
+    let bake = ["bake", "cube.obj", "torus.obj", "-o", "both.cbvh", "--json", "-q"];
     let one = cbvh_in(directory, &bake).done().json();
     assert_eq!((&one["objects"], &one["triangles"]), (&1.into(), &172.into()));
     cbvh_in(directory, &["verify", "both.cbvh", "cube.obj", "torus.obj"]).done();
@@ -182,7 +183,7 @@ fn a_dump_adds_up() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
     fs::write(directory.join("torus.obj"), torus(60, 30)).unwrap();
-    let baked = cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh", "--json"]).done().json();
+    let baked = cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q"]).done().json();
     let dump = cbvh_in(directory, &["dump", "t.cbvh", "--json"]).done().json();
     assert_eq!(dump["content_xxh3"], baked["content_xxh3"]);
     assert_eq!(dump["provenance"]["input"], "torus.obj");

@@ -140,7 +140,7 @@ fn bytes_are_those_of_single_bakes() {
         counts(&summary, 6, 6, 0, 0);
         for (number, (_, arguments)) in options.iter().enumerate() {
             let input = format!("meshes/{number}.obj");
-            let single = [&["bake", &input, "-o", "single.cbvh", "--json"], *arguments].concat();
+            let single = [&["bake", &input, "-o", "single.cbvh", "--json", "-q"], *arguments].concat();
             let report = cbvh_in(directory, &single).done().json();
             let line = &lines(&directory.join("out.jsonl"))[number];
             assert_eq!(line["content_xxh3"], report["content_xxh3"]);

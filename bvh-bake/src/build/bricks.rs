@@ -14,6 +14,7 @@ use super::{Builder, Node};
 use crate::ablation::SplitRule;
 use crate::error::BakeError;
 use crate::means::Means;
+use crate::progress::Tally;
 use crate::scratch::{Spill, Stream};
 use crate::soup::{Grouped, InStream, Triangle, Triangles, distribute, fold};
 
@@ -38,6 +39,8 @@ pub(super) struct Division<'a> {
     pub(super) builder: &'a Builder,
     pub(super) means: &'a Means,
     pub(super) spill: &'a Spill,
+    /// Over the triangles, once; those that are divided again count no more.
+    pub(super) tally: &'a Tally<'a>,
     pub(super) bricks: Vec<Stream<Triangle>>,
 }
 
@@ -56,6 +59,7 @@ impl Division<'_> {
                 |part| Ok(Grouped::new(&triangles.part(part)?, 1, |_, _| 0)),
                 &mut brick,
                 self.spill,
+                self.tally,
             )?;
             self.bricks.append(&mut brick);
             return Ok(Node::Leaf(self.bricks.len() as u32 - 1));
@@ -77,7 +81,7 @@ impl Division<'_> {
             };
             Ok(Grouped::new(&triangles.part(part)?, parts.counts.len(), group))
         };
-        distribute(triangles.parts(), make, &mut streams, self.spill)?;
+        distribute(triangles.parts(), make, &mut streams, self.spill, self.tally)?;
         drop((grid, parts));
         let mut streams = streams.into_iter();
         // In the order in which the parts were numbered.
@@ -108,7 +112,7 @@ impl Division<'_> {
             let right = |place: usize, _: &Triangle| u32::from(firsts[part] + place as u64 >= half);
             Ok(Grouped::new(&triangles.part(part)?, 2, right))
         };
-        distribute(triangles.parts(), make, &mut halves, self.spill)?;
+        distribute(triangles.parts(), make, &mut halves, self.spill, self.tally)?;
         Ok(halves)
     }
 }
@@ -247,6 +251,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb, splits: SplitRule) -> Option<(usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::{Progress, Step};
     use crate::soup::Corners;
 
     const BUILDER: Builder =
@@ -267,13 +272,16 @@ mod tests {
     }
 
     fn divided(triangles: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Node<BrickIndex>) {
-        let means = Means::unlimited();
+        let progress = Progress::default();
+        let means = Means::unlimited(&progress);
+        let tally = progress.tally(Step::Read, 0, 0, 0);
         let spill = means.scratch.spill();
         let mut all = Stream::of_pieces(1000);
         let triangles = triangles.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
         all.append(&spill, &triangles.collect::<Vec<_>>()).unwrap();
         all.finish(&spill).unwrap();
-        let mut division = Division { builder, means: &means, spill: &spill, bricks: Vec::new() };
+        let mut division =
+            Division { builder, means: &means, spill: &spill, tally: &tally, bricks: Vec::new() };
         let top = division.divide_stream(Some(all)).unwrap();
         let bricks = division.bricks.into_iter().map(|brick| brick.take().unwrap());
         (bricks.map(|brick| brick.iter().map(|triangle| triangle.id).collect()).collect(), top)

@@ -46,7 +46,7 @@ pub(super) fn refuse_special(path: &Path) -> Result<(), BakeError> {
 }
 
 /// Removes what processes that were killed have left in a directory of files that were to become `name`.
-pub(crate) fn remove_stale(directory: &Path, name: &OsStr) {
+pub(crate) fn remove_stale_of(directory: &Path, name: &OsStr) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name(), name)) {
         let path = entry.path();
@@ -96,7 +96,7 @@ impl Temporary {
     /// Creates an empty file in a directory, hidden and named after `name`.
     pub(crate) fn named(directory: &Path, name: &OsStr) -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        remove_stale(directory, name);
+        remove_stale_of(directory, name);
         loop {
             let number = COUNT.fetch_add(1, Ordering::Relaxed);
             let mut hidden = OsString::from(".");
@@ -190,5 +190,21 @@ mod tests {
         write_atomically(&output, b"whole").unwrap();
         assert_eq!(fs::read(&output).unwrap(), b"whole");
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), others.len() + 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_synchronised_gets_no_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let output = directory.path().join("out.cbvh");
+        fs::write(&output, "old").unwrap();
+        let mut unfinished = Temporary::beside(&output).unwrap();
+        // A pipe has nothing that could be synchronised, and the system says so.
+        let (_reader, writer) = io::pipe().unwrap();
+        unfinished.file = std::os::fd::OwnedFd::from(writer).into();
+        let refused = unfinished.rename(&output).unwrap_err();
+        assert!(matches!(refused, BakeError::Write { action: "write", .. }), "{refused}");
+        assert_eq!(fs::read(&output).unwrap(), b"old");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
     }
 }

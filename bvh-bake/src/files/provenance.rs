@@ -1,6 +1,8 @@
 //! The provenance text of a file: where its mesh came from, and whether a bake would give it again.
 
+use crate::io::Input;
 use crate::options::Options;
+use crate::progress::Progress;
 use crate::summary::FileSummary;
 use crate::target::Source;
 use bvh_format::Layout;
@@ -70,10 +72,10 @@ fn plain(text: &str) -> String {
 }
 
 /// What an existing output says of itself, if a bake with this provenance would give the same content.
-pub(super) fn up_to_date(output: &Path, provenance: &Provenance) -> Option<FileSummary> {
+pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Progress) -> Option<FileSummary> {
     let file = File::open(output).ok()?;
     let length = file.metadata().ok()?.len();
-    let source = Source::File { file: &file, path: output, length };
+    let source = Source::File { file: &file, path: output, length, progress };
     let layout = Layout::read_with(length, |range| source.read(range)).ok()?;
     let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance)?;
     // Those that are baked here are short.
@@ -98,9 +100,9 @@ const MOST_TEXT: usize = 1 << 20;
 /// Bytes that are read at a time.
 const READ_BYTES: usize = 1 << 20;
 
-/// The checksum of a file's bytes, which are not kept.
-pub(super) fn file_checksum(path: &Path) -> io::Result<u64> {
-    let mut file = File::open(path)?;
+/// The checksum of a file's bytes, which are not kept. Reading them is a pass of so much weight.
+pub(super) fn file_checksum(path: &Path, progress: &Progress, weight: u64) -> io::Result<u64> {
+    let mut file = Input::open(path, progress, weight)?;
     let (mut hasher, mut bytes) = (Hasher::default(), vec![0; READ_BYTES]);
     loop {
         match file.read(&mut bytes) {

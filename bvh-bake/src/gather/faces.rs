@@ -11,6 +11,7 @@ use crate::error::BakeError;
 use crate::io::{COORDINATE, Fault, Halt, Place, obj, ply, polygon};
 use crate::means::Means;
 use crate::mesh::coordinate_fits;
+use crate::progress::Tally;
 use crate::scratch::{Piece, Spill, Stream};
 use bytemuck::{Pod, Zeroable};
 
@@ -76,6 +77,10 @@ impl Indexed {
         self.vertices
     }
 
+    pub(super) fn corner_count(&self) -> u64 {
+        self.corners.count()
+    }
+
     fn add_vertex(&mut self, position: [f64; 3]) -> Result<(), BakeError> {
         self.open.push(position);
         self.vertices += 1;
@@ -138,10 +143,12 @@ impl Indexed {
     }
 
     /// Gives all triangles to the gatherer, if there is one, until a corner is a misfit. All corners are vertices.
+    /// `tally` is over the corners.
     pub(super) fn resolve(
         &self,
         object_of: impl Fn(&Run) -> usize,
         mut gatherer: Option<&mut Gatherer>,
+        tally: &Tally,
     ) -> Result<Option<Misfit>, Halt> {
         let mut corners = Corners { stream: &self.corners, piece: 0, open: Vec::new(), at: 0 };
         let mut counter = Counter::default();
@@ -174,6 +181,7 @@ impl Indexed {
                     }
                 }
             }
+            tally.add(window.len() as u64);
             runs.clear();
             window.clear();
             Ok::<_, Halt>(None)

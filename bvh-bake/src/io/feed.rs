@@ -4,7 +4,9 @@
 //! is kept here (`stopped`) and looks like the end of the file until somebody asks.
 
 use super::error::{Fault, Halt, Place, excerpt};
+use super::input::Watched;
 use super::text::{is_blank, number};
+use crate::progress::Tally;
 use std::io::Read;
 
 /// Bytes that are read at a time.
@@ -25,8 +27,16 @@ pub(crate) struct Feed<R> {
     stopped: Option<Halt>,
 }
 
+impl<'a> Feed<Watched<'a>> {
+    /// Bytes in memory; what is read of them is counted.
+    pub(crate) fn watched(bytes: &'a [u8], tally: &'a Tally<'a>) -> Self {
+        Self::new(Watched { bytes, tally }, bytes.len() as u64)
+    }
+}
+
+#[cfg(test)]
 impl<'a> Feed<&'a [u8]> {
-    pub(crate) fn of_bytes(bytes: &'a [u8]) -> Self {
+    fn of_bytes(bytes: &'a [u8]) -> Self {
         Self::new(bytes, bytes.len() as u64)
     }
 }

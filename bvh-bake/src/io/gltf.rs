@@ -17,6 +17,7 @@ mod buffer;
 use super::error::{Fault, Place, excerpt};
 use super::next_ids;
 use crate::mesh::{Mesh, Object};
+use crate::progress::Progress;
 use buffer::Buffers;
 use gltf::Document;
 use gltf::json::{self, validation::Checked};
@@ -30,12 +31,12 @@ const MAX_COPIES: u64 = 1 << 26;
 /// Vertices that a primitive counts as, besides its own, for the time that it takes.
 const PRIMITIVE_ITEMS: usize = 16;
 
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+pub(super) fn read(bytes: &[u8], path: &Path, progress: &Progress) -> Result<Mesh, Fault> {
     let (text, blob) = split(bytes)?;
     let document = parse(text, blob.is_some())?;
     let mut scene = Scene {
         document: &document,
-        buffers: Buffers::new(blob, path),
+        buffers: Buffers::new(blob, path, progress),
         mesh: Mesh::default(),
         next_id: 0,
         items: 0,

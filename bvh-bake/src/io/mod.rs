@@ -10,6 +10,7 @@
 mod error;
 mod feed;
 mod gltf;
+mod input;
 pub(crate) mod obj;
 pub(crate) mod ply;
 pub(crate) mod polygon;
@@ -19,9 +20,11 @@ mod text;
 pub(crate) use error::{Fault, Halt, excerpt};
 pub use error::{Place, ReadError};
 pub(crate) use feed::Feed;
+pub(crate) use input::Input;
 
 use crate::error::BakeError;
 use crate::mesh::Mesh;
+use crate::progress::{Progress, Step, WHOLE};
 use std::path::Path;
 
 /// A format of mesh files.
@@ -85,10 +88,15 @@ impl MeshFormat {
 /// # Errors
 /// [`ReadError`]: the system's, or the first thing that the file gets wrong.
 pub fn read(path: &Path) -> Result<Mesh, ReadError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| Fault::Io { path: path.to_owned(), source }.in_file(path))?;
+    read_counted(path, &Progress::default(), WHOLE)
+}
+
+/// As [`read`]; it is a pass of so much weight.
+pub(crate) fn read_counted(path: &Path, progress: &Progress, weight: u64) -> Result<Mesh, ReadError> {
+    let failed = |source| ReadError::Io { path: path.to_owned(), source };
+    let bytes = Input::open(path, progress, 0).and_then(|mut input| input.read_all()).map_err(failed)?;
     let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
-    read_bytes(&bytes, format.ok_or_else(|| unknown_format(path))?, path)
+    parse(&bytes, format.ok_or_else(|| unknown_format(path))?, path, progress, weight)
 }
 
 /// What is said of a file of no known format.
@@ -106,11 +114,25 @@ pub(crate) fn unknown_format(path: &Path) -> ReadError {
 /// # Errors
 /// As [`read`].
 pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
+    parse(bytes, format, source, &Progress::default(), WHOLE)
+}
+
+/// As [`read_bytes`]; it is a pass of so much weight.
+pub(crate) fn parse(
+    bytes: &[u8],
+    format: MeshFormat,
+    source: &Path,
+    progress: &Progress,
+    weight: u64,
+) -> Result<Mesh, ReadError> {
+    let length = bytes.len() as u64;
+    let tally = |units| progress.tally(Step::Read, weight, length, units);
     let mesh = match format {
-        MeshFormat::Obj => obj::read(bytes).map_err(Halt::from),
-        MeshFormat::Stl => stl::read(bytes),
-        MeshFormat::Ply => ply::read(bytes),
-        MeshFormat::Gltf => gltf::read(bytes, source).map_err(Halt::from),
+        // The text is gone through twice.
+        MeshFormat::Obj => obj::read(bytes, tally(2 * length)).map_err(Halt::from),
+        MeshFormat::Stl => stl::read(Feed::watched(bytes, &tally(length))),
+        MeshFormat::Ply => ply::read(Feed::watched(bytes, &tally(length))),
+        MeshFormat::Gltf => gltf::read(bytes, source, progress).map_err(Halt::from),
     };
     let mut mesh = mesh.map_err(|halt| match halt.in_file(source) {
         BakeError::Read(error) => error,

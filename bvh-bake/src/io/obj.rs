@@ -21,6 +21,7 @@ pub(crate) use stream::{Statements, misfit, stream};
 use super::error::{Fault, Place};
 use super::{next_ids, polygon};
 use crate::mesh::{Mesh, Object};
+use crate::progress::Tally;
 use clean::Cleaner;
 use std::io::BufRead;
 
@@ -32,8 +33,9 @@ fn parse(clean: &mut impl BufRead) -> tobj::LoadResult {
     tobj::load_obj_buf(clean, &tobj::LoadOptions::default(), |_| Ok(Default::default()))
 }
 
-pub(super) fn read(text: &[u8]) -> Result<Mesh, Fault> {
-    let mut cleaner = Cleaner::new(text);
+/// `tally` is over the bytes of the text, twice.
+pub(super) fn read(text: &[u8], tally: Tally) -> Result<Mesh, Fault> {
+    let mut cleaner = Cleaner::new(text, tally);
     let parsed = if text.len() >= LARGE && rayon::current_num_threads() > 1 {
         relay::beside(&mut cleaner, parse)
     } else {

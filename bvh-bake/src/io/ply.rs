@@ -24,9 +24,9 @@ pub(crate) trait Faces {
     fn face(&mut self, corners: &[u32]) -> Result<(), Halt>;
 }
 
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Halt> {
+pub(super) fn read<R: Read>(feed: Feed<R>) -> Result<Mesh, Halt> {
     let mut parts = Parts::default();
-    stream(Feed::of_bytes(bytes), &mut parts)?;
+    stream(feed, &mut parts)?;
     Ok(parts.finish()?)
 }
 

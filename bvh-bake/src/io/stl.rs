@@ -31,9 +31,9 @@ pub(crate) trait Solids {
     fn end(&mut self) -> Result<(), Halt>;
 }
 
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh, Halt> {
+pub(super) fn read<R: Read>(feed: Feed<R>) -> Result<Mesh, Halt> {
     let mut joined = Joined::default();
-    stream(Feed::of_bytes(bytes), &mut joined)?;
+    stream(feed, &mut joined)?;
     Ok(joined.mesh)
 }
 

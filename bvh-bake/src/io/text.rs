@@ -37,6 +37,11 @@ impl<'a> Lines<'a> {
     pub(crate) fn continued(text: &'a [u8], number: u64) -> Self {
         Lines { rest: text, number }
     }
+
+    /// Bytes behind the line last given.
+    pub(crate) fn bytes_left(&self) -> usize {
+        self.rest.len()
+    }
 }
 
 impl<'a> Iterator for Lines<'a> {

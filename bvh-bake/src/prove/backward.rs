@@ -5,7 +5,9 @@
 //! one after the other: the memory this takes hardly grows with the file.
 
 use super::first_error;
+use crate::bake::Stage;
 use crate::error::BakeError;
+use crate::progress::{Progress, Step, WHOLE};
 use crate::target::Source;
 use bvh_format::bounds::{Inflation, check_bounds_of};
 use bvh_format::checksum::Hasher;
@@ -32,12 +34,12 @@ const MOST_BLOCK_BYTES: usize = 1 << 16;
 const SECTION_BYTES: usize = 4 << 20;
 
 /// Validates a whole file and checks its bounds; returns how loose they are.
-pub(crate) fn prove(source: Source) -> Result<(Layout, Inflation), BakeError> {
+pub(crate) fn prove(source: Source, progress: &Progress) -> Result<(Layout, Inflation), BakeError> {
     let layout = Layout::read_with(source.length(), |range| source.read(range))?;
     let pages = || {
         let mut inflation = Inflation::default();
         for object in &layout.objects {
-            inflation.join(&prove_object(&layout, source, object, true)?);
+            inflation.join(&prove_object(&layout, source, object, true, progress)?);
         }
         Ok::<_, BakeError>(inflation)
     };
@@ -104,9 +106,12 @@ pub(super) fn prove_object(
     source: Source,
     object: &Object,
     structure: bool,
+    progress: &Progress,
 ) -> Result<Inflation, BakeError> {
     let pages = object.pages();
     let mut walk = Walk { layout, object, roots: HashMap::new(), inflation: Inflation::default() };
+    let (triangles, count) = (object.record.triangles.get(), (pages.end - pages.start).into());
+    let tally = progress.tally(Step::Bake(Stage::Prove), WHOLE, triangles, count);
     let mut counts = CountsFromEnd::default();
     let mut end = pages.end;
     while end > pages.start {
@@ -123,6 +128,7 @@ pub(super) fn prove_object(
             }
         }
         walk.go_through(&window, start..end)?;
+        tally.add((end - start).into());
         end = start;
     }
     if structure {

@@ -1,12 +1,11 @@
 //! A file without a name that grows at its end and is read anywhere.
 
-use super::Counters;
 use crate::error::BakeError;
-use crate::files::Temporary;
+use crate::files::{Temporary, remove_stale_of};
+use crate::progress::Progress;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The name that scratch files have while they are opened.
@@ -17,11 +16,16 @@ pub(crate) struct ScratchFile {
     temporary: Temporary,
     directory: PathBuf,
     end: AtomicU64,
-    counters: Arc<Counters>,
+    progress: Progress,
+}
+
+/// Removes what processes that were killed just as they opened a scratch file have left in a directory.
+pub(crate) fn remove_stale(directory: &Path) {
+    remove_stale_of(directory, NAME.as_ref());
 }
 
 impl ScratchFile {
-    pub(super) fn create(directory: &Path, counters: &Arc<Counters>) -> Result<Self, BakeError> {
+    pub(super) fn create(directory: &Path, progress: &Progress) -> Result<Self, BakeError> {
         let failed = |source| BakeError::Write {
             path: directory.to_owned(),
             action: "create scratch files in it",
@@ -30,23 +34,21 @@ impl ScratchFile {
         let mut temporary = Temporary::named(directory, NAME.as_ref()).map_err(failed)?;
         temporary.forget_name();
         let directory = directory.to_owned();
-        Ok(Self { temporary, directory, end: AtomicU64::new(0), counters: counters.clone() })
+        Ok(Self { temporary, directory, end: AtomicU64::new(0), progress: progress.clone() })
     }
 
     /// Writes bytes behind all others; returns where.
     pub(super) fn append(&self, bytes: &[u8]) -> Result<u64, BakeError> {
         let length = bytes.len() as u64;
         let offset = self.end.fetch_add(length, Ordering::Relaxed);
-        let held = self.counters.held.fetch_add(length, Ordering::Relaxed) + length;
-        self.counters.most.fetch_max(held, Ordering::Relaxed);
-        self.counters.written.fetch_add(length, Ordering::Relaxed);
+        self.progress.add_scratch_written(length);
         write_all_at(self.temporary.file(), bytes, offset).map_err(|error| self.failed("write", error))?;
         Ok(offset)
     }
 
     /// Reads bytes that were written.
     pub(super) fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), BakeError> {
-        self.counters.read.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.progress.add_scratch_read(bytes.len() as u64);
         read_exact_at(self.temporary.file(), bytes, offset).map_err(|error| self.failed("read", error))
     }
 
@@ -58,7 +60,7 @@ impl ScratchFile {
 
 impl Drop for ScratchFile {
     fn drop(&mut self) {
-        self.counters.held.fetch_sub(self.end.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.progress.drop_scratch(self.end.load(Ordering::Relaxed));
     }
 }
 

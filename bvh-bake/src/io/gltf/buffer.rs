@@ -1,26 +1,27 @@
 //! Finds the bytes of glTF buffers: embedded in the file, in a base64 URI, or in a file beside it.
 
 use crate::io::error::{Fault, Place, excerpt};
+use crate::io::input::Input;
+use crate::progress::Progress;
 use gltf::Buffer;
 use gltf::buffer::Source;
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The buffers read so far.
 pub(super) struct Buffers<'a> {
     blob: Option<&'a [u8]>,
     document: &'a Path,
+    progress: &'a Progress,
     read: HashMap<usize, Cow<'a, [u8]>>,
     /// The bytes of all of them.
     pub(super) total: u64,
 }
 
 impl<'a> Buffers<'a> {
-    pub(super) fn new(blob: Option<&'a [u8]>, document: &'a Path) -> Self {
-        Buffers { blob, document, read: HashMap::new(), total: 0 }
+    pub(super) fn new(blob: Option<&'a [u8]>, document: &'a Path, progress: &'a Progress) -> Self {
+        Buffers { blob, document, progress, read: HashMap::new(), total: 0 }
     }
 
     /// The bytes of a buffer, exactly as many as it declares.
@@ -61,19 +62,17 @@ impl<'a> Buffers<'a> {
             return Err(refused("a buffer in a file named relative to this one"));
         }
         let path = self.document.parent().unwrap_or(Path::new("")).join(relative);
-        read_file(&path, buffer.length()).map(Cow::Owned).map_err(|source| Fault::Io { path, source })
+        self.read_file(&path, buffer.length()).map(Cow::Owned).map_err(|source| Fault::Io { path, source })
     }
-}
 
-/// Reads no more than `length` bytes: the file may be one without an end.
-fn read_file(path: &Path, length: usize) -> std::io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));
+    /// Reads no more than `length` bytes: the file may be one without an end.
+    fn read_file(&self, path: &Path, length: usize) -> std::io::Result<Vec<u8>> {
+        let mut input = Input::open(path, self.progress, 0)?;
+        if !input.is_regular()? {
+            return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));
+        }
+        input.read_up_to(length as u64)
     }
-    let mut bytes = Vec::new();
-    file.take(length as u64).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {

@@ -8,6 +8,7 @@ use crate::io::error::{Fault, Place, excerpt};
 use crate::io::text::{Lines, is_blank, number, words};
 use crate::io::{COORDINATE, polygon::MAX_CORNERS};
 use crate::mesh::{MAX_TRIANGLES, MAX_VERTICES, coordinate_fits};
+use crate::progress::Tally;
 use std::collections::HashMap;
 use std::io::{self, BufRead, Read, Write};
 
@@ -28,6 +29,10 @@ pub(super) struct Cleaner<'a> {
     text: &'a [u8],
     statements: Statements<'a>,
     pass: Pass,
+    /// Counts the bytes walked.
+    walked: Tally<'a>,
+    /// Bytes of the text that the walk had before it when they were last counted.
+    left: usize,
     clean: Vec<u8>,
     taken: usize,
     /// Vertices seen: in the first pass all so far, in the second those above the current line.
@@ -47,11 +52,13 @@ pub(super) struct Cleaner<'a> {
 }
 
 impl<'a> Cleaner<'a> {
-    pub(super) fn new(text: &'a [u8]) -> Self {
+    pub(super) fn new(text: &'a [u8], walked: Tally<'a>) -> Self {
         Cleaner {
             text,
             statements: Statements::new(Lines::new(text)),
             pass: Pass::Vertices,
+            walked,
+            left: text.len(),
             clean: Vec::with_capacity(2 * BLOCK),
             taken: 0,
             vertices: 0,
@@ -74,6 +81,8 @@ impl<'a> Cleaner<'a> {
             match (&self.pass, statement) {
                 (Pass::Done, _) => break,
                 (Pass::Vertices, None) => {
+                    self.count();
+                    self.left = self.text.len();
                     self.all_vertices = self.vertices;
                     self.vertices = 0;
                     self.statements = Statements::new(Lines::new(self.text));
@@ -94,7 +103,15 @@ impl<'a> Cleaner<'a> {
                 _ => {}
             }
         }
+        self.count();
         Ok(())
+    }
+
+    /// Counts what has been walked since the last time.
+    fn count(&mut self) {
+        let left = self.statements.bytes_left();
+        self.walked.add((self.left - left) as u64);
+        self.left = left;
     }
 
     /// Passes on the first three numbers of a vertex. A fourth is a weight or the first of a colour.
@@ -292,6 +309,11 @@ impl<'a> Statements<'a> {
         self.lines.number
     }
 
+    /// Bytes behind the line last read.
+    fn bytes_left(&self) -> usize {
+        self.lines.bytes_left()
+    }
+
     /// What follows the keyword.
     pub(super) fn operands(&self) -> &[u8] {
         if self.is_joined { &self.joined } else { self.line }
@@ -400,9 +422,12 @@ fn is_plain_number(word: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::{Progress, Step};
 
     fn clean(text: &str) -> Result<String, String> {
-        let mut cleaner = Cleaner::new(text.as_bytes());
+        let progress = Progress::default();
+        let tally = progress.tally(Step::Read, 1, 0, 0);
+        let mut cleaner = Cleaner::new(text.as_bytes(), tally);
         let mut out = String::new();
         match cleaner.read_to_string(&mut out) {
             Ok(_) => Ok(out),
