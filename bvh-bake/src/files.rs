@@ -65,7 +65,8 @@ pub fn least_memory(triangles: u64) -> u64 {
 ///
 /// The bytes of the output do not depend on the budget of memory, nor on the number of threads.
 ///
-/// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, twice, and up to 200 bytes of scratch a
+/// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, OBJ twice, all once more if there is an output
+/// that may be up to date, and up to 200 bytes of scratch a
 /// triangle, each written and read two to three times. If the output is up to date, reading inputs and output.
 ///
 /// How far it is, and what has been read and written, can be seen in `progress` at any time, from any thread. `begin` is
@@ -107,11 +108,11 @@ struct Job<'a> {
 impl Job<'_> {
     fn in_memory(&self, begin: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
         let mut sources = Sources::new(self.progress);
-        let mut provenance = Provenance::new(self.inputs, self.options);
         for input in self.inputs {
             sources.add(input)?;
         }
-        provenance.checksums(&sources.file_checksums, &sources.mesh_checksums);
+        let provenance =
+            Provenance::new(self.inputs, self.options).with(&sources.file_checksums, &sources.mesh_checksums);
         if let Some(summary) = self.up_to_date(&provenance) {
             return Ok(Outcome::UpToDate(summary));
         }
@@ -131,14 +132,21 @@ impl Job<'_> {
     fn within(&self, budget: u64, begin: &mut dyn FnMut(Step)) -> Result<Outcome, BakeError> {
         // What certainly does not fit is not even read.
         self.check_budget(budget, 0, Means::least(0))?;
-        let mut provenance = Provenance::new(self.inputs, self.options);
         let progress = self.progress;
+        // The bytes of most inputs are not needed before they are parsed, unless what is there may be what they would give.
+        let is_new = self.file_options.force || !self.output.exists();
         let (mut formats, mut files, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for input in self.inputs {
             let failed = |source| ReadError::Io { path: input.clone(), source };
             let (format, length) = format_of(input, progress)?;
-            files.push(provenance::file_checksum(input, progress, CHECKSUM).map_err(failed)?);
-            if format == MeshFormat::Gltf {
+            let is_gltf = format == MeshFormat::Gltf;
+            files.push(if is_gltf || !is_new {
+                let weight = if is_gltf { CHECKSUM } else { 0 };
+                provenance::file_checksum(input, progress, weight).map_err(failed)?
+            } else {
+                0
+            });
+            if is_gltf {
                 self.check_budget(
                     budget,
                     0,
@@ -148,8 +156,8 @@ impl Job<'_> {
             }
             formats.push(format);
         }
-        provenance.checksums(&files, &meshes);
-        if let Some(summary) = self.up_to_date(&provenance) {
+        let provenance = |files: &[u64]| Provenance::new(self.inputs, self.options).with(files, &meshes);
+        if !is_new && let Some(summary) = self.up_to_date(&provenance(&files)) {
             return Ok(Outcome::UpToDate(summary));
         }
         // Fails before the work, where the output cannot be written.
@@ -159,12 +167,13 @@ impl Job<'_> {
         room::check(&[(scratch, file_lengths(self.inputs))])?;
         let means = Means::within(budget, scratch, progress);
         let mut gatherer = Gatherer::new(&means, self.options.split_objects);
-        for (input, format) in self.inputs.iter().zip(formats) {
+        for ((input, format), checksum) in self.inputs.iter().zip(formats).zip(&mut files) {
             match format {
                 MeshFormat::Gltf => gatherer.read_gltf(input)?,
-                format => gatherer.read(input, format)?,
+                format => *checksum = gatherer.read(input, format)?,
             }
         }
+        let provenance = provenance(&files);
         let triangles = gatherer.triangles();
         self.check_budget(budget, triangles, Means::least(triangles))?;
         let bytes = |each: u64| triangles.saturating_mul(each);
@@ -226,7 +235,7 @@ const GLTF_BYTES: u64 = 8;
 
 /// What passes over an input's bytes are worth in memory: reading, parsing.
 const IN_MEMORY: [u64; 2] = [3, 13];
-/// Within a budget: the checksum of the bytes, and of a glTF file that of the mesh. Then comes the gatherer.
+/// Within a budget, of a glTF file: the checksum of the bytes, and that of the mesh. Then comes the gatherer.
 const CHECKSUM: u64 = 2;
 const GLTF: u64 = 7;
 

@@ -3,30 +3,34 @@
 //! The readers of STL and PLY are those of meshes in memory; OBJ has one of its own (`io::obj`). Triangles, ids, counts
 //! and errors are the same as of a mesh in memory.
 
+mod away;
 mod counter;
 mod faces;
 mod solids;
 
 use crate::error::BakeError;
-use crate::io::{self, Fault, Feed, Halt, Input, MeshFormat, Place, ReadError};
+use crate::io::{self, Fault, Feed, Halt, Input, MeshFormat, Place, ReadError, Relay};
 use crate::means::Means;
 use crate::mesh::{InputError, MAX_TRIANGLES};
 use crate::placement::{Extent, Moved, Placement};
 use crate::prepare::Prepared;
 use crate::progress::{Progress, Step};
 use crate::scratch::{Piece, Spill};
-use crate::soup::{PART, Part, Soup, Triangle, WideTriangle};
+use crate::soup::{PART, Part, Soup, WideTriangle};
+use away::Away;
 use faces::{Indexed, Misfit};
 use solids::Solids;
 use std::cell::Cell;
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
+use std::thread::{self, Scope};
 
 /// What passes over a file's bytes are worth: reading STL; reading PLY, and looking up the corners of its faces; reading
 /// OBJ for vertices and for faces, which is one weight, and looking up.
-const STL: u64 = 14;
-const PLY: [u64; 2] = [6, 8];
-const OBJ: [u64; 2] = [4, 6];
-/// Reading glTF.
+const STL: u64 = 16;
+const PLY: [u64; 2] = [7, 9];
+const OBJ: [u64; 2] = [5, 6];
+/// Reading glTF, after its checksums.
 const GLTF: u64 = 7;
 
 /// The objects found so far.
@@ -34,7 +38,9 @@ pub(crate) struct Gatherer<'a> {
     means: &'a Means,
     /// Whether objects stay apart.
     split: bool,
-    spill: Spill,
+    spill: Arc<Spill>,
+    /// Where parts go while a file is read.
+    away: Option<Away>,
     /// The names of the objects of all files, and whether they have triangles.
     names: Vec<(String, bool)>,
     /// What is baked: each object, or all as one.
@@ -61,31 +67,12 @@ impl Gathering {
         let (parts, open) = (Vec::new(), Vec::new());
         Self { parts, open, parked: None, extent: Extent::EMPTY, count: 0, vertices: 0 }
     }
-
-    /// Makes a part of what is in memory.
-    fn close_part(&mut self, spill: &Spill, progress: &Progress) -> Result<(), BakeError> {
-        let open = std::mem::take(&mut self.open);
-        progress.find(open.len() as u64);
-        let fits = |triangle: &WideTriangle| {
-            triangle.corners.as_flattened().iter().all(|&value| f64::from(value as f32) == value)
-        };
-        self.parts.push(if open.iter().all(fits) {
-            let narrow = |triangle: &WideTriangle| Triangle {
-                corners: triangle.corners.map(|corner| corner.map(|value| value as f32)),
-                id: triangle.id,
-            };
-            Part::Narrow(spill.put(open.iter().map(narrow).collect())?)
-        } else {
-            Part::Wide(spill.put(open)?)
-        });
-        Ok(())
-    }
 }
 
 impl<'a> Gatherer<'a> {
     pub(crate) fn new(means: &'a Means, split: bool) -> Self {
-        let spill = means.scratch.spill();
-        Self { means, split, spill, names: Vec::new(), bodies: Vec::new(), current: 0, next_id: 0 }
+        let (spill, away) = (Arc::new(means.scratch.spill()), None);
+        Self { means, split, spill, away, names: Vec::new(), bodies: Vec::new(), current: 0, next_id: 0 }
     }
 
     /// Triangles of all files so far.
@@ -93,14 +80,29 @@ impl<'a> Gatherer<'a> {
         self.next_id
     }
 
-    /// Reads a file of a format other than glTF.
-    pub(crate) fn read(&mut self, path: &Path, format: MeshFormat) -> Result<(), BakeError> {
+    /// Reads a file of a format other than glTF. Returns the checksum of its bytes.
+    pub(crate) fn read(&mut self, path: &Path, format: MeshFormat) -> Result<u64, BakeError> {
         let before = self.next_id;
-        self.read_as(path, format).map_err(|halt| halt.in_file(path))?;
+        let checksum = OnceLock::new();
+        let spill = self.spill.clone();
+        let (read, parts) = thread::scope(|scope| {
+            let (away, putting) = Away::start(scope, &spill);
+            self.away = Some(away);
+            let files = Files { path, progress: &self.means.progress, checksum: &checksum, scope };
+            let read = self.read_as(&files, format);
+            self.away = None;
+            (read, putting.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        });
+        // Reading ends early where parts cannot be put away.
+        for (body, part) in parts? {
+            self.bodies[body].parts.push(part);
+        }
+        read.map_err(|halt| halt.in_file(path))?;
         if self.next_id == before {
             return Err(ReadError::Mesh { path: path.to_owned(), source: InputError::Empty }.into());
         }
-        Ok(())
+        // A reader that has not seen the end of the file has failed.
+        Ok(checksum.into_inner().unwrap_or_default())
     }
 
     /// Reads a glTF file, whole.
@@ -119,14 +121,13 @@ impl<'a> Gatherer<'a> {
         Ok(())
     }
 
-    fn read_as(&mut self, path: &Path, format: MeshFormat) -> Result<(), Halt> {
+    fn read_as(&mut self, files: &Files, format: MeshFormat) -> Result<(), Halt> {
         let means = self.means;
-        let feed = |weight| feed(path, &means.progress, weight);
         match format {
-            MeshFormat::Stl => io::stl::stream(feed(STL)?, &mut Solids::new(self)),
+            MeshFormat::Stl => io::stl::stream(files.feed(STL)?, &mut Solids::new(self)),
             MeshFormat::Ply => {
                 let mut faces = Indexed::new(self.means);
-                let file = feed(PLY[0])?;
+                let file = files.feed(PLY[0])?;
                 let length = file.length();
                 io::ply::stream(file, &mut faces)?;
                 faces.finish()?;
@@ -138,20 +139,19 @@ impl<'a> Gatherer<'a> {
                 let tally = means.progress.tally(Step::Read, PLY[1], length, faces.corner_count());
                 faces.resolve(|_| object, Some(self), &tally)?.map_or(Ok(()), |misfit| {
                     // What is wrong is met again where it stands.
-                    io::ply::stream(feed(0)?, &mut faces::Probe::new(misfit))
+                    io::ply::stream(files.feed(0)?, &mut faces::Probe::new(misfit))
                 })
             }
-            MeshFormat::Obj => self.read_obj(path),
+            MeshFormat::Obj => self.read_obj(files),
             MeshFormat::Gltf => Ok(()),
         }
     }
 
-    fn read_obj(&mut self, path: &Path) -> Result<(), Halt> {
+    fn read_obj(&mut self, files: &Files) -> Result<(), Halt> {
         let mut faces = Indexed::new(self.means);
         let progress = &self.means.progress;
-        let feed = |weight| feed(path, progress, weight);
         let length = Cell::new(0);
-        let walk = || feed(OBJ[0]).inspect(|file| length.set(file.length()));
+        let walk = || files.feed(OBJ[0]).inspect(|file| length.set(file.length()));
         let read = io::obj::stream(walk, &mut faces);
         faces.finish()?;
         let tally = progress.tally(Step::Read, OBJ[1], length.get(), faces.corner_count());
@@ -160,7 +160,9 @@ impl<'a> Gatherer<'a> {
             Ok(names) => names,
             Err(halt) => {
                 let misfit = faces.resolve(|_| 0, None, &tally)?;
-                return Err(misfit.map_or(Ok(halt), |Misfit(vertex)| io::obj::misfit(feed(0)?, vertex))?);
+                return Err(
+                    misfit.map_or(Ok(halt), |Misfit(vertex)| io::obj::misfit(files.feed(0)?, vertex))?
+                );
             }
         };
         let first = self.names.len();
@@ -168,7 +170,7 @@ impl<'a> Gatherer<'a> {
             self.object(name);
         }
         let misfit = faces.resolve(|run| first + run.object as usize, Some(self), &tally)?;
-        misfit.map_or(Ok(()), |Misfit(vertex)| Err(io::obj::misfit(feed(0)?, vertex)?))
+        misfit.map_or(Ok(()), |Misfit(vertex)| Err(io::obj::misfit(files.feed(0)?, vertex)?))
     }
 
     /// The number of a new object.
@@ -209,8 +211,21 @@ impl<'a> Gatherer<'a> {
         gathering.open.push(WideTriangle { corners, id: self.next_id as u32, spare: 0 });
         gathering.count += 1;
         self.next_id += 1;
-        if gathering.open.len() == PART {
-            gathering.close_part(&self.spill, &self.means.progress)?;
+        if gathering.open.len() == PART { self.close_part(body) } else { Ok(()) }
+    }
+
+    /// Ends the open part of a body.
+    fn close_part(&mut self, body: usize) -> Result<(), Halt> {
+        let gathering = &mut self.bodies[body];
+        let part = std::mem::take(&mut gathering.open);
+        self.means.progress.find(part.len() as u64);
+        match &self.away {
+            Some(away) => {
+                // What has gone wrong is told when all have been put away.
+                let stopped = || Halt::Io(std::io::ErrorKind::BrokenPipe.into());
+                gathering.open = away.put(body, part).ok_or_else(stopped)?;
+            }
+            None => gathering.parts.push(away::part(&part, &self.spill)?),
         }
         Ok(())
     }
@@ -229,6 +244,7 @@ impl<'a> Gatherer<'a> {
     /// All objects with triangles, ready to be baked.
     pub(crate) fn finish(self, grid_error: impl Fn(f64) -> Option<f64>) -> Result<Vec<Prepared>, BakeError> {
         let Self { means, names, bodies, spill, split, .. } = self;
+        let spill = &*spill;
         let mut names = names.into_iter().filter(|(_, found)| *found).map(|(name, _)| name);
         let mut prepared = Vec::new();
         for mut body in bodies.into_iter().filter(|body| body.count > 0) {
@@ -236,7 +252,8 @@ impl<'a> Gatherer<'a> {
                 body.open = parked.take()?;
             }
             if !body.open.is_empty() {
-                body.close_part(&spill, &means.progress)?;
+                means.progress.find(body.open.len() as u64);
+                body.parts.push(away::part(&body.open, spill)?);
             }
             let name = names.next().unwrap_or_default();
             // One object alone keeps its name; several that are joined have none.
@@ -258,9 +275,20 @@ impl<'a> Gatherer<'a> {
     }
 }
 
-/// A file from its beginning, reading which is a pass of so much weight.
-fn feed<'a>(path: &Path, progress: &'a Progress, weight: u64) -> Result<Feed<Input<'a>>, Halt> {
-    let input = Input::open(path, progress, weight).map_err(Halt::Io)?;
-    let length = input.length();
-    Ok(Feed::new(input, length))
+/// An input, which is read on threads of its own.
+struct Files<'scope, 'env> {
+    path: &'env Path,
+    progress: &'env Progress,
+    /// Of the bytes, when a reader has come to the end.
+    checksum: &'env OnceLock<u64>,
+    scope: &'scope Scope<'scope, 'env>,
+}
+
+impl Files<'_, '_> {
+    /// The file from its beginning, reading which is a pass of so much weight.
+    fn feed(&self, weight: u64) -> Result<Feed<Relay>, Halt> {
+        let input = Input::open(self.path, self.progress, weight).map_err(Halt::Io)?;
+        let length = input.length();
+        Ok(Feed::new(Relay::start(self.scope, input.with_checksum(self.checksum)), length))
+    }
 }

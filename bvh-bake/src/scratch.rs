@@ -49,9 +49,10 @@ impl Scratch {
         Arc::new(Self { directory, allowance, kept: AtomicU64::new(0), progress: progress.clone() })
     }
 
-    /// A place for the pieces of one stage, which share a file.
+    /// A place for the pieces of one stage.
     pub(crate) fn spill(self: &Arc<Self>) -> Spill {
-        Spill { scratch: self.clone(), file: Mutex::new(None) }
+        let threads = rayon::current_num_threads() + 1;
+        Spill { scratch: self.clone(), files: (0..threads).map(|_| Mutex::new(None)).collect() }
     }
 
     /// Room in memory for so many bytes, if there is.
@@ -74,10 +75,12 @@ impl Drop for Lease {
     }
 }
 
-/// Takes pieces. The file is made with the first piece that needs one, and lives as long as its pieces.
+/// Takes pieces. Each thread has a file of its own, since systems let only one at a time write to a file: it is made
+/// with the first piece that needs it, and lives as long as its pieces.
 pub(crate) struct Spill {
     scratch: Arc<Scratch>,
-    file: Mutex<Option<Arc<ScratchFile>>>,
+    /// That of threads outside the pool first.
+    files: Vec<Mutex<Option<Arc<ScratchFile>>>>,
 }
 
 impl Spill {
@@ -94,7 +97,8 @@ impl Spill {
     }
 
     fn file(&self) -> Result<Arc<ScratchFile>, BakeError> {
-        let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let number = rayon::current_thread_index().map_or(0, |thread| thread + 1) % self.files.len();
+        let mut file = self.files[number].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(file) = &*file {
             return Ok(file.clone());
         }

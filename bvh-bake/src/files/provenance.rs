@@ -35,11 +35,12 @@ impl Provenance {
     }
 
     /// Notes the checksums of the inputs' bytes, and of the meshes of those whose bytes do not tell all.
-    pub(super) fn checksums(&mut self, files: &[u64], meshes: &[u64]) {
+    pub(super) fn with(mut self, files: &[u64], meshes: &[u64]) -> Self {
         self.stamp.push(("input_xxh3", format!("{:016x}", joined(files))));
         if !meshes.is_empty() {
             self.stamp.push(("mesh_xxh3", format!("{:016x}", joined(meshes))));
         }
+        self
     }
 
     pub(super) fn to_text(&self) -> String {

@@ -62,8 +62,12 @@ impl<R: Read> Feed<R> {
         self.length.saturating_sub(self.position())
     }
 
-    /// What came of reading, unless something else stopped it.
+    /// What came of reading, unless something else stopped it. After a success the file is read to its end, whatever
+    /// is there.
     pub(crate) fn finish<T>(&mut self, result: Result<T, Halt>) -> Result<T, Halt> {
+        while result.is_ok() && self.has(1) {
+            self.start = self.end;
+        }
         self.stopped.take().map_or(result, Err)
     }
 

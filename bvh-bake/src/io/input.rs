@@ -1,9 +1,11 @@
 //! Input files, and their bytes in memory, that count what is read of them.
 
 use crate::progress::{Progress, Step, Tally};
+use bvh_format::checksum::Hasher;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Bytes that are read at a time of a file that is read whole.
 const BLOCK: u64 = 4 << 20;
@@ -14,6 +16,8 @@ pub(crate) struct Input<'a> {
     length: u64,
     progress: &'a Progress,
     tally: Tally<'a>,
+    /// Where the checksum of all bytes goes when they have been read in order, if it is asked for.
+    checksum: Option<(Hasher, &'a OnceLock<u64>)>,
 }
 
 impl<'a> Input<'a> {
@@ -22,7 +26,12 @@ impl<'a> Input<'a> {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
         let tally = progress.tally(Step::Read, weight, length, length);
-        Ok(Self { file, length, progress, tally })
+        Ok(Self { file, length, progress, tally, checksum: None })
+    }
+
+    /// The same file, with a checksum of its bytes when its end has been read.
+    pub(crate) fn with_checksum(self, checksum: &'a OnceLock<u64>) -> Self {
+        Self { checksum: Some((Hasher::default(), checksum)), ..self }
     }
 
     /// Bytes of the file.
@@ -64,6 +73,14 @@ impl Read for Input<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
         self.count(count);
+        if let Some((hasher, checksum)) = &mut self.checksum {
+            if count > 0 {
+                hasher.update(&buffer[..count]);
+            } else if !buffer.is_empty() {
+                // What is read again at the end changes nothing.
+                checksum.get_or_init(|| hasher.finish());
+            }
+        }
         Ok(count)
     }
 }

@@ -14,6 +14,7 @@ mod input;
 pub(crate) mod obj;
 pub(crate) mod ply;
 pub(crate) mod polygon;
+mod relay;
 pub(crate) mod stl;
 mod text;
 
@@ -21,6 +22,7 @@ pub(crate) use error::{Fault, Halt, excerpt};
 pub use error::{Place, ReadError};
 pub(crate) use feed::Feed;
 pub(crate) use input::Input;
+pub(crate) use relay::Relay;
 
 use crate::error::BakeError;
 use crate::mesh::Mesh;

@@ -13,17 +13,17 @@
 //! are one object.
 
 mod clean;
-mod relay;
 mod stream;
 
 pub(crate) use stream::{Statements, misfit, stream};
 
 use super::error::{Fault, Place};
-use super::{next_ids, polygon};
+use super::{Relay, next_ids, polygon};
 use crate::mesh::{Mesh, Object};
 use crate::progress::Tally;
 use clean::Cleaner;
 use std::io::BufRead;
+use std::thread;
 
 /// Bytes of a file that is filtered on a thread beside the one that parses.
 const LARGE: usize = 1 << 20;
@@ -37,7 +37,7 @@ fn parse(clean: &mut impl BufRead) -> tobj::LoadResult {
 pub(super) fn read(text: &[u8], tally: Tally) -> Result<Mesh, Fault> {
     let mut cleaner = Cleaner::new(text, tally);
     let parsed = if text.len() >= LARGE && rayon::current_num_threads() > 1 {
-        relay::beside(&mut cleaner, parse)
+        thread::scope(|scope| parse(&mut Relay::start(scope, &mut cleaner)))
     } else {
         parse(&mut cleaner)
     };

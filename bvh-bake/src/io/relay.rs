@@ -4,16 +4,29 @@
 
 use std::io::{self, BufRead, Read};
 use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
-use std::thread;
+use std::thread::Scope;
 
 /// Blocks that may wait to be read.
 const WAITING: usize = 4;
+/// Bytes of a block.
+const BLOCK: usize = 1 << 17;
 
-/// Calls `read` with all that `source` gives, its error included.
-pub(super) fn beside<T>(mut source: impl BufRead + Send, read: impl FnOnce(&mut Relay) -> T) -> T {
-    let (full, blocks) = sync_channel(WAITING);
-    let (emptied, spare) = channel::<Vec<u8>>();
-    thread::scope(|scope| {
+/// Where the stream comes out.
+pub(crate) struct Relay {
+    blocks: Receiver<io::Result<Vec<u8>>>,
+    emptied: Sender<Vec<u8>>,
+    block: Vec<u8>,
+    taken: usize,
+}
+
+impl Relay {
+    /// Starts a thread that reads all that `source` gives, its error included. It ends soon after the relay is gone.
+    pub(crate) fn start<'scope>(
+        scope: &'scope Scope<'scope, '_>,
+        mut source: impl Read + Send + 'scope,
+    ) -> Self {
+        let (full, blocks) = sync_channel(WAITING);
+        let (emptied, spare) = channel::<Vec<u8>>();
         scope.spawn(move || {
             loop {
                 let mut block = spare.try_recv().unwrap_or_default();
@@ -25,25 +38,21 @@ pub(super) fn beside<T>(mut source: impl BufRead + Send, read: impl FnOnce(&mut 
                 }
             }
         });
-        read(&mut Relay { blocks, emptied, block: Vec::new(), taken: 0 })
-    })
+        Self { blocks, emptied, block: Vec::new(), taken: 0 }
+    }
 }
 
-/// Replaces a block by what the source has ready: nothing at its end.
-fn fill(source: &mut impl BufRead, block: &mut Vec<u8>) -> io::Result<usize> {
-    block.clear();
-    let ready = source.fill_buf()?;
-    block.extend_from_slice(ready);
-    source.consume(block.len());
-    Ok(block.len())
-}
-
-/// Where the stream comes out.
-pub(super) struct Relay {
-    blocks: Receiver<io::Result<Vec<u8>>>,
-    emptied: Sender<Vec<u8>>,
-    block: Vec<u8>,
-    taken: usize,
+/// Replaces a block by what comes next: nothing at the end of the source.
+fn fill(source: &mut impl Read, block: &mut Vec<u8>) -> io::Result<usize> {
+    block.resize(BLOCK, 0);
+    let count = loop {
+        match source.read(block) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            other => break other?,
+        }
+    };
+    block.truncate(count);
+    Ok(count)
 }
 
 impl Read for Relay {
@@ -90,29 +99,33 @@ mod tests {
         }
     }
 
+    /// Reads on one thread what another makes.
+    fn relayed<T>(source: impl Read + Send, read: impl FnOnce(&mut Relay) -> T) -> T {
+        std::thread::scope(|scope| read(&mut Relay::start(scope, source)))
+    }
+
     #[test]
     fn all_arrives_in_order() {
-        let sent: Vec<u8> = (0..100_000u32).flat_map(u32::to_le_bytes).collect();
-        for block in [1000, 1 << 16, 1 << 20] {
+        let sent: Vec<u8> = (0..300_000u32).flat_map(u32::to_le_bytes).collect();
+        for most in [1000, 1 << 16, 1 << 20] {
             let mut received = Vec::new();
-            beside(BufReader::with_capacity(block, &sent[..]), |relay| relay.read_to_end(&mut received))
-                .unwrap();
-            assert!(received == sent, "{block}");
+            let source = BufReader::with_capacity(most, &sent[..]);
+            relayed(source, |relay| relay.read_to_end(&mut received)).unwrap();
+            assert!(received == sent, "{most}");
         }
     }
 
     #[test]
     fn an_error_arrives_behind_what_came_before() {
         let mut received = Vec::new();
-        let source = BufReader::with_capacity(100, Broken { left: 12_345 });
-        let error = beside(source, |relay| relay.read_to_end(&mut received)).unwrap_err();
-        assert_eq!((error.kind(), received.len()), (io::ErrorKind::InvalidData, 12_345));
+        let error =
+            relayed(Broken { left: 1_234_567 }, |relay| relay.read_to_end(&mut received)).unwrap_err();
+        assert_eq!((error.kind(), received.len()), (io::ErrorKind::InvalidData, 1_234_567));
     }
 
     #[test]
     fn a_reader_may_stop_early() {
-        let first =
-            beside(BufReader::with_capacity(10, io::repeat(7)), |relay| relay.fill_buf().map(<[u8]>::len));
-        assert_eq!(first.unwrap(), 10);
+        let first = relayed(io::repeat(7), |relay| relay.fill_buf().map(<[u8]>::len));
+        assert_eq!(first.unwrap(), BLOCK);
     }
 }
