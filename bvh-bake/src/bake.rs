@@ -225,7 +225,7 @@ impl<'a> Baker<'a> {
         progress(Stage::Encode);
         assemble(self.contents, self.options.ids, provenance, target)?;
         progress(Stage::Prove);
-        let (layout, inflation) = prove(target.source())?;
+        let (layout, inflation) = prove(&target.source())?;
         Ok(BakeReport {
             file: FileSummary::new(&layout, target.length()),
             reason: self.reason.unwrap_or_default(),

@@ -155,7 +155,10 @@ Examples:
   cbvh dump rock.cbvh --page 3
   cbvh dump rock.cbvh --treelet 0 --json
 
-Treelets are numbered through the whole file, in the order of pages and of slots in a page.";
+Treelets are numbered through the whole file, in the order of pages and of slots in a page.
+
+The file is read piece by piece, in some 10 MiB of memory and a byte for each ten thousand of the file. --max-memory \
+SIZE is a promise to stay within SIZE; one that is too small is refused with exit code 4.";
 
 /// What `dump` takes.
 #[derive(Debug, Args)]
@@ -172,13 +175,19 @@ pub(crate) struct DumpArguments {
     /// Decode this page: anchors, links to other pages, treelets
     #[arg(long, value_name = "N")]
     pub(crate) page: Option<u32>,
+    /// Stay within this much memory, such as 64MiB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
 }
 
 const VALIDATE_HELP: &str = "\
 Example:
   cbvh validate rock.cbvh --json
 
-Exit code 3 if the file is invalid. With --json the object says so too: rule, offset, expected, found.";
+Exit code 3 if the file is invalid. With --json the object says so too: rule, offset, expected, found.
+
+The file is read piece by piece, in some 10 MiB of memory whatever its size. --max-memory SIZE is a promise to stay \
+within SIZE; one that is too small is refused with exit code 4.";
 
 /// What `validate` takes.
 #[derive(Debug, Args)]
@@ -186,6 +195,9 @@ Exit code 3 if the file is invalid. With --json the object says so too: rule, of
 pub(crate) struct ValidateArguments {
     /// The file
     pub(crate) file: PathBuf,
+    /// Stay within this much memory, such as 64MiB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
     /// Print one JSON object
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,6 +1,6 @@
 //! What went wrong, as one line and an exit code.
 
-use bvh_bake::{BakeError, VerifyError};
+use bvh_bake::{BakeError, FileError, VerifyError};
 use bvh_query::{BackendError, OpenError};
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -115,6 +115,15 @@ impl Failure {
     /// An invalid file, named.
     pub(crate) fn invalid(path: &Path, error: impl Display) -> Self {
         Self::Invalid(format!("{}: {error}", path.display()))
+    }
+
+    /// What went wrong with a `.cbvh` file that was read piece by piece.
+    pub(crate) fn from_file(path: &Path, error: FileError) -> Self {
+        match error {
+            FileError::Io { .. } => Self::System(error.to_string()),
+            FileError::Memory { .. } => Self::Limit(error.to_string()),
+            FileError::Format(error) => Self::invalid(path, error),
+        }
     }
 
     /// What `verify` found.
