@@ -226,7 +226,7 @@ impl Job<'_> {
 const GLTF_BYTES: u64 = 8;
 
 /// A file's format and length.
-fn format_of(input: &Path) -> Result<(MeshFormat, u64), BakeError> {
+pub(crate) fn format_of(input: &Path) -> Result<(MeshFormat, u64), BakeError> {
     let failed = |source| ReadError::Io { path: input.to_owned(), source };
     let mut file = std::fs::File::open(input).map_err(failed)?;
     let length = file.metadata().map_err(failed)?.len();

@@ -5,7 +5,10 @@
 
 mod counter;
 mod faces;
+mod sequence;
 mod solids;
+
+pub(crate) use sequence::Sequence;
 
 use crate::error::BakeError;
 use crate::io::{self, Fault, Feed, Halt, MeshFormat, Place, ReadError};
@@ -16,6 +19,7 @@ use crate::prepare::Prepared;
 use crate::scratch::{Piece, Spill};
 use crate::soup::{PART, Part, Soup, Triangle, WideTriangle};
 use faces::{Indexed, Misfit};
+use sequence::Runs;
 use solids::Solids;
 use std::fs::File;
 use std::path::Path;
@@ -33,6 +37,8 @@ pub(crate) struct Gatherer<'a> {
     /// The body of the triangle before, whose last triangles are in memory.
     current: usize,
     next_id: u64,
+    /// Which object each triangle belongs to, where that is asked for.
+    runs: Option<Runs>,
 }
 
 /// A body that grows.
@@ -75,7 +81,21 @@ impl Gathering {
 impl<'a> Gatherer<'a> {
     pub(crate) fn new(means: &'a Means, split: bool) -> Self {
         let spill = means.scratch.spill();
-        Self { means, split, spill, names: Vec::new(), bodies: Vec::new(), current: 0, next_id: 0 }
+        Self {
+            means,
+            split,
+            spill,
+            names: Vec::new(),
+            bodies: Vec::new(),
+            current: 0,
+            next_id: 0,
+            runs: None,
+        }
+    }
+
+    /// Gathers all objects as one that knows which triangles are whose.
+    pub(crate) fn in_sequence(means: &'a Means) -> Self {
+        Self { runs: Some(Runs::new()), ..Self::new(means, false) }
     }
 
     /// Triangles of all files so far.
@@ -179,6 +199,9 @@ impl<'a> Gatherer<'a> {
             self.go_to(body)?;
         }
         self.names[object].1 = true;
+        if let Some(runs) = &mut self.runs {
+            runs.add(object, &self.spill)?;
+        }
         let gathering = &mut self.bodies[body];
         let corners = corners.map(|corner| corner.map(|value| value + 0.0));
         corners.iter().for_each(|&corner| gathering.extent.add(corner));
@@ -203,6 +226,19 @@ impl<'a> Gatherer<'a> {
         }
         self.current = body;
         Ok(())
+    }
+
+    /// All triangles as they were read, in the order of their ids, of a gatherer [`in_sequence`](Self::in_sequence).
+    pub(crate) fn into_sequence(self) -> Result<Sequence, BakeError> {
+        let Self { names, mut bodies, spill, runs, .. } = self;
+        let mut parts = Vec::new();
+        for body in &mut bodies {
+            if !body.open.is_empty() {
+                body.close_part(&spill)?;
+            }
+            parts.append(&mut body.parts);
+        }
+        Sequence::new(parts, runs.unwrap_or_else(Runs::new), names.len(), &spill)
     }
 
     /// All objects with triangles, ready to be baked.

@@ -46,4 +46,4 @@ pub use report::BakeReport;
 pub use scratch::Traffic;
 pub use stored::{FileError, StoredFile};
 pub use summary::FileSummary;
-pub use verify::{VerifyError, VerifyReport, verify};
+pub use verify::{VerifyError, VerifyOptions, VerifyReport, verify, verify_files};

@@ -207,7 +207,11 @@ const VERIFY_HELP: &str = "\
 Example:
   cbvh verify rock.cbvh rock.obj
 
-Give the same meshes in the same order as to bake. Exit code 3 if anything differs.";
+Give the same meshes in the same order as to bake. Exit code 3 if anything differs.
+
+File and mesh are read piece by piece. What does not fit into 1.5 GiB of memory, or what --max-memory says, goes to \
+scratch files: up to 240 bytes a triangle, which have no names and vanish however the process ends. With --max-memory \
+the whole process stays within SIZE; one that is too small is refused with exit code 4. glTF meshes are read whole.";
 
 /// What `verify` takes.
 #[derive(Debug, Args)]
@@ -218,6 +222,12 @@ pub(crate) struct VerifyArguments {
     /// The mesh, or the meshes, it was baked from
     #[arg(required = true, value_name = "MESH")]
     pub(crate) meshes: Vec<PathBuf>,
+    /// Stay within this much memory, such as 64MiB; what does not fit goes to scratch files
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
+    /// Where scratch files go [default: the system's directory for temporary files]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scratch: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     pub(crate) json: bool,

@@ -127,11 +127,13 @@ impl Failure {
     }
 
     /// What `verify` found.
-    pub(crate) fn from_verify(path: &Path, meshes: &str, error: &VerifyError) -> Self {
+    pub(crate) fn from_verify(path: &Path, meshes: &str, error: VerifyError) -> Self {
         match error {
             VerifyError::Mesh(error) if error.is_limit() => Self::Limit(format!("{meshes}: {error}")),
             VerifyError::Mesh(error) => Self::Invalid(format!("{meshes}: {error}")),
-            _ => Self::invalid(path, error),
+            VerifyError::Input(error) => Self::from_bake(meshes, &error),
+            VerifyError::File(error) => Self::from_file(path, error),
+            error => Self::invalid(path, error),
         }
     }
 }
