@@ -243,7 +243,7 @@ impl<'a> Baker<'a> {
         assemble(self.contents, self.options.ids, provenance, target, progress)?;
         progress.reach(Step::Bake(Stage::Encode), self.kept);
         begin(Stage::Prove);
-        let (layout, inflation) = prove(target.source(), progress)?;
+        let (layout, inflation) = prove(&target.source(), progress)?;
         progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
             file: FileSummary::new(&layout, target.length()),

@@ -240,7 +240,7 @@ const CHECKSUM: u64 = 2;
 const GLTF: u64 = 7;
 
 /// A file's format and length.
-fn format_of(input: &Path, progress: &Progress) -> Result<(MeshFormat, u64), BakeError> {
+pub(crate) fn format_of(input: &Path, progress: &Progress) -> Result<(MeshFormat, u64), BakeError> {
     let failed = |source| ReadError::Io { path: input.to_owned(), source };
     let mut file = Input::open(input, progress, 0).map_err(failed)?;
     let length = file.length();

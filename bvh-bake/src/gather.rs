@@ -6,7 +6,10 @@
 mod away;
 mod counter;
 mod faces;
+mod sequence;
 mod solids;
+
+pub(crate) use sequence::Sequence;
 
 use crate::error::BakeError;
 use crate::io::{self, Fault, Feed, Halt, Input, MeshFormat, Place, ReadError, Relay};
@@ -19,6 +22,7 @@ use crate::scratch::{Piece, Spill};
 use crate::soup::{PART, Part, Soup, WideTriangle};
 use away::Away;
 use faces::{Indexed, Misfit};
+use sequence::Runs;
 use solids::Solids;
 use std::cell::Cell;
 use std::path::Path;
@@ -48,6 +52,8 @@ pub(crate) struct Gatherer<'a> {
     /// The body of the triangle before, whose last triangles are in memory.
     current: usize,
     next_id: u64,
+    /// Which object each triangle belongs to, where that is asked for.
+    runs: Option<Runs>,
 }
 
 /// A body that grows.
@@ -71,8 +77,27 @@ impl Gathering {
 
 impl<'a> Gatherer<'a> {
     pub(crate) fn new(means: &'a Means, split: bool) -> Self {
-        let (spill, away) = (Arc::new(means.scratch.spill()), None);
-        Self { means, split, spill, away, names: Vec::new(), bodies: Vec::new(), current: 0, next_id: 0 }
+        Self {
+            means,
+            split,
+            spill: Arc::new(means.scratch.spill()),
+            away: None,
+            names: Vec::new(),
+            bodies: Vec::new(),
+            current: 0,
+            next_id: 0,
+            runs: None,
+        }
+    }
+
+    /// Gathers all objects as one that knows which triangles are whose.
+    pub(crate) fn in_sequence(means: &'a Means) -> Self {
+        Self { runs: Some(Runs::new()), ..Self::new(means, false) }
+    }
+
+    /// Whether anybody asks how many distinct vertices there are.
+    fn counts_vertices(&self) -> bool {
+        self.runs.is_none()
     }
 
     /// Triangles of all files so far.
@@ -202,6 +227,9 @@ impl<'a> Gatherer<'a> {
             self.go_to(body)?;
         }
         self.names[object].1 = true;
+        if let Some(runs) = &mut self.runs {
+            runs.add(object, &self.spill)?;
+        }
         let gathering = &mut self.bodies[body];
         let corners = corners.map(|corner| corner.map(|value| value + 0.0));
         corners.iter().for_each(|&corner| gathering.extent.add(corner));
@@ -239,6 +267,19 @@ impl<'a> Gatherer<'a> {
         }
         self.current = body;
         Ok(())
+    }
+
+    /// All triangles as they were read, in the order of their ids, of a gatherer [`in_sequence`](Self::in_sequence).
+    pub(crate) fn into_sequence(self) -> Result<Sequence, BakeError> {
+        let Self { names, mut bodies, spill, runs, .. } = self;
+        let mut parts = Vec::new();
+        for body in &mut bodies {
+            if !body.open.is_empty() {
+                body.parts.push(away::part(&body.open, &spill)?);
+            }
+            parts.append(&mut body.parts);
+        }
+        Sequence::new(parts, runs.unwrap_or_else(Runs::new), names.len(), &spill)
     }
 
     /// All objects with triangles, ready to be baked.

@@ -5,60 +5,63 @@
 
 mod backward;
 
-use crate::error::BakeError;
 use crate::progress::Progress;
-use crate::target::Source;
+use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
-use bvh_format::validate::{validate_counts, validate_links, validate_page, validate_sections};
-use bvh_format::{FormatError, Layout};
+use bvh_format::source::Source;
+use bvh_format::validate::{Workers, validate_with};
 use rayon::prelude::*;
+use std::ops::Range;
 
 pub(crate) use backward::prove;
 
-/// `bvh_format::validate::validate` with the pages checked in parallel.
+/// The threads of rayon's current pool.
+struct InParallel;
+
+impl Workers for InParallel {
+    fn both<A: Send, B: Send, E: Send>(
+        &self,
+        a: impl FnOnce() -> Result<A, E> + Send,
+        b: impl FnOnce() -> Result<B, E> + Send,
+    ) -> Result<(A, B), E> {
+        let (a, b) = rayon::join(a, b);
+        Ok((a?, b?))
+    }
+
+    fn each<T: Send, E: Send>(
+        &self,
+        pages: Range<u32>,
+        check: impl Fn(u32) -> Result<T, E> + Sync + Send,
+    ) -> Result<Vec<T>, E> {
+        // Parallel `collect` into a result would give any of the errors.
+        let results: Vec<_> = pages.into_par_iter().map(check).collect();
+        results.into_iter().collect()
+    }
+}
+
+/// `bvh_format::validate::validate_with` by the threads of rayon's current pool, of bytes in memory or of a
+/// [`StoredFile`](crate::StoredFile) of any size.
 ///
 /// # Errors
-/// The rule that `bvh_format::validate::validate` finds broken, whatever the number of threads.
-pub fn validate_in_parallel(bytes: &[u8]) -> Result<Layout, FormatError> {
-    let layout = Layout::read(bytes)?;
-    let (sections, pages) = rayon::join(|| validate_sections(bytes), || validate_pages(&layout, bytes));
-    sections?;
-    pages?;
-    Ok(layout)
-}
-
-fn validate_pages(layout: &Layout, bytes: &[u8]) -> Result<(), FormatError> {
-    for object in &layout.objects {
-        let pages = object.pages().into_par_iter();
-        let counts = first_error(pages.clone().map(|number| validate_page(layout, bytes, object, number)))?;
-        first_error(pages.map(|number| validate_links(layout, bytes, object, number)))?;
-        validate_counts(layout, object, &counts)?;
-    }
-    Ok(())
-}
-
-/// All results, or the first of the errors: parallel `collect` would give any of them.
-fn first_error<T: Send>(
-    results: impl IndexedParallelIterator<Item = Result<T, FormatError>>,
-) -> Result<Vec<T>, FormatError> {
-    let results: Vec<_> = results.collect();
-    results.into_iter().collect()
+/// The rule that one thread finds broken, whatever the number of threads; and those of the source.
+pub fn validate_in_parallel<S: Source + ?Sized>(source: &S) -> Result<Layout, S::Error> {
+    validate_with(source, &InParallel)
 }
 
 /// Checks the bounds of a file whose structure has been validated; returns how loose they are.
 ///
+/// Cost: one pass over the pages and leaf blocks, from the last page to the first. Memory: 128 pages with their leaf
+/// blocks, at most 10 MiB as files are baked, and some 130 bytes for each subtree root that has been seen before the
+/// link to it: some hundreds in files baked here, whatever their size, and at most all roots in files whose pages are
+/// ordered otherwise.
+///
 /// # Errors
-/// Rule 35, with the page and slot.
-pub fn prove_bounds(layout: &Layout, bytes: &[u8]) -> Result<Inflation, FormatError> {
+/// Rule 35, with the page and slot; and those of the source.
+pub fn prove_bounds<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<Inflation, S::Error> {
     let mut inflation = Inflation::default();
     let progress = Progress::default();
     for object in &layout.objects {
-        match backward::prove_object(layout, Source::Memory(bytes), object, false, &progress) {
-            Ok(sums) => inflation.join(&sums),
-            Err(BakeError::Unproved(error)) => return Err(error),
-            // Memory is read without fail.
-            Err(_) => {}
-        }
+        inflation.join(&backward::prove_object(layout, source, object, false, &progress)?);
     }
     Ok(inflation)
 }

@@ -4,8 +4,10 @@ use crate::error::BakeError;
 use crate::scratch::{Piece, Spill};
 use bytemuck::Pod;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 /// Records that are to be sorted.
 pub(crate) struct Sorter<T> {
@@ -16,7 +18,7 @@ pub(crate) struct Sorter<T> {
     count: u64,
 }
 
-/// Bytes that are read at a time of each run.
+/// Bytes that are read at a time of each run, at most.
 const READ_BYTES: usize = 1 << 16;
 
 impl<T: Pod + Ord + Send + Sync> Sorter<T> {
@@ -45,60 +47,93 @@ impl<T: Pod + Ord + Send + Sync> Sorter<T> {
     }
 
     /// Visits all records in ascending order.
-    pub(crate) fn visit(
-        mut self,
-        mut visit: impl FnMut(&T) -> Result<(), BakeError>,
-    ) -> Result<(), BakeError> {
-        self.open.par_sort_unstable();
-        if self.runs.is_empty() {
-            return self.open.iter().try_for_each(visit);
-        }
-        let block = (READ_BYTES / size_of::<T>()).max(1);
-        let mut readers: Vec<Reader<T>> = self.runs.into_iter().map(|run| Reader::new(run, block)).collect();
-        readers.push(Reader { run: None, next: 0, block, open: self.open, at: 0 });
-        let mut heap = BinaryHeap::with_capacity(readers.len());
-        for (number, reader) in readers.iter_mut().enumerate() {
-            if let Some(record) = reader.next()? {
-                heap.push(Reverse((record, number)));
-            }
-        }
-        while let Some(mut least) = heap.peek_mut() {
-            let Reverse((record, number)) = *least;
+    pub(crate) fn visit(self, mut visit: impl FnMut(&T) -> Result<(), BakeError>) -> Result<(), BakeError> {
+        let sorted = self.finish();
+        let mut merge = sorted.merge();
+        while let Some(record) = merge.next()? {
             visit(&record)?;
-            match readers[number].next()? {
-                Some(record) => *least = Reverse((record, number)),
-                None => drop(std::collections::binary_heap::PeekMut::pop(least)),
-            }
         }
         Ok(())
+    }
+
+    /// After the last record.
+    pub(crate) fn finish(mut self) -> Sorted<T> {
+        self.open.par_sort_unstable();
+        // What is read of all runs together is no more than a run.
+        let block = (READ_BYTES / size_of::<T>()).min(self.run / (self.runs.len() + 1)).max(1);
+        Sorted { runs: self.runs, open: self.open, block }
+    }
+}
+
+/// Sorted runs, which are gone through any number of times.
+pub(crate) struct Sorted<T> {
+    runs: Vec<Piece<T>>,
+    open: Vec<T>,
+    /// Records that are read at a time of each run.
+    block: usize,
+}
+
+impl<T: Pod + Ord> Sorted<T> {
+    /// All records in ascending order.
+    pub(crate) fn merge(&self) -> Merge<'_, T> {
+        let reader = |run| Reader { run: Some(run), next: 0, block: self.block, open: Cow::default(), at: 0 };
+        let mut readers: Vec<Reader<T>> = self.runs.iter().map(reader).collect();
+        let open = Cow::Borrowed(&self.open[..]);
+        readers.push(Reader { run: None, next: 0, block: self.block, open, at: 0 });
+        Merge { readers, heap: BinaryHeap::new() }
+    }
+}
+
+/// Goes through sorted runs side by side.
+pub(crate) struct Merge<'a, T: Clone> {
+    readers: Vec<Reader<'a, T>>,
+    /// The next record of each run, and its number; empty before the first and behind the last.
+    heap: BinaryHeap<Reverse<(T, usize)>>,
+}
+
+impl<T: Pod + Ord> Merge<'_, T> {
+    /// The next record.
+    pub(crate) fn next(&mut self) -> Result<Option<T>, BakeError> {
+        if let [only] = &mut self.readers[..] {
+            return only.next();
+        }
+        if self.heap.is_empty() {
+            // Nothing comes of it once all have been read.
+            for (number, reader) in self.readers.iter_mut().enumerate() {
+                self.heap.extend(reader.next()?.map(|record| Reverse((record, number))));
+            }
+        }
+        let Some(mut least) = self.heap.peek_mut() else { return Ok(None) };
+        let Reverse((record, number)) = *least;
+        match self.readers[number].next()? {
+            Some(next) => *least = Reverse((next, number)),
+            None => drop(PeekMut::pop(least)),
+        }
+        Ok(Some(record))
     }
 }
 
 /// Reads a run from its beginning.
-struct Reader<T> {
-    run: Option<Piece<T>>,
+struct Reader<'a, T: Clone> {
+    run: Option<&'a Piece<T>>,
     /// The first record not read yet.
     next: usize,
     block: usize,
-    open: Vec<T>,
+    open: Cow<'a, [T]>,
     at: usize,
 }
 
-impl<T: Pod> Reader<T> {
-    fn new(run: Piece<T>, block: usize) -> Self {
-        Self { run: Some(run), next: 0, block, open: Vec::new(), at: 0 }
-    }
-
+impl<T: Pod> Reader<'_, T> {
     fn next(&mut self) -> Result<Option<T>, BakeError> {
         if self.at == self.open.len()
-            && let Some(run) = &self.run
+            && let Some(run) = self.run
         {
             let end = (self.next + self.block).min(run.len());
-            self.open = run.range(self.next..end)?.into_owned();
+            self.open = run.range(self.next..end)?;
             (self.next, self.at) = (end, 0);
         }
         let record = self.open.get(self.at).copied();
-        self.at += 1;
+        self.at += usize::from(record.is_some());
         Ok(record)
     }
 }
@@ -126,6 +161,15 @@ mod tests {
             };
             sorter.visit(keep).unwrap();
             assert_eq!(sorted, expected);
+            let mut again = Sorter::of_runs(run);
+            again.extend(&records, &spill).unwrap();
+            let again = again.finish();
+            for _ in 0..2 {
+                let mut merge = again.merge();
+                let all: Vec<_> = std::iter::from_fn(|| merge.next().unwrap()).collect();
+                assert_eq!(all, expected);
+                assert_eq!(merge.next().unwrap(), None);
+            }
         }
     }
 }

@@ -91,16 +91,17 @@ pub(crate) enum Source<'a> {
     File { file: &'a std::fs::File, path: &'a Path, length: u64, progress: &'a Progress },
 }
 
-impl<'a> Source<'a> {
-    pub(crate) fn length(&self) -> u64 {
+impl bvh_format::source::Source for Source<'_> {
+    type Error = BakeError;
+
+    fn length(&self) -> u64 {
         match self {
             Self::Memory(bytes) => bytes.len() as u64,
             Self::File { length, .. } => *length,
         }
     }
 
-    /// A range within the length.
-    pub(crate) fn read(&self, range: Range<usize>) -> Result<Cow<'a, [u8]>, BakeError> {
+    fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, BakeError> {
         match self {
             Self::Memory(bytes) => Ok(Cow::Borrowed(&bytes[range])),
             Self::File { file, path, progress, .. } => {

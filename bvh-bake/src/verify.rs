@@ -1,22 +1,36 @@
 //! Verifies a file against the mesh it was baked from: the same triangles, and bounds that contain them.
 //!
-//! Shares no code with the baker's way from mesh to bytes, so that neither hides a mistake of the other.
-//! With ids every triangle is looked up by its number, and its corners compared in order. Without ids
-//! the stored triangles and the mesh's rounded ones are sorted and compared as multisets.
+//! Shares no code with the baker's way from mesh to bytes, so that neither hides a mistake of the other. What it shares
+//! is what surrounds that way: the readers of meshes, which give corners as the file has them; scratch files and the
+//! sorter; and the checks of finished bytes, which work with the reference decoder of bvh-format.
+//!
+//! With ids every triangle is matched by its number, and its corners compared in order. Without ids the stored
+//! triangles and the mesh's rounded ones are compared as multisets. Either way both are sorted and gone through side by
+//! side, so that neither has to be in memory.
 
 mod by_id;
 mod by_value;
+mod input;
 
-use crate::mesh::{InputError, Mesh, Object as MeshObject};
+use crate::error::BakeError;
+use crate::files::format_of;
+use crate::gather::Gatherer;
+use crate::io::MeshFormat;
+use crate::means::Means;
+use crate::mesh::{InputError, Mesh};
+use crate::progress::Progress;
 use crate::prove::{prove_bounds, validate_in_parallel};
+use crate::stored::{FileError, StoredFile};
 use bvh_format::FormatError;
 use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::object::Object;
-use bvh_format::page::Page;
+use bvh_format::source::Source;
 use bvh_format::validate::packets;
+use input::{InMemory, Input};
+use std::path::{Path, PathBuf};
 
 /// What a successful verification found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +50,7 @@ pub struct VerifyReport {
 }
 
 /// Why a file is not a faithful bake of a mesh.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
     /// The file itself breaks a rule of the format.
@@ -45,6 +59,12 @@ pub enum VerifyError {
     /// The mesh breaks the input contract, so that no file can be a bake of it.
     #[error("the mesh: {0}")]
     Mesh(#[from] InputError),
+    /// A mesh cannot be read, or what was read of it cannot be kept.
+    #[error(transparent)]
+    Input(#[from] BakeError),
+    /// The file cannot be read, or not in the memory allowed.
+    #[error(transparent)]
+    File(FileError),
     /// The file is sound, but not this mesh's.
     #[error("{what}: expected {expected}, found {found}")]
     Differs {
@@ -55,6 +75,15 @@ pub enum VerifyError {
         /// What the file has.
         found: String,
     },
+}
+
+impl From<FileError> for VerifyError {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Format(error) => Self::Format(error),
+            other => Self::File(other),
+        }
+    }
 }
 
 impl VerifyError {
@@ -68,24 +97,99 @@ impl VerifyError {
 /// its triangles are the mesh's (those that are not stored are exact duplicates of some that are), and
 /// no corner is further from where the mesh has it than the file states.
 ///
-/// Cost: about that of reading the mesh. Memory: 9 bytes a triangle of the mesh and about 110 bytes a page
-/// with ids, 36 bytes for each triangle of mesh and file without.
+/// Cost: about that of reading the mesh. Memory: 8 bytes a triangle of the mesh; 60 bytes a stored triangle with ids,
+/// 40 bytes for each triangle of mesh and file without. [`verify_files`] takes as much as it may.
 ///
 /// # Errors
 /// The first thing found that does not hold.
 pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
     mesh.check()?;
-    let layout = validate_in_parallel(bytes)?;
-    let inflation = prove_bounds(&layout, bytes)?;
-    let sources = match_objects(&layout, mesh)?;
-    for (object, source) in layout.objects.iter().zip(&sources) {
-        check_counts(object, source, mesh)?;
-        check_hull(&layout, bytes, object)?;
+    let layout = Layout::read(bytes)?;
+    compare(&layout, bytes, || InMemory::new(mesh), &Means::unlimited(&Progress::default()))
+}
+
+/// How to go about files.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct VerifyOptions {
+    /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. What does not fit goes to
+    /// scratch files. glTF files are read into memory, other meshes piece by piece. An allocator that keeps much of what
+    /// is freed is to be told not to, as said at [`FileOptions`](crate::FileOptions).
+    pub max_memory: Option<u64>,
+    /// The directory for scratch files; `None` for the system's for temporary files. They have no names there: nothing
+    /// of them is left, however the process ends.
+    pub scratch: Option<PathBuf>,
+}
+
+/// What `VerifyOptions::max_memory` is if nothing is said.
+const USUAL_MEMORY: u64 = 3 << 29;
+/// Bytes of memory a byte of a glTF file, at least.
+const GLTF_BYTES: u64 = 8;
+
+/// [`verify`] of a file of any size and of the meshes that it was baked from, read piece by piece.
+///
+/// Cost: reading the meshes once and the file five times, and up to 240 bytes of scratch a triangle, each written and read
+/// once or twice.
+///
+/// # Errors
+/// As [`verify`]; [`VerifyError::Input`] if a mesh or scratch file cannot be read or written, [`VerifyError::File`] if the
+/// file cannot be read or the memory is too little.
+pub fn verify_files(
+    path: &Path,
+    meshes: &[PathBuf],
+    options: &VerifyOptions,
+) -> Result<VerifyReport, VerifyError> {
+    let budget = options.max_memory.unwrap_or(USUAL_MEMORY);
+    let enough = |path: &Path, needed: u64| {
+        let path = path.to_owned();
+        if needed <= budget { Ok(()) } else { Err(FileError::Memory { path, needed, budget }) }
+    };
+    enough(path, Means::least_of_check())?;
+    let file = StoredFile::open(path, options.max_memory)?;
+    let layout = Layout::read_from(&file)?;
+    let scratch = options.scratch.clone().unwrap_or_else(std::env::temp_dir);
+    let means = Means::of_check(budget, &scratch);
+    let mut gatherer = Gatherer::in_sequence(&means);
+    for mesh in meshes {
+        match format_of(mesh, &means.progress)? {
+            (MeshFormat::Gltf, length) => {
+                if options.max_memory.is_some() {
+                    enough(mesh, length.saturating_mul(GLTF_BYTES).saturating_add(Means::least_of_check()))?;
+                }
+                gatherer.read_gltf(mesh)?;
+            }
+            (format, _) => {
+                gatherer.read(mesh, format)?;
+            }
+        }
+    }
+    let sequence = gatherer.into_sequence()?;
+    compare(&layout, &file, || Ok(sequence), &means)
+}
+
+/// Checks a file, and compares it with a mesh that has been checked.
+fn compare<S: Source + ?Sized, I: Input>(
+    layout: &Layout,
+    source: &S,
+    input: impl FnOnce() -> Result<I, VerifyError>,
+    means: &Means,
+) -> Result<VerifyReport, VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    validate_in_parallel(source)?;
+    let inflation = prove_bounds(layout, source)?;
+    let input = input()?;
+    match_objects(layout, input.counts())?;
+    let all = input.counts().iter().sum();
+    for (number, object) in layout.objects.iter().enumerate() {
+        let own = if layout.objects.len() == 1 { all } else { input.counts()[number] };
+        check_counts(object, own, all)?;
+        check_hull(layout, source, object)?;
     }
     let (max_move, duplicates) = if layout.has_ids() {
-        by_id::compare(&layout, bytes, mesh)?
+        by_id::compare(layout, source, &input, means)?
     } else {
-        by_value::compare(&layout, bytes, &sources)?
+        by_value::compare(layout, source, &input, means)?
     };
     Ok(VerifyReport {
         triangles: layout.objects.iter().map(|object| object.record.triangles.get()).sum(),
@@ -97,23 +201,28 @@ pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
     })
 }
 
-/// For each object of the file the objects of the mesh that it was made of: all, or one each.
-fn match_objects<'m>(layout: &Layout, mesh: &'m Mesh) -> Result<Vec<Vec<&'m MeshObject>>, VerifyError> {
-    let full: Vec<_> = mesh.objects.iter().filter(|object| !object.triangles.is_empty()).collect();
+/// A file has one object of all the mesh's, or one of each that has triangles.
+fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
     match layout.objects.len() {
-        1 => Ok(vec![full]),
-        count if count == full.len() => Ok(full.into_iter().map(|object| vec![object]).collect()),
+        1 => Ok(()),
+        count if count == full.len() => Ok(()),
         count => Err(VerifyError::differs("objects", format!("1 or {}", full.len()), count)),
     }
 }
 
-fn check_counts(object: &Object, source: &[&MeshObject], mesh: &Mesh) -> Result<(), VerifyError> {
+/// The number of the file's object that an object of the mesh is in, counted among those with triangles.
+fn source_of(layout: &Layout, number: u32) -> usize {
+    if layout.objects.len() == 1 { 0 } else { number as usize }
+}
+
+/// `own` are the triangles that the mesh has for this object, `all` those for all.
+fn check_counts(object: &Object, own: u64, all: u64) -> Result<(), VerifyError> {
     let record = &object.record;
     let counts = [
-        ("triangles of the input", mesh.triangle_count(), record.input_triangles.get()),
+        ("triangles of the input", all, record.input_triangles.get()),
         (
             "triangles stored and duplicates left out",
-            source.iter().map(|object| object.triangles.len() as u64).sum(),
+            own,
             record.triangles.get().saturating_add(record.duplicates.get()),
         ),
     ];
@@ -126,13 +235,16 @@ fn check_counts(object: &Object, source: &[&MeshObject], mesh: &Mesh) -> Result<
 }
 
 /// Checks that the record's box and sphere contain all corners stored.
-fn check_hull(layout: &Layout, bytes: &[u8], object: &Object) -> Result<(), VerifyError> {
+fn check_hull<S: Source + ?Sized>(layout: &Layout, source: &S, object: &Object) -> Result<(), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
     let record = &object.record;
     let axes = [0, 1, 2];
     let (lo, hi) = (axes.map(|a| record.box_lo[a].get()), axes.map(|a| record.box_hi[a].get()));
     let centre = axes.map(|a| f64::from(record.sphere_centre[a].get()));
     let radius = f64::from(record.sphere_radius.get());
-    each_triangle(layout, bytes, object, |triangle| {
+    each_triangle(layout, source, object, |triangle| {
         for (corner, v) in triangle.corners.iter().enumerate() {
             let what = || format!("{}, corner {corner}", triangle.name());
             if axes.iter().any(|&a| v[a] < lo[a] || v[a] > hi[a]) {
@@ -173,19 +285,21 @@ impl Stored {
 }
 
 /// Calls `visit` for every triangle of an object of a validated file, in the order of the leaves.
-fn each_triangle(
+fn each_triangle<S: Source + ?Sized>(
     layout: &Layout,
-    bytes: &[u8],
+    source: &S,
     object: &Object,
     mut visit: impl FnMut(&Stored) -> Result<(), VerifyError>,
-) -> Result<(), VerifyError> {
-    let first = object.record.first_page.get();
-    for number in first..first + object.record.pages.get() {
-        // Validation has seen every page.
-        let Some(page_bytes) = layout.page_bytes(bytes, number) else { continue };
-        let page = Page::new(page_bytes, object.profile);
-        let block = layout.leaf_block(bytes, page.header());
-        let ids = layout.id_block(bytes, page.header());
+) -> Result<(), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    for number in object.pages() {
+        let bytes = layout.read_page(source, number)?;
+        let page = bytes.page(object);
+        let leaves = layout.read_leaf_block(source, page.header())?;
+        let ids = layout.read_id_block(source, page.header())?;
+        let (block, ids) = (leaves.bytes(), ids.bytes());
         for (packet, count) in packets(&page) {
             let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
             for lane in 0..count {

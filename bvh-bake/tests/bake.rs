@@ -75,7 +75,7 @@ fn bake_all(mesh: &Mesh) -> Vec<(Options, Vec<u8>, BakeReport)> {
     all.map(|options| {
         let (bytes, report) = to_bytes(mesh, &options).unwrap_or_else(|e| panic!("{}: {e}", options.stamp()));
         let layout = validate(&bytes).unwrap();
-        let inflation = prove_bounds(&layout, &bytes).unwrap();
+        let inflation = prove_bounds(&layout, &bytes[..]).unwrap();
         assert_eq!(inflation.mean_width(), report.width_inflation);
         assert!(report.width_inflation >= 1.0 && report.volume_inflation >= 1.0, "{report:?}");
         assert_eq!(report.file.file_bytes, bytes.len() as u64);
@@ -219,7 +219,7 @@ fn a_tightened_slab_fails_the_proof() {
                 }
             }
             repair_page(&mut changed[at..at + PAGE]);
-            let error = prove_bounds(&Layout::read(&changed).unwrap(), &changed).err();
+            let error = prove_bounds(&Layout::read(&changed).unwrap(), &changed[..]).err();
             refused += usize::from(error.is_some());
             assert!(error.is_none_or(|error| error.rule == Rule::BoundContains));
         }
@@ -262,7 +262,7 @@ fn a_tightened_anchor_fails_the_proof() {
         let lo = f32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + 64 + i]));
         bytes[at + 64..at + 68].copy_from_slice(&lo.next_up().to_le_bytes());
         repair_page(&mut bytes[at..at + PAGE]);
-        let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes).unwrap_err();
+        let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap_err();
         assert_eq!(error.rule, Rule::BoundContains, "{}", profile.name());
     }
 }

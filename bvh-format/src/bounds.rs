@@ -33,21 +33,9 @@ pub struct Bound {
 /// # Errors
 /// The first error of `visit`.
 pub fn visit_bounds(
-    layout: &Layout,
-    bytes: &[u8],
     object: &Object,
     page: &Page,
-    below: impl Fn(RootRef) -> Kdop,
-    visit: impl FnMut(Bound) -> Result<(), FormatError>,
-) -> Result<Vec<Kdop>, FormatError> {
-    visit_bounds_of(object, page, layout.leaf_block(bytes, page.header()), below, visit)
-}
-
-/// [`visit_bounds`] of a page and its leaf block, wherever they are.
-fn visit_bounds_of(
-    object: &Object,
-    page: &Page,
-    block: &[u8],
+    leaf_block: &[u8],
     below: impl Fn(RootRef) -> Kdop,
     mut visit: impl FnMut(Bound) -> Result<(), FormatError>,
 ) -> Result<Vec<Kdop>, FormatError> {
@@ -64,7 +52,7 @@ fn visit_bounds_of(
                 Child::Treelet(slot) => tight[usize::from(slot)],
                 Child::Remote(link) => below(page.remote(link)),
                 Child::Leaf { packet, triangles } => {
-                    let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                    let values = decode_packet(object.triangle_encoding, leaf_block, usize::from(packet));
                     Kdop::of_points((0..usize::from(triangles)).flat_map(|lane| values.triangle(lane)))
                 }
                 Child::Empty => continue,
@@ -102,21 +90,6 @@ fn visit_bounds_of(
 /// Rule 35 where a decoded slab cuts its triangles.
 pub fn check_bounds(
     layout: &Layout,
-    bytes: &[u8],
-    object: &Object,
-    page: &Page,
-    below: impl Fn(RootRef) -> Kdop,
-) -> Result<(Vec<Kdop>, Inflation), FormatError> {
-    check_bounds_of(layout, object, page, layout.leaf_block(bytes, page.header()), below)
-}
-
-/// [`check_bounds`] of a page and its leaf block, wherever they are: for those who go through a file piece by
-/// piece.
-///
-/// # Errors
-/// As [`check_bounds`].
-pub fn check_bounds_of(
-    layout: &Layout,
     object: &Object,
     page: &Page,
     leaf_block: &[u8],
@@ -125,7 +98,7 @@ pub fn check_bounds_of(
     let slabs = object.profile.directions().slabs();
     let at = layout.page_offset(page.header().page_number.get());
     let mut inflation = Inflation::default();
-    let tight = visit_bounds_of(object, page, leaf_block, below, |bound| {
+    let tight = visit_bounds(object, page, leaf_block, below, |bound| {
         let Bound { slot, child, decoded, tight } = bound;
         ensure(decoded.contains(&tight, slabs), Rule::BoundContains, at, || {
             let place =

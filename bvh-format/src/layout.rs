@@ -9,7 +9,10 @@ use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
 use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
 use crate::rule::Rule;
+use crate::source::{Block, Source};
 use std::ops::Range;
+use zerocopy::FromBytes;
+use zerocopy::little_endian::U32;
 
 /// Where everything is in a file. Made by reading the header page and the object table alone.
 #[derive(Debug, Clone)]
@@ -35,23 +38,20 @@ impl Layout {
     /// # Errors
     /// The first of rules 1 to 9 and 11 to 14 that does not hold, or rule 10 for the object table.
     pub fn read(bytes: &[u8]) -> Result<Self, FormatError> {
-        Self::read_with(bytes.len() as u64, |range| Ok(&bytes[range]))
+        Self::read_from(bytes)
     }
 
-    /// Opens a file of `length` bytes of which `read` gives those that are asked for: the header page, or what there
-    /// is of it, then the object section. No range goes beyond `length`.
+    /// Opens a file wherever its bytes are: reads the header page, or what there is of it, then the object section.
     ///
     /// # Errors
-    /// As [`Layout::read`], and what `read` returns.
-    pub fn read_with<B: AsRef<[u8]>, E: From<FormatError>>(
-        length: u64,
-        mut read: impl FnMut(Range<usize>) -> Result<B, E>,
-    ) -> Result<Self, E> {
-        let head = read(0..length.min(PAGE as u64) as usize)?;
-        let (header, sections) = read_header_of(head.as_ref(), length)?;
+    /// As [`Layout::read`], and those of the source.
+    pub fn read_from<S: Source + ?Sized>(source: &S) -> Result<Self, S::Error> {
+        let length = source.length();
+        let head = source.read(0..length.min(PAGE as u64) as usize)?;
+        let (header, sections) = read_header_of(&head, length)?;
         let objects = sections.iter().find(|section| section.kind == SectionKind::Objects);
-        let table = read(objects.map_or(0..0, |section| section.range.clone()))?;
-        Ok(Self::from_tables(&header, sections, table.as_ref())?)
+        let table = source.read(objects.map_or(0..0, |section| section.range.clone()))?;
+        Ok(Self::from_tables(&header, sections, &table)?)
     }
 
     /// The layout of checked sections and the bytes of the object section.
@@ -102,25 +102,40 @@ impl Layout {
         self.nodes.start as u64 + u64::from(page) * PAGE as u64
     }
 
+    /// Where a page is in the file; `None` beyond the last.
+    #[inline]
+    pub(crate) fn page_range(&self, page: u32) -> Option<Range<usize>> {
+        units_within(&self.nodes, page.into(), 1, PAGE)
+    }
+
     /// The bytes of a page; `None` beyond the last.
     #[inline]
     pub fn page_bytes<'a>(&self, bytes: &'a [u8], page: u32) -> Option<&'a [u8; PAGE]> {
-        let start = (page as usize).checked_mul(PAGE)?.checked_add(self.nodes.start)?;
-        if start.checked_add(PAGE)? > self.nodes.end { None } else { bytes.get(start..)?.first_chunk() }
+        bytes.get(self.page_range(page)?)?.first_chunk()
+    }
+
+    /// Where the leaf block of a page is in the file; `None` if that is not within the leaf section.
+    #[inline]
+    pub(crate) fn leaf_range(&self, header: &PageHeader) -> Option<Range<usize>> {
+        units_within(&self.leaves, header.leaf_line.get(), header.leaf_lines.get(), LINE)
     }
 
     /// The leaf block of a page, empty if the page's header is nonsense.
     #[inline]
     pub fn leaf_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
-        let section = bytes.get(self.leaves.clone()).unwrap_or(&[]);
-        slice(section, header.leaf_line.get(), header.leaf_lines.get(), LINE)
+        self.leaf_range(header).and_then(|range| bytes.get(range)).unwrap_or(&[])
+    }
+
+    /// Where the id block of a page is in the file; `None` if that is not within the id section.
+    #[inline]
+    pub(crate) fn id_range(&self, header: &PageHeader) -> Option<Range<usize>> {
+        units_within(self.ids.as_ref()?, header.id_word.get(), header.id_words.get(), WORD)
     }
 
     /// The id block of a page, empty without ids.
     #[inline]
     pub fn id_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
-        let section = self.ids.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
-        slice(section, header.id_word.get(), header.id_words.get(), WORD)
+        self.id_range(header).and_then(|range| bytes.get(range)).unwrap_or(&[])
     }
 
     /// True if the file holds original triangle ids.
@@ -129,10 +144,10 @@ impl Layout {
     }
 
     /// The pairs (kept id, id of an exact duplicate left out), ascending.
-    pub fn duplicate_ids<'a>(&self, bytes: &'a [u8]) -> &'a [[zerocopy::little_endian::U32; 2]] {
+    pub fn duplicate_ids<'a>(&self, bytes: &'a [u8]) -> &'a [[U32; 2]] {
         let section = self.duplicates.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
         let whole = section.len() / 8 * 8;
-        <[[zerocopy::little_endian::U32; 2]]>::ref_from_bytes(&section[..whole]).unwrap_or(&[])
+        <[[U32; 2]]>::ref_from_bytes(&section[..whole]).unwrap_or(&[])
     }
 
     /// Checks the section of duplicate ids: its checksum and its order.
@@ -145,11 +160,9 @@ impl Layout {
         let at = section.range.start as u64;
         let data = &bytes[section.range.clone()];
         require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(data)))?;
-        require(Rule::DuplicateIds, at, 0, data.len() % 8)?;
-        let pairs = self.duplicate_ids(bytes);
-        let ascending = pairs.iter().all(|[kept, dropped]| kept.get() < dropped.get())
-            && pairs.windows(2).all(|w| w[0].map(|v| v.get()) < w[1].map(|v| v.get()));
-        ensure(ascending, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
+        let mut pairs = PairsInOrder::default();
+        pairs.add(data);
+        pairs.check(section)
     }
 
     /// Checks the place, size and checksum of a page's leaf block. Cost: one pass over its bytes.
@@ -157,32 +170,38 @@ impl Layout {
     /// # Errors
     /// Rules 26 to 28.
     pub fn check_leaf_block(&self, bytes: &[u8], page: &Page, object: &Object) -> Result<(), FormatError> {
-        self.check_leaf_bytes(self.leaf_block(bytes, page.header()), page, object)
+        self.check_leaf_block_of(&Block::of_bytes(self.leaf_block(bytes, page.header())), page, object)
     }
 
-    /// [`Layout::check_leaf_block`] of a block wherever it is; empty stands for one outside the section.
+    /// [`Layout::check_leaf_block`] of a block that has been read.
     ///
     /// # Errors
     /// Rules 26 to 28.
-    pub fn check_leaf_bytes(&self, block: &[u8], page: &Page, object: &Object) -> Result<(), FormatError> {
+    pub fn check_leaf_block_of(
+        &self,
+        block: &Block,
+        page: &Page,
+        object: &Object,
+    ) -> Result<(), FormatError> {
         let header = page.header();
         let at = self.page_offset(header.page_number.get());
         let lines = header.leaf_lines.get() as usize;
         let packets = usize::from(header.packets.get());
         let there = |needed: usize| {
             // Not multiplied: a stated number may be anything.
-            let holds = block.len() / LINE == lines && block.len() == needed.next_multiple_of(LINE);
+            let length = block.length();
+            let holds = length / LINE == lines && length == needed.next_multiple_of(LINE);
             ensure(holds, Rule::LeafPlace, at + 24, || {
-                (format!("a block of {needed} bytes"), format!("{} of {lines} lines", block.len()))
+                (format!("a block of {needed} bytes"), format!("{length} of {lines} lines"))
             })
         };
         if object.triangle_encoding == TriangleEncoding::F32 {
             there(packets * F32_PACKET_BYTES)?;
         }
         let sum = header.leaf_checksum.get();
-        require(Rule::LeafChecksum, at + 8, hex(sum), hex(checksum(block)))?;
+        require(Rule::LeafChecksum, at + 8, hex(sum), hex(block.checksum()))?;
         if object.triangle_encoding != TriangleEncoding::F32 && packets > 0 {
-            let head = PackedHead::read(block).filter(|head| {
+            let head = PackedHead::read(block.bytes()).filter(|head| {
                 let vertex_bytes = (usize::from(head.vertices) * head.stride()).div_ceil(8);
                 head.bits.iter().all(|&bits| bits <= 32)
                     && head.index_bits <= 16
@@ -190,7 +209,7 @@ impl Layout {
                     && head.indices_at as usize == 32 + vertex_bytes
             });
             let head = head.ok_or_else(|| {
-                let found = format!("{:?}", PackedHead::read(block));
+                let found = format!("{:?}", PackedHead::read(block.bytes()));
                 FormatError::new(Rule::PackedHeader, at + 24, "a consistent head", found)
             })?;
             there(head.block_bytes(packets))?;
@@ -203,42 +222,70 @@ impl Layout {
     /// # Errors
     /// Rules 31 and 32.
     pub fn check_id_block(&self, bytes: &[u8], page: &Page) -> Result<(), FormatError> {
-        self.check_id_bytes(self.id_block(bytes, page.header()), page)
+        self.check_id_block_of(&Block::of_bytes(self.id_block(bytes, page.header())), page)
     }
 
-    /// [`Layout::check_id_block`] of a block wherever it is; empty stands for one outside the section.
+    /// [`Layout::check_id_block`] of a block that has been read.
     ///
     /// # Errors
     /// Rules 31 and 32.
-    pub fn check_id_bytes(&self, block: &[u8], page: &Page) -> Result<(), FormatError> {
+    pub fn check_id_block_of(&self, block: &Block, page: &Page) -> Result<(), FormatError> {
         let header = page.header();
         let at = self.page_offset(header.page_number.get());
         let words = header.id_words.get() as usize;
         if !self.has_ids() || header.packets.get() == 0 {
             return require(Rule::IdPlace, at + 52, 0, words);
         }
-        let bits = block.get(4).copied().unwrap_or(0);
+        let bits = block.bytes().get(4).copied().unwrap_or(0);
+        let length = block.length();
         let needed = id_block_bytes(usize::from(header.packets.get()), bits);
-        let whole = block.len() / WORD == words && block.len() == needed && bits <= 32;
-        ensure(whole && block.len() >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
-            (format!("a block of {needed} bytes"), format!("{} of {words} words", block.len()))
+        let whole = length / WORD == words && length == needed && bits <= 32;
+        ensure(whole && length >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
+            (format!("a block of {needed} bytes"), format!("{length} of {words} words"))
         })?;
         let sum = header.id_checksum.get();
-        require(Rule::IdChecksum, at + 16, hex(sum), hex(checksum(block)))
+        require(Rule::IdChecksum, at + 16, hex(sum), hex(block.checksum()))
     }
 }
 
-use zerocopy::FromBytes;
-
-/// `count` units of `unit` bytes from unit `first`; empty if they are not all there.
+/// `count` units of `unit` bytes from unit `first` of a section; `None` if they are not all there.
 #[inline]
-fn slice(section: &[u8], first: u64, count: u32, unit: usize) -> &[u8] {
-    let start = usize::try_from(first).ok().and_then(|first| first.checked_mul(unit));
-    let length = (count as usize).checked_mul(unit);
-    let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
-    match (start, end) {
-        (Some(start), Some(end)) => section.get(start..end).unwrap_or(&[]),
-        _ => &[],
+fn units_within(section: &Range<usize>, first: u64, count: u32, unit: usize) -> Option<Range<usize>> {
+    let start = usize::try_from(first).ok()?.checked_mul(unit)?.checked_add(section.start)?;
+    let end = (count as usize).checked_mul(unit)?.checked_add(start)?;
+    (end <= section.end).then_some(start..end)
+}
+
+/// Whether duplicate ids, which come in whole pairs but for the end, ascend.
+#[derive(Default)]
+pub(crate) struct PairsInOrder {
+    last: Option<[u32; 2]>,
+    others: bool,
+    /// Bytes that are no pair.
+    left: usize,
+}
+
+impl PairsInOrder {
+    /// Adds the next bytes of the section.
+    pub(crate) fn add(&mut self, bytes: &[u8]) {
+        let (pairs, left) = bytes.as_chunks::<8>();
+        self.left += left.len();
+        for pair in pairs {
+            let [kept, dropped]: [U32; 2] = zerocopy::transmute!(*pair);
+            let pair = [kept.get(), dropped.get()];
+            self.others |= pair[0] >= pair[1] || self.last >= Some(pair);
+            self.last = Some(pair);
+        }
+    }
+
+    /// After the last bytes of the section.
+    ///
+    /// # Errors
+    /// Rule 36.
+    pub(crate) fn check(&self, section: &Section) -> Result<(), FormatError> {
+        let at = section.range.start as u64;
+        require(Rule::DuplicateIds, at, 0, self.left)?;
+        ensure(!self.others, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
     }
 }
 

@@ -29,6 +29,7 @@ pub mod profile;
 pub mod quantize;
 mod rule;
 pub mod slabs;
+pub mod source;
 pub mod support;
 pub mod treelet;
 pub mod validate;

@@ -1,221 +1,217 @@
 //! Checks the structure and the checksums of a whole file by the rules, page by page.
+//!
+//! Goes through the bytes in order, wherever they are, and holds a few pages at a time: once for the checksums of
+//! sections, once for the pages and their blocks, once for the links. What is left of a page is added to a sum, so that
+//! memory does not grow with the file.
 
-use crate::checksum::checksum;
-use crate::checksum::hex;
+mod counts;
+
+pub use counts::{Counts, CountsFromEnd};
+
+use crate::checksum::{Hasher, hex};
 use crate::error::{FormatError, ensure, require};
+use crate::header::SectionKind;
 use crate::ids::decode_id;
-use crate::layout::{ContentHasher, Layout};
+use crate::layout::{ContentHasher, Layout, PairsInOrder};
 use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
 use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
+use crate::source::{Block, PageBytes, Source, chunks};
 use crate::treelet::{Child, Links};
+use counts::CountsFromStart;
+use std::ops::Range;
+
+/// Pages whose counts are in memory at a time, and that workers share.
+const BATCH: u32 = 1 << 12;
+
+/// Who does the work of [`validate_with`]: one thread, or several.
+pub trait Workers: Sync {
+    /// Does both; the error is the first one's, if that has one.
+    ///
+    /// # Errors
+    /// Those of both.
+    fn both<A: Send, B: Send, E: Send>(
+        &self,
+        a: impl FnOnce() -> Result<A, E> + Send,
+        b: impl FnOnce() -> Result<B, E> + Send,
+    ) -> Result<(A, B), E>;
+
+    /// Checks some pages; results are in their order.
+    ///
+    /// # Errors
+    /// That of the first page that has one.
+    fn each<T: Send, E: Send>(
+        &self,
+        pages: Range<u32>,
+        check: impl Fn(u32) -> Result<T, E> + Sync + Send,
+    ) -> Result<Vec<T>, E>;
+}
+
+/// One thread, which does one thing after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct OneThread;
+
+impl Workers for OneThread {
+    fn both<A, B, E>(
+        &self,
+        a: impl FnOnce() -> Result<A, E>,
+        b: impl FnOnce() -> Result<B, E>,
+    ) -> Result<(A, B), E> {
+        Ok((a()?, b()?))
+    }
+
+    fn each<T, E>(&self, pages: Range<u32>, check: impl Fn(u32) -> Result<T, E>) -> Result<Vec<T>, E> {
+        pages.map(check).collect()
+    }
+}
+
+/// Checks structure and checksums of the whole file: [`validate_with`] of bytes in memory, by one thread.
+///
+/// # Errors
+/// As [`validate_with`].
+pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
+    validate_with(bytes, &OneThread)
+}
 
 /// Checks structure and checksums of the whole file.
 ///
-/// Cost: two passes over the bytes and 48 bytes of memory a page. Its parts are public for those who
-/// check pages in parallel.
+/// Cost: two passes over the bytes, and one over the pages for their links, with a page read for each link. Memory: twice
+/// the object table, some 300 KiB for counts, and for each worker a page with its blocks: at most 1 MiB, and 64 KiB in
+/// files baked here.
 ///
 /// # Errors
-/// The first rule that does not hold; bounds (rule 35) are [`crate::bounds::check_bounds`]' business.
-pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
-    let layout = validate_sections(bytes)?;
-    for object in &layout.objects {
-        let pages = object.pages();
-        let checked = pages.clone().map(|number| validate_page(&layout, bytes, object, number));
-        let counts = checked.collect::<Result<Vec<_>, _>>()?;
-        pages.clone().try_for_each(|number| validate_links(&layout, bytes, object, number))?;
-        validate_counts(&layout, object, &counts)?;
-    }
+/// The first rule that does not hold, in the order of the specification, whoever does the work and wherever the bytes
+/// are; and those of the source. Bounds (rule 35) are [`crate::bounds::check_bounds`]' business.
+pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> Result<Layout, S::Error> {
+    let layout = Layout::read_from(source)?;
+    let pages =
+        || layout.objects.iter().try_for_each(|object| check_object(&layout, source, object, workers));
+    workers.both(|| check_sections(&layout, source), pages)?;
     Ok(layout)
 }
 
-/// Checks the header, the tables, the checksums of whole sections and the duplicate ids.
+/// Checks the checksums of whole sections and of the content, and the order of duplicate ids.
 ///
 /// # Errors
-/// The first of rules 1 to 14 and 36 that does not hold.
-pub fn validate_sections(bytes: &[u8]) -> Result<Layout, FormatError> {
-    let layout = Layout::read(bytes)?;
+/// The first of rules 10 and 36 that does not hold, and those of the source.
+pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(), S::Error> {
     let mut content = ContentHasher::default();
+    let mut pairs = PairsInOrder::default();
     for section in &layout.sections {
-        let data = &bytes[section.range.clone()];
-        let at = section.range.start as u64;
-        require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(data)))?;
+        let mut hasher = Hasher::default();
         if section.kind.is_content() {
-            content.begin(section.kind, data.len() as u64);
-            content.update(data);
+            content.begin(section.kind, section.range.len() as u64);
         }
+        for chunk in chunks(section.range.clone()) {
+            let bytes = source.read(chunk)?;
+            hasher.update(&bytes);
+            if section.kind.is_content() {
+                content.update(&bytes);
+            }
+            if section.kind == SectionKind::Duplicates {
+                pairs.add(&bytes);
+            }
+        }
+        let at = section.range.start as u64;
+        require(Rule::SectionChecksum, at, hex(section.checksum), hex(hasher.finish()))?;
     }
     require(Rule::SectionChecksum, 24, hex(layout.content_checksum), hex(content.finish()))?;
-    layout.check_duplicates(bytes)?;
-    Ok(layout)
+    let duplicates = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
+    Ok(duplicates.map_or(Ok(()), |section| pairs.check(section))?)
 }
 
-/// What a page has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    first_packet: u64,
-    treelets: u64,
-    packets: u64,
-    triangles: u64,
-    roots: u64,
-    remotes: u64,
+fn check_object<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    object: &Object,
+    workers: &impl Workers,
+) -> Result<(), S::Error> {
+    let pages = object.pages();
+    let batches = || {
+        let end = pages.end;
+        pages.clone().step_by(BATCH as usize).map(move |start| start..end.min(start.saturating_add(BATCH)))
+    };
+    let mut counts = CountsFromStart::default();
+    for batch in batches() {
+        let checked = workers.each(batch.clone(), |number| {
+            let validated = validate_page(layout, source, object, number)?;
+            Ok::<_, S::Error>(validated.counts)
+        })?;
+        batch.zip(&checked).for_each(|(number, page)| counts.add(layout, number, page));
+    }
+    for batch in batches() {
+        workers.each(batch, |number| check_links(layout, source, object, number))?;
+    }
+    Ok(counts.finish(layout, object)?)
 }
 
-/// Checks a page and its blocks value by value, all but where its links lead.
+/// A page that has been validated, all but where its links lead.
+pub struct ValidatedPage<'a> {
+    /// Its bytes.
+    pub bytes: PageBytes<'a>,
+    /// Its leaf block.
+    pub leaves: Block<'a>,
+    /// What it has.
+    pub counts: Counts,
+}
+
+/// Reads a page and its blocks and checks them value by value, all but where the links lead.
 ///
 /// # Errors
-/// The first of rules 15 to 33, 37 and 38 that does not hold.
-pub fn validate_page(
+/// The first of rules 15 to 33, 37 and 38 that does not hold, and those of the source.
+pub fn validate_page<'a, S: Source + ?Sized>(
     layout: &Layout,
-    bytes: &[u8],
+    source: &'a S,
     object: &Object,
     number: u32,
-) -> Result<Counts, FormatError> {
-    let page = page_of(layout, bytes, object, number)?;
-    let blocks = [layout.leaf_block(bytes, page.header()), layout.id_block(bytes, page.header())];
-    validate_page_of(layout, object, number, &page, blocks)
-}
-
-/// [`validate_page`] of a page with its leaf block and its id block, wherever they are: for those who go through a file
-/// piece by piece. A block that is not within its section is given as empty.
-///
-/// # Errors
-/// As [`validate_page`].
-pub fn validate_page_of(
-    layout: &Layout,
-    object: &Object,
-    number: u32,
-    page: &Page,
-    blocks: [&[u8]; 2],
-) -> Result<Counts, FormatError> {
+) -> Result<ValidatedPage<'a>, S::Error> {
+    let bytes = layout.read_page(source, number)?;
+    let page = bytes.page(object);
     check_page(page.bytes(), number, object, layout.page_offset(number))?;
+    // Only now: blocks that a damaged page states may be of any length.
     let header = page.header();
-    Ok(Counts {
+    let leaves = layout.read_leaf_block(source, header)?;
+    layout.check_leaf_block_of(&leaves, &page, object)?;
+    let ids = layout.read_id_block(source, header)?;
+    layout.check_id_block_of(&ids, &page)?;
+    let counts = Counts {
         first_packet: header.first_packet.get().into(),
         treelets: header.treelets.into(),
         packets: header.packets.get().into(),
-        triangles: check_leaves(layout, object, page, blocks)?,
+        triangles: check_values(layout, object, &page, leaves.bytes(), ids.bytes())?,
         roots: header.roots.into(),
         remotes: header.remotes.into(),
-    })
+    };
+    Ok(ValidatedPage { bytes, leaves, counts })
 }
 
-/// Checks where the links of a page lead, after all pages have been checked.
-///
-/// # Errors
-/// Rule 20.
-pub fn validate_links(
+/// Checks where the links of a page lead, after all pages have been checked: rule 20.
+fn check_links<S: Source + ?Sized>(
     layout: &Layout,
-    bytes: &[u8],
+    source: &S,
     object: &Object,
     number: u32,
-) -> Result<(), FormatError> {
-    let page = page_of(layout, bytes, object, number)?;
+) -> Result<(), S::Error> {
+    let bytes = layout.read_page(source, number)?;
+    let page = bytes.page(object);
     for link in 0..page.header().remotes {
         let to = page.remote(link);
-        let target = page_of(layout, bytes, object, to.page())?;
-        check_crossing(&target, to, number, link, layout.page_offset(to.page()))?;
+        let target = layout.read_page(source, to.page())?;
+        check_crossing(&target.page(object), to, number, link, layout.page_offset(to.page()))?;
     }
     Ok(())
 }
 
-/// Checks the sums of what an object's pages have, in their order, after their links.
-///
-/// # Errors
-/// Rule 34.
-pub fn validate_counts(layout: &Layout, object: &Object, pages: &[Counts]) -> Result<(), FormatError> {
-    let mut sum = Counts::default();
-    for (number, counts) in object.pages().zip(pages) {
-        require(Rule::Counts, layout.page_offset(number) + 40, sum.packets, counts.first_packet)?;
-        sum.add(counts);
-    }
-    sum.check(layout, object)
-}
-
-/// Checks the same sums for those who go through an object's pages from the last to the first.
-#[derive(Debug, Default)]
-pub struct CountsFromEnd {
-    sum: Counts,
-    /// `first_packet` of the page added last, with its number.
-    next: Option<(u32, u64)>,
-}
-
-impl CountsFromEnd {
-    /// Adds the page before the one added last.
-    ///
-    /// # Errors
-    /// Rule 34.
-    pub fn add(&mut self, layout: &Layout, number: u32, counts: &Counts) -> Result<(), FormatError> {
-        if let Some((page, first)) = self.next {
-            let expected = counts.first_packet + counts.packets;
-            require(Rule::Counts, layout.page_offset(page) + 40, expected, first)?;
-        }
-        self.next = Some((number, counts.first_packet));
-        self.sum.add(counts);
-        Ok(())
-    }
-
-    /// After the first page of the object.
-    ///
-    /// # Errors
-    /// Rule 34.
-    pub fn finish(self, layout: &Layout, object: &Object) -> Result<(), FormatError> {
-        if let Some((page, first)) = self.next {
-            require(Rule::Counts, layout.page_offset(page) + 40, 0, first)?;
-        }
-        self.sum.check(layout, object)
-    }
-}
-
-impl Counts {
-    fn add(&mut self, page: &Counts) {
-        self.treelets += page.treelets;
-        self.packets += page.packets;
-        self.triangles += page.triangles;
-        self.roots += page.roots;
-        self.remotes += page.remotes;
-    }
-
-    /// Compares the sum over an object's pages with its record.
-    fn check(&self, layout: &Layout, object: &Object) -> Result<(), FormatError> {
-        let record = &object.record;
-        let at = layout.page_offset(record.first_page.get());
-        // Each link has been followed to a root that names it back: no two share a root, so that equal
-        // numbers leave no root without a way to it.
-        require(Rule::Counts, at, self.remotes + 1, self.roots)?;
-        let found = [self.treelets, self.packets, self.triangles];
-        let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];
-        ensure(found == stated, Rule::Counts, at, || {
-            (format!("treelets, packets, triangles {stated:?}"), format!("{found:?}"))
-        })
-    }
-}
-
-/// A page, not checked.
-fn page_of<'a>(
-    layout: &Layout,
-    bytes: &'a [u8],
-    object: &Object,
-    number: u32,
-) -> Result<Page<'a>, FormatError> {
-    let at = layout.page_offset(number);
-    let page = layout.page_bytes(bytes, number);
-    let missing = || FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section");
-    Ok(Page::new(page.ok_or_else(missing)?, object.profile))
-}
-
-/// Checks a page's leaf and id blocks value by value; returns the number of its triangles.
-fn check_leaves(
+/// Checks the values in a page's checked leaf and id blocks; returns the number of its triangles.
+fn check_values(
     layout: &Layout,
     object: &Object,
     page: &Page,
-    [block, ids]: [&[u8]; 2],
+    block: &[u8],
+    ids: &[u8],
 ) -> Result<u64, FormatError> {
-    layout.check_leaf_bytes(block, page, object)?;
-    layout.check_id_bytes(ids, page)?;
-    let header = page.header();
-    let at = layout.page_offset(header.page_number.get());
+    let at = layout.page_offset(page.header().page_number.get());
     let origin = object.record.origin.map(|o| o.get());
     let mut triangles = 0;
     for (packet, count) in packets(page) {

@@ -162,7 +162,10 @@ Examples:
   cbvh dump rock.cbvh --page 3
   cbvh dump rock.cbvh --treelet 0 --json
 
-Treelets are numbered through the whole file, in the order of pages and of slots in a page.";
+Treelets are numbered through the whole file, in the order of pages and of slots in a page.
+
+The file is read piece by piece, in some 10 MiB of memory and a byte for each ten thousand of the file. --max-memory \
+SIZE is a promise to stay within SIZE; one that is too small is refused with exit code 4.";
 
 /// What `dump` takes.
 #[derive(Debug, Args)]
@@ -179,13 +182,19 @@ pub(crate) struct DumpArguments {
     /// Decode this page: anchors, links to other pages, treelets
     #[arg(long, value_name = "N")]
     pub(crate) page: Option<u32>,
+    /// Stay within this much memory, such as 64MiB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
 }
 
 const VALIDATE_HELP: &str = "\
 Example:
   cbvh validate rock.cbvh --json
 
-Exit code 3 if the file is invalid. With --json the object says so too: rule, offset, expected, found.";
+Exit code 3 if the file is invalid. With --json the object says so too: rule, offset, expected, found.
+
+The file is read piece by piece, in some 10 MiB of memory whatever its size. --max-memory SIZE is a promise to stay \
+within SIZE; one that is too small is refused with exit code 4.";
 
 /// What `validate` takes.
 #[derive(Debug, Args)]
@@ -193,6 +202,9 @@ Exit code 3 if the file is invalid. With --json the object says so too: rule, of
 pub(crate) struct ValidateArguments {
     /// The file
     pub(crate) file: PathBuf,
+    /// Stay within this much memory, such as 64MiB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
     /// Print one JSON object
     #[arg(long)]
     pub(crate) json: bool,
@@ -202,7 +214,11 @@ const VERIFY_HELP: &str = "\
 Example:
   cbvh verify rock.cbvh rock.obj
 
-Give the same meshes in the same order as to bake. Exit code 3 if anything differs.";
+Give the same meshes in the same order as to bake. Exit code 3 if anything differs.
+
+File and mesh are read piece by piece. What does not fit into 1.5 GiB of memory, or what --max-memory says, goes to \
+scratch files: up to 240 bytes a triangle, which have no names and vanish however the process ends. With --max-memory \
+the whole process stays within SIZE; one that is too small is refused with exit code 4. glTF meshes are read whole.";
 
 /// What `verify` takes.
 #[derive(Debug, Args)]
@@ -213,6 +229,12 @@ pub(crate) struct VerifyArguments {
     /// The mesh, or the meshes, it was baked from
     #[arg(required = true, value_name = "MESH")]
     pub(crate) meshes: Vec<PathBuf>,
+    /// Stay within this much memory, such as 64MiB; what does not fit goes to scratch files
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) max_memory: Option<u64>,
+    /// Where scratch files go [default: the system's directory for temporary files]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scratch: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     pub(crate) json: bool,

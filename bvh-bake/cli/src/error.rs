@@ -1,6 +1,6 @@
 //! What went wrong, as one line and an exit code.
 
-use bvh_bake::{BakeError, VerifyError};
+use bvh_bake::{BakeError, FileError, VerifyError};
 use bvh_query::{BackendError, OpenError};
 use serde::Serialize;
 use std::fmt::Display;
@@ -118,12 +118,23 @@ impl Failure {
         Self::Invalid(format!("{}: {error}", path.display()))
     }
 
+    /// What went wrong with a `.cbvh` file that was read piece by piece.
+    pub(crate) fn from_file(path: &Path, error: FileError) -> Self {
+        match error {
+            FileError::Io { .. } => Self::System(error.to_string()),
+            FileError::Memory { .. } => Self::Limit(error.to_string()),
+            FileError::Format(error) => Self::invalid(path, error),
+        }
+    }
+
     /// What `verify` found.
-    pub(crate) fn from_verify(path: &Path, meshes: &str, error: &VerifyError) -> Self {
+    pub(crate) fn from_verify(path: &Path, meshes: &str, error: VerifyError) -> Self {
         match error {
             VerifyError::Mesh(error) if error.is_limit() => Self::Limit(format!("{meshes}: {error}")),
             VerifyError::Mesh(error) => Self::Invalid(format!("{meshes}: {error}")),
-            _ => Self::invalid(path, error),
+            VerifyError::Input(error) => Self::from_bake(meshes, &error),
+            VerifyError::File(error) => Self::from_file(path, error),
+            error => Self::invalid(path, error),
         }
     }
 }

@@ -2,22 +2,13 @@
 
 use crate::error::Failure;
 use bvh_format::FormatError;
-use bvh_query::{Bvh, OpenError};
+use bvh_query::Bvh;
 use serde::Serialize;
 use std::path::Path;
 
 /// Maps a file.
 pub(crate) fn open(path: &Path) -> Result<Bvh, Failure> {
     Ok(Bvh::open(path)?)
-}
-
-/// Maps a file; a breach of the format comes back for those who report it in their own way.
-pub(crate) fn open_or_breach(path: &Path) -> Result<Result<Bvh, FormatError>, Failure> {
-    match Bvh::open(path) {
-        Ok(bvh) => Ok(Ok(bvh)),
-        Err(OpenError::Format { source, .. }) => Ok(Err(source)),
-        Err(error) => Err(error.into()),
-    }
 }
 
 /// A breach of the format in JSON.

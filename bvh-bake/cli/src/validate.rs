@@ -3,17 +3,18 @@
 use crate::arguments::ValidateArguments;
 use crate::bake::plural;
 use crate::error::Failure;
-use crate::opened::{Breach, open_or_breach};
+use crate::opened::Breach;
 use crate::output::{self, hex};
-use bvh_format::validate::validate;
+use crate::resident;
+use bvh_bake::{FileError, StoredFile, validate_in_parallel};
+use bvh_format::source::Source;
 use serde::Serialize;
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let path = &arguments.file;
-    let bvh = open_or_breach(path)?;
-    let result = bvh.and_then(|bvh| {
-        let layout = validate(bvh.bytes())?;
-        Ok((layout, bvh.bytes().len() as u64))
+    let result = StoredFile::open(path, arguments.max_memory).and_then(|file| {
+        let layout = validate_in_parallel(&file)?;
+        Ok((layout, file.length()))
     });
     let file = path.display().to_string();
     match result {
@@ -29,15 +30,17 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
                 triangles: records().map(|record| record.triangles.get()).sum(),
                 file_bytes: bytes,
                 content_xxh3: hex(layout.content_checksum),
+                peak_rss_bytes: resident::peak_bytes(),
             };
             if arguments.json { output::json(&valid) } else { output::text(&valid.to_text()) }
         }
-        Err(error) => {
+        Err(FileError::Format(error)) => {
             if arguments.json {
                 output::json(&Invalid { file, valid: false, breach: Breach::new(&error) })?;
             }
             Err(Failure::invalid(path, error))
         }
+        Err(error) => Err(Failure::from_file(path, error)),
     }
 }
 
@@ -52,6 +55,7 @@ struct Valid {
     triangles: u64,
     file_bytes: u64,
     content_xxh3: String,
+    peak_rss_bytes: Option<u64>,
 }
 
 impl Valid {

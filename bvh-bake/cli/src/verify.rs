@@ -3,22 +3,19 @@
 use crate::arguments::VerifyArguments;
 use crate::bake::{names, plural};
 use crate::error::Failure;
-use crate::opened::{Breach, open_or_breach};
-use crate::output;
-use bvh_bake::{VerifyError, read_meshes, verify};
+use crate::opened::Breach;
+use crate::{output, resident};
+use bvh_bake::{VerifyError, VerifyOptions, verify_files};
 use serde::Serialize;
 
 pub(crate) fn run(arguments: &VerifyArguments) -> Result<(), Failure> {
     let path = &arguments.file;
     let meshes = names(&arguments.meshes);
-    let bvh = open_or_breach(path)?;
-    let result = match bvh {
-        Err(error) => Err(VerifyError::Format(error)),
-        Ok(bvh) => {
-            let mesh = read_meshes(&arguments.meshes).map_err(|error| Failure::from_bake(&meshes, &error))?;
-            verify(bvh.bytes(), &mesh)
-        }
-    };
+    let options = VerifyOptions { max_memory: arguments.max_memory, scratch: arguments.scratch.clone() };
+    if arguments.max_memory.is_some() {
+        resident::give_back();
+    }
+    let result = verify_files(path, &arguments.meshes, &options);
     let file = path.display().to_string();
     match result {
         Ok(report) => {
@@ -34,14 +31,16 @@ pub(crate) fn run(arguments: &VerifyArguments) -> Result<(), Failure> {
                 nodes: report.inflation.nodes,
                 width_inflation: report.inflation.mean_width(),
                 volume_inflation: report.inflation.mean_volume(),
+                peak_rss_bytes: resident::peak_bytes(),
             };
             if arguments.json { output::json(&faithful) } else { output::text(&faithful.to_text()) }
         }
         Err(error) => {
-            if arguments.json {
+            let compared = !matches!(error, VerifyError::Input(_) | VerifyError::File(_));
+            if arguments.json && compared {
                 output::json(&Unfaithful::new(file, meshes.clone(), &error))?;
             }
-            Err(Failure::from_verify(path, &meshes, &error))
+            Err(Failure::from_verify(path, &meshes, error))
         }
     }
 }
@@ -59,6 +58,7 @@ struct Faithful {
     nodes: u64,
     width_inflation: f64,
     volume_inflation: f64,
+    peak_rss_bytes: Option<u64>,
 }
 
 impl Faithful {

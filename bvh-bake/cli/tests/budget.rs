@@ -1,4 +1,4 @@
-//! Baking within a budget of memory: the same bytes, and the memory promised.
+//! Baking and checking within a budget of memory: the same results, and the memory promised.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -6,7 +6,9 @@ mod common;
 use common::sheet::write_sheet;
 use common::{cbvh_in, names};
 use serde_json::Value;
+use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 fn bake(directory: &Path, input: &str, more: &[&str]) -> Value {
     let arguments = [&["bake", input, "-o", "out.cbvh", "--json", "-q", "--force"], more].concat();
@@ -53,4 +55,49 @@ fn memory_stays_within_the_budget() {
     let refused =
         cbvh_in(directory, &["bake", "sheet.stl", "-o", "out.cbvh", "--force", "--max-memory", "64MiB"]);
     refused.failed(4, &["sheet.stl", "67108864 bytes of memory", "2000000 triangles", "at least"]);
+}
+
+#[test]
+fn memory_of_checks_stays_within_the_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    write_sheet(&directory.join("sheet.stl"), 1000);
+    bake(directory, "sheet.stl", &[]);
+    let length = fs::metadata(directory.join("out.cbvh")).unwrap().len();
+    let threads = std::thread::available_parallelism().unwrap().get() as u64;
+    let within = |arguments: &[&str], mebibytes: u64| {
+        let budget = format!("{mebibytes}MiB");
+        let told =
+            cbvh_in(directory, &[arguments, &["--json", "--max-memory", &budget]].concat()).done().json();
+        let peak = told["peak_rss_bytes"].as_u64().unwrap();
+        assert!(peak <= mebibytes << 20, "{arguments:?}: {peak} bytes, not {budget}");
+        let mut usual = cbvh_in(directory, &[arguments, &["--json"]].concat()).done().json();
+        usual["peak_rss_bytes"] = peak.into();
+        assert_eq!(told, usual);
+    };
+    let least = 10 + threads;
+    assert!(threads > 16 || length > (5 * least) << 20, "{length} bytes");
+    within(&["validate", "out.cbvh"], least);
+    within(&["verify", "out.cbvh", "sheet.stl"], 46 + threads);
+    // Who may not have more addresses than this holds no more memory; a thread has but its stack.
+    for way in ["--json", "--page 7", "--treelet 9999"] {
+        let command = format!("ulimit -v 65536; exec {} dump out.cbvh {way}", env!("CARGO_BIN_EXE_cbvh"));
+        let ended = Command::new("sh").args(["-c", &command]).current_dir(directory).output().unwrap();
+        let told = String::from_utf8(ended.stdout).unwrap();
+        assert_eq!(ended.status.code(), Some(0), "{way}: {}", String::from_utf8_lossy(&ended.stderr));
+        let arguments: Vec<&str> = ["dump", "out.cbvh"].into_iter().chain(way.split(' ')).collect();
+        assert_eq!(told, cbvh_in(directory, &arguments).done().out);
+    }
+    assert!(length > 64 << 20);
+    // A damaged byte near the end is found.
+    let mut bytes = fs::read(directory.join("out.cbvh")).unwrap();
+    let at = bytes.len() / 20 * 19;
+    bytes[at] ^= 1;
+    fs::write(directory.join("out.cbvh"), bytes).unwrap();
+    let budget = format!("{least}MiB");
+    let damaged = |more: &[&str]| {
+        cbvh_in(directory, &[&["validate", "out.cbvh"], more].concat()).failed(3, &["out.cbvh: byte"]).err
+    };
+    assert_eq!(damaged(&[]), damaged(&["--max-memory", &budget]));
+    assert_eq!(names(directory), ["out.cbvh", "sheet.stl"]);
 }

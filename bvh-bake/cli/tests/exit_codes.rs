@@ -46,6 +46,9 @@ fn wrong_usage_is_1() {
         &["bake", "cube.obj", "-o", "cube.obj"],
         &["bake", "cube.obj", "-o", "./cube.obj", "--force"],
         &["dump", "cube.cbvh", "--page", "x"],
+        &["dump", "cube.cbvh", "--max-memory", "lots"],
+        &["validate", "cube.cbvh", "--max-memory", "-1"],
+        &["verify", "cube.cbvh", "cube.obj", "--max-memory", "lots"],
         &["query", "cube.obj", "cube.obj"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--pose", pose],
         &["query", "cube.obj", "cube.obj", "--pose", "1 2 3"],
@@ -95,6 +98,7 @@ fn what_the_system_refuses_is_2() {
     io(&["verify", "missing.cbvh", "cube.obj"], "missing.cbvh");
     cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh"]).done();
     io(&["verify", "cube.cbvh", "missing.obj"], "missing.obj");
+    io(&["verify", "cube.cbvh", "folder"], "folder");
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "p.txt");
     fs::write(directory.join("p.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "missing.cbvh");
@@ -155,6 +159,12 @@ fn limits_are_4() {
     }
     assert_eq!(names(directory), ["cube.obj"]);
     cbvh_in(directory, &[&bake[..], &["512MiB"]].concat()).done();
+    for check in [&["dump", "o.cbvh"][..], &["validate", "o.cbvh"], &["verify", "o.cbvh", "cube.obj"]] {
+        for size in ["0", "8MiB"] {
+            cbvh_in(directory, &[check, &["--max-memory", size]].concat()).failed(4, &["o.cbvh", "memory"]);
+        }
+        cbvh_in(directory, &[check, &["--max-memory", "512MiB"]].concat()).done();
+    }
 }
 
 #[test]

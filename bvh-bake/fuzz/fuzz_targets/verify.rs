@@ -25,7 +25,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut bytes = bytes.to_vec();
     seal::seal(&mut bytes);
     let _ = verify(&bytes, &CUBE);
-    if let Ok(layout) = validate_in_parallel(&bytes) {
-        let _ = prove_bounds(&layout, &bytes);
+    if let Ok(layout) = validate_in_parallel(&bytes[..]) {
+        let _ = prove_bounds(&layout, &bytes[..]);
     }
 });

@@ -7,7 +7,9 @@ use crate::summary::FileSummary;
 use crate::target::Source;
 use bvh_format::Layout;
 use bvh_format::checksum::{Hasher, checksum};
-use bvh_format::header::{MAJOR, MINOR, Section, SectionKind};
+use bvh_format::header::{MAJOR, MINOR, SectionKind};
+use bvh_format::source::Source as _;
+use bvh_format::validate::check_sections;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -77,23 +79,14 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
     let file = File::open(output).ok()?;
     let length = file.metadata().ok()?.len();
     let source = Source::File { file: &file, path: output, length, progress };
-    let layout = Layout::read_with(length, |range| source.read(range)).ok()?;
+    let layout = Layout::read_from(&source).ok()?;
     let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance)?;
     // Those that are baked here are short.
     let range = section.range.start..section.range.end.min(section.range.start + MOST_TEXT);
     let text = source.read(range).ok()?;
     let same = layout.version == (MAJOR, MINOR) && provenance.matches(std::str::from_utf8(&text).ok()?);
     // A damaged file is baked again.
-    let whole = |section: &Section| {
-        let mut hasher = Hasher::default();
-        section.range.clone().step_by(READ_BYTES).try_for_each(|start| {
-            hasher.update(&source.read(start..(start + READ_BYTES).min(section.range.end)).ok()?);
-            Some(())
-        })?;
-        (hasher.finish() == section.checksum).then_some(())
-    };
-    (same && layout.sections.iter().all(|section| whole(section).is_some()))
-        .then(|| FileSummary::new(&layout, length))
+    (same && check_sections(&layout, &source).is_ok()).then(|| FileSummary::new(&layout, length))
 }
 
 /// The most bytes of a provenance text that are read.

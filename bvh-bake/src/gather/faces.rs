@@ -69,7 +69,7 @@ impl Indexed {
             runs: Stream::of_pieces(PIECE),
             run: Run::zeroed(),
             largest: 0,
-            window: (means.brick_bytes() / WINDOW_BYTES).max(1 << 17),
+            window: (means.brick_bytes / WINDOW_BYTES).max(1 << 17),
         }
     }
 

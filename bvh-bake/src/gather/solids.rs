@@ -29,6 +29,9 @@ impl stl::Solids for Solids<'_, '_> {
 
     fn triangle(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Halt> {
         self.gatherer.add(self.object, corners)?;
+        if !self.gatherer.counts_vertices() {
+            return Ok(());
+        }
         corners.into_iter().try_for_each(|corner| self.vertices.add(corner))
     }
 

@@ -1,86 +1,184 @@
 //! Compares the triangles of mesh and file as multisets of rounded corners, for files without ids.
+//!
+//! Both are sorted by object and corners, and gone through side by side.
 
-use super::{VerifyError, distance, each_triangle, place, tolerance};
-use crate::mesh::Object as MeshObject;
+use super::input::{Corners, Input};
+use super::{VerifyError, distance, each_triangle, place, source_of, tolerance};
+use crate::means::Means;
+use crate::sorter::{Merge, Sorter};
 use bvh_format::Layout;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::Object;
-use rayon::prelude::*;
+use bvh_format::source::Source;
+use bytemuck::{Pod, Zeroable};
 
 /// The corners' bits, in ascending order: the same for equal triangles, however they are turned.
 type Key = [[u32; 3]; 3];
 
+/// A triangle of an object of the file.
+#[derive(Clone, Copy, Pod, Zeroable, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(C)]
+struct Keyed {
+    object: u32,
+    key: Key,
+}
+
+impl Keyed {
+    fn new(object: u32, corners: &[[f32; 3]; 3]) -> Self {
+        let mut key = corners.map(|corner| corner.map(f32::to_bits));
+        key.sort_unstable();
+        Self { object, key }
+    }
+}
+
 /// Checks each object of the file against the mesh objects it was made of. Returns the largest distance
 /// of a corner from where it is stored, and the number of duplicates.
-pub(super) fn compare(
+pub(super) fn compare<S: Source + ?Sized>(
     layout: &Layout,
-    bytes: &[u8],
-    sources: &[Vec<&MeshObject>],
-) -> Result<(f64, u64), VerifyError> {
-    let (mut max_move, mut duplicates) = (0.0f64, 0);
-    for (object, source) in layout.objects.iter().zip(sources) {
-        let mut stored = Vec::with_capacity(object.record.triangles.get() as usize);
-        each_triangle(layout, bytes, object, |triangle| {
-            stored.push(key(&triangle.corners));
+    source: &S,
+    input: &impl Input,
+    means: &Means,
+) -> Result<(f64, u64), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    let spill = means.scratch.spill();
+    let run = means.sorted_at_once::<Keyed>(u64::MAX);
+    let mut stored = Sorter::of_runs(run);
+    let mut roundings: Vec<Rounding> = layout.objects.iter().map(Rounding::new).collect();
+    for (number, object) in (0..).zip(&layout.objects) {
+        each_triangle(layout, source, object, |triangle| {
+            let keyed = Keyed::new(number, &triangle.corners);
+            roundings[number as usize].add_stored(&keyed.key);
+            Ok(stored.extend(&[keyed], &spill)?)
+        })?;
+    }
+    if roundings.iter().any(|rounding| rounding.origin != [0.0; 3]) {
+        input.visit(&mut |mesh, _, corners| {
+            roundings[source_of(layout, mesh)].add_expected(corners);
             Ok(())
         })?;
-        stored.par_sort_unstable();
-        let rounding = Rounding::new(object, source, &stored);
-        let mut expected = Vec::with_capacity(stored.len());
-        for mesh in source {
-            for (index, corners) in mesh.triangles.iter().enumerate() {
-                let corners = corners.map(|vertex| mesh.positions[vertex as usize]);
-                let rounded = corners.map(|corner| rounding.round(corner));
-                for corner in 0..3 {
-                    let moved = distance(corners[corner], place(object, rounded[corner]));
-                    let limit = tolerance(object);
-                    if moved.is_nan() || moved > limit {
-                        let what = format!("triangle {}, corner {corner}", mesh.triangle_ids[index]);
-                        let found = format!("{moved:e}");
-                        return Err(VerifyError::differs(
-                            what,
-                            format!("a move of at most {limit:e}"),
-                            found,
-                        ));
-                    }
-                    max_move = max_move.max(moved);
-                }
-                expected.push(key(&rounded));
+    }
+    roundings.iter_mut().for_each(Rounding::settle);
+    let mut expected = Sorter::of_runs(run);
+    let mut max_move = 0.0f64;
+    // The first in the order of the objects of the file, then of the mesh.
+    let mut first: Option<((usize, u32, u32), VerifyError)> = None;
+    input.visit(&mut |mesh, id, corners| {
+        let number = source_of(layout, mesh);
+        let (object, rounding) = (&layout.objects[number], &roundings[number]);
+        let rounded = corners.map(|corner| rounding.round(corner));
+        match check_moves(object, id, corners, &rounded) {
+            Ok(moved) => max_move = max_move.max(moved),
+            Err(error) if first.as_ref().is_none_or(|(at, _)| (number, mesh, id) < *at) => {
+                first = Some(((number, mesh, id), error));
             }
+            Err(_) => {}
         }
-        expected.par_sort_unstable();
-        let all = expected.len();
-        expected.dedup();
-        duplicates += (all - expected.len()) as u64;
-        compare_sorted(object, &expected, &stored)?;
+        Ok(expected.extend(&[Keyed::new(number as u32, &rounded)], &spill)?)
+    })?;
+    let (stored, expected) = (stored.finish(), expected.finish());
+    let (mut stored, mut expected) = (Keys::new(stored.merge())?, Keys::new(expected.merge())?);
+    let mut duplicates = 0;
+    for (number, object) in layout.objects.iter().enumerate() {
+        if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
+            return Err(error);
+        }
+        duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored)?;
     }
     Ok((max_move, duplicates))
 }
 
-fn compare_sorted(object: &Object, expected: &[Key], stored: &[Key]) -> Result<(), VerifyError> {
-    let place = |key: Option<&Key>| match key {
-        Some(key) => format!("{:?}", key.map(|corner| place(object, corner.map(f32::from_bits)))),
-        None => "no more".to_owned(),
-    };
-    let count = expected.len().max(stored.len());
-    match (0..count).find(|&index| expected.get(index) != stored.get(index)) {
-        Some(index) => {
-            let what = format!("the triangles in order of their corners, number {index}");
-            Err(VerifyError::differs(what, place(expected.get(index)), place(stored.get(index))))
+/// How far the corners of a triangle of the mesh are from where rounding puts them.
+fn check_moves(
+    object: &Object,
+    id: u32,
+    corners: &Corners,
+    rounded: &[[f32; 3]; 3],
+) -> Result<f64, VerifyError> {
+    let mut max_move = 0.0f64;
+    for corner in 0..3 {
+        let moved = distance(corners[corner], place(object, rounded[corner]));
+        let limit = tolerance(object);
+        if moved.is_nan() || moved > limit {
+            let what = format!("triangle {id}, corner {corner}");
+            return Err(VerifyError::differs(
+                what,
+                format!("a move of at most {limit:e}"),
+                format!("{moved:e}"),
+            ));
         }
-        None => Ok(()),
+        max_move = max_move.max(moved);
+    }
+    Ok(max_move)
+}
+
+/// Triangles in ascending order, of which the first can be looked at.
+struct Keys<'a> {
+    merge: Merge<'a, Keyed>,
+    first: Option<Keyed>,
+}
+
+impl<'a> Keys<'a> {
+    fn new(mut merge: Merge<'a, Keyed>) -> Result<Self, VerifyError> {
+        let first = merge.next()?;
+        Ok(Self { merge, first })
+    }
+
+    /// The next triangle of an object.
+    fn next_of(&mut self, object: u32) -> Result<Option<Key>, VerifyError> {
+        let Some(now) = self.first.filter(|first| first.object == object) else { return Ok(None) };
+        self.first = self.merge.next()?;
+        Ok(Some(now.key))
+    }
+
+    /// The next triangle of an object, and how many follow it that are equal, which are passed over.
+    fn next_distinct_of(&mut self, object: u32) -> Result<(Option<Key>, u64), VerifyError> {
+        let (now, mut others) = (self.next_of(object)?, 0);
+        while now.is_some_and(|key| self.first == Some(Keyed { object, key })) {
+            self.next_of(object)?;
+            others += 1;
+        }
+        Ok((now, others))
     }
 }
 
-fn key(corners: &[[f32; 3]; 3]) -> Key {
-    let mut key = corners.map(|corner| corner.map(f32::to_bits));
-    key.sort_unstable();
-    key
+/// Compares the triangles of an object; returns the number of duplicates.
+fn compare_sorted(
+    object: &Object,
+    number: u32,
+    expected: &mut Keys,
+    stored: &mut Keys,
+) -> Result<u64, VerifyError> {
+    let place = |key: Option<Key>| match key {
+        Some(key) => format!("{:?}", key.map(|corner| place(object, corner.map(f32::from_bits)))),
+        None => "no more".to_owned(),
+    };
+    let mut duplicates = 0;
+    for index in 0u64.. {
+        let (wanted, others) = expected.next_distinct_of(number)?;
+        let found = stored.next_of(number)?;
+        duplicates += others;
+        if wanted != found {
+            let what = format!("the triangles in order of their corners, number {index}");
+            return Err(VerifyError::differs(what, place(wanted), place(found)));
+        }
+        if wanted.is_none() {
+            break;
+        }
+    }
+    Ok(duplicates)
 }
 
 /// What a baker does to a coordinate, found again from the file.
 struct Rounding {
     origin: [f64; 3],
+    /// Whether vertices may have been put on a grid.
+    quantized: bool,
+    /// The lowest bit set in any stored coordinate, by axis.
+    lowest: [Option<i32>; 3],
+    /// The largest magnitude of the mesh's coordinates, by axis.
+    largest: [f64; 3],
     /// Grid of the origin by axis; 0 where the origin is.
     origin_grid: [f64; 3],
     /// Grid of quantisation by axis; 0 for none, infinite if it leaves nothing but 0.
@@ -88,25 +186,55 @@ struct Rounding {
 }
 
 impl Rounding {
-    fn new(object: &Object, source: &[&MeshObject], stored: &[Key]) -> Self {
-        let origin = object.record.origin.map(|value| value.get());
-        let used = || {
-            let corners = |mesh: &'_ MeshObject| mesh.triangles.iter().flatten().copied().collect::<Vec<_>>();
-            source
-                .iter()
-                .flat_map(move |mesh| corners(mesh).into_iter().map(|vertex| mesh.positions[vertex as usize]))
-        };
-        let origin_grid = [0, 1, 2].map(|axis| {
-            if origin[axis] == 0.0 {
-                return 0.0;
+    fn new(object: &Object) -> Self {
+        Self {
+            origin: object.record.origin.map(|value| value.get()),
+            quantized: object.triangle_encoding == TriangleEncoding::Quantized,
+            lowest: [None; 3],
+            largest: [0.0; 3],
+            origin_grid: [0.0; 3],
+            grid: [0.0; 3],
+        }
+    }
+
+    /// Adds a stored triangle.
+    fn add_stored(&mut self, key: &Key) {
+        if !self.quantized {
+            return;
+        }
+        for corner in key {
+            for axis in 0..3 {
+                let bit = lowest_bit(corner[axis]);
+                self.lowest[axis] = [self.lowest[axis], bit].into_iter().flatten().min();
             }
-            // Sums of origin and vertex stay below twice the largest coordinate; their f64 have this spacing.
-            let largest = 2.0 * used().map(|position| position[axis].abs()).fold(0.0, f64::max);
-            largest.next_up() - largest
-        });
-        let quantized = object.triangle_encoding == TriangleEncoding::Quantized;
-        let grid = [0, 1, 2].map(|axis| if quantized { coarsest_grid(stored, axis) } else { 0.0 });
-        Self { origin, origin_grid, grid }
+        }
+    }
+
+    /// Adds a triangle of the mesh.
+    fn add_expected(&mut self, corners: &Corners) {
+        for corner in corners {
+            for axis in 0..3 {
+                self.largest[axis] = self.largest[axis].max(corner[axis].abs());
+            }
+        }
+    }
+
+    /// After all triangles of file and mesh.
+    ///
+    /// The grid of quantisation is the coarsest power of two of which all stored coordinates of an axis are multiples.
+    /// Rounding to it is the same as to the baker's own, perhaps finer, grid: a value that the finer grid puts on the
+    /// coarser one is within half a fine step of it.
+    fn settle(&mut self) {
+        for axis in 0..3 {
+            if self.origin[axis] != 0.0 {
+                // Sums of origin and vertex stay below twice the largest coordinate; their f64 have this spacing.
+                let largest = 2.0 * self.largest[axis];
+                self.origin_grid[axis] = largest.next_up() - largest;
+            }
+            if self.quantized {
+                self.grid[axis] = self.lowest[axis].map_or(f64::INFINITY, |exponent| 2f64.powi(exponent));
+            }
+        }
     }
 
     fn round(&self, position: [f64; 3]) -> [f32; 3] {
@@ -123,15 +251,6 @@ impl Rounding {
             snap(rounded, self.grid[axis]) as f32 + 0.0
         })
     }
-}
-
-/// The coarsest power of two of which all stored coordinates of an axis are multiples. Rounding to it is
-/// the same as to the baker's own, perhaps finer, grid: a value that the finer grid puts on the coarser one
-/// is within half a fine step of it. Infinite if all coordinates are 0.
-fn coarsest_grid(stored: &[Key], axis: usize) -> f64 {
-    let coordinates = stored.par_iter().flat_map_iter(|key| key.iter().map(|corner| corner[axis]));
-    let lowest = coordinates.filter_map(lowest_bit).min();
-    lowest.map_or(f64::INFINITY, |exponent| 2f64.powi(exponent))
 }
 
 /// The exponent of the lowest set bit of a float, `None` for 0.

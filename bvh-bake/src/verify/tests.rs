@@ -1,6 +1,7 @@
 //! Faithful bakes pass; each way of not being one is told.
 
 use super::*;
+use crate::mesh::Object as MeshObject;
 use crate::{Options, to_bytes};
 use bvh_format::leaf::TriangleEncoding;
 
@@ -120,4 +121,101 @@ fn a_damaged_file_is_named_by_rule() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
     assert!(matches!(verify(&bytes, &mesh), Err(VerifyError::Format(_))));
+}
+
+/// A mesh as an OBJ file, ids in its order.
+fn write_obj(mesh: &Mesh, path: &Path) {
+    let (mut text, mut first) = (String::new(), 1);
+    for object in &mesh.objects {
+        text += &format!("o {}x\n", object.name);
+        object.positions.iter().for_each(|[x, y, z]| text += &format!("v {x} {y} {z}\n"));
+        for [a, b, c] in object.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first)) {
+            text += &format!("f {a} {b} {c}\n");
+        }
+        first += object.positions.len() as u32;
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn files_are_told_as_meshes_in_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, obj] = ["f.cbvh", "m.obj"].map(|name| folder.path().join(name));
+    let scratch = Some(folder.path().to_owned());
+    let (mut fine, mut wrong) = (0, std::collections::BTreeSet::new());
+    for (mesh, options) in bakes() {
+        let (bytes, baked) = to_bytes(&mesh, &options).unwrap();
+        let others: [fn(&mut Mesh, f64); 7] = [
+            |_, _| (),
+            |mesh, far| mesh.objects[0].positions[77][1] += far,
+            |mesh, far| mesh.objects[1].positions[7][0] += far,
+            |mesh, _| mesh.objects[0].triangles.swap(3, 9),
+            |mesh, _| mesh.objects[0].triangles[5].swap(0, 1),
+            |mesh, _| mesh.objects[1].triangles[0] = mesh.objects[1].triangles[1],
+            |mesh, _| {
+                // The first object's last triangle becomes the second's first.
+                let triangle = mesh.objects[0].triangles.pop().unwrap();
+                let id = mesh.objects[0].triangle_ids.pop().unwrap();
+                mesh.objects[1].triangles.insert(0, triangle);
+                mesh.objects[1].triangle_ids.insert(0, id);
+            },
+        ];
+        for other in others {
+            let mut mesh = mesh.clone();
+            other(
+                &mut mesh,
+                4.0 * (baked.file.max_vertex_rounding + baked.file.max_quantization_error) + 0.01,
+            );
+            std::fs::write(&file, &bytes).unwrap();
+            write_obj(&mesh, &obj);
+            let in_memory = verify(&bytes, &mesh).map_err(|error| error.to_string());
+            for max_memory in [None, Some(100 << 20)] {
+                let options = VerifyOptions { max_memory, scratch: scratch.clone() };
+                let streamed = verify_files(&file, std::slice::from_ref(&obj), &options);
+                assert_eq!(streamed.map_err(|error| error.to_string()), in_memory);
+            }
+            match in_memory {
+                Ok(_) => fine += 1,
+                Err(error) => drop(wrong.insert(error)),
+            }
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no scratch file is left");
+    }
+    assert!(fine >= 36 && wrong.len() > 60, "{fine} fine, {wrong:#?}");
+}
+
+/// Of several differences the first in the order of the leaves is told, whatever the ids.
+#[test]
+fn the_first_difference_is_told() {
+    let mesh = sheet(12, 0.0);
+    let (bytes, _) = to_bytes(&mesh, &Options::default()).unwrap();
+    let layout = Layout::read(&bytes).unwrap();
+    let mut ids = Vec::new();
+    let object = &layout.objects[0];
+    let mut note = |triangle: &Stored| {
+        ids.extend(triangle.id);
+        Ok(())
+    };
+    each_triangle(&layout, &bytes[..], object, &mut note).unwrap();
+    let mut other = mesh.clone();
+    let all: Vec<(usize, u32)> = (0..mesh.objects.len())
+        .flat_map(|object| mesh.objects[object].triangle_ids.iter().map(move |&id| (object, id)))
+        .collect();
+    for &(object, id) in &all {
+        let first = mesh.objects[object].triangle_ids[0];
+        other.objects[object].triangles[(id - first) as usize].reverse();
+    }
+    let error = verify(&bytes, &other).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("triangle {}, corner 0", ids[0])), "{error}, {:?}", &ids[..3]);
+}
+
+#[test]
+fn a_small_budget_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("f.cbvh");
+    let (bytes, _) = to_bytes(&sheet(5, 0.0), &Options::default()).unwrap();
+    std::fs::write(&file, bytes).unwrap();
+    let options = VerifyOptions { max_memory: Some(Means::least_of_check() - 1), scratch: None };
+    let refused = verify_files(&file, &[folder.path().join("m.obj")], &options).unwrap_err();
+    assert!(matches!(refused, VerifyError::File(FileError::Memory { .. })), "{refused}");
 }

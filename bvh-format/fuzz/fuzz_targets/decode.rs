@@ -47,7 +47,7 @@ pub fn decode(bytes: &[u8]) {
                 }
             }
             if checked.is_ok() && blocks {
-                let _ = check_bounds(&layout, bytes, object, &page, |_| Kdop::EMPTY);
+                let _ = check_bounds(&layout, object, &page, leaves, |_| Kdop::EMPTY);
             }
         }
     }

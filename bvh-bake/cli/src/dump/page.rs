@@ -1,15 +1,15 @@
 //! One page, decoded: its anchors, its links, its treelets. One treelet: its links and slabs.
 
-use super::{checked, object_of};
+use super::Contents;
 use crate::output::hex;
+use bvh_bake::FileError;
 use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{Child, Links};
-use bvh_format::{FormatError, Rule};
-use bvh_query::Bvh;
+use bvh_format::{FormatError, Layout, Rule};
 use serde::Serialize;
 
 /// What `dump FILE --page N --json` prints.
@@ -131,11 +131,13 @@ fn slabs_text(slabs: &[[f32; 2]]) -> String {
 }
 
 impl PageDump {
-    pub(super) fn new(bvh: &Bvh, number: u32) -> Result<Self, FormatError> {
-        let at = bvh.layout().page_offset(number);
-        let (index, object) = object_of(bvh, number)
+    pub(super) fn new(contents: &Contents, number: u32) -> Result<Self, FileError> {
+        let at = contents.layout.page_offset(number);
+        let (index, object) = contents
+            .object_of(number)
             .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "an object's page", "none"))?;
-        let page = checked(bvh, object, number)?;
+        let bytes = contents.checked(object, number)?;
+        let page = bytes.page(object);
         let header = page.header();
         let slabs = object.profile.directions().slabs();
         let anchor = |slot| {
@@ -228,16 +230,16 @@ pub(super) struct TreeletDump {
 
 impl TreeletDump {
     /// The treelet of this number in the file, `None` beyond the last.
-    pub(super) fn find(bvh: &Bvh, number: u64) -> Result<Option<Self>, FormatError> {
+    pub(super) fn find(contents: &Contents, number: u64) -> Result<Option<Self>, FileError> {
         let mut before = 0;
-        for (index, object) in bvh.objects().iter().enumerate() {
-            let first = object.record.first_page.get();
-            for page_number in first..first + object.record.pages.get() {
-                let page = checked(bvh, object, page_number)?;
+        for (index, object) in contents.layout.objects.iter().enumerate() {
+            for page_number in object.pages() {
+                let bytes = contents.checked(object, page_number)?;
+                let page = bytes.page(object);
                 let treelets = u64::from(page.header().treelets);
                 if number < before + treelets {
                     let slot = (number - before) as u8;
-                    return Ok(Some(Self::new(bvh, index, object, &page, number, slot)));
+                    return Ok(Some(Self::new(&contents.layout, index, object, &page, number, slot)));
                 }
                 before += treelets;
             }
@@ -245,7 +247,7 @@ impl TreeletDump {
         Ok(None)
     }
 
-    fn new(bvh: &Bvh, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
+    fn new(layout: &Layout, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
         let header = page.header();
         let slabs = object.profile.directions().slabs();
         let own = decoded_slots(object, page)[usize::from(slot)];
@@ -263,7 +265,7 @@ impl TreeletDump {
             profile: object.profile.name(),
             page: page_number,
             slot,
-            offset: bvh.layout().page_offset(page_number) + within as u64,
+            offset: layout.page_offset(page_number) + within as u64,
             slabs: slabs_of(&own.to_kdop(slabs), slabs),
             children,
         }

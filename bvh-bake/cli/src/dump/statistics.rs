@@ -1,16 +1,19 @@
 //! Counts of an object's tree by level, and how loose its slabs are there.
 //!
 //! Two passes over the pages, since links only lead to later pages: forwards for the levels, backwards for
-//! the tight bounds of what is below each subtree root.
+//! the tight bounds of what is below each subtree root. In memory are a page with its leaf block, the levels of the roots,
+//! and the bounds of those roots whose link has not come by: few, as in the proof of a bake.
 
-use super::checked;
+use super::Contents;
+use super::levels::RootLevels;
+use bvh_bake::FileError;
 use bvh_format::bounds::{Inflation, visit_bounds};
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
 use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
-use bvh_query::Bvh;
+use std::collections::HashMap;
 
 /// The treelets of one level; the root's is level 0.
 #[derive(Debug, Clone, Copy, Default)]
@@ -62,57 +65,55 @@ pub(super) struct Statistics {
 }
 
 impl Statistics {
-    pub(super) fn gather(bvh: &Bvh, object: &Object) -> Result<Self, FormatError> {
-        let first = object.record.first_page.get();
-        let end = first + object.record.pages.get();
+    pub(super) fn gather(contents: &Contents, object: &Object) -> Result<Self, FileError> {
+        let Contents { file, layout } = contents;
         let mut statistics = Self { levels: Vec::new(), lines: 0, roots: 0 };
-        // Levels of each page's roots; a root that no link leads to counts as the tree's.
-        let mut root_levels: Vec<Vec<usize>> = vec![Vec::new(); (end - first) as usize];
-        for number in first..end {
-            let page = checked(bvh, object, number)?;
+        let mut root_levels = RootLevels::default();
+        for number in object.pages() {
+            let bytes = contents.checked(object, number)?;
+            let page = bytes.page(object);
             let header = page.header();
-            bvh.layout().check_leaf_block(bvh.bytes(), &page, object)?;
+            layout.check_leaf_block_of(&layout.read_leaf_block(file, header)?, &page, object)?;
             let treelet_lines = usize::from(header.treelets) * object.profile.treelet_bytes() / 64;
             statistics.lines += u64::from(header.treelet_line) + treelet_lines as u64;
             statistics.roots += u64::from(header.roots);
-            let levels = slot_levels(&page, &root_levels[(number - first) as usize]);
+            let levels = slot_levels(&page, &root_levels.come(number, header.roots));
             for slot in 0..header.treelets {
                 let level = levels[usize::from(slot)];
                 let links = Links::read(page.treelet(slot));
                 statistics.count(level, &links);
                 for child in 0..links.children() {
                     if let Child::Remote(link) = links.child(child) {
-                        let to = page.remote(link);
-                        // The page check has made sure that it is a later one of the object.
-                        let target = &mut root_levels[(to.page() - first) as usize];
-                        let root = usize::from(to.root());
-                        target.resize(target.len().max(root + 1), 0);
-                        target[root] = level + 1;
+                        root_levels.set(page.remote(link), level + 1);
                     }
                 }
             }
+            file.require_memory(root_levels.bytes())?;
         }
         let slabs = object.profile.directions().slabs();
-        let mut below: Vec<Vec<Kdop>> = vec![Vec::new(); (end - first) as usize];
-        for number in (first..end).rev() {
-            let page = checked(bvh, object, number)?;
-            let levels = slot_levels(&page, &root_levels[(number - first) as usize]);
-            let known = |to: RootRef| {
-                let roots = below.get((to.page() - first) as usize);
-                roots.and_then(|roots| roots.get(usize::from(to.root()))).copied().unwrap_or(Kdop::EMPTY)
-            };
-            let tight = visit_bounds(bvh.layout(), bvh.bytes(), object, &page, known, |bound| {
+        // Of the roots whose link has not come by.
+        let mut below: HashMap<RootRef, Kdop> = HashMap::new();
+        for number in object.pages().rev() {
+            let bytes = contents.checked(object, number)?;
+            let page = bytes.page(object);
+            let levels = slot_levels(&page, &root_levels.go(page.header().roots));
+            let leaves = layout.read_leaf_block(file, page.header())?;
+            let known = |to: RootRef| below.get(&to).copied().unwrap_or(Kdop::EMPTY);
+            let tight = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
                 if bound.child.is_some() {
                     let level = statistics.level(levels[usize::from(bound.slot)]);
                     level.inflation.add(&bound.decoded, &bound.tight, slabs);
                 }
                 Ok(())
             })?;
-            below[(number - first) as usize] = tight;
+            for link in 0..page.header().remotes {
+                below.remove(&page.remote(link));
+            }
+            below.extend((0..).map(|root| RootRef::new(number, root)).zip(tight));
         }
         if statistics.levels.is_empty() {
-            let at = bvh.layout().page_offset(first);
-            return Err(FormatError::new(Rule::Counts, at, "a treelet", "none"));
+            let at = layout.page_offset(object.record.first_page.get());
+            return Err(FormatError::new(Rule::Counts, at, "a treelet", "none").into());
         }
         Ok(statistics)
     }

@@ -1,11 +1,12 @@
 //! A whole file: header, sections, objects and the statistics of their trees.
 
+use super::Contents;
 use super::statistics::{Level, Statistics};
 use crate::output::hex;
-use bvh_format::FormatError;
+use bvh_bake::FileError;
 use bvh_format::header::SectionKind;
 use bvh_format::object::Object;
-use bvh_query::Bvh;
+use bvh_format::source::Source;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -88,22 +89,20 @@ struct LevelDump {
 }
 
 impl FileDump {
-    pub(super) fn new(file: String, bvh: &Bvh) -> Result<Self, FormatError> {
-        let layout = bvh.layout();
-        let objects: Result<Vec<_>, _> = bvh
-            .objects()
-            .iter()
-            .enumerate()
-            .map(|(number, object)| ObjectDump::new(bvh, number, object))
-            .collect();
+    pub(super) fn new(file: String, contents: &Contents) -> Result<Self, FileError> {
+        let layout = &contents.layout;
+        let objects = layout.objects.iter().enumerate();
+        let dumps = objects.map(|(number, object)| ObjectDump::new(contents, number, object));
+        let dumps: Vec<_> = dumps.collect::<Result<_, _>>()?;
         let bytes = |kinds: &[SectionKind]| -> u64 {
             let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
             sections.map(|section| section.range.len() as u64).sum()
         };
-        let total = bvh.bytes().len() as u64;
+        let total = contents.file.length();
         let (nodes, leaves) = (bytes(&[SectionKind::Nodes]), bytes(&[SectionKind::Leaves]));
         let ids = bytes(&[SectionKind::Ids, SectionKind::Duplicates]);
-        let each = |bytes: u64| bytes as f64 / bvh.all().triangles() as f64;
+        let triangles: u64 = layout.objects.iter().map(|object| object.record.triangles.get()).sum();
+        let each = |bytes: u64| bytes as f64 / triangles as f64;
         Ok(Self {
             file,
             format_version: format!("{}.{}", layout.version.0, layout.version.1),
@@ -121,8 +120,8 @@ impl FileDump {
                     xxh3: hex(section.checksum),
                 })
                 .collect(),
-            provenance: provenance(bvh),
-            objects: objects?,
+            provenance: provenance(contents)?,
+            objects: dumps,
             bytes_per_tri: Split {
                 total: each(total),
                 nodes: each(nodes),
@@ -155,19 +154,20 @@ impl FileDump {
 }
 
 /// The provenance lines; what is not of that form is left out.
-fn provenance(bvh: &Bvh) -> BTreeMap<String, String> {
-    let section = bvh.layout().sections.iter().find(|section| section.kind == SectionKind::Provenance);
-    let bytes = section.and_then(|section| bvh.bytes().get(section.range.clone())).unwrap_or(&[]);
-    let text = String::from_utf8_lossy(bytes);
+fn provenance(contents: &Contents) -> Result<BTreeMap<String, String>, FileError> {
+    let mut sections = contents.layout.sections.iter();
+    let section = sections.find(|section| section.kind == SectionKind::Provenance);
+    let bytes = contents.file.read(section.map_or(0..0, |section| section.range.clone()))?;
+    let text = String::from_utf8_lossy(&bytes);
     let lines = text.lines().filter_map(|line| line.split_once('='));
     // Control characters would do things to a terminal.
     let plain = |text: &str| text.chars().filter(|c| !c.is_control()).collect();
-    lines.map(|(key, value)| (plain(key), plain(value))).collect()
+    Ok(lines.map(|(key, value)| (plain(key), plain(value))).collect())
 }
 
 impl ObjectDump {
-    fn new(bvh: &Bvh, number: usize, object: &Object) -> Result<Self, FormatError> {
-        let statistics = Statistics::gather(bvh, object)?;
+    fn new(contents: &Contents, number: usize, object: &Object) -> Result<Self, FileError> {
+        let statistics = Statistics::gather(contents, object)?;
         let record = &object.record;
         let whole = statistics.levels.iter().fold(Level::default(), |sum, level| sum.joined(level));
         let pages = f64::from(record.pages.get());

@@ -1,0 +1,196 @@
+//! Files that are read piece by piece: whatever is wrong with them is told as of files in memory.
+
+#[allow(dead_code, reason = "others use the rest")]
+#[path = "../../bvh-format/tests/common/seal.rs"]
+mod seal;
+
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{FileError, Options, StoredFile, to_bytes, validate_in_parallel};
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::validate::validate;
+use bvh_format::{FormatError, Rule};
+use seal::{put, seal, section};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// Validates bytes in every way; returns what all of them say.
+    #[track_caller]
+    fn validate(&self, bytes: &[u8]) -> Result<(), FormatError> {
+        let path = self.0.path().join("f.cbvh");
+        fs::write(&path, bytes).unwrap();
+        let told = validate(bytes).map(|_| ());
+        assert_eq!(validate_in_parallel(bytes).map(|_| ()), told);
+        match StoredFile::open(&path, Some(64 << 20)).and_then(|file| validate_in_parallel(&file)) {
+            Ok(_) => assert_eq!(told, Ok(())),
+            Err(FileError::Format(error)) => assert_eq!(told, Err(error)),
+            Err(error) => panic!("{error}, not {told:?}"),
+        }
+        told
+    }
+}
+
+/// Splitmix64 of a counter.
+fn random(draw: u64) -> usize {
+    let mut x = draw.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (x ^ x >> 31) as usize >> 1
+}
+
+#[test]
+fn golden_and_damaged_files_are_told_alike() {
+    let folder = Folder::new();
+    let testdata = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
+    let (mut rules, mut draw) = (BTreeSet::new(), 0);
+    let mut files = 0;
+    for entry in fs::read_dir(testdata).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if !name.ends_with(".cbvh") {
+            continue;
+        }
+        files += 1;
+        let golden = fs::read(&path).unwrap();
+        let told = folder.validate(&golden);
+        assert_eq!(told.is_ok(), name.starts_with("ok-"), "{name}");
+        rules.extend(told.err().map(|error| error.rule));
+        for round in 0..if name.starts_with("ok-") { 150 } else { 5 } {
+            let mut bytes = golden.clone();
+            for _ in 0..1 + round % 4 {
+                draw += 4;
+                // Pages, blocks and tables have what is in use at their start.
+                let place = section(&golden, [1, 2, 2, 3, 4, 5][random(draw) % 6]);
+                let place = if place.len() < 4 { 0..golden.len() } else { place };
+                let at = place.start + random(draw + 1) % place.len().min(700) / 4 * 4;
+                let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, random(draw + 2) as u32];
+                let value = values[random(draw + 3) % values.len()].to_le_bytes();
+                if at + 4 <= bytes.len() {
+                    put(&mut bytes, at, &value);
+                }
+            }
+            if round % 3 > 0 && bytes.len() >= 4096 {
+                seal(&mut bytes);
+            }
+            if round % 10 == 9 {
+                bytes.truncate(random(draw) % bytes.len());
+            }
+            rules.extend(folder.validate(&bytes).err().map(|error| error.rule));
+        }
+    }
+    assert!(files > 35 && rules.len() > 30, "{files} files, {rules:?}");
+}
+
+/// A sheet of `2 * side * side` triangles.
+fn sheet(side: u32) -> Mesh {
+    let at = |i: u32| [i % (side + 1), i / (side + 1)].map(f64::from);
+    let positions = (0..(side + 1).pow(2)).map(at).map(|[x, y]| [x, y, (x * 0.7).sin() * (y * 0.3).cos()]);
+    let square = |i: u32| {
+        let first = i / side * (side + 1) + i % side;
+        [[first, first + 1, first + side + 2], [first, first + side + 2, first + side + 1]]
+    };
+    Mesh::from_triangles(positions.collect(), (0..side * side).flat_map(square).collect())
+}
+
+/// A block may be stated to be as long as its section, with the right checksum; it is not read at once.
+#[test]
+fn blocks_longer_than_any_are_told_alike() {
+    let folder = Folder::new();
+    for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
+        let options = Options { triangles: Some(encoding), ..Options::default() };
+        let (golden, _) = to_bytes(&sheet(400), &options).unwrap();
+        assert_eq!(folder.validate(&golden), Ok(()));
+        let [nodes, leaves, ids] = [2, 3, 4].map(|kind| section(&golden, kind));
+        let has_packets = |at: &usize| golden[at + 56..at + 58] != [0, 0];
+        let page = nodes.clone().step_by(4096).find(has_packets).unwrap();
+        assert!(leaves.len() > 1 << 20);
+        // Lines from the first on.
+        let mut bytes = golden.clone();
+        put(&mut bytes, page + 24, &0u64.to_le_bytes());
+        put(&mut bytes, page + 48, &(leaves.len() as u32 / 64).to_le_bytes());
+        let unsealed = folder.validate(&bytes).unwrap_err();
+        assert!([Rule::SectionChecksum, Rule::PageChecksum].contains(&unsealed.rule), "{unsealed}");
+        seal(&mut bytes);
+        let long = folder.validate(&bytes).unwrap_err();
+        assert_eq!((long.rule, long.offset), (Rule::LeafPlace, page as u64 + 24), "{long}");
+        // Packed blocks tell how long they are: the first is a page's own.
+        assert!(long.found.contains(&(leaves.len() / 64).to_string()), "{long}");
+        let mut bytes = golden.clone();
+        put(&mut bytes, page + 32, &0u64.to_le_bytes());
+        put(&mut bytes, page + 52, &(ids.len() as u32 / 8).to_le_bytes());
+        seal(&mut bytes);
+        assert_eq!(folder.validate(&bytes).unwrap_err().rule, Rule::IdPlace);
+        // Beyond its section.
+        let mut bytes = golden.clone();
+        put(&mut bytes, page + 48, &(leaves.len() as u32 / 64 + 1).to_le_bytes());
+        seal(&mut bytes);
+        let beyond = folder.validate(&bytes).unwrap_err();
+        assert!([Rule::LeafPlace, Rule::PackedHeader].contains(&beyond.rule), "{beyond}");
+    }
+}
+
+#[test]
+fn the_last_page_of_many_is_checked_as_the_first() {
+    let folder = Folder::new();
+    let (golden, _) = to_bytes(&sheet(250), &Options::default()).unwrap();
+    let nodes = section(&golden, 2);
+    for (at, rule) in [
+        // The number of the first packet, and an anchor's parent: seen only when all pages have been.
+        (nodes.end - 4096 + 40, Rule::Counts),
+        (nodes.end - 4096 + 62, Rule::PageProfile),
+    ] {
+        let mut bytes = golden.clone();
+        bytes[at] ^= 1;
+        seal(&mut bytes);
+        let told = folder.validate(&bytes).unwrap_err();
+        assert_eq!((told.rule, told.offset), (rule, at as u64), "{told}");
+    }
+}
+
+#[test]
+fn what_is_no_file_is_refused() {
+    let folder = Folder::new();
+    let refused = StoredFile::open(folder.0.path(), None).unwrap_err();
+    assert!(matches!(refused, FileError::Io { .. }), "{refused}");
+    let path = folder.0.path().join("f.cbvh");
+    assert!(matches!(StoredFile::open(&path, None), Err(FileError::Io { .. })));
+    fs::write(&path, b"x").unwrap();
+    assert!(matches!(StoredFile::open(&path, Some(1 << 20)), Err(FileError::Memory { .. })));
+    let told = StoredFile::open(&path, None).and_then(|file| validate_in_parallel(&file)).unwrap_err();
+    assert!(matches!(told, FileError::Format(error) if error.rule == Rule::Magic));
+}
+
+/// Names and records are in memory: a table that does not fit is refused before it is read.
+#[test]
+fn a_large_object_table_is_refused_within_a_small_budget() {
+    let folder = Folder::new();
+    let (mut bytes, _) = to_bytes(&sheet(5), &Options::default()).unwrap();
+    // The table takes the rest of the file, which is not there but as zeros.
+    let end = 1u64 << 30;
+    let table = section(&bytes, 1);
+    put(&mut bytes, 64 + 8, &4096u64.to_le_bytes());
+    assert_eq!(table.start, 4096);
+    // Only the objects are left, so that nothing overlaps; the others begin behind them, and are empty.
+    for entry in 1..u64::from(bytes[12]) {
+        let at = 64 + 32 * entry as usize;
+        put(&mut bytes, at + 8, &end.to_le_bytes());
+        put(&mut bytes, at + 16, &0u64.to_le_bytes());
+    }
+    put(&mut bytes, 64 + 16, &(end - 4096).to_le_bytes());
+    put(&mut bytes, 16, &end.to_le_bytes());
+    put(&mut bytes, 32, &[0; 8]);
+    let sum = bvh_format::checksum::checksum(&bytes[..4096]);
+    put(&mut bytes, 32, &sum.to_le_bytes());
+    let path = folder.0.path().join("f.cbvh");
+    fs::write(&path, &bytes[..4096]).unwrap();
+    fs::File::options().write(true).open(&path).unwrap().set_len(end).unwrap();
+    let told = StoredFile::open(&path, Some(64 << 20)).and_then(|file| validate_in_parallel(&file));
+    assert!(matches!(told, Err(FileError::Memory { needed, .. }) if needed > end), "{told:?}");
+}
