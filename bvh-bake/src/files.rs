@@ -23,7 +23,8 @@ use crate::report::BakeReport;
 use crate::scratch;
 use crate::summary::FileSummary;
 use crate::target::Target;
-use bvh_format::checksum::{Hasher, checksum};
+use bvh_format::checksum::checksum;
+pub(crate) use provenance::Checksums;
 use provenance::Provenance;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -65,9 +66,9 @@ pub fn least_memory(triangles: u64) -> u64 {
 ///
 /// The bytes of the output do not depend on the budget of memory, nor on the number of threads.
 ///
-/// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, OBJ twice, all once more if there is an output
-/// that may be up to date, and up to 200 bytes of scratch a
-/// triangle, each written and read two to three times. If the output is up to date, reading inputs and output.
+/// Cost: that of [`crate::to_bytes`], and reading all inputs; within a budget, OBJ twice, all once more if there is an
+/// output that may be up to date, and up to 200 bytes of scratch a triangle, each written and read two to three times. If
+/// the output is up to date, reading inputs and output.
 ///
 /// How far it is, and what has been read and written, can be seen in `progress` at any time, from any thread. `begin` is
 /// called when a step begins, and what the step before has done is in `progress` then.
@@ -111,8 +112,7 @@ impl Job<'_> {
         for input in self.inputs {
             sources.add(input)?;
         }
-        let provenance =
-            Provenance::new(self.inputs, self.options).with(&sources.file_checksums, &sources.mesh_checksums);
+        let provenance = Provenance::new(self.inputs, self.options, &sources.checksums);
         if let Some(summary) = self.up_to_date(&provenance) {
             return Ok(Outcome::UpToDate(summary));
         }
@@ -133,32 +133,25 @@ impl Job<'_> {
         // What certainly does not fit is not even read.
         self.check_budget(budget, 0, Means::least(0))?;
         let progress = self.progress;
-        // The bytes of most inputs are not needed before they are parsed, unless what is there may be what they would give.
-        let is_new = self.file_options.force || !self.output.exists();
-        let (mut formats, mut files, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut formats = Vec::new();
         for input in self.inputs {
-            let failed = |source| ReadError::Io { path: input.clone(), source };
             let (format, length) = format_of(input, progress)?;
-            let is_gltf = format == MeshFormat::Gltf;
-            files.push(if is_gltf || !is_new {
-                let weight = if is_gltf { CHECKSUM } else { 0 };
-                provenance::file_checksum(input, progress, weight).map_err(failed)?
-            } else {
-                0
-            });
-            if is_gltf {
-                self.check_budget(
-                    budget,
-                    0,
-                    Means::least(0).saturating_add(length.saturating_mul(GLTF_BYTES)),
-                )?;
-                meshes.push(mesh_checksum(&io::read_counted(input, progress, GLTF)?));
+            if format == MeshFormat::Gltf {
+                let needed = Means::least(0).saturating_add(length.saturating_mul(GLTF_BYTES));
+                self.check_budget(budget, 0, needed)?;
             }
             formats.push(format);
         }
-        let provenance = |files: &[u64]| Provenance::new(self.inputs, self.options).with(files, &meshes);
-        if !is_new && let Some(summary) = self.up_to_date(&provenance(&files)) {
-            return Ok(Outcome::UpToDate(summary));
+        // What inputs are is known when they have been parsed; before, it matters only where the output may be what they
+        // would give.
+        if !self.file_options.force && self.output.exists() {
+            let inputs = self.inputs.iter().zip(&formats);
+            let checksums = inputs.map(|(input, &format)| Checksums::of_file(input, format, progress));
+            let checksums = checksums.collect::<Result<Vec<_>, _>>()?;
+            let provenance = Provenance::new(self.inputs, self.options, &checksums);
+            if let Some(summary) = self.up_to_date(&provenance) {
+                return Ok(Outcome::UpToDate(summary));
+            }
         }
         // Fails before the work, where the output cannot be written.
         drop(Target::beside(self.output, progress)?);
@@ -167,13 +160,10 @@ impl Job<'_> {
         room::check(&[(scratch, file_lengths(self.inputs))])?;
         let means = Means::within(budget, scratch, progress);
         let mut gatherer = Gatherer::new(&means, self.options.split_objects);
-        for ((input, format), checksum) in self.inputs.iter().zip(formats).zip(&mut files) {
-            match format {
-                MeshFormat::Gltf => gatherer.read_gltf(input)?,
-                format => *checksum = gatherer.read(input, format)?,
-            }
-        }
-        let provenance = provenance(&files);
+        let inputs = self.inputs.iter().zip(formats);
+        let checksums = inputs.map(|(input, format)| gatherer.read(input, format));
+        let checksums = checksums.collect::<Result<Vec<_>, _>>()?;
+        let provenance = Provenance::new(self.inputs, self.options, &checksums);
         let triangles = gatherer.triangles();
         self.check_budget(budget, triangles, Means::least(triangles))?;
         let bytes = |each: u64| triangles.saturating_mul(each);
@@ -231,13 +221,10 @@ impl Job<'_> {
 }
 
 /// Bytes of memory a byte of a glTF file, at least.
-const GLTF_BYTES: u64 = 8;
+pub(crate) const GLTF_BYTES: u64 = 8;
 
 /// What passes over an input's bytes are worth in memory: reading, parsing.
 const IN_MEMORY: [u64; 2] = [3, 13];
-/// Within a budget, of a glTF file: the checksum of the bytes, and that of the mesh. Then comes the gatherer.
-const CHECKSUM: u64 = 2;
-const GLTF: u64 = 7;
 
 /// A file's format and length.
 pub(crate) fn format_of(input: &Path, progress: &Progress) -> Result<(MeshFormat, u64), BakeError> {
@@ -277,8 +264,7 @@ fn append(joined: &mut Mesh, mut mesh: Mesh) -> Result<(), BakeError> {
 /// Inputs that have been read into memory; text is parsed only once it is known that it has to be.
 struct Sources<'a> {
     files: Vec<Source>,
-    file_checksums: Vec<u64>,
-    mesh_checksums: Vec<u64>,
+    checksums: Vec<Checksums>,
     progress: &'a Progress,
 }
 
@@ -289,7 +275,7 @@ enum Source {
 
 impl<'a> Sources<'a> {
     fn new(progress: &'a Progress) -> Self {
-        Self { files: Vec::new(), file_checksums: Vec::new(), mesh_checksums: Vec::new(), progress }
+        Self { files: Vec::new(), checksums: Vec::new(), progress }
     }
 
     fn add(&mut self, input: &Path) -> Result<(), BakeError> {
@@ -297,18 +283,19 @@ impl<'a> Sources<'a> {
         let [reading, parsing] = IN_MEMORY;
         let whole = Input::open(input, self.progress, reading).and_then(|mut file| file.read_all());
         let bytes = whole.map_err(failed)?;
-        self.file_checksums.push(checksum(&bytes));
+        let mut checksums = Checksums { file: checksum(&bytes), mesh: None };
         let format = MeshFormat::from_extension(input).or_else(|| MeshFormat::from_content(&bytes));
         self.files.push(match format {
             // A glTF file may name others, which its own bytes say nothing of: what is read counts.
             Some(MeshFormat::Gltf) => {
                 let mesh = io::parse(&bytes, MeshFormat::Gltf, input, self.progress, parsing)?;
-                self.mesh_checksums.push(mesh_checksum(&mesh));
+                checksums.mesh = Some(mesh.checksum());
                 Source::Mesh(mesh)
             }
             Some(format) => Source::Bytes(input.to_owned(), bytes, format),
             None => return Err(io::unknown_format(input).into()),
         });
+        self.checksums.push(checksums);
         Ok(())
     }
 
@@ -326,19 +313,6 @@ impl<'a> Sources<'a> {
         }
         Ok(joined)
     }
-}
-
-/// A checksum of all that a bake takes from a mesh.
-fn mesh_checksum(mesh: &Mesh) -> u64 {
-    let mut hasher = Hasher::default();
-    for object in &mesh.objects {
-        let lengths = [object.name.len(), object.positions.len(), object.triangles.len()];
-        lengths.iter().for_each(|&length| hasher.update(&(length as u64).to_le_bytes()));
-        hasher.update(object.name.as_bytes());
-        object.positions.iter().flatten().for_each(|value| hasher.update(&value.to_le_bytes()));
-        object.triangles.iter().flatten().for_each(|index| hasher.update(&index.to_le_bytes()));
-    }
-    hasher.finish()
 }
 
 /// Bytes of all inputs; those that are not there are met when they are read.

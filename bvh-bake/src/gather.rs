@@ -12,12 +12,13 @@ mod solids;
 pub(crate) use sequence::Sequence;
 
 use crate::error::BakeError;
+use crate::files::Checksums;
 use crate::io::{self, Fault, Feed, Halt, Input, MeshFormat, Place, ReadError, Relay};
 use crate::means::Means;
 use crate::mesh::{InputError, MAX_TRIANGLES};
 use crate::placement::{Extent, Moved, Placement};
 use crate::prepare::Prepared;
-use crate::progress::{Progress, Step};
+use crate::progress::{Progress, Step, WHOLE};
 use crate::scratch::{Piece, Spill};
 use crate::soup::{PART, Part, Soup, WideTriangle};
 use away::Away;
@@ -31,11 +32,9 @@ use std::thread::{self, Scope};
 
 /// What passes over a file's bytes are worth: reading STL; reading PLY, and looking up the corners of its faces; reading
 /// OBJ for vertices and for faces, which is one weight, and looking up.
-const STL: u64 = 16;
+const STL: u64 = WHOLE;
 const PLY: [u64; 2] = [7, 9];
 const OBJ: [u64; 2] = [5, 6];
-/// Reading glTF, after its checksums.
-const GLTF: u64 = 7;
 
 /// The objects found so far.
 pub(crate) struct Gatherer<'a> {
@@ -105,8 +104,11 @@ impl<'a> Gatherer<'a> {
         self.next_id
     }
 
-    /// Reads a file of a format other than glTF. Returns the checksum of its bytes.
-    pub(crate) fn read(&mut self, path: &Path, format: MeshFormat) -> Result<u64, BakeError> {
+    /// Reads a file: glTF whole, others piece by piece.
+    pub(crate) fn read(&mut self, path: &Path, format: MeshFormat) -> Result<Checksums, BakeError> {
+        if format == MeshFormat::Gltf {
+            return self.read_gltf(path);
+        }
         let before = self.next_id;
         let checksum = OnceLock::new();
         let spill = self.spill.clone();
@@ -126,13 +128,16 @@ impl<'a> Gatherer<'a> {
         if self.next_id == before {
             return Err(ReadError::Mesh { path: path.to_owned(), source: InputError::Empty }.into());
         }
-        // A reader that has not seen the end of the file has failed.
-        Ok(checksum.into_inner().unwrap_or_default())
+        // Readers that succeed go to the end of the file, where its checksum is known.
+        let file = checksum.into_inner().ok_or_else(|| {
+            let source = std::io::ErrorKind::UnexpectedEof.into();
+            ReadError::Io { path: path.to_owned(), source }
+        })?;
+        Ok(Checksums { file, mesh: None })
     }
 
-    /// Reads a glTF file, whole.
-    pub(crate) fn read_gltf(&mut self, path: &Path) -> Result<(), BakeError> {
-        let mesh = io::read_counted(path, &self.means.progress, GLTF)?;
+    fn read_gltf(&mut self, path: &Path) -> Result<Checksums, BakeError> {
+        let (mesh, checksums) = io::read_gltf(path, &self.means.progress, WHOLE)?;
         for object in &mesh.objects {
             let number = self.object(object.name.clone());
             let mut used = vec![false; object.positions.len()];
@@ -143,7 +148,7 @@ impl<'a> Gatherer<'a> {
             }
             self.add_vertices(number, used.iter().filter(|&&used| used).count() as u64);
         }
-        Ok(())
+        Ok(checksums)
     }
 
     fn read_as(&mut self, files: &Files, format: MeshFormat) -> Result<(), Halt> {

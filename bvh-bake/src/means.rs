@@ -7,15 +7,15 @@ use bytemuck::Pod;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Bytes that any bake needs: the program, its threads and what is allocated page by page.
-const BYTES_AT_LEAST: u64 = 8 << 20;
+/// Bytes that any bake or check needs: the program, its threads and what is allocated page by page.
+pub(crate) const BYTES_AT_LEAST: u64 = 8 << 20;
 /// Bytes of memory a triangle of a brick, from its triangles to its pages.
 const BRICK_BYTES_A_TRIANGLE: u64 = 300;
 /// Bytes of the records that wait for their piece of a file to fill up, and of a run that is sorted at once.
 const BUFFER_BYTES: u64 = 16 << 20;
 
 /// Bytes of memory for each thread of a check: its stack, a page and its blocks.
-const CHECK_BYTES_A_THREAD: u64 = 1 << 20;
+pub(crate) const CHECK_BYTES_A_THREAD: u64 = 1 << 20;
 /// Bytes of the buffers of a check: at least, and at most.
 const CHECK_BUFFER_BYTES: [u64; 2] = [4 << 20, 32 << 20];
 /// Buffers of a check: a window of corners takes two, two sorters two each, some pages with their leaf blocks two.

@@ -4,6 +4,7 @@
 //! the input, counted over all objects after polygons are triangulated.
 
 use crate::io::excerpt;
+use bvh_format::checksum::Hasher;
 use bvh_format::object::MAX_COORDINATE;
 use rayon::prelude::*;
 
@@ -129,6 +130,19 @@ impl Mesh {
             // -0.0 + 0.0 is 0.0; every other number stays as it is.
             object.positions.par_iter_mut().for_each(|position| *position = position.map(|c| c + 0.0));
         }
+    }
+
+    /// A checksum of all that a bake takes from it.
+    pub(crate) fn checksum(&self) -> u64 {
+        let mut hasher = Hasher::default();
+        for object in &self.objects {
+            let lengths = [object.name.len(), object.positions.len(), object.triangles.len()];
+            lengths.iter().for_each(|&length| hasher.update(&(length as u64).to_le_bytes()));
+            hasher.update(object.name.as_bytes());
+            object.positions.iter().flatten().for_each(|value| hasher.update(&value.to_le_bytes()));
+            object.triangles.iter().flatten().for_each(|index| hasher.update(&index.to_le_bytes()));
+        }
+        hasher.finish()
     }
 
     /// Checks the contract: between 1 and 2^32 - 2 triangles, at most 2^32 - 1 vertices, ascending ids,

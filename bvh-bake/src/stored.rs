@@ -2,6 +2,7 @@
 //!
 //! Not mapped: pages of a map count as memory of the process, and a file that somebody truncates meanwhile would end it.
 
+use crate::means::{BYTES_AT_LEAST, CHECK_BYTES_A_THREAD};
 use crate::scratch::read_exact_at;
 use bvh_format::FormatError;
 use bvh_format::source::Source;
@@ -11,10 +12,6 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Bytes of memory of any check: the program and what is allocated page by page.
-const BYTES_AT_LEAST: u64 = 8 << 20;
-/// Bytes of memory for each thread: its stack, a page and its blocks.
-const BYTES_A_THREAD: u64 = 1 << 20;
 /// Bytes of memory for each byte of a piece that is read at once, as the object table is, and kept in another form.
 const PIECE_BYTES: u64 = 3;
 
@@ -89,9 +86,9 @@ impl StoredFile {
     pub fn require_memory(&self, piece: usize) -> Result<(), FileError> {
         let Some(budget) = self.max_memory else { return Ok(()) };
         let threads = rayon::current_num_threads() as u64;
-        let needed = BYTES_AT_LEAST + threads * BYTES_A_THREAD;
+        let needed = BYTES_AT_LEAST + threads * CHECK_BYTES_A_THREAD;
         // What a thread has for itself is counted already.
-        let piece = (piece as u64).saturating_sub(BYTES_A_THREAD);
+        let piece = (piece as u64).saturating_sub(CHECK_BYTES_A_THREAD);
         let needed = needed.saturating_add(piece.saturating_mul(PIECE_BYTES));
         if needed <= budget {
             return Ok(());

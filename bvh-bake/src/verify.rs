@@ -13,7 +13,7 @@ mod by_value;
 mod input;
 
 use crate::error::BakeError;
-use crate::files::format_of;
+use crate::files::{GLTF_BYTES, format_of};
 use crate::gather::Gatherer;
 use crate::io::MeshFormat;
 use crate::means::Means;
@@ -122,8 +122,6 @@ pub struct VerifyOptions {
 
 /// What `VerifyOptions::max_memory` is if nothing is said.
 const USUAL_MEMORY: u64 = 3 << 29;
-/// Bytes of memory a byte of a glTF file, at least.
-const GLTF_BYTES: u64 = 8;
 
 /// [`verify`] of a file of any size and of the meshes that it was baked from, read piece by piece.
 ///
@@ -150,17 +148,11 @@ pub fn verify_files(
     let means = Means::of_check(budget, &scratch);
     let mut gatherer = Gatherer::in_sequence(&means);
     for mesh in meshes {
-        match format_of(mesh, &means.progress)? {
-            (MeshFormat::Gltf, length) => {
-                if options.max_memory.is_some() {
-                    enough(mesh, length.saturating_mul(GLTF_BYTES).saturating_add(Means::least_of_check()))?;
-                }
-                gatherer.read_gltf(mesh)?;
-            }
-            (format, _) => {
-                gatherer.read(mesh, format)?;
-            }
+        let (format, length) = format_of(mesh, &means.progress)?;
+        if format == MeshFormat::Gltf && options.max_memory.is_some() {
+            enough(mesh, length.saturating_mul(GLTF_BYTES).saturating_add(Means::least_of_check()))?;
         }
+        gatherer.read(mesh, format)?;
     }
     let sequence = gatherer.into_sequence()?;
     compare(&layout, &file, || Ok(sequence), &means)

@@ -11,6 +11,7 @@ mod json;
 mod machine;
 mod measure;
 mod model;
+mod origin;
 mod pairs;
 mod pareto;
 mod pin;

@@ -1,22 +1,32 @@
 //! The provenance text of a file: where its mesh came from, and whether a bake would give it again.
 
-use crate::io::Input;
+use crate::io::{self, Input, MeshFormat, ReadError};
 use crate::options::Options;
 use crate::progress::Progress;
 use crate::summary::FileSummary;
 use crate::target::Source;
 use bvh_format::Layout;
-use bvh_format::checksum::{Hasher, checksum};
+use bvh_format::checksum::checksum;
 use bvh_format::header::{MAJOR, MINOR, SectionKind};
 use bvh_format::source::Source as _;
 use bvh_format::validate::check_sections;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Raised whenever a bake of the same mesh with the same options gives other bytes, so that files of
 /// an earlier revision do not count as up to date.
 const REVISION: u32 = 3;
+
+/// What tells whether an input is still as it was.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Checksums {
+    /// Of its bytes.
+    pub(crate) file: u64,
+    /// Of the mesh, where the bytes do not tell all: a glTF file may name others.
+    pub(crate) mesh: Option<u64>,
+}
 
 /// The lines `key=value` of the provenance section.
 pub(super) struct Provenance {
@@ -27,22 +37,19 @@ pub(super) struct Provenance {
 }
 
 impl Provenance {
-    pub(super) fn new(inputs: &[PathBuf], options: &Options) -> Self {
+    pub(super) fn new(inputs: &[PathBuf], options: &Options, checksums: &[Checksums]) -> Self {
         // Directories say more of the machine than of the mesh.
         let name = |path: &PathBuf| path.file_name().map(|name| plain(&name.to_string_lossy()));
         let names: Vec<String> = inputs.iter().filter_map(name).collect();
         let generator = format!("cbvh {}, revision {REVISION}", env!("CARGO_PKG_VERSION"));
-        let stamp = vec![("generator", generator), ("options", options.stamp())];
-        Self { input: names.join(", "), stamp }
-    }
-
-    /// Notes the checksums of the inputs' bytes, and of the meshes of those whose bytes do not tell all.
-    pub(super) fn with(mut self, files: &[u64], meshes: &[u64]) -> Self {
-        self.stamp.push(("input_xxh3", format!("{:016x}", joined(files))));
+        let files: Vec<u64> = checksums.iter().map(|checksums| checksums.file).collect();
+        let input = format!("{:016x}", joined(&files));
+        let mut stamp = vec![("generator", generator), ("options", options.stamp()), ("input_xxh3", input)];
+        let meshes: Vec<u64> = checksums.iter().filter_map(|checksums| checksums.mesh).collect();
         if !meshes.is_empty() {
-            self.stamp.push(("mesh_xxh3", format!("{:016x}", joined(meshes))));
+            stamp.push(("mesh_xxh3", format!("{:016x}", joined(&meshes))));
         }
-        self
+        Self { input: names.join(", "), stamp }
     }
 
     pub(super) fn to_text(&self) -> String {
@@ -94,16 +101,21 @@ const MOST_TEXT: usize = 1 << 20;
 /// Bytes that are read at a time.
 const READ_BYTES: usize = 1 << 20;
 
-/// The checksum of a file's bytes, which are not kept. Reading them is a pass of so much weight.
-pub(super) fn file_checksum(path: &Path, progress: &Progress, weight: u64) -> io::Result<u64> {
-    let mut file = Input::open(path, progress, weight)?;
-    let (mut hasher, mut bytes) = (Hasher::default(), vec![0; READ_BYTES]);
-    loop {
-        match file.read(&mut bytes) {
-            Ok(0) => return Ok(hasher.finish()),
-            Ok(count) => hasher.update(&bytes[..count]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
+impl Checksums {
+    /// Reads a file for nothing else; that is no part of the work that progress is counted in.
+    pub(super) fn of_file(path: &Path, format: MeshFormat, progress: &Progress) -> Result<Self, ReadError> {
+        if format == MeshFormat::Gltf {
+            return Ok(io::read_gltf(path, progress, 0)?.1);
         }
+        let file = file_checksum(path, progress);
+        let file = file.map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+        Ok(Self { file, mesh: None })
     }
+}
+
+fn file_checksum(path: &Path, progress: &Progress) -> std::io::Result<u64> {
+    let checksum = OnceLock::new();
+    let file = Input::open(path, progress, 0)?.with_checksum(&checksum);
+    std::io::copy(&mut BufReader::with_capacity(READ_BYTES, file), &mut std::io::sink())?;
+    checksum.into_inner().ok_or_else(|| ErrorKind::UnexpectedEof.into())
 }

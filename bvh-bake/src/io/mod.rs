@@ -25,8 +25,10 @@ pub(crate) use input::Input;
 pub(crate) use relay::Relay;
 
 use crate::error::BakeError;
+use crate::files::Checksums;
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Step, WHOLE};
+use bvh_format::checksum::checksum;
 use std::path::Path;
 
 /// A format of mesh files.
@@ -90,15 +92,26 @@ impl MeshFormat {
 /// # Errors
 /// [`ReadError`]: the system's, or the first thing that the file gets wrong.
 pub fn read(path: &Path) -> Result<Mesh, ReadError> {
-    read_counted(path, &Progress::default(), WHOLE)
+    let bytes = read_whole(path, &Progress::default())?;
+    let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
+    read_bytes(&bytes, format.ok_or_else(|| unknown_format(path))?, path)
 }
 
-/// As [`read`]; it is a pass of so much weight.
-pub(crate) fn read_counted(path: &Path, progress: &Progress, weight: u64) -> Result<Mesh, ReadError> {
-    let failed = |source| ReadError::Io { path: path.to_owned(), source };
-    let bytes = Input::open(path, progress, 0).and_then(|mut input| input.read_all()).map_err(failed)?;
-    let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
-    parse(&bytes, format.ok_or_else(|| unknown_format(path))?, path, progress, weight)
+/// Reads a glTF file, which is a pass of so much weight, with what tells whether it is still as it was.
+pub(crate) fn read_gltf(
+    path: &Path,
+    progress: &Progress,
+    weight: u64,
+) -> Result<(Mesh, Checksums), ReadError> {
+    let bytes = read_whole(path, progress)?;
+    let mesh = parse(&bytes, MeshFormat::Gltf, path, progress, weight)?;
+    let checksums = Checksums { file: checksum(&bytes), mesh: Some(mesh.checksum()) };
+    Ok((mesh, checksums))
+}
+
+fn read_whole(path: &Path, progress: &Progress) -> Result<Vec<u8>, ReadError> {
+    let read = Input::open(path, progress, 0).and_then(|mut input| input.read_all());
+    read.map_err(|source| ReadError::Io { path: path.to_owned(), source })
 }
 
 /// What is said of a file of no known format.

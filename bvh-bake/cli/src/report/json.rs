@@ -1,7 +1,8 @@
 //! The whole report: where and how it was measured, the pairs, and the rows.
 
-use super::machine::{self, Cache};
+use super::machine;
 use super::measure::{Baked, Question};
+use super::origin::Origin;
 use super::pairs::Pair;
 use super::pin::Pinned;
 use super::row::Row;
@@ -55,34 +56,6 @@ impl Settings {
         let sweep_bytes = arguments.sweep.unwrap_or(QUICK_SWEEP);
         Self { rounds: 2, poses: 10, cold_poses: 2, disk_poses: 2, model_poses: 5, sweep_bytes, ..settings }
     }
-}
-
-/// Where it was measured.
-#[derive(Debug, Serialize)]
-pub(super) struct Machine {
-    pub(super) processor: String,
-    pub(super) processors: usize,
-    pub(super) is_virtual: bool,
-    pub(super) system: String,
-    pub(super) caches: Vec<Cache>,
-}
-
-impl Machine {
-    /// This one, as far as the system tells.
-    pub(super) fn here() -> Self {
-        Self {
-            processor: machine::processor(),
-            processors: std::thread::available_parallelism().map_or(1, usize::from),
-            is_virtual: machine::is_virtual(),
-            system: machine::system(),
-            caches: machine::caches(),
-        }
-    }
-}
-
-/// Major and minor version of the format.
-pub(super) fn format_version() -> String {
-    format!("{}.{}", bvh_format::header::MAJOR, bvh_format::header::MINOR)
 }
 
 /// A side of a pair.
@@ -142,14 +115,8 @@ impl PairRecord {
 /// All of it.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
-    pub(super) tool: &'static str,
-    pub(super) version: &'static str,
-    /// Major and minor version of the format.
-    pub(super) format_version: String,
-    /// True if the program was built without optimisation.
-    pub(super) unoptimised: bool,
-    pub(super) date: String,
-    pub(super) machine: Machine,
+    #[serde(flatten)]
+    pub(super) origin: Origin,
     pub(super) settings: Settings,
     pub(super) questions: Vec<&'static str>,
     pub(super) pairs: Vec<PairRecord>,
@@ -161,12 +128,7 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn new(settings: Settings) -> Self {
         Self {
-            tool: "cbvh",
-            version: env!("CARGO_PKG_VERSION"),
-            format_version: format_version(),
-            unoptimised: cfg!(debug_assertions),
-            date: machine::today(),
-            machine: Machine::here(),
+            origin: Origin::here(),
             settings,
             questions: vec![Question::Collide.name(), Question::Distance(0.0).name()],
             pairs: Vec::new(),
@@ -183,7 +145,7 @@ impl Report {
 
     /// True if what is swept is more than the largest cache, as far as one knows.
     pub(super) fn is_cold(&self) -> bool {
-        let largest = self.machine.caches.iter().map(|cache| cache.bytes).max();
+        let largest = self.origin.machine.caches.iter().map(|cache| cache.bytes).max();
         largest.is_some_and(|largest| self.settings.sweep_bytes > largest)
     }
 

@@ -1,7 +1,8 @@
 //! The words around figures and tables: what was measured, where, how, and what to mind.
 
 use super::escape;
-use crate::report::json::{Machine, PairRecord, Report};
+use crate::report::json::{PairRecord, Report};
+use crate::report::origin::Machine;
 
 /// What the page is about, and whether answers were right.
 pub(super) fn opening(report: &Report) -> String {
@@ -10,12 +11,12 @@ pub(super) fn opening(report: &Report) -> String {
     let mut text = format!(
         "<p>How fast cbvh {} answers queries between triangle meshes, in every layout of its files (format {}), and \
          how exact the answers are. Pairs: {}. Measured on {} with the backend {}.</p>\n{}",
-        report.version,
-        report.format_version,
+        report.origin.version,
+        report.origin.format_version,
         names.join(", "),
-        report.date,
+        report.origin.date,
         report.settings.isa,
-        machine(&report.machine)
+        machine(&report.origin.machine)
     );
     if report.wrong.is_empty() {
         text += "<p>All layouts gave the same answers about contact, and the same distances to the bit for the same \
@@ -34,7 +35,7 @@ pub(super) fn opening(report: &Report) -> String {
             report.settings.quick,
             "A quick run, to try the command: a few poses and two rounds. Nothing to quote.",
         ),
-        (report.unoptimised, "The program was built without optimisation: times say nothing."),
+        (report.origin.unoptimised, "The program was built without optimisation: times say nothing."),
         (!report.is_cold(), "What was swept is no more than the largest cache: cold figures are not cold."),
         (
             report.pairs.iter().any(|pair| pair.pinned.is_none()),

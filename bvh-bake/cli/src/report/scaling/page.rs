@@ -112,18 +112,18 @@ fn opening(record: &Record) -> String {
     let mut text = format!(
         "<p>How the time of queries grows with the number of triangles: a closed ball with bumps against itself, \
          cbvh {} (format {}). Measured on {} with the backend {}: {} of each gap, {}.</p>\n{}",
-        record.version,
-        record.format_version,
-        record.date,
+        record.origin.version,
+        record.origin.format_version,
+        record.origin.date,
         settings.isa,
         html::count(settings.poses, "pose"),
         html::count(settings.rounds, "round"),
-        html::machine(&record.machine)
+        html::machine(&record.origin.machine)
     );
     for (holds, warning) in [
         (!record.wrong.is_empty(), "There are answers that do not agree: see scaling.json."),
         (settings.quick, "A quick run, to try the command: a few poses and two rounds. Nothing to quote."),
-        (record.unoptimised, "The program was built without optimisation: times say nothing."),
+        (record.origin.unoptimised, "The program was built without optimisation: times say nothing."),
         (record.pinned.is_none(), "The measuring thread was not bound to a processor: the system would not."),
     ] {
         if holds {

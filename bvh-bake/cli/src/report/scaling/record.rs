@@ -2,8 +2,7 @@
 
 use super::row::{Part, Row, gap_name};
 use crate::arguments::ReportArguments;
-use crate::report::json::{Machine, format_version};
-use crate::report::machine;
+use crate::report::origin::Origin;
 use crate::report::pin::Pinned;
 use crate::report::plot::micro;
 use bvh_query::Backend;
@@ -46,14 +45,8 @@ impl Settings {
 /// All of it.
 #[derive(Debug, Serialize)]
 pub(super) struct Record {
-    tool: &'static str,
-    pub(super) version: &'static str,
-    /// Major and minor version of the format.
-    pub(super) format_version: String,
-    /// True if the program was built without optimisation.
-    pub(super) unoptimised: bool,
-    pub(super) date: String,
-    pub(super) machine: Machine,
+    #[serde(flatten)]
+    pub(super) origin: Origin,
     pub(super) settings: Settings,
     /// The processor of single queries and of paths.
     pub(super) pinned: Option<Pinned>,
@@ -65,18 +58,7 @@ pub(super) struct Record {
 impl Record {
     /// Without rows.
     pub(super) fn new(settings: Settings, pinned: Option<Pinned>) -> Self {
-        Self {
-            tool: "cbvh",
-            version: env!("CARGO_PKG_VERSION"),
-            format_version: format_version(),
-            unoptimised: cfg!(debug_assertions),
-            date: machine::today(),
-            machine: Machine::here(),
-            settings,
-            pinned,
-            wrong: Vec::new(),
-            rows: Vec::new(),
-        }
+        Self { origin: Origin::here(), settings, pinned, wrong: Vec::new(), rows: Vec::new() }
     }
 
     /// The rows of a part.
