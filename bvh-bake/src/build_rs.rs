@@ -1,9 +1,7 @@
-//! Baking from a build script.
+//! Bakes a mesh from a build script.
 
+use crate::bake::files::FileBake;
 use crate::error::BakeError;
-use crate::files::{FileOptions, bake_files};
-use crate::options::Options;
-use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 
 /// Bakes a mesh file into the directory of a build script's outputs, with default options, and tells
@@ -18,18 +16,17 @@ use std::path::{Path, PathBuf};
 /// }
 /// ```
 ///
-/// and in the program `include_bytes!(concat!(env!("OUT_DIR"), "/rock.cbvh"))`. Of a glTF file only
-/// the file itself is watched, not the buffers that it names.
+/// In the program, `include_bytes!(concat!(env!("OUT_DIR"), "/rock.cbvh"))` gives the bytes. For a glTF file, Cargo
+/// watches only the file itself, not the buffers that it names.
 ///
 /// # Errors
-/// [`BakeError::NoOutDir`] outside a build script; else as [`bake_files`].
+/// [`BakeError::NoOutDir`] outside a build script, and the errors of [`FileBake::run`].
 pub fn bake(input: impl AsRef<Path>, output_name: impl AsRef<Path>) -> Result<PathBuf, BakeError> {
     let input = input.as_ref();
     tell_cargo(&format!("rerun-if-changed={}", input.display()));
     let directory = std::env::var_os("OUT_DIR").ok_or(BakeError::NoOutDir)?;
     let output = Path::new(&directory).join(output_name);
-    let (options, file_options) = (Options::default(), FileOptions::default());
-    bake_files(&[input.to_owned()], &output, &options, &file_options, &Progress::default(), &mut |_| ())?;
+    FileBake::new([input], &output).run()?;
     Ok(output)
 }
 

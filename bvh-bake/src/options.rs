@@ -1,17 +1,16 @@
-//! What a user may choose when baking.
+//! The options of a bake.
 
-use crate::ablation::Ablation;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
-/// How much time a bake takes for a better tree. Answers are the same; times and files' sizes are those of
-/// `spec/rationale.md`.
+/// The time that a bake spends on a better tree. The answers are the same; `spec/rationale.md` lists times and file
+/// sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Effort {
-    /// Coarser splits, and nothing is moved afterwards.
+    /// Splits are coarser, and no subtrees move afterwards.
     Fast,
-    /// Fine splits near the leaves; then a tenth of all subtrees, the largest, move to better places.
+    /// Splits near the leaves are fine; then the largest tenth of all subtrees moves to better places.
     #[default]
     Default,
     /// All subtrees move to better places, three times.
@@ -19,10 +18,10 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// All of them, the quickest first.
+    /// All efforts, the fastest first.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Default, Self::High];
 
-    /// The name in options and provenance.
+    /// Returns the name used in options and in the provenance.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",
@@ -31,31 +30,37 @@ impl Effort {
         }
     }
 
-    /// The effort of a name.
+    /// Returns the effort with a name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|effort| effort.name() == name)
     }
 }
 
-/// How to bake. `Options::default()` is right for most meshes.
+/// The options of a bake. `Options::default()` is right for most meshes; each method changes one option of it.
+///
+/// ```
+/// use bvh_bake::{Effort, Options};
+///
+/// let options = Options::default().effort(Effort::High).ids(false);
+/// assert_eq!(options.effort, Effort::High);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Options {
-    /// Treelet profile; `None` picks the one of least estimated query cost for each object.
+    /// The treelet profile; `None` chooses the profile with the lowest estimated query cost for each object.
     pub profile: Option<Profile>,
-    /// Triangle encoding; `None` picks `F32` or `Packed`, whichever the cost model prefers.
+    /// The triangle encoding; `None` chooses `F32` or `Packed`, whichever the cost model prefers.
     pub triangles: Option<TriangleEncoding>,
-    /// For `Quantized`: how far a vertex may move, in mesh units. Default: 1e-5 of the diagonal of
-    /// the object's box.
+    /// With `Quantized`, the largest distance by which a vertex may move, in mesh units. The default is 1e-5 of the
+    /// diagonal of the object's box, and the limit is a hundredth of the diagonal.
     pub max_error: Option<f64>,
-    /// How much time goes into the tree.
+    /// The time spent on the tree.
     pub effort: Effort,
-    /// One tree per object of the input instead of one for all.
+    /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
+    /// their files.
     pub split_objects: bool,
-    /// Keep the original triangle numbers.
+    /// Whether the original triangle numbers are kept.
     pub ids: bool,
-    /// For measurements: what to do otherwise than usual.
-    #[doc(hidden)]
-    pub ablation: Ablation,
 }
 
 impl Default for Options {
@@ -67,15 +72,50 @@ impl Default for Options {
             effort: Effort::Default,
             split_objects: false,
             ids: true,
-            ablation: Ablation::default(),
         }
     }
 }
 
 impl Options {
-    /// The options as one line of text: equal options, equal text.
+    /// Sets the treelet profile; `None` lets the baker choose.
+    #[must_use]
+    pub fn profile(self, profile: impl Into<Option<Profile>>) -> Self {
+        Self { profile: profile.into(), ..self }
+    }
+
+    /// Sets the triangle encoding; `None` lets the baker choose.
+    #[must_use]
+    pub fn triangles(self, triangles: impl Into<Option<TriangleEncoding>>) -> Self {
+        Self { triangles: triangles.into(), ..self }
+    }
+
+    /// Sets how far quantisation may move a vertex, in mesh units; `None` for the default.
+    #[must_use]
+    pub fn max_error(self, max_error: impl Into<Option<f64>>) -> Self {
+        Self { max_error: max_error.into(), ..self }
+    }
+
+    /// Sets the time spent on the tree.
+    #[must_use]
+    pub fn effort(self, effort: Effort) -> Self {
+        Self { effort, ..self }
+    }
+
+    /// Sets whether each object of the input gets a tree of its own.
+    #[must_use]
+    pub fn split_objects(self, split_objects: bool) -> Self {
+        Self { split_objects, ..self }
+    }
+
+    /// Sets whether the original triangle numbers are kept.
+    #[must_use]
+    pub fn ids(self, ids: bool) -> Self {
+        Self { ids, ..self }
+    }
+
+    /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
-        let mut stamp = format!(
+        format!(
             "profile={} triangles={} max_error={} effort={} split={} ids={}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
@@ -83,10 +123,6 @@ impl Options {
             self.effort.name(),
             self.split_objects,
             self.ids
-        );
-        if self.ablation != Ablation::default() {
-            stamp += &format!(" {:?}", self.ablation);
-        }
-        stamp
+        )
     }
 }

@@ -1,28 +1,52 @@
-//! How far a bake is, and what it has read and written: numbers that stages add to and anybody may look at meanwhile.
+//! The progress of a bake, and its bytes read and written: counters that the stages update and any thread may read.
 //!
-//! A stage goes through its triangles a few times, and each time takes about the same part of the stage's time: what
-//! is done is counted in such passes, a part or a batch of pages at a time, in relaxed atomic sums. Nothing of a bake
-//! depends on them. While a bake goes on, numbers that are looked at together need not be of the same moment; when it
-//! has ended they are exact.
+//! A stage goes through its triangles in several passes, each of which takes about the same share of the stage's time.
+//! Progress is counted in such passes, one part or batch of pages at a time, in relaxed atomic sums. The bake does not
+//! depend on them. While it runs, counters that are read together may be of slightly different moments; when it has
+//! ended, they are exact.
 
-use crate::bake::Stage;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A step of [`crate::bake_files`], in the order in which they begin. With several objects, those of
+/// A stage of a bake, as shown to users.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Chooses origins, rounds coordinates and finds duplicates.
+    Prepare,
+    /// Dividing the triangles into bricks, building their trees and encoding their pages.
+    Build,
+    /// Writes the pages with their numbers, the sections and the checksums.
+    Encode,
+    /// Proves the finished bytes.
+    Prove,
+}
+
+impl Stage {
+    /// The stage's name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Prepare => "preparing",
+            Self::Build => "building bricks",
+            Self::Encode => "assembling",
+            Self::Prove => "proving bounds",
+        }
+    }
+}
+
+/// A step of [`crate::FileBake`], in the order in which they begin. With several objects, those of
 /// [`Stage::Prepare`] and [`Stage::Build`] take turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
-    /// Reading inputs and looking at what the output already is.
+    /// Reads the inputs, and checks whether the output is up to date.
     Read,
     /// A stage of the bake.
     Bake(Stage),
-    /// Writing the output: what the system has not written yet, and the name.
+    /// Completes the output: the bytes that the system has not written yet, and the name.
     Write,
 }
 
 impl Step {
-    /// All of them in order.
+    /// All steps, in order.
     pub const ALL: [Self; 6] = [
         Self::Read,
         Self::Bake(Stage::Prepare),
@@ -50,36 +74,37 @@ impl Step {
     }
 }
 
-/// Bytes that a bake asks the system to read and write, each time that it does.
+/// The bytes that a bake asks the system to read and write. Repeated reads and writes count each time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Traffic {
-    /// Bytes read of inputs, more than once within a budget of memory.
+    /// Bytes read from the inputs: each once, and once more if an existing output may be up to date.
     pub input_read: u64,
-    /// Bytes written to scratch files; none without a budget of memory.
+    /// Bytes written to scratch files; none without a memory budget.
     pub scratch_written: u64,
-    /// Bytes read of scratch files, some several times.
+    /// Bytes read from scratch files; some are read several times.
     pub scratch_read: u64,
     /// The most bytes that scratch files had at one time.
     pub scratch_most: u64,
-    /// Bytes written to the output: each once, and its header again when all the others are known.
+    /// Bytes written to the output: each once, and the header once more when all its values are known.
     pub output_written: u64,
-    /// Bytes read of the output: of an old one to see whether it is up to date, of the new one to prove it.
+    /// Bytes read from the output: those of an old one to see whether it is up to date, and under a memory budget also
+    /// those of the new one to prove it.
     pub output_read: u64,
 }
 
 impl Traffic {
-    /// Bytes read of all files.
+    /// Returns the bytes read from all files.
     pub fn read(&self) -> u64 {
         self.input_read + self.scratch_read + self.output_read
     }
 
-    /// Bytes written to all files.
+    /// Returns the bytes written to all files.
     pub fn written(&self) -> u64 {
         self.scratch_written + self.output_written
     }
 }
 
-/// How far a bake is. Clones look at the same bake. Each bake needs one of its own.
+/// The progress of a bake. Clones show the same bake, and each bake needs a progress of its own.
 #[derive(Debug, Clone, Default)]
 pub struct Progress(Arc<Counters>);
 
@@ -97,27 +122,27 @@ struct Counters {
     output_read: AtomicU64,
 }
 
-/// What a step does in all, and what of it is done: bytes when reading and triangles later, times [`WHOLE`].
+/// The work of a step and the part of it that is done: bytes while reading and triangles later, times [`WHOLE`].
 #[derive(Debug, Default)]
 struct Work {
     done: AtomicU64,
     total: AtomicU64,
 }
 
-/// What all passes of a step over a triangle, or a byte, add up to at most.
+/// The sum of the weights of all passes of a step over one triangle or byte.
 pub(crate) const WHOLE: u64 = 16;
 
 impl Progress {
-    /// How much of a step is done, from 0 to 1; `None` until that can be told.
+    /// Returns the share of a step that is done, from 0 to 1, or `None` while it is unknown.
     pub fn share(&self, step: Step) -> Option<f64> {
         let Work { done, total } = &self.0.work[step.index()];
         let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
         (total > 0).then(|| done.min(total) as f64 / total as f64)
     }
 
-    /// Triangles that a step has done: found in the inputs when reading, later those that all passes are over with, or
-    /// as many as the passes so far are worth. When a step has ended: all of the input up to [`Stage::Prepare`], then
-    /// all that are stored.
+    /// Returns the number of triangles that a step has done. While reading, these are the triangles found so far.
+    /// Later, they are the triangles that all passes have completed, or as many as the passes so far are worth. When a
+    /// step has ended, the number is that of the input up to [`Stage::Prepare`], and then that of the stored triangles.
     pub fn triangles(&self, step: Step) -> u64 {
         match step {
             Step::Read => self.0.found.load(Ordering::Relaxed),
@@ -125,7 +150,7 @@ impl Progress {
         }
     }
 
-    /// What has been read and written so far.
+    /// Returns the bytes read and written so far.
     pub fn traffic(&self) -> Traffic {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let counters = &*self.0;
@@ -139,37 +164,37 @@ impl Progress {
         }
     }
 
-    /// Inputs have so many bytes, which are read or parsed.
+    /// Records the total bytes of the inputs, which are read or parsed.
     pub(crate) fn expect_bytes(&self, bytes: u64) {
         self.0.work[Step::Read.index()].total.store(bytes.saturating_mul(WHOLE), Ordering::Relaxed);
     }
 
-    /// More triangles were found.
+    /// Adds triangles that were found.
     pub(crate) fn find(&self, triangles: u64) {
         self.0.found.fetch_add(triangles, Ordering::Relaxed);
     }
 
-    /// All inputs have been read: so many triangles go through all other steps.
+    /// Records that all inputs have been read, and the number of triangles that go through all later steps.
     pub(crate) fn expect(&self, triangles: u64) {
         let [read, others @ ..] = &self.0.work;
         read.done.store(read.total.load(Ordering::Relaxed), Ordering::Relaxed);
         others.iter().for_each(|work| work.total.store(triangles * WHOLE, Ordering::Relaxed));
     }
 
-    /// So many triangles are duplicates, which go through no step after [`Stage::Prepare`].
+    /// Records the number of duplicates, which take part in no step after [`Stage::Prepare`].
     pub(crate) fn leave_out(&self, triangles: u64) {
         for work in &self.0.work[Step::Bake(Stage::Build).index()..] {
             work.total.fetch_sub(triangles * WHOLE, Ordering::Relaxed);
         }
     }
 
-    /// A step is done with so many triangles, counted from the first.
+    /// Records that a step has completed the first `triangles` triangles.
     pub(crate) fn reach(&self, step: Step, triangles: u64) {
         self.0.work[step.index()].done.store(triangles * WHOLE, Ordering::Relaxed);
     }
 
-    /// Counts a pass of a step over so many triangles, or bytes of inputs, that is done when `units` of whatever it goes
-    /// through have been added. `weight` is its part of [`WHOLE`].
+    /// Starts to count a pass over `amount` triangles or bytes of inputs. The pass is complete when `units` units have
+    /// been added; `weight` is its share of [`WHOLE`].
     pub(crate) fn tally(&self, step: Step, weight: u64, amount: u64, units: u64) -> Tally<'_> {
         let work = &self.0.work[step.index()].done;
         Tally { work, worth: amount.saturating_mul(weight), units, done: AtomicU64::new(0) }
@@ -183,14 +208,14 @@ impl Progress {
         self.0.scratch_read.fetch_add(bytes, Ordering::Relaxed);
     }
 
-    /// Scratch files have grown.
+    /// Records that scratch files have grown.
     pub(crate) fn add_scratch_written(&self, bytes: u64) {
         let held = self.0.scratch_held.fetch_add(bytes, Ordering::Relaxed) + bytes;
         self.0.scratch_most.fetch_max(held, Ordering::Relaxed);
         self.0.scratch_written.fetch_add(bytes, Ordering::Relaxed);
     }
 
-    /// A scratch file of so many bytes is gone.
+    /// Records that a scratch file was deleted.
     pub(crate) fn drop_scratch(&self, bytes: u64) {
         self.0.scratch_held.fetch_sub(bytes, Ordering::Relaxed);
     }
@@ -203,7 +228,7 @@ impl Progress {
         self.0.output_read.fetch_add(bytes, Ordering::Relaxed);
     }
 
-    /// Bytes that scratch files have now.
+    /// The present size of all scratch files, in bytes.
     #[cfg(test)]
     pub(crate) fn scratch_held(&self) -> u64 {
         self.0.scratch_held.load(Ordering::Relaxed)
@@ -220,14 +245,14 @@ pub(crate) struct Tally<'a> {
 }
 
 impl Tally<'_> {
-    /// More units are done. Those beyond the number stated count for nothing.
+    /// Adds units that are done. Units beyond the stated number are ignored.
     pub(crate) fn add(&self, units: u64) {
         let before = self.done.fetch_add(units, Ordering::Relaxed);
         let worth = self.worth_of(before + units) - self.worth_of(before);
         self.work.fetch_add(worth, Ordering::Relaxed);
     }
 
-    /// The work of so many units; rounding does not add up.
+    /// Returns the work of `units` units, computed such that rounding errors do not accumulate.
     fn worth_of(&self, units: u64) -> u64 {
         let part = u128::from(self.worth) * u128::from(units.min(self.units)) / u128::from(self.units.max(1));
         part as u64

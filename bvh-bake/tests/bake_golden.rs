@@ -10,11 +10,8 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::profile::Profile;
 use bvh_format::{Layout, validate::validate};
+use cbvh_testkit::seal;
 use std::path::PathBuf;
-
-#[path = "../../bvh-format/tests/common/seal.rs"]
-#[allow(dead_code, reason = "the other tests of the folder use the rest")]
-mod seal;
 
 /// What ends the names of the files that today's baker makes.
 const GENERATION: &str = "";
@@ -29,12 +26,7 @@ fn cube(centre: [f64; 3]) -> Mesh {
 
 /// The least that a file can hold: one object, no ids.
 fn plain() -> Vec<u8> {
-    let options = Options {
-        profile: Some(Profile::Dop14U8),
-        triangles: Some(TriangleEncoding::F32),
-        ids: false,
-        ..Options::default()
-    };
+    let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::F32).ids(false);
     to_bytes(&cube([0.0; 3]), &options).unwrap().0
 }
 
@@ -45,11 +37,7 @@ fn everything() -> Vec<u8> {
     let object = &mut mesh.objects[0];
     object.triangles.extend([[2, 3, 0], [0, 0, 7], [3, 0, 2]]);
     object.triangle_ids.extend([12, 13, 14]);
-    let options = Options {
-        profile: Some(Profile::Dop14U8),
-        triangles: Some(TriangleEncoding::Packed),
-        ..Options::default()
-    };
+    let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::Packed);
     to_bytes_with(&mesh, &options, "generator=a test\ninput=a cube\n", &mut |_| ()).unwrap().0
 }
 
@@ -58,16 +46,14 @@ fn everything() -> Vec<u8> {
 fn profiles() -> Vec<u8> {
     let (mut records, mut nodes, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
     for (number, profile) in Profile::ALL.into_iter().enumerate() {
-        let options = Options {
-            profile: Some(profile),
-            triangles: Some(TriangleEncoding::ALL[number % 3]),
-            max_error: Some(1e-3),
-            ids: false,
-            ..Options::default()
-        };
+        let options = Options::default()
+            .profile(profile)
+            .triangles(TriangleEncoding::ALL[number % 3])
+            .max_error(1e-3)
+            .ids(false);
         let file = to_bytes(&cube([3.0 * number as f64, 0.0, 0.0]), &options).unwrap().0;
         let sections = seal::take_apart(&file);
-        let record = Layout::read(&file).unwrap().objects[0].record;
+        let record = *Layout::read(&file).unwrap().objects[0].record();
         assert_eq!(record.pages.get(), 1);
         let mut page = sections[1].2.clone();
         seal::put(&mut page, 24, &(leaves.len() as u64 / 64).to_le_bytes());

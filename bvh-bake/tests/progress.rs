@@ -1,9 +1,8 @@
 //! What can be seen of a bake while it goes on: shares that only grow, and are whole when the next step begins.
 
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{FileOptions, Options, Outcome, Progress, Stage, Step, Traffic, bake_files, to_bytes};
+use bvh_bake::{FileBake, Options, Outcome, Progress, Stage, Step, Traffic, to_bytes};
 use std::fs;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A strip of triangles as OBJ, the last of which is twice there.
@@ -20,7 +19,6 @@ fn shares_grow_to_the_whole() {
     let count = 300_000;
     fs::write(&input, strip(count)).unwrap();
     for max_memory in [None, Some(140 << 20)] {
-        let file_options = FileOptions { force: true, max_memory, ..FileOptions::default() };
         let progress = Progress::default();
         assert!(Step::ALL.iter().all(|&step| progress.share(step).is_none()));
         let mut begun = Vec::new();
@@ -37,14 +35,15 @@ fn shares_grow_to_the_whole() {
                     std::thread::yield_now();
                 }
             });
-            let inputs: &[PathBuf] = std::slice::from_ref(&input);
-            let outcome =
-                bake_files(inputs, &output, &Options::default(), &file_options, &progress, &mut |step| {
-                    let shares = begun.iter().map(|&step| progress.share(step));
-                    assert!(shares.into_iter().all(|share| share == Some(1.0)), "{step:?} after {begun:?}");
-                    assert!(progress.share(step).unwrap_or(0.0) < 1.0, "{step:?}");
-                    begun.push(step);
-                });
+            let bake =
+                FileBake::new([&input], &output).force(true).max_memory(max_memory).progress(&progress);
+            let bake = bake.on_step(|step| {
+                let shares = begun.iter().map(|&step| progress.share(step));
+                assert!(shares.into_iter().all(|share| share == Some(1.0)), "{step:?} after {begun:?}");
+                assert!(progress.share(step).unwrap_or(0.0) < 1.0, "{step:?}");
+                begun.push(step);
+            });
+            let outcome = bake.run();
             is_done.store(true, Ordering::Relaxed);
             outcome
         });
@@ -67,8 +66,7 @@ fn what_is_up_to_date_is_read_and_not_written() {
     fs::write(&input, strip(1000)).unwrap();
     let bake = || {
         let progress = Progress::default();
-        let (inputs, options) = (std::slice::from_ref(&input), FileOptions::default());
-        bake_files(inputs, &output, &Options::default(), &options, &progress, &mut |_| ()).unwrap();
+        FileBake::new([&input], &output).progress(&progress).run().unwrap();
         progress.traffic()
     };
     bake();

@@ -1,7 +1,8 @@
-//! Every reader, on small files written here and on a folder of malformed ones.
+//! Tests every reader, on small files that are written here and on a folder of malformed ones.
 
-use bvh_bake::io::{MeshFormat, Place, ReadError, read, read_bytes};
+use bvh_bake::input::{MeshFormat, Place, ReadError, read, read_bytes};
 use bvh_bake::mesh::{Mesh, Object};
+use cbvh_testkit::depth::rounds;
 use proptest::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ fn obj(text: &str) -> Mesh {
     try_bytes(text.as_bytes(), MeshFormat::Obj).unwrap()
 }
 
-/// What is said of a file that has to be refused as invalid.
+/// Returns the error message of a file that must be refused as invalid.
 #[track_caller]
 fn refusal(bytes: &[u8], format: MeshFormat) -> String {
     let error = try_bytes(bytes, format).unwrap_err();
@@ -156,7 +157,7 @@ fn ascii_stl_has_many_solids_and_any_case() {
     assert!(refusal(wrong.as_bytes(), MeshFormat::Stl).contains("expected endloop, found vertex"));
 }
 
-/// A square and a triangle with properties before, between and after those that matter.
+/// Returns a square and a triangle, with properties before, between and after those that matter.
 fn ply(format: &str) -> Vec<u8> {
     let header = format!(
         "ply\r\nformat {format} 1.0\r\ncomment made by hand\r\nelement extra 2\r\nproperty list uint8 int16 what\r\n\
@@ -232,7 +233,8 @@ fn ply_counts_are_checked_before_anything_is_read() {
     assert!(said.contains("line 12: expected a finite coordinate"), "{said}");
 }
 
-/// A document with one buffer: three u8 indices, a zero, three f32 positions, one sparse index, three zeros, one position.
+/// Returns a document with one buffer: three u8 indices, a zero, three f32 positions, one sparse index, three zeros
+/// and one position.
 fn gltf(nodes: &str, primitive: &str, uri: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"meshes":[{{"name":"m","primitives":[{primitive}]}}],
@@ -355,7 +357,7 @@ fn gltf_that_is_no_tree_or_needs_an_extension_is_refused() {
 
 #[test]
 fn gltf_instances_have_a_limit() {
-    // Each node places a mesh whose primitive is drawn again and again.
+    // Many nodes place a mesh that draws its primitive many times.
     let nodes = vec![r#"{"mesh":0}"#; 20_000].join(",");
     let primitives = vec![INDEXED; 20_000].join(",");
     let error =
@@ -389,7 +391,7 @@ fn the_format_is_told_by_name_or_content() {
     assert!(matches!(error, ReadError::Invalid { place: Place::Line(1), .. }));
 }
 
-/// Triangles in a file that can be read, or a part of what is said about one that can't.
+/// For each file, the number of triangles if it can be read, or else a part of the error message.
 const HARD: &[(&str, Result<u64, &str>)] = &[
     ("assimp__3DSMaxExport.STL", Ok(2000)),
     ("assimp__Spider_ascii.stl", Ok(1368)),
@@ -512,7 +514,7 @@ fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
 
 const FORMATS: [MeshFormat; 4] = [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply, MeshFormat::Gltf];
 
-/// What must hold whatever the bytes.
+/// Asserts what must hold for any bytes.
 fn survives(bytes: &[u8], format: MeshFormat) {
     MeshFormat::from_content(bytes);
     match try_bytes(bytes, format) {
@@ -522,7 +524,7 @@ fn survives(bytes: &[u8], format: MeshFormat) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: rounds(200) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {

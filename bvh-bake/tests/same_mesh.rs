@@ -2,7 +2,7 @@
 //!
 //! Text holds each coordinate to the last digit of f64: fewer would be another number.
 
-use bvh_bake::io::{MeshFormat, read_bytes};
+use bvh_bake::input::{MeshFormat, read_bytes};
 use bvh_bake::{Options, to_bytes};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
@@ -128,7 +128,7 @@ fn every_format_gives_the_same_content() {
     let mut contents = Vec::new();
     for profile in Profile::ALL.map(Some).into_iter().chain([None]) {
         for encoding in TriangleEncoding::ALL {
-            let options = Options { profile, triangles: Some(encoding), ..Options::default() };
+            let options = Options::default().profile(profile).triangles(encoding);
             let bake = |mesh| to_bytes(mesh, &options).unwrap();
             let (bytes, report) = bake(&meshes[0].1);
             assert_eq!((report.file.triangles, report.file.duplicates, report.file.degenerate), (601, 1, 1));

@@ -1,15 +1,13 @@
-//! Files that are read piece by piece: whatever is wrong with them is told as of files in memory.
-
-#[allow(dead_code, reason = "others use the rest")]
-#[path = "../../bvh-format/tests/common/seal.rs"]
-mod seal;
+//! Files that are read piece by piece: the errors are those of the same bytes in memory.
 
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{FileError, Options, StoredFile, to_bytes, validate_in_parallel};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::validate::validate;
 use bvh_format::{FormatError, Rule};
-use seal::{put, seal, section};
+use cbvh_testkit::Random;
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::seal::{put, seal, section};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -37,19 +35,11 @@ impl Folder {
     }
 }
 
-/// Splitmix64 of a counter.
-fn random(draw: u64) -> usize {
-    let mut x = draw.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x ^ x >> 31) as usize >> 1
-}
-
 #[test]
 fn golden_and_damaged_files_are_told_alike() {
     let folder = Folder::new();
     let testdata = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
-    let (mut rules, mut draw) = (BTreeSet::new(), 0);
+    let (mut rules, mut random) = (BTreeSet::new(), Random::new(0));
     let mut files = 0;
     for entry in fs::read_dir(testdata).unwrap() {
         let path = entry.unwrap().path();
@@ -62,16 +52,15 @@ fn golden_and_damaged_files_are_told_alike() {
         let told = folder.validate(&golden);
         assert_eq!(told.is_ok(), name.starts_with("ok-"), "{name}");
         rules.extend(told.err().map(|error| error.rule));
-        for round in 0..if name.starts_with("ok-") { 150 } else { 5 } {
+        for round in 0..if name.starts_with("ok-") { rounds(15) } else { 5 } {
             let mut bytes = golden.clone();
             for _ in 0..1 + round % 4 {
-                draw += 4;
-                // Pages, blocks and tables have what is in use at their start.
-                let place = section(&golden, [1, 2, 2, 3, 4, 5][random(draw) % 6]);
+                // The part of a page, block or table that is in use lies at its start.
+                let place = section(&golden, [1, 2, 2, 3, 4, 5][random.below(6)]);
                 let place = if place.len() < 4 { 0..golden.len() } else { place };
-                let at = place.start + random(draw + 1) % place.len().min(700) / 4 * 4;
-                let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, random(draw + 2) as u32];
-                let value = values[random(draw + 3) % values.len()].to_le_bytes();
+                let at = place.start + random.below(place.len().min(700)) / 4 * 4;
+                let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, random.bits() as u32];
+                let value = values[random.below(values.len())].to_le_bytes();
                 if at + 4 <= bytes.len() {
                     put(&mut bytes, at, &value);
                 }
@@ -80,7 +69,7 @@ fn golden_and_damaged_files_are_told_alike() {
                 seal(&mut bytes);
             }
             if round % 10 == 9 {
-                bytes.truncate(random(draw) % bytes.len());
+                bytes.truncate(random.below(bytes.len()));
             }
             rules.extend(folder.validate(&bytes).err().map(|error| error.rule));
         }
@@ -104,7 +93,7 @@ fn sheet(side: u32) -> Mesh {
 fn blocks_longer_than_any_are_told_alike() {
     let folder = Folder::new();
     for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
-        let options = Options { triangles: Some(encoding), ..Options::default() };
+        let options = Options::default().triangles(encoding);
         let (golden, _) = to_bytes(&sheet(400), &options).unwrap();
         assert_eq!(folder.validate(&golden), Ok(()));
         let [nodes, leaves, ids] = [2, 3, 4].map(|kind| section(&golden, kind));

@@ -1,6 +1,6 @@
 //! Meshes that are read piece by piece: the same file, the same counts and the same errors as of meshes in memory.
 
-use bvh_bake::{BakeReport, FileOptions, Options, Outcome, Progress, bake_files};
+use bvh_bake::{BakeReport, FileBake, Options, Outcome};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,12 @@ use std::path::{Path, PathBuf};
 type Told = Result<(Vec<u8>, u64), String>;
 
 fn bake(inputs: &[PathBuf], output: &Path, options: &Options, max_memory: Option<u64>) -> Told {
-    let file_options = FileOptions { force: true, max_memory, ..FileOptions::default() };
-    match bake_files(inputs, output, options, &file_options, &Progress::default(), &mut |_| ()) {
+    match FileBake::new(inputs, output).options(options.clone()).force(true).max_memory(max_memory).run() {
         Ok(Outcome::Baked(report)) => {
             let BakeReport { vertices, .. } = *report;
             Ok((fs::read(output).unwrap(), vertices))
         }
-        Ok(Outcome::UpToDate(_)) => unreachable!("every bake is forced"),
+        Ok(other) => unreachable!("every bake is forced: {other:?}"),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -33,7 +32,7 @@ impl Folder {
         fs::write(&input, bytes).unwrap();
         let mut told = Err(String::new());
         for split_objects in [false, true] {
-            let options = Options { split_objects, ..Options::default() };
+            let options = Options::default().split_objects(split_objects);
             let output = self.0.path().join("out.cbvh");
             let inputs = std::slice::from_ref(&input);
             let in_memory = bake(inputs, &output, &options, None);

@@ -1,11 +1,11 @@
-//! Arrays of integers of a few bits each, least significant bit first.
+//! Bit arrays: integers of a few bits each, stored without gaps, least significant bit first.
 //!
-//! Value `i` of width `w` takes bits `i * w .. (i + 1) * w` of the bytes read as one little-endian
-//! number. Arrays are followed by at least 8 bytes, so that a reader may load 64 bits at once.
+//! Value `i` of width `w` takes bits `i * w .. (i + 1) * w` of the bytes, which are read as one little-endian number. At
+//! least 8 bytes follow each array, so that a reader may load 64 bits at once.
 
 /// Reads `width` bits (at most 32) from bit `at`. Bits beyond the end read as zero.
 #[inline]
-pub fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
+pub(crate) fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
     let word = match bytes.get(at / 8..at / 8 + 8) {
         Some(eight) => {
             let mut word = [0; 8];
@@ -17,16 +17,16 @@ pub fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
     ((word >> (at % 8)) & ((1u64 << width) - 1)) as u32
 }
 
-/// The last bytes of an array as a number.
+/// Reads the last bytes of an array, fewer than eight, as a number.
 #[cold]
 fn read_tail(bytes: &[u8], start: usize) -> u64 {
     let tail = bytes.get(start..).unwrap_or(&[]);
     tail.iter().take(8).rev().fold(0, |word, &byte| word << 8 | u64::from(byte))
 }
 
-/// Appends values to an array.
+/// Writes an array by appending values.
 #[derive(Default)]
-pub struct BitWriter {
+pub(crate) struct BitWriter {
     bytes: Vec<u8>,
     pending: u64,
     pending_bits: u32,
@@ -35,7 +35,7 @@ pub struct BitWriter {
 impl BitWriter {
     /// Appends the low `width` bits (at most 32) of `value`.
     #[inline]
-    pub fn push(&mut self, value: u32, width: u32) {
+    pub(crate) fn push(&mut self, value: u32, width: u32) {
         debug_assert!(width == 32 || value >> width == 0);
         self.pending |= u64::from(value) << self.pending_bits;
         self.pending_bits += width;
@@ -46,8 +46,8 @@ impl BitWriter {
         }
     }
 
-    /// The bytes, the last one filled up with zeros.
-    pub fn finish(mut self) -> Vec<u8> {
+    /// Returns the bytes. Zeros fill the last one.
+    pub(crate) fn finish(mut self) -> Vec<u8> {
         if self.pending_bits > 0 {
             self.bytes.push(self.pending as u8);
         }
@@ -55,8 +55,8 @@ impl BitWriter {
     }
 }
 
-/// Bits needed to hold `value`: 0 for 0.
-pub fn bit_width(value: u32) -> u32 {
+/// The number of bits that `value` needs: 0 for 0.
+pub(crate) fn bit_width(value: u32) -> u32 {
     32 - value.leading_zeros()
 }
 

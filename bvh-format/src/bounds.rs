@@ -1,7 +1,7 @@
-//! Decoded bounds beside tight ones: the proof that every slab contains its triangles, and how loose it is.
+//! Compares decoded bounds with tight ones: proves that each slab contains its triangles, and measures how loose it is.
 //!
-//! Going through an object's pages from the last to the first, the tight k-DOP of every subtree is found from
-//! the stored triangles and compared with what a query decodes.
+//! The functions here take one page at a time, from the last page of an object to the first. They compute the tight
+//! k-DOP of each subtree from the stored triangles, and compare it with what a query decodes.
 
 use crate::decode::decode_child;
 use crate::error::{FormatError, ensure};
@@ -14,21 +14,21 @@ use crate::rule::Rule;
 use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, Links};
 
-/// A child of a treelet, or a subtree root of a page, with its two bounds.
+/// A child of a treelet or a subtree root of a page, with both of its bounds.
 pub struct Bound {
     /// The treelet's slot.
     pub slot: u8,
-    /// The child's place in the treelet; of a subtree root none.
+    /// The number of the child in the treelet; `None` for a subtree root.
     pub child: Option<usize>,
-    /// What a query decodes.
+    /// The bound that a query decodes.
     pub decoded: Kdop,
-    /// What the triangles below need.
+    /// The tightest bound of the triangles below.
     pub tight: Kdop,
 }
 
-/// Visits all subtree roots and children of a page; returns the tight k-DOPs of its roots.
+/// Visits all subtree roots and children of a page, and returns the tight k-DOPs of the roots.
 ///
-/// `below` gives the tight k-DOPs of roots in later pages. The page and its leaf block have been checked.
+/// The page and its leaf block must have been checked. `below` returns the tight k-DOPs of roots in later pages.
 ///
 /// # Errors
 /// The first error of `visit`.
@@ -42,9 +42,10 @@ pub fn visit_bounds(
     let header = page.header();
     let slabs = object.profile.directions().slabs();
     let treelets = usize::from(header.treelets);
-    // Children have higher slots: tight bounds go up from the last slot, decoded ones down.
+    // A child has a higher slot than its parent: tight bounds go up from the last slot, decoded ones down from the first.
     let mut tight = vec![Kdop::EMPTY; treelets];
-    let mut children = vec![[Kdop::EMPTY; 8]; treelets];
+    let width = object.profile.width();
+    let mut children = vec![Kdop::EMPTY; treelets * width];
     for slot in (0..treelets).rev() {
         let links = Links::read(page.treelet(slot as u8));
         for child in 0..links.children() {
@@ -53,11 +54,11 @@ pub fn visit_bounds(
                 Child::Remote(link) => below(page.remote(link)),
                 Child::Leaf { packet, triangles } => {
                     let values = decode_packet(object.triangle_encoding, leaf_block, usize::from(packet));
-                    Kdop::of_points((0..usize::from(triangles)).flat_map(|lane| values.triangle(lane)))
+                    values.kdop(usize::from(triangles), slabs)
                 }
                 Child::Empty => continue,
             };
-            children[slot][child] = kdop;
+            children[slot * width + child] = kdop;
             tight[slot].join(&kdop, slabs);
         }
     }
@@ -72,7 +73,7 @@ pub fn visit_bounds(
         let links = Links::read(treelet);
         for child in 0..links.children() {
             let node = decode_child(object.profile, object.f16_scale, treelet, child, &decoded[slot]);
-            let (held, tight) = (node.to_kdop(slabs), children[slot][child]);
+            let (held, tight) = (node.to_kdop(slabs), children[slot * width + child]);
             visit(Bound { slot: slot as u8, child: Some(child), decoded: held, tight })?;
             if let Child::Treelet(slot) = links.child(child) {
                 decoded[usize::from(slot)] = node;
@@ -83,11 +84,13 @@ pub fn visit_bounds(
     Ok(tight)
 }
 
-/// Checks that every slab decoded in a page contains what is below it. Returns the tight k-DOPs of the
-/// page's subtree roots and how loose the children's slabs are; otherwise as [`visit_bounds`].
+/// Checks that each slab decoded in a page contains the triangles below it.
+///
+/// Returns the tight k-DOPs of the page's subtree roots, and how loose the slabs of the children are. The arguments are
+/// those of [`visit_bounds`].
 ///
 /// # Errors
-/// Rule 35 where a decoded slab cuts its triangles.
+/// Rule 35, if a decoded slab cuts its triangles.
 pub fn check_bounds(
     layout: &Layout,
     object: &Object,
@@ -113,19 +116,19 @@ pub fn check_bounds(
     Ok((tight, inflation))
 }
 
-/// How much wider decoded bounds are than tight ones.
+/// How much wider decoded bounds are than tight ones, as sums over nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Inflation {
-    /// Nodes counted.
+    /// The nodes that have been counted.
     pub nodes: u64,
-    /// Sum over nodes of the mean over slabs of decoded width / tight width.
+    /// The sum over nodes of: decoded width / tight width, as the mean over slabs.
     pub width: f64,
-    /// Sum over nodes of the product over the box's sides of decoded width / tight width.
+    /// The sum over nodes of: decoded width / tight width, as the product over the sides of the box.
     pub volume: f64,
 }
 
 impl Inflation {
-    /// Adds a node; one that is flat in every direction (a point) has no ratio and is not counted.
+    /// Adds a node. A point, which is flat in every direction, has no ratio and is not counted.
     pub fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize) {
         let ratio = |slab: usize| {
             let tight = f64::from(tight.hi[slab]) - f64::from(tight.lo[slab]);
@@ -149,12 +152,12 @@ impl Inflation {
         self.volume += other.volume;
     }
 
-    /// Mean width ratio, 1 without nodes.
+    /// The mean ratio of widths; 1 without nodes.
     pub fn mean_width(&self) -> f64 {
         if self.nodes == 0 { 1.0 } else { self.width / self.nodes as f64 }
     }
 
-    /// Mean volume ratio, 1 without nodes.
+    /// The mean ratio of volumes; 1 without nodes.
     pub fn mean_volume(&self) -> f64 {
         if self.nodes == 0 { 1.0 } else { self.volume / self.nodes as f64 }
     }

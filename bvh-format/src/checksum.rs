@@ -1,13 +1,13 @@
-//! The checksum of everything in a file: XXH3, 64 bits, seed 0.
+//! The checksum that guards every part of a file: XXH3 with 64 bits and seed 0.
 
 use xxhash_rust::xxh3;
 
-/// XXH3-64 with seed 0 of `bytes`. It finds damage, not malice.
+/// Returns the checksum of `bytes`. It detects damage, but not forgery.
 pub fn checksum(bytes: &[u8]) -> u64 {
     xxh3::xxh3_64(bytes)
 }
 
-/// The same checksum over bytes that come in pieces.
+/// Computes the same checksum of bytes that come in pieces.
 #[derive(Default)]
 pub struct Hasher(xxh3::Xxh3);
 
@@ -17,13 +17,13 @@ impl Hasher {
         self.0.update(bytes);
     }
 
-    /// The checksum of all pieces so far, as if they had been one.
+    /// Returns the checksum of all pieces so far, as if they were one.
     pub fn finish(&self) -> u64 {
         self.0.digest()
     }
 }
 
-/// A checksum as people compare them.
+/// Writes a checksum as 16 hexadecimal digits.
 pub(crate) fn hex(sum: u64) -> String {
     format!("{sum:016x}")
 }

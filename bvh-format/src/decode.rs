@@ -1,11 +1,13 @@
-//! The scalar reference decoder of treelets: normative, and the oracle of every vector backend.
+//! The scalar reference decoder of treelets.
+//!
+//! It is written as section 8 of `spec/format.md` reads, and it is the oracle for every vector backend.
 
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
 use crate::slabs::{NodeSlabs, row};
 use crate::treelet::{read_codes, read_ends};
 
-/// Decodes one child of a treelet under its parent's decoded slabs.
+/// Decodes the slabs of one child of a treelet. `parent` holds the decoded slabs of the treelet itself.
 pub fn decode_child(
     profile: Profile,
     object_scale: f32,
@@ -34,9 +36,9 @@ pub fn decode_child(
 mod tests {
     use super::*;
     use crate::kdop::Kdop;
-    use crate::treelet::encode_slabs;
+    use crate::treelet::SlabEncoder;
 
-    /// A random point cloud's k-DOP, nested in the parent cloud's.
+    /// The k-DOPs of eight random point clouds, and of all their points.
     fn clouds(seed: u64) -> (Kdop, Vec<Kdop>) {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut random = || {
@@ -67,7 +69,9 @@ mod tests {
                 let scale = 2f32.powi((seed % 60) as i32 - 30 - 14);
                 let mut treelet = vec![0; profile.treelet_bytes()];
                 let children = &children[..profile.width()];
-                encode_slabs(profile, scale, &parent, children, &mut treelet);
+                let encoder = SlabEncoder::new(profile, scale, &parent);
+                let numbered = children.iter().enumerate();
+                numbered.for_each(|(index, child)| encoder.encode(index, child, &mut treelet));
                 for (index, child) in children.iter().enumerate() {
                     let decoded = decode_child(profile, scale, &treelet, index, &parent);
                     assert!(decoded.to_kdop(slabs).contains(child, slabs), "{}", profile.name());

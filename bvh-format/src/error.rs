@@ -1,11 +1,12 @@
-//! What is wrong with a file: the rule broken, where, what was expected and what was found.
+//! What is wrong with a file: the rule it breaks, the place, what was expected, what was found, and what helps.
 
 use crate::rule::Rule;
 
-/// A breach of the format. One line of text says the rule, the byte offset in the file, what was
-/// expected there and what was found.
+/// A breach of the format. Its text is one line, which names the byte offset in the file, the rule, what was expected
+/// there, what was found, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("byte {offset}: {rule}: expected {expected}, found {found}")]
+#[error("byte {offset}: {rule}: expected {expected}, found {found}; {}", .rule.remedy())]
+#[non_exhaustive]
 pub struct FormatError {
     /// The rule of the specification that does not hold.
     pub rule: Rule,
@@ -13,19 +14,19 @@ pub struct FormatError {
     pub offset: u64,
     /// What the rule asks for at this place.
     pub expected: String,
-    /// What stands there.
+    /// What the file has at this place.
     pub found: String,
 }
 
 impl FormatError {
-    /// Builds an error; the texts are made only on the failing path.
+    /// Builds an error from its rule, its byte offset and two short texts.
     #[cold]
     pub fn new(rule: Rule, offset: u64, expected: impl ToString, found: impl ToString) -> Self {
         Self { rule, offset, expected: expected.to_string(), found: found.to_string() }
     }
 }
 
-/// `Ok` if `found` equals `expected`, else the error of `rule` at `offset`.
+/// Returns `Ok` if `found` equals `expected`, else the error of `rule` at `offset`.
 pub(crate) fn require<T: PartialEq + ToString>(
     rule: Rule,
     offset: u64,
@@ -35,7 +36,7 @@ pub(crate) fn require<T: PartialEq + ToString>(
     if expected == found { Ok(()) } else { Err(FormatError::new(rule, offset, expected, found)) }
 }
 
-/// `Ok` if `holds`, else the error of `rule` at `offset` with lazily made texts.
+/// Returns `Ok` if `holds`, else the error of `rule` at `offset`. The texts are made only for an error.
 pub(crate) fn ensure(
     holds: bool,
     rule: Rule,
@@ -47,4 +48,27 @@ pub(crate) fn ensure(
     }
     let (expected, found) = texts();
     Err(FormatError::new(rule, offset, expected, found))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::validate::validate;
+
+    #[test]
+    fn errors_name_the_remedy() {
+        let text = |bytes: &[u8]| validate(bytes).unwrap_err().to_string();
+        assert_eq!(
+            text(b"solid cube"),
+            "byte 0: R01 (the file starts with the magic bytes): expected the magic bytes of a .cbvh file, \
+             found \"solid cu\"; this is not a .cbvh file: bake it first"
+        );
+        assert!(text(b"").contains("found an empty file; this is not a .cbvh file"));
+        let mut newer = [0; 4096];
+        newer[..10].copy_from_slice(b"\x89cbvh\r\n\x1a\x02\0");
+        assert_eq!(
+            text(&newer),
+            "byte 8: R02 (the major version is one that this reader knows): expected 1, found 2; \
+             bake it again with this cbvh"
+        );
+    }
 }

@@ -1,4 +1,4 @@
-//! The header page: magic, version, lengths and the section table. Byte for byte as in the specification.
+//! The header page: magic bytes, version, length, checksums and the section table.
 
 use crate::checksum::{checksum, hex};
 use crate::error::{FormatError, ensure, require};
@@ -8,13 +8,13 @@ use std::ops::Range;
 use zerocopy::byteorder::little_endian::{U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-/// The first eight bytes of a file. A high bit and both line ends show damage by text transfers.
+/// The first eight bytes of a file. Transfers in text mode damage the high bit or the line ends, and so show.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
-/// Readers refuse another major version.
+/// The major version. Readers refuse any other.
 pub const MAJOR: u16 = 1;
-/// Readers accept any minor version of their major version.
+/// The minor version. Readers accept any minor version of their major version.
 pub const MINOR: u16 = 0;
-/// Most entries of the section table.
+/// The most entries that the section table can have.
 pub const MAX_SECTIONS: usize = 64;
 
 /// The first 64 bytes of a file.
@@ -27,13 +27,13 @@ pub struct Header {
     pub major: U16,
     /// Minor version.
     pub minor: U16,
-    /// Entries in the section table.
+    /// The number of entries in the section table.
     pub sections: U32,
     /// Length of the file in bytes.
     pub file_length: U64,
-    /// XXH3 over the sections that make up the content; see `ContentHasher`.
+    /// XXH3 of the sections that make up the content: see [`ContentHasher`](crate::layout::ContentHasher).
     pub content_checksum: U64,
-    /// XXH3 of the header page with this field zero.
+    /// XXH3 of the header page, in which this field counts as zero.
     pub header_checksum: U64,
     /// Zero.
     pub reserved: [u8; 24],
@@ -43,13 +43,13 @@ pub struct Header {
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
 #[repr(C)]
 pub struct SectionEntry {
-    /// What the section holds: the number of a `SectionKind`.
+    /// The number of a `SectionKind`.
     pub kind: U32,
-    /// 1: a reader that does not know the kind refuses the file; 0: it skips the section.
+    /// 0 if a reader that does not know the kind skips the section; 1 if it refuses the file.
     pub required: U32,
     /// Byte offset in the file, a multiple of the page size.
     pub offset: U64,
-    /// Length in bytes; zeros fill the rest of the last page.
+    /// Length in bytes. Zeros fill the rest of the last page.
     pub length: U64,
     /// XXH3 of the section's bytes.
     pub checksum: U64,
@@ -57,40 +57,41 @@ pub struct SectionEntry {
 
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
 
-/// The sections of version 1.
+/// The sections of version 1. Later minor versions of the format may add kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 #[repr(u32)]
 pub enum SectionKind {
-    /// The object table and the objects' names. Required.
+    /// The object table and the names of the objects. Required.
     Objects = 1,
     /// Pages of treelets. Required.
     Nodes = 2,
     /// Leaf blocks. Required.
     Leaves = 3,
-    /// Id blocks: original triangle numbers. Optional.
+    /// Id blocks: the numbers of the triangles in the input. Optional.
     Ids = 4,
-    /// Numbers of exactly duplicated triangles. Optional.
+    /// The ids of exact duplicates that were left out. Optional.
     Duplicates = 5,
-    /// Where the mesh came from and how it was baked; not part of the content. Optional.
+    /// Where the mesh came from and how it was baked. Optional, and not part of the content.
     Provenance = 6,
 }
 
 impl SectionKind {
-    /// All kinds, by number on disk from 1.
+    /// All kinds in the order of their numbers on disk, which start at 1.
     pub const ALL: [Self; 6] =
         [Self::Objects, Self::Nodes, Self::Leaves, Self::Ids, Self::Duplicates, Self::Provenance];
 
-    /// The kind of a number on disk.
-    pub fn from_number(number: u32) -> Option<Self> {
+    /// Returns the kind of a number on disk.
+    pub(crate) fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|&kind| kind as u32 == number)
     }
 
-    /// True if a reader cannot do without it.
+    /// Returns true if each file has a section of this kind.
     pub fn required(self) -> bool {
         matches!(self, Self::Objects | Self::Nodes | Self::Leaves)
     }
 
-    /// True if the content checksum covers it.
+    /// Returns true if the content checksum covers the section.
     pub fn is_content(self) -> bool {
         self != Self::Provenance
     }
@@ -108,18 +109,18 @@ impl SectionKind {
     }
 }
 
-/// A section of a file by kind and place.
+/// A section of a file: its kind and its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Section {
-    /// What it holds.
+    /// What the section holds.
     pub kind: SectionKind,
-    /// Its bytes in the file.
+    /// The bytes of the file that belong to it.
     pub range: Range<usize>,
-    /// The checksum that the table states.
+    /// The checksum that the section table states.
     pub checksum: u64,
 }
 
-/// Writes a header page. `sections` are in the order of the file.
+/// Writes a header page. `sections` must be in the order of the file.
 pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section]) -> Vec<u8> {
     let header = Header {
         magic: MAGIC,
@@ -148,23 +149,22 @@ pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section
     page
 }
 
-/// Reads and checks the header page and the section table; touches nothing else of the file.
+/// Reads and checks the header page and the section table of a file of `length` bytes that starts with `bytes`.
 ///
 /// # Errors
 /// The first of rules 1 to 9 that does not hold.
-pub fn read_header(bytes: &[u8]) -> Result<(Header, Vec<Section>), FormatError> {
-    read_header_of(bytes, bytes.len() as u64)
-}
-
-/// [`read_header`] of a file of `length` bytes that starts with `bytes`.
-pub(crate) fn read_header_of(bytes: &[u8], length: u64) -> Result<(Header, Vec<Section>), FormatError> {
-    let shown = &bytes[..bytes.len().min(8)];
-    ensure(shown == MAGIC, Rule::Magic, 0, || (format!("{MAGIC:02x?}"), format!("{shown:02x?}")))?;
+pub(crate) fn read_header(bytes: &[u8], length: u64) -> Result<(Header, Vec<Section>), FormatError> {
+    let start = &bytes[..bytes.len().min(MAGIC.len())];
+    ensure(start == MAGIC, Rule::Magic, 0, || {
+        let text = format!("\"{}\"", start.escape_ascii());
+        let found = if start.is_empty() { "an empty file".into() } else { text };
+        ("the magic bytes of a .cbvh file".into(), found)
+    })?;
     let found = bytes.len();
     let page = bytes
         .get(..PAGE)
         .ok_or_else(|| FormatError::new(Rule::HeaderSize, 0, "4096 bytes or more", found))?;
-    // A page of the right length always has a header; the error keeps the code free of panics.
+    // A page always has room for a header; the error keeps the code free of panics.
     let (header, rest) = Header::read_from_prefix(page)
         .map_err(|_| FormatError::new(Rule::HeaderSize, 0, "a header", "none"))?;
     require(Rule::Version, 8, MAJOR, header.major.get())?;
@@ -199,12 +199,14 @@ fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Sect
         match SectionKind::from_number(entry.kind.get()) {
             Some(kind) => {
                 let once = sections.iter().all(|section| section.kind != kind);
-                ensure(once, Rule::SectionOnce, at, || (format!("one {}", kind.name()), "two".into()))?;
+                ensure(once, Rule::SectionOnce, at, || {
+                    (format!("one section of kind {}", kind.name()), "two".into())
+                })?;
                 sections.push(Section { kind, range: start..end, checksum: entry.checksum.get() });
             }
             None => {
                 let skip = entry.required.get() == 0;
-                let unknown = || ("a known kind".into(), entry.kind.to_string());
+                let unknown = || ("a known kind of section".into(), format!("kind {}", entry.kind));
                 ensure(skip, Rule::SectionKnown, at, unknown)?;
             }
         }
@@ -212,7 +214,9 @@ fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Sect
     for kind in SectionKind::ALL.into_iter().filter(|kind| kind.required()) {
         let there = sections.iter().any(|section| section.kind == kind);
         let at = size_of::<Header>() as u64;
-        ensure(there, Rule::SectionOnce, at, || (format!("a section {}", kind.name()), "none".into()))?;
+        ensure(there, Rule::SectionOnce, at, || {
+            (format!("a section of kind {}", kind.name()), "none".into())
+        })?;
     }
     Ok(sections)
 }

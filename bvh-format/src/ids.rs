@@ -1,8 +1,8 @@
-//! The id block of a page: for each lane of each packet the triangle's number in the input.
+//! The id block of a page: the number that each triangle of each packet has in the input.
 //!
-//! `u32` base, `u8` bits of an offset (at most 32), three zero bytes, then one offset a lane,
-//! bit-packed; lanes beyond a packet's triangles hold 0. The block ends with at least 8 spare bytes
-//! and fills whole words of 8 bytes.
+//! A block holds a base and one offset per lane, bit-packed; the offsets of lanes beyond a packet's triangles are 0.
+//! It ends with at least 8 spare bytes and fills whole words of 8 bytes. Section 12 of `spec/format.md` says where each
+//! byte stands.
 
 use crate::bits::{BitWriter, bit_width, read_bits};
 use crate::leaf::PACKET;
@@ -12,15 +12,15 @@ pub const ID_HEAD_BYTES: usize = 8;
 /// Id blocks fill whole words of this many bytes.
 pub const WORD: usize = 8;
 
-/// Makes the id block of a page from the ids of its packets.
-pub fn encode_ids(packets: &[Vec<u32>]) -> Vec<u8> {
-    let all = || packets.iter().flatten().copied();
+/// Makes the id block of a page from the ids of its packets, one to four per packet.
+pub fn encode_ids(packets: &[impl AsRef<[u32]>]) -> Vec<u8> {
+    let all = || packets.iter().flat_map(AsRef::as_ref).copied();
     let base = all().min().unwrap_or(0);
     let bits = bit_width(all().max().unwrap_or(0) - base);
     let mut writer = BitWriter::default();
     for packet in packets {
         for lane in 0..PACKET {
-            writer.push(packet.get(lane).map_or(0, |id| id - base), bits);
+            writer.push(packet.as_ref().get(lane).map_or(0, |id| id - base), bits);
         }
     }
     let mut block = Vec::new();
@@ -32,13 +32,13 @@ pub fn encode_ids(packets: &[Vec<u32>]) -> Vec<u8> {
     block
 }
 
-/// Bytes that the id block of `packets` packets needs at `bits` bits an offset.
-pub fn id_block_bytes(packets: usize, bits: u8) -> usize {
+/// The bytes that the id block of `packets` packets needs, if each offset takes `bits` bits.
+pub(crate) fn id_block_bytes(packets: usize, bits: u8) -> usize {
     let bytes = ID_HEAD_BYTES + (packets * PACKET * usize::from(bits)).div_ceil(8) + 8;
     bytes.next_multiple_of(WORD)
 }
 
-/// The id of a lane; 0 if the block is too short.
+/// Returns the id of the triangle in a lane of a packet, or 0 if the block is shorter than its head.
 pub fn decode_id(block: &[u8], packet: usize, lane: usize) -> u32 {
     let Some(head) = block.first_chunk::<ID_HEAD_BYTES>() else { return 0 };
     let base = u32::from_le_bytes([head[0], head[1], head[2], head[3]]);

@@ -1,11 +1,13 @@
-//! Fixed directions and the k-DOPs over them: the shape that bounds triangles.
+//! Fixed directions, and the k-DOPs over them that bound triangles.
 //!
-//! A direction set is a prefix of one list of 13 integer vectors: 3 axes, then 4 cube diagonals,
-//! then 6 face diagonals, so that the sets nest (6 in 14 in 26). Directions are *not* normalised:
-//! a slab along `(1, 1, 1)` holds `x + y + z`. That keeps sums of coordinates free of products.
+//! All direction sets are prefixes of one list of 13 integer vectors, so they nest: 3 axes, then 4 cube diagonals, then
+//! 6 face diagonals give k = 6, 14 and 26. Directions are *not* normalised: a slab along `(1, 1, 1)` bounds `x + y + z`.
+//! That keeps projections free of products.
 //!
-//! A k-DOP here is a pair of `f32` bounds per direction, rounded outward: the true extent of the
-//! geometry lies within `[lo, hi]` along each direction.
+//! A k-DOP is a pair of `f32` ends per direction, rounded outward: along each direction, the true extent of the geometry
+//! lies within `[lo, hi]`.
+
+use crate::leaf::{PACKET, Packet, from_ordered, to_ordered};
 
 /// The list of directions. `DIRECTIONS[..3]` are a box's, `[..7]` dop14's, `[..13]` dop26's.
 pub const DIRECTIONS: [[i8; 3]; 13] = [
@@ -24,19 +26,22 @@ pub const DIRECTIONS: [[i8; 3]; 13] = [
     [0, 1, -1],
 ];
 
-/// How many directions a node is bounded along; k counts both ends of each slab.
+/// The directions along which a node is bounded; k counts both ends of each slab.
+///
+/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that whoever must do
+/// something for each set does not compile until a new one is dealt with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum DirectionSet {
-    /// 3 slabs: the axis-aligned box.
+    /// 3 slabs: an axis-aligned box.
     Dop6,
-    /// 7 slabs: box and cube diagonals.
+    /// 7 slabs: a box and the cube diagonals.
     Dop14,
-    /// 13 slabs: box, cube diagonals and face diagonals.
+    /// 13 slabs: a box, the cube diagonals and the face diagonals.
     Dop26,
 }
 
 impl DirectionSet {
-    /// Number of slabs: k / 2.
+    /// The number of slabs: k / 2.
     pub const fn slabs(self) -> usize {
         match self {
             Self::Dop6 => 3,
@@ -45,13 +50,13 @@ impl DirectionSet {
         }
     }
 
-    /// The larger of two sets; every other set is a part of it.
+    /// Returns the larger of two sets, which contains the other.
     pub fn max(self, other: Self) -> Self {
         if self >= other { self } else { other }
     }
 }
 
-/// A k-DOP over all 13 directions; code for a smaller set leaves the rest alone.
+/// A k-DOP with slabs along all 13 directions. Code for a smaller set neither reads nor writes the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kdop {
     /// Lower ends, rounded down.
@@ -61,14 +66,57 @@ pub struct Kdop {
 }
 
 impl Kdop {
-    /// The bound of nothing: joins with any other to that other.
+    /// The bound of nothing. Joined with another k-DOP it gives that k-DOP.
     pub const EMPTY: Self = Self { lo: [f32::INFINITY; 13], hi: [f32::NEG_INFINITY; 13] };
 
-    /// The k-DOP of points: the nearest `f32` outside their exact projections.
+    /// The first `slabs` slabs of the k-DOP of a packet's lanes, as [`of_points`](Self::of_points) finds them.
     ///
-    /// Projections add at most three `f32`. Sums are taken in `f64` with the error of each addition
-    /// recovered exactly (Knuth's two-sum). Where no sum can have an error, as nearly everywhere, none is
-    /// looked for.
+    /// Twelve points at a time along one direction after the other: compilers turn the loops into vector code.
+    pub(crate) fn of_lanes(packet: &Packet, slabs: usize) -> Self {
+        let axes: &[[[f32; PACKET]; 3]; 3] = &packet.corners;
+        let coordinates: [[f32; 12]; 3] =
+            [0, 1, 2].map(|axis| std::array::from_fn(|place| axes[place / PACKET][axis][place % PACKET]));
+        if !all_sums_are_exact(&coordinates) {
+            let points = (0..12).map(|place| [0, 1, 2].map(|axis| coordinates[axis][place]));
+            let (mut kdop, whole) = (Self::EMPTY, Self::of_points(points));
+            kdop.join(&whole, slabs);
+            return kdop;
+        }
+        let [x, y, z] = coordinates.map(|axis| axis.map(f64::from));
+        let (mut lo, mut negated_hi) = ([f64::INFINITY; 13], [f64::INFINITY; 13]);
+        let mut put = |slab: usize, values: [f64; 12]| {
+            let (least, largest) = ends(&values);
+            (lo[slab], negated_hi[slab]) = (least, -largest);
+        };
+        let of_two = |a: &[f64; 12], b: &[f64; 12], sign: f64| -> [f64; 12] {
+            std::array::from_fn(|place| a[place] + sign * b[place])
+        };
+        put(0, x);
+        put(1, y);
+        put(2, z);
+        if slabs > 3 {
+            let (sum, difference) = (of_two(&x, &y, 1.0), of_two(&x, &y, -1.0));
+            put(3, of_two(&sum, &z, 1.0));
+            put(4, of_two(&sum, &z, -1.0));
+            put(5, of_two(&difference, &z, 1.0));
+            put(6, of_two(&z, &difference, -1.0));
+            if slabs > 7 {
+                put(7, sum);
+                put(8, of_two(&x, &z, 1.0));
+                put(9, of_two(&y, &z, 1.0));
+                put(10, difference);
+                put(11, of_two(&x, &z, -1.0));
+                put(12, of_two(&y, &z, -1.0));
+            }
+        }
+        Self { lo: lo.map(round_down), hi: negated_hi.map(|end| -round_down(end)) }
+    }
+
+    /// Returns the tightest k-DOP of points: each end is the nearest `f32` outside their exact projections.
+    ///
+    /// A projection adds at most three `f32` numbers. Sums are taken in `f64`, and the error of each addition is
+    /// recovered exactly (Knuth's two-sum). For nearly all points the sums are known to be exact, and this is skipped.
+    /// Coordinates must be finite. Without points the result is [`Kdop::EMPTY`].
     pub fn of_points(points: impl IntoIterator<Item = [f32; 3]>) -> Self {
         let (mut lo, mut hi) = ([f64::INFINITY; 13], [f64::NEG_INFINITY; 13]);
         for point in points {
@@ -92,30 +140,30 @@ impl Kdop {
         Self { lo: lo.map(round_down), hi: hi.map(|end| -round_down(-end)) }
     }
 
-    /// Grows the first `slabs` slabs by another k-DOP.
+    /// Grows the first `slabs` slabs to contain those of another k-DOP.
     #[inline]
     pub fn join(&mut self, other: &Self, slabs: usize) {
         for slab in 0..slabs {
-            // Not `min` and `max`: there is no NaN to care for.
+            // `min` and `max` would take extra instructions for NaN, which does not occur here.
             let (lo, hi) = (other.lo[slab], other.hi[slab]);
             self.lo[slab] = if lo < self.lo[slab] { lo } else { self.lo[slab] };
             self.hi[slab] = if hi > self.hi[slab] { hi } else { self.hi[slab] };
         }
     }
 
-    /// True if the first `slabs` slabs of `self` contain those of `inner`.
+    /// Returns true if the first `slabs` slabs contain those of `inner`.
     pub fn contains(&self, inner: &Self, slabs: usize) -> bool {
         (0..slabs).all(|slab| self.lo[slab] <= inner.lo[slab] && self.hi[slab] >= inner.hi[slab])
     }
 
-    /// Surface area of the axis-aligned box in the first three slabs, in square mesh units.
+    /// The surface area of the axis-aligned box in the first three slabs, in square mesh units.
     pub fn box_area(&self) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|a| f64::from(self.hi[a]) - f64::from(self.lo[a]));
         2.0 * (x * y + y * z + z * x)
     }
 }
 
-/// The directions as factors.
+/// The directions in `f64`, as factors of coordinates.
 pub const FACTORS: [[f64; 3]; 13] = {
     let mut factors = [[0.0; 3]; 13];
     let mut slab = 0;
@@ -127,21 +175,21 @@ pub const FACTORS: [[f64; 3]; 13] = {
     factors
 };
 
-/// True if sums and differences of a point's coordinates are surely exact in `f64`: the coordinates that are
-/// not 0 are less than 2^28 apart in magnitude. Sums of three then have no more than the 53 bits from two
-/// above the largest to the last of the smallest.
+/// Returns true if all sums and differences of a point's coordinates are certainly exact in `f64`: the coordinates that
+/// are not 0 differ in magnitude by less than a factor of 2^28. A sum of three then has at most the 53 bits from two
+/// above the highest bit of the largest to the lowest bit of the smallest.
 #[inline(always)]
 fn sums_are_exact(point: [f32; 3]) -> bool {
     let magnitudes = point.map(|value| value.to_bits() & 0x7fff_ffff);
     let largest = magnitudes.map(|bits| bits >> 23);
-    // 0 wraps to more than any; a power of two counts as half of itself.
+    // 0 wraps around and exceeds all others; a power of two counts as half of itself.
     let smallest = magnitudes.map(|bits| bits.wrapping_sub(1) >> 23);
     let [largest, smallest] =
         [largest.into_iter().max(), smallest.into_iter().min()].map(Option::unwrap_or_default);
     largest <= smallest + 27
 }
 
-/// The projections of a point onto all directions, each exact if all sums are.
+/// Projects a point onto all directions. Each projection is exact if all sums are.
 #[inline(always)]
 fn projections([x, y, z]: [f64; 3]) -> [f64; 13] {
     let (sum, difference) = (x + y, x - y);
@@ -149,31 +197,64 @@ fn projections([x, y, z]: [f64; 3]) -> [f64; 13] {
     [x, y, z, a, b, c, d, sum, x + z, y + z, difference, x - z, y - z]
 }
 
-/// The nearest `f32` at or below.
-fn round_down(value: f64) -> f32 {
-    let nearest = value as f32;
-    if f64::from(nearest) > value { nearest.next_down() } else { nearest }
+/// True if all sums of the coordinates of twelve points are surely exact, as [`sums_are_exact`] says of one point.
+#[inline(always)]
+fn all_sums_are_exact(coordinates: &[[f32; 12]; 3]) -> bool {
+    let (mut largest, mut smallest) = ([0; 12], [u32::MAX; 12]);
+    for axis in coordinates {
+        for place in 0..12 {
+            let bits = axis[place].to_bits() & 0x7fff_ffff;
+            largest[place] = largest[place].max(bits >> 23);
+            smallest[place] = smallest[place].min(bits.wrapping_sub(1) >> 23);
+        }
+    }
+    (0..12).all(|place| largest[place] <= smallest[place] + 27)
 }
 
-/// The nearest `f64` at or below and at or above `a + b + c`, for `f32` values.
+/// The least and the largest of twelve values that are numbers.
+#[inline(always)]
+fn ends(values: &[f64; 12]) -> (f64, f64) {
+    // Four chains each: minima and maxima wait for those before them.
+    let [mut lo, mut hi] = [[values[0], values[1], values[2], values[3]]; 2];
+    for four in values[4..].as_chunks::<4>().0 {
+        for lane in 0..4 {
+            lo[lane] = if four[lane] < lo[lane] { four[lane] } else { lo[lane] };
+            hi[lane] = if four[lane] > hi[lane] { four[lane] } else { hi[lane] };
+        }
+    }
+    let less = |a: f64, b: f64| if b < a { b } else { a };
+    let more = |a: f64, b: f64| if b > a { b } else { a };
+    (less(less(lo[0], lo[1]), less(lo[2], lo[3])), more(more(hi[0], hi[1]), more(hi[2], hi[3])))
+}
+
+/// Returns the nearest `f32` at or below a value.
+#[inline(always)]
+fn round_down(value: f64) -> f32 {
+    let nearest = value as f32;
+    // The ordered integer below is that of the next number below, but for 0.0. No sum is rounded up to that: sums are
+    // multiples of the smallest `f32`. Without a branch compilers round several ends at once.
+    from_ordered(to_ordered(nearest) - i32::from(f64::from(nearest) > value))
+}
+
+/// Returns the nearest `f64` at or below, and at or above, the exact sum of three `f32` numbers.
 fn sum_of_three(a: f64, b: f64, c: f64) -> (f64, f64) {
     let (sum_ab, error_ab) = two_sum(a, b);
     let (sum, error_c) = two_sum(sum_ab, c);
-    // The errors may count for more than the sum, where c cancels a + b.
+    // Where c cancels a + b, the errors may be larger than the sum.
     let (error, error_of_error) = two_sum(error_ab, error_c);
     let (sum, rest) = two_sum(sum, error);
-    // `rest` is half of the spacing of `sum` at most. There is an error of the error only if `error_c` is not 0;
-    // then c has cancelled less than half of the sum (Sterbenz), `error` is below 2^-51 of it, and the error of
-    // that far below half of the spacing. So the next number is beyond all that is left.
+    // `rest` is at most half of the spacing of numbers at `sum`. `error_of_error` is 0 unless `error_c` is not 0. In that
+    // case c has cancelled less than half of the sum (Sterbenz), `error` is below 2^-51 of the sum, and its own error is
+    // far below half of the spacing. So the next number lies beyond all that is left.
     let rest = rest + error_of_error;
     let below = if rest < 0.0 { sum.next_down() } else { sum };
     let above = if rest > 0.0 { sum.next_up() } else { sum };
     (below, above)
 }
 
-/// `a + b` rounded, and the exact error of that rounding.
+/// Returns `a + b` rounded, and the exact error of that rounding.
 #[inline(always)]
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     (sum, (a - (sum - b_part)) + (b - b_part))
@@ -183,8 +264,8 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// A test's number in units of 2^-100: points are multiples of 2^-62, and so are sums, of which those that
-    /// aren't 0 have neighbours that are multiples of 2^-86.
+    /// A number of the test in units of 2^-100. Points and sums are multiples of 2^-62, and the neighbours of sums that
+    /// are not 0 are multiples of 2^-86.
     fn units(value: f32) -> i128 {
         (f64::from(value) * 2f64.powi(100)) as i128
     }
@@ -198,7 +279,7 @@ mod tests {
             (((state >> 20) as u32 & 0xff_ffff) as f32 - 8388608.0) * 2f32.powi(exponent - 24)
         };
         let mut points: Vec<[f32; 3]> = (0..20_000).map(|_| [random(), random(), random()]).collect();
-        // One coordinate cancels another; the third is below the last bit of either, or of their sum.
+        // One coordinate cancels another, and the third lies below the last bit of either or of their sum.
         for _ in 0..5_000 {
             let (x, tiny) = (random(), (random() * 32.0).round() * 2f32.powi(-62));
             let nearly = if random() > 0.0 { x } else { x.next_up() };
@@ -249,6 +330,33 @@ mod tests {
                     })
                 });
                 assert!(errors.as_flattened().as_flattened().iter().all(|&error| error == 0.0), "{point:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_kdop_of_lanes_is_that_of_their_points() {
+        let mut state = 3u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state >> 33
+        };
+        for round in 0..20_000 {
+            // Coordinates close to each other in magnitude, far apart, and some of them 0.
+            let spread = [1, 8, 60][round % 3];
+            let mut coordinate = || match random() % 5 {
+                0 => 0.0,
+                _ => (random() as f32 - 2f32.powi(30)) * 2f32.powi((random() % spread) as i32 - 60),
+            };
+            let triangles: Vec<[[f32; 3]; 3]> =
+                (0..1 + round % 4).map(|_| [(); 3].map(|()| [(); 3].map(|()| coordinate()))).collect();
+            let points = Kdop::of_points(triangles.as_flattened().iter().copied());
+            for slabs in [3, 7, 13] {
+                let mut expected = Kdop::EMPTY;
+                expected.join(&points, slabs);
+                let lanes = Packet::new(&triangles).kdop(triangles.len(), slabs);
+                let bits = |kdop: Kdop| (kdop.lo.map(f32::to_bits), kdop.hi.map(f32::to_bits));
+                assert_eq!(bits(lanes), bits(expected), "{triangles:?}");
             }
         }
     }

@@ -1,20 +1,20 @@
-//! From the bytes of a file to its sections, objects, pages and blocks, without copying any.
+//! Finds the sections, objects, pages and blocks of a file in its bytes, without copying any.
 
 use crate::checksum::hex;
 use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
-use crate::header::{Header, Section, SectionKind, read_header_of};
+use crate::header::{Header, Section, SectionKind, read_header};
 use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
 use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
 use crate::rule::Rule;
-use crate::source::{Block, Source};
+use crate::source::{Block, PageBytes, Source};
 use std::ops::Range;
 use zerocopy::FromBytes;
 use zerocopy::little_endian::U32;
 
-/// Where everything is in a file. Made by reading the header page and the object table alone.
+/// Where everything is in a file. Reading it takes the header page and the object table, and nothing else.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Major and minor version.
@@ -32,8 +32,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Opens a file: header page, section table and object table. O(objects), whatever the
-    /// file's size.
+    /// Reads and checks the header page, the section table and the object table of a file in memory. The cost grows
+    /// with the number of objects, and not with the length of the file.
     ///
     /// # Errors
     /// The first of rules 1 to 9 and 11 to 14 that does not hold, or rule 10 for the object table.
@@ -41,20 +41,20 @@ impl Layout {
         Self::read_from(bytes)
     }
 
-    /// Opens a file wherever its bytes are: reads the header page, or what there is of it, then the object section.
+    /// Does the same for a file whose bytes are read piece by piece: first the header page, then the object section.
     ///
     /// # Errors
-    /// As [`Layout::read`], and those of the source.
+    /// The errors of [`Layout::read`], and those of the source.
     pub fn read_from<S: Source + ?Sized>(source: &S) -> Result<Self, S::Error> {
         let length = source.length();
         let head = source.read(0..length.min(PAGE as u64) as usize)?;
-        let (header, sections) = read_header_of(&head, length)?;
+        let (header, sections) = read_header(&head, length)?;
         let objects = sections.iter().find(|section| section.kind == SectionKind::Objects);
         let table = source.read(objects.map_or(0..0, |section| section.range.clone()))?;
         Ok(Self::from_tables(&header, sections, &table)?)
     }
 
-    /// The layout of checked sections and the bytes of the object section.
+    /// Makes the layout from checked sections and the bytes of the object section.
     fn from_tables(
         header: &Header,
         sections: Vec<Section>,
@@ -67,7 +67,7 @@ impl Layout {
         // `read_header` has made sure of the required sections.
         let needed = |kind| find(kind).unwrap_or(0..0);
         let (nodes, table) = (needed(SectionKind::Nodes), needed(SectionKind::Objects));
-        // Origins and exponents have no page checksum to guard them.
+        // No page checksum guards origins and exponents, so the checksum of the section does.
         let stated = sections.iter().find(|section| section.kind == SectionKind::Objects);
         let stated = stated.map_or(0, |section| section.checksum);
         let found = checksum(object_table);
@@ -92,58 +92,103 @@ impl Layout {
         })
     }
 
-    /// Number of pages in the node section.
+    /// The number of pages in the node section.
     pub fn page_count(&self) -> u32 {
         (self.nodes.len() / PAGE) as u32
     }
 
-    /// Byte offset of a page in the file.
+    /// The byte offset of a page in the file.
     pub fn page_offset(&self, page: u32) -> u64 {
         self.nodes.start as u64 + u64::from(page) * PAGE as u64
     }
 
-    /// Where a page is in the file; `None` beyond the last.
+    /// The bytes of the file that are a page; `None` beyond the last page.
     #[inline]
     pub(crate) fn page_range(&self, page: u32) -> Option<Range<usize>> {
         units_within(&self.nodes, page.into(), 1, PAGE)
     }
 
-    /// The bytes of a page; `None` beyond the last.
+    /// The bytes of a page; `None` beyond the last page.
     #[inline]
     pub fn page_bytes<'a>(&self, bytes: &'a [u8], page: u32) -> Option<&'a [u8; PAGE]> {
         bytes.get(self.page_range(page)?)?.first_chunk()
     }
 
-    /// Where the leaf block of a page is in the file; `None` if that is not within the leaf section.
+    /// Reads a page, without checking it.
+    ///
+    /// # Errors
+    /// Rule 13 beyond the last page, and the errors of the source.
+    pub fn read_page<'a, S: Source + ?Sized>(
+        &self,
+        source: &'a S,
+        number: u32,
+    ) -> Result<PageBytes<'a>, S::Error> {
+        let at = self.page_offset(number);
+        let range = self.page_range(number).ok_or_else(|| {
+            FormatError::new(
+                Rule::ObjectPages,
+                at,
+                "a page within the node section",
+                format!("page {number}"),
+            )
+        })?;
+        Ok(PageBytes::new(source.read(range)?))
+    }
+
+    /// The bytes of the file that are the leaf block of a page; `None` if the header leads out of the leaf section.
     #[inline]
     pub(crate) fn leaf_range(&self, header: &PageHeader) -> Option<Range<usize>> {
         units_within(&self.leaves, header.leaf_line.get(), header.leaf_lines.get(), LINE)
     }
 
-    /// The leaf block of a page, empty if the page's header is nonsense.
+    /// The leaf block of a page; empty if the header leads out of the leaf section.
     #[inline]
     pub fn leaf_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
         self.leaf_range(header).and_then(|range| bytes.get(range)).unwrap_or(&[])
     }
 
-    /// Where the id block of a page is in the file; `None` if that is not within the id section.
+    /// Reads the leaf block of a page, without checking it. It is empty if the header leads out of the leaf section.
+    ///
+    /// # Errors
+    /// The errors of the source.
+    pub fn read_leaf_block<'a, S: Source + ?Sized>(
+        &self,
+        source: &'a S,
+        header: &PageHeader,
+    ) -> Result<Block<'a>, S::Error> {
+        Block::read(source, self.leaf_range(header))
+    }
+
+    /// The bytes of the file that are the id block of a page; `None` if the header leads out of the id section.
     #[inline]
     pub(crate) fn id_range(&self, header: &PageHeader) -> Option<Range<usize>> {
         units_within(self.ids.as_ref()?, header.id_word.get(), header.id_words.get(), WORD)
     }
 
-    /// The id block of a page, empty without ids.
+    /// The id block of a page; empty if there are no ids.
     #[inline]
     pub fn id_block<'a>(&self, bytes: &'a [u8], header: &PageHeader) -> &'a [u8] {
         self.id_range(header).and_then(|range| bytes.get(range)).unwrap_or(&[])
     }
 
-    /// True if the file holds original triangle ids.
+    /// Reads the id block of a page, without checking it. It is empty if there are no ids.
+    ///
+    /// # Errors
+    /// The errors of the source.
+    pub fn read_id_block<'a, S: Source + ?Sized>(
+        &self,
+        source: &'a S,
+        header: &PageHeader,
+    ) -> Result<Block<'a>, S::Error> {
+        Block::read(source, self.id_range(header))
+    }
+
+    /// Returns true if the file holds the ids of its triangles.
     pub fn has_ids(&self) -> bool {
         self.ids.is_some()
     }
 
-    /// The pairs (kept id, id of an exact duplicate left out), ascending.
+    /// The ascending pairs of a kept id and the id of an exact duplicate that was left out.
     pub fn duplicate_ids<'a>(&self, bytes: &'a [u8]) -> &'a [[U32; 2]] {
         let section = self.duplicates.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
         let whole = section.len() / 8 * 8;
@@ -165,7 +210,7 @@ impl Layout {
         pairs.check(section)
     }
 
-    /// Checks the place, size and checksum of a page's leaf block. Cost: one pass over its bytes.
+    /// Checks the place, size and checksum of a page's leaf block, in one pass over its bytes.
     ///
     /// # Errors
     /// Rules 26 to 28.
@@ -173,7 +218,7 @@ impl Layout {
         self.check_leaf_block_of(&Block::of_bytes(self.leaf_block(bytes, page.header())), page, object)
     }
 
-    /// [`Layout::check_leaf_block`] of a block that has been read.
+    /// Does the same as [`Layout::check_leaf_block`] for a block that has been read.
     ///
     /// # Errors
     /// Rules 26 to 28.
@@ -188,11 +233,14 @@ impl Layout {
         let lines = header.leaf_lines.get() as usize;
         let packets = usize::from(header.packets.get());
         let there = |needed: usize| {
-            // Not multiplied: a stated number may be anything.
+            // The stated number may be anything: multiplying it could overflow.
             let length = block.length();
             let holds = length / LINE == lines && length == needed.next_multiple_of(LINE);
             ensure(holds, Rule::LeafPlace, at + 24, || {
-                (format!("a block of {needed} bytes"), format!("{length} of {lines} lines"))
+                (
+                    format!("a block of {needed} bytes in whole lines"),
+                    format!("{length} bytes, stated as {lines} lines"),
+                )
             })
         };
         if object.triangle_encoding == TriangleEncoding::F32 {
@@ -225,11 +273,11 @@ impl Layout {
         self.check_id_block_of(&Block::of_bytes(self.id_block(bytes, page.header())), page)
     }
 
-    /// [`Layout::check_id_block`] of a block that has been read.
+    /// Does the same as [`Layout::check_id_block`] for a block that has been read.
     ///
     /// # Errors
     /// Rules 31 and 32.
-    pub fn check_id_block_of(&self, block: &Block, page: &Page) -> Result<(), FormatError> {
+    pub(crate) fn check_id_block_of(&self, block: &Block, page: &Page) -> Result<(), FormatError> {
         let header = page.header();
         let at = self.page_offset(header.page_number.get());
         let words = header.id_words.get() as usize;
@@ -241,14 +289,14 @@ impl Layout {
         let needed = id_block_bytes(usize::from(header.packets.get()), bits);
         let whole = length / WORD == words && length == needed && bits <= 32;
         ensure(whole && length >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
-            (format!("a block of {needed} bytes"), format!("{length} of {words} words"))
+            (format!("a block of {needed} bytes"), format!("{length} bytes, stated as {words} words"))
         })?;
         let sum = header.id_checksum.get();
         require(Rule::IdChecksum, at + 16, hex(sum), hex(block.checksum()))
     }
 }
 
-/// `count` units of `unit` bytes from unit `first` of a section; `None` if they are not all there.
+/// The bytes of `count` units from unit `first` of a section; `None` if they do not all lie within it.
 #[inline]
 fn units_within(section: &Range<usize>, first: u64, count: u32, unit: usize) -> Option<Range<usize>> {
     let start = usize::try_from(first).ok()?.checked_mul(unit)?.checked_add(section.start)?;
@@ -256,12 +304,12 @@ fn units_within(section: &Range<usize>, first: u64, count: u32, unit: usize) -> 
     (end <= section.end).then_some(start..end)
 }
 
-/// Whether duplicate ids, which come in whole pairs but for the end, ascend.
+/// Checks that the pairs of duplicate ids ascend. Bytes come in pieces, of which all but the last hold whole pairs.
 #[derive(Default)]
 pub(crate) struct PairsInOrder {
     last: Option<[u32; 2]>,
-    others: bool,
-    /// Bytes that are no pair.
+    descending: bool,
+    /// Bytes that make no whole pair.
     left: usize,
 }
 
@@ -273,24 +321,26 @@ impl PairsInOrder {
         for pair in pairs {
             let [kept, dropped]: [U32; 2] = zerocopy::transmute!(*pair);
             let pair = [kept.get(), dropped.get()];
-            self.others |= pair[0] >= pair[1] || self.last >= Some(pair);
+            self.descending |= pair[0] >= pair[1] || self.last >= Some(pair);
             self.last = Some(pair);
         }
     }
 
-    /// After the last bytes of the section.
+    /// Returns the outcome, after the last bytes of the section.
     ///
     /// # Errors
     /// Rule 36.
     pub(crate) fn check(&self, section: &Section) -> Result<(), FormatError> {
         let at = section.range.start as u64;
         require(Rule::DuplicateIds, at, 0, self.left)?;
-        ensure(!self.others, Rule::DuplicateIds, at, || ("ascending pairs".into(), "others".into()))
+        ensure(!self.descending, Rule::DuplicateIds, at, || {
+            ("ascending pairs".into(), "pairs that do not ascend".into())
+        })
     }
 }
 
-/// The content checksum: XXH3 over kind (`u32`), length (`u64`) and bytes of each content section in
-/// the order of the file. Equal meshes baked with equal options have equal contents.
+/// Computes the content checksum: XXH3 of the kind (`u32`), the length (`u64`) and the bytes of each content section, in
+/// the order of the file. Equal meshes that are baked with equal options have equal content checksums.
 #[derive(Default)]
 pub struct ContentHasher(Hasher);
 
@@ -306,7 +356,7 @@ impl ContentHasher {
         self.0.update(bytes);
     }
 
-    /// The checksum.
+    /// Returns the checksum.
     pub fn finish(&self) -> u64 {
         self.0.finish()
     }

@@ -1,35 +1,21 @@
-//! Leaf packets: up to four triangles in lane order, and the block of all packets of a page.
+//! Leaf packets of up to four triangles in lane order, and the block of all packets of a page.
 //!
-//! Two encodings of a block. `F32` holds plain lanes, 144 bytes a packet: corner by corner, axis by
-//! axis, four lanes. `Packed` (and `Quantized`, the same bytes after the baker has moved the
-//! vertices to a grid) holds one pool of the distinct vertices of the page, each coordinate as an
-//! offset of a few bits from the block's base, and three pool indices a triangle:
+//! A block has one of two forms. `F32` holds plain lanes, 144 bytes per packet: corner by corner, axis by axis, four
+//! lanes. `Packed` (and `Quantized`, which holds the same bytes after the baker has moved the vertices to a grid) holds
+//! a [`PackedHead`], one pool of the distinct vertices of the page, and three pool indices per triangle. Each coordinate
+//! in the pool is an offset of a few bits from the block's base. Section 11.2 of `spec/format.md` says where each byte
+//! stands.
 //!
-//! | bytes | what |
-//! |---|---|
-//! | 0..2 | `u16` vertices in the pool |
-//! | 2 | `u8` bits of an index, at most 16 |
-//! | 3 | `u8` bit `a` set: axis `a` is fixed-point, else ordered |
-//! | 4..7 | `u8` bits of an offset per axis, at most 32 |
-//! | 7 | 0 |
-//! | 8..20 | `i32` base per axis |
-//! | 20..23 | `i8` exponent per axis (fixed-point), else 0 |
-//! | 23 | 0 |
-//! | 24..28 | `u32` byte offset of the index array in the block |
-//! | 28..32 | 0 |
-//! | 32.. | pool: per vertex the offsets of x, y, z, bit-packed |
-//! | | index array: per packet 12 indices, corner by corner, four lanes, bit-packed |
-//!
-//! An *ordered* coordinate is the `f32` whose bits, made monotone (`b ^ ((b >> 31) >>> 1)`), are
-//! base + offset; a *fixed-point* one is (base + offset) * 2^exponent. Both are exact. Lanes beyond
-//! a packet's triangles repeat its last triangle. A block ends with at least 8 spare bytes and fills
-//! whole lines of 64 bytes.
+//! A coordinate is *ordered* or *fixed-point*, whichever takes fewer bits on its axis. The bits of an ordered `f32`,
+//! made monotone (`b ^ ((b >> 31) >>> 1)`), are base + offset. A fixed-point one is (base + offset) · 2^exponent. Both
+//! are exact. Lanes beyond a packet's triangles repeat its last triangle. A block ends with at least 8 spare bytes and
+//! fills whole lines of 64 bytes.
 
 use crate::bits::{BitWriter, bit_width, read_bits};
+use crate::kdop::Kdop;
 use bytemuck::{Pod, Zeroable};
-use std::collections::HashMap;
 
-/// Triangles in a full packet.
+/// Triangles in a full leaf packet.
 pub const PACKET: usize = 4;
 /// Bytes of a packet of plain lanes.
 pub const F32_PACKET_BYTES: usize = 144;
@@ -39,23 +25,26 @@ pub const PACKED_HEAD_BYTES: usize = 32;
 pub const LINE: usize = 64;
 
 /// How the triangles of an object are stored.
+///
+/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that whoever must do
+/// something for each encoding does not compile until a new one is dealt with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum TriangleEncoding {
-    /// Plain `f32` lanes: the fastest to load.
+    /// Plain `f32` lanes, the fastest to load.
     F32 = 0,
     /// The same values bit for bit in fewer bytes.
     Packed = 1,
-    /// Packed, after moving vertices to a grid by a stated error.
+    /// Packed, after the baker has moved the vertices to a grid, by no more than a stated error.
     Quantized = 2,
 }
 
 impl TriangleEncoding {
-    /// All encodings, by number on disk.
+    /// All encodings in the order of their numbers on disk.
     pub const ALL: [Self; 3] = [Self::F32, Self::Packed, Self::Quantized];
 
-    /// The encoding of a number on disk.
-    pub fn from_number(number: u8) -> Option<Self> {
+    /// Returns the encoding of a number on disk.
+    pub(crate) fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()
     }
 
@@ -78,7 +67,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// A packet of one to four triangles; the lanes beyond repeat the last.
+    /// Makes a packet of one to four triangles. Lanes beyond them repeat the last triangle.
     pub fn new(triangles: &[[[f32; 3]; 3]]) -> Self {
         let mut packet = Self::default();
         for lane in 0..PACKET {
@@ -92,14 +81,29 @@ impl Packet {
         packet
     }
 
-    /// One triangle: three corners.
+    /// The first `slabs` slabs of the tight k-DOP of the first `triangles` lanes, as [`Kdop::of_points`] finds them. The
+    /// other slabs are empty.
+    pub fn kdop(&self, triangles: usize, slabs: usize) -> Kdop {
+        if !(1..PACKET).contains(&triangles) {
+            return Kdop::of_lanes(self, slabs);
+        }
+        // A file from elsewhere may hold anything in the lanes beyond.
+        let mut packet = *self;
+        for lanes in packet.corners.iter_mut().flatten() {
+            let last = lanes[triangles - 1];
+            lanes[triangles..].fill(last);
+        }
+        Kdop::of_lanes(&packet, slabs)
+    }
+
+    /// The three corners of the triangle in a lane.
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| self.corners[corner][axis][lane]))
     }
 }
 
-/// Makes the leaf block of a page in whole lines.
+/// Makes the leaf block of a page, in whole lines.
 pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet]) -> Vec<u8> {
     let mut block = match encoding {
         TriangleEncoding::F32 => encode_f32(packets),
@@ -121,10 +125,10 @@ fn encode_f32(packets: &[Packet]) -> Vec<u8> {
 
 /// Reads packet `index` of an F32 block. Bytes beyond the block read as zero.
 #[inline]
-pub fn decode_f32(block: &[u8], index: usize) -> Packet {
+fn decode_f32(block: &[u8], index: usize) -> Packet {
     let start = index * F32_PACKET_BYTES;
     let Some(bytes) = block.get(start..start + F32_PACKET_BYTES) else { return Packet::default() };
-    // In memory as on disk, but for the order of bytes.
+    // Memory and disk differ in the order of bytes at most.
     let mut packet: Packet = bytemuck::pod_read_unaligned(bytes);
     if cfg!(target_endian = "big") {
         for value in packet.corners.iter_mut().flatten().flatten() {
@@ -141,20 +145,20 @@ pub struct PackedHead {
     pub vertices: u16,
     /// Bits of an index.
     pub index_bits: u8,
-    /// Bit `a` set: axis `a` is fixed-point.
+    /// Bit `a` is set if axis `a` is fixed-point.
     pub fixed: u8,
     /// Bits of an offset, per axis.
     pub bits: [u8; 3],
-    /// What offsets count from, per axis.
+    /// The number that offsets count from, per axis.
     pub base: [i32; 3],
-    /// Power of two of fixed-point axes.
+    /// The power of two of each fixed-point axis.
     pub exponent: [i8; 3],
     /// Byte offset of the index array in the block.
     pub indices_at: u32,
 }
 
 impl PackedHead {
-    /// Reads the head; `None` if the block is shorter.
+    /// Reads the head, or returns `None` if the block is shorter.
     #[inline]
     pub fn read(block: &[u8]) -> Option<Self> {
         let head = block.first_chunk::<PACKED_HEAD_BYTES>()?;
@@ -184,17 +188,17 @@ impl PackedHead {
 
     /// Bits of one vertex in the pool.
     #[inline]
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.bits.iter().map(|&b| usize::from(b)).sum()
     }
 
-    /// The bit at which the vertex in place `index` of the pool starts.
+    /// The bit of the block at which vertex `index` of the pool starts.
     #[inline]
     fn vertex_at(&self, index: u32) -> usize {
         PACKED_HEAD_BYTES * 8 + index as usize * self.stride()
     }
 
-    /// The three offsets that start at a bit.
+    /// Reads the three offsets that start at bit `at`.
     #[inline]
     fn offsets(&self, block: &[u8], mut at: usize) -> [u32; 3] {
         self.bits.map(|bits| {
@@ -205,30 +209,30 @@ impl PackedHead {
         })
     }
 
-    /// Pool index `place` (corner * 4 + lane) of packet `packet`.
+    /// Reads pool index `place` (4 · corner + lane) of packet `packet`.
     #[inline]
-    pub fn index(&self, block: &[u8], packet: usize, place: usize) -> u32 {
+    pub(crate) fn index(&self, block: &[u8], packet: usize, place: usize) -> u32 {
         let width = usize::from(self.index_bits.min(16));
         let at = self.indices_at as usize * 8 + (packet * 12 + place) * width;
         read_bits(block, at, width as u32)
     }
 
-    /// Bytes that a block of `packets` packets needs before it is filled up to whole lines.
-    pub fn block_bytes(&self, packets: usize) -> usize {
+    /// The bytes that a block of `packets` packets needs, before zeros fill its last line.
+    pub(crate) fn block_bytes(&self, packets: usize) -> usize {
         self.indices_at as usize + (packets * 12 * usize::from(self.index_bits)).div_ceil(8) + 8
     }
 }
 
 /// Reads packet `index` of a packed block. Bytes beyond the block read as zero.
 #[inline(always)]
-pub fn decode_packed(block: &[u8], index: usize) -> Packet {
+fn decode_packed(block: &[u8], index: usize) -> Packet {
     let mut packet = Packet::default();
     let Some(head) = PackedHead::read(block) else { return packet };
     let offsets = match head.offsets_of_twelve(block, index) {
         Some(offsets) => offsets,
         None => head.offsets_one_by_one(block, index),
     };
-    // Axis by axis, twelve at once: loops that compilers turn into vector code.
+    // Compilers turn a loop over the twelve vertices of one axis into vector code.
     for axis in 0..3 {
         let mut values = [0.0; 12];
         for place in 0..12 {
@@ -241,7 +245,8 @@ pub fn decode_packed(block: &[u8], index: usize) -> Packet {
     packet
 }
 
-/// Reads one triangle of a packet: `decode_packet(..).triangle(lane)`, for less. Bytes beyond the block read as zero.
+/// Reads one triangle of a packet, as `decode_packet(..).triangle(lane)` does but at less cost. Bytes beyond the block
+/// read as zero.
 #[inline]
 pub fn decode_triangle(encoding: TriangleEncoding, block: &[u8], index: usize, lane: usize) -> [[f32; 3]; 3] {
     match (encoding, PackedHead::read(block)) {
@@ -256,7 +261,7 @@ pub fn decode_triangle(encoding: TriangleEncoding, block: &[u8], index: usize, l
 }
 
 impl PackedHead {
-    /// The coordinate that an offset stands for.
+    /// Returns the coordinate that an offset stands for.
     #[inline(always)]
     fn coordinate(&self, axis: usize, offset: u32) -> f32 {
         let value = self.base[axis].wrapping_add(offset as i32);
@@ -267,13 +272,14 @@ impl PackedHead {
         }
     }
 
-    /// The offsets of a packet's twelve vertices, by axis, without a loop over bits: all indices in one load, two
-    /// loads a vertex. `None` where fields are too wide for that, or stand too near the end of the block.
+    /// Reads the offsets of a packet's twelve vertices, by axis, without a loop over bits: one load takes all indices,
+    /// and two loads take each vertex. Returns `None` where the fields are too wide for that, or too near the end of
+    /// the block.
     #[inline(always)]
     fn offsets_of_twelve(&self, block: &[u8], packet: usize) -> Option<[[u32; 12]; 3]> {
         let [x, y, z] = self.bits.map(u32::from);
         let width = usize::from(self.index_bits);
-        // A field and the bits of its first byte before it fit in a load.
+        // A load holds a field and the bits before it in its first byte.
         if x + y > 57 || z > 32 || x > 32 || y > 32 || 12 * width > 121 {
             return None;
         }
@@ -295,7 +301,7 @@ impl PackedHead {
         Some(offsets)
     }
 
-    /// The same for fields of any width. Bytes beyond the block read as zero.
+    /// Reads the same offsets from fields of any width. Bytes beyond the block read as zero.
     #[cold]
     #[inline(never)]
     fn offsets_one_by_one(&self, block: &[u8], packet: usize) -> [[u32; 12]; 3] {
@@ -310,14 +316,14 @@ impl PackedHead {
     }
 }
 
-/// The 57 bits or more from a bit on, if all their bytes are there.
+/// Reads at least 57 bits from bit `at` on, if the block has all eight bytes of the load.
 #[inline(always)]
 fn field_at(block: &[u8], at: usize) -> Option<u64> {
     let bytes = block.get(at / 8..)?.first_chunk()?;
     Some(u64::from_le_bytes(*bytes) >> (at % 8))
 }
 
-/// Reads packet `index` of a block.
+/// Reads packet `index` of a block. Bytes beyond the block read as zero.
 #[inline(always)]
 pub fn decode_packet(encoding: TriangleEncoding, block: &[u8], index: usize) -> Packet {
     match encoding {
@@ -326,31 +332,31 @@ pub fn decode_packet(encoding: TriangleEncoding, block: &[u8], index: usize) -> 
     }
 }
 
-/// The bits of a float as an integer in the order of the numbers.
+/// Maps the bits of a float to an integer. Integers are in the same order as their floats.
 #[inline]
 pub fn to_ordered(value: f32) -> i32 {
     flip(value.to_bits() as i32)
 }
 
-/// The float of an ordered integer.
+/// Returns the float of an ordered integer.
 #[inline]
-pub fn from_ordered(ordered: i32) -> f32 {
+pub(crate) fn from_ordered(ordered: i32) -> f32 {
     f32::from_bits(flip(ordered) as u32)
 }
 
-/// Flips all bits but the sign of a negative number: its own inverse.
+/// Flips all bits but the sign of a negative number. It is its own inverse.
 #[inline]
 fn flip(bits: i32) -> i32 {
     bits ^ ((bits >> 31) as u32 >> 1) as i32
 }
 
-/// 2^exponent for exponents of normal floats; smaller ones give 0.
+/// Returns 2^exponent for the exponent of a normal float, and 0 for a smaller one.
 #[inline]
-pub fn power_of_two(exponent: i8) -> f32 {
+fn power_of_two(exponent: i8) -> f32 {
     f32::from_bits(((i32::from(exponent) + 127).max(0) as u32) << 23)
 }
 
-/// One axis of the pool: mode, base and width.
+/// How the pool stores the coordinates of one axis.
 struct Axis {
     fixed: bool,
     base: i32,
@@ -358,7 +364,7 @@ struct Axis {
     bits: u8,
 }
 
-/// Picks the mode that takes fewer bits; ordered on a tie.
+/// Picks the mode that takes fewer bits, and `ordered` on a tie.
 fn fit_axis(values: impl Iterator<Item = f32> + Clone) -> Axis {
     let (mut lo, mut hi) = (i32::MAX, i32::MIN);
     for value in values.clone() {
@@ -373,7 +379,7 @@ fn fit_axis(values: impl Iterator<Item = f32> + Clone) -> Axis {
     }
 }
 
-/// The coarsest power of two of which all values are multiples, if their quotients fit in 31 bits.
+/// Fits the coarsest power of two that divides all values, if the quotients fit in 31 bits.
 fn fit_fixed(values: impl Iterator<Item = f32> + Clone) -> Option<Axis> {
     let exponent = values.clone().filter(|&v| v != 0.0).map(lowest_bit).min().unwrap_or(0);
     let exponent = i8::try_from(exponent).ok().filter(|&e| e >= -126)?;
@@ -391,7 +397,7 @@ fn fit_fixed(values: impl Iterator<Item = f32> + Clone) -> Option<Axis> {
     Some(Axis { fixed: true, base: lo, exponent, bits })
 }
 
-/// Power of two of the lowest set bit of a non-zero float.
+/// The exponent of the lowest set bit of a float that is not zero.
 fn lowest_bit(value: f32) -> i32 {
     let bits = value.to_bits();
     let biased = ((bits >> 23) & 0xff) as i32;
@@ -399,22 +405,56 @@ fn lowest_bit(value: f32) -> i32 {
     biased.max(1) - 150 + mantissa.trailing_zeros() as i32
 }
 
-fn encode_packed(packets: &[Packet]) -> Vec<u8> {
-    let mut pool: Vec<[f32; 3]> = Vec::new();
-    let mut places: HashMap<[u32; 3], u32> = HashMap::new();
-    let mut indices = Vec::with_capacity(packets.len() * 12);
-    for packet in packets {
-        for corner in &packet.corners {
-            for lane in 0..PACKET {
-                let vertex = [0, 1, 2].map(|axis| corner[axis][lane]);
-                let place = *places.entry(vertex.map(f32::to_bits)).or_insert_with(|| {
-                    pool.push(vertex);
-                    pool.len() as u32 - 1
-                });
-                indices.push(place);
+/// Distinct vertices in the order in which they first come by.
+struct Pool {
+    vertices: Vec<[f32; 3]>,
+    /// A table with open addressing: one more than a vertex's place in the pool, 0 where it is free. It has room for
+    /// twice the vertices that may come.
+    table: Vec<u32>,
+}
+
+impl Pool {
+    /// A pool to which at most so many vertices are given.
+    fn new(vertices: usize) -> Self {
+        Self { vertices: Vec::new(), table: vec![0; (2 * vertices).next_power_of_two()] }
+    }
+
+    /// The place of a vertex. Vertices are equal if their bits are.
+    fn place(&mut self, vertex: [f32; 3]) -> u32 {
+        // An odd factor for each axis; the upper bits of their sum depend on all bits. A page has few enough vertices
+        // for a hash that a hostile mesh can make collide.
+        const FACTORS: [u64; 3] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f, 0x1656_67b1_9e37_79f9];
+        let bits = vertex.map(f32::to_bits);
+        let sum = (0..3).fold(0, |sum: u64, axis| {
+            (sum ^ u64::from(bits[axis])).wrapping_mul(FACTORS[axis]).rotate_left(29)
+        });
+        let mut slot = sum as usize;
+        loop {
+            slot &= self.table.len() - 1;
+            match self.table[slot] {
+                0 => {
+                    self.vertices.push(vertex);
+                    self.table[slot] = self.vertices.len() as u32;
+                    return self.vertices.len() as u32 - 1;
+                }
+                held if self.vertices[held as usize - 1].map(f32::to_bits) == bits => return held - 1,
+                _ => slot += 1,
             }
         }
     }
+}
+
+fn encode_packed(packets: &[Packet]) -> Vec<u8> {
+    let mut pool = Pool::new(packets.len() * 3 * PACKET);
+    let mut indices = Vec::with_capacity(packets.len() * 3 * PACKET);
+    for packet in packets {
+        for corner in &packet.corners {
+            for lane in 0..PACKET {
+                indices.push(pool.place([0, 1, 2].map(|axis| corner[axis][lane])));
+            }
+        }
+    }
+    let pool = pool.vertices;
     let axes = [0, 1, 2].map(|axis| fit_axis(pool.iter().map(move |vertex| vertex[axis])));
     let mut head = PackedHead {
         vertices: pool.len() as u16,
@@ -498,7 +538,8 @@ mod tests {
         }
     }
 
-    /// Whatever the bytes are: the ways that read several fields at once agree with the one that reads bit by bit.
+    /// Whatever the bytes are, the functions that read several fields at once agree with the one that reads them one by
+    /// one.
     #[test]
     fn all_ways_to_decode_agree_on_any_bytes() {
         let mut state = 9u64;
@@ -510,7 +551,7 @@ mod tests {
         for round in 0..20_000 {
             let mut block: Vec<u8> = (0..random() % 400).map(|_| random() as u8).collect();
             if let Some(head) = block.get_mut(..28) {
-                // Fields that mostly lead into the block.
+                // Most of these fields lead into the block.
                 (head[2], head[4], head[5], head[6]) = ((random() % 14) as u8, 20, (random() % 40) as u8, 30);
                 head[24..28].copy_from_slice(&(random() as u32 % 400).to_le_bytes());
                 if round % 3 > 0 {
@@ -543,7 +584,7 @@ mod tests {
 
     #[test]
     fn a_grid_takes_the_bits_of_its_extent() {
-        // 16 steps of 2^-10 far from zero: 4 bits an axis, whatever the magnitude.
+        // 16 steps of 2^-10 far from zero take 4 bits per axis, whatever the magnitude.
         let packets = packets(3, 40, |r| 100.0 + (r % 16) as f32 / 1024.0);
         let head = PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets)).unwrap();
         assert_eq!(head.bits, [4, 4, 4]);

@@ -1,19 +1,56 @@
-//! The `.cbvh` file format: bounding volume hierarchies of triangle meshes in 64-byte treelets.
+//! The `.cbvh` file format: bounding volume hierarchies of triangle meshes, in treelets of 64 bytes.
 //!
-//! This crate knows bytes: what stands where, how it is written and read, and which rules it obeys.
-//! It neither builds trees (`bvh-bake`) nor asks them anything (`bvh-query`). The normative text is
-//! `spec/format.md`; a test compares its tables with the types here.
+//! This crate knows the bytes: where each one stands, how it is written and read, and which rules it obeys. It builds no
+//! trees and answers no questions about them. Most applications need only its siblings: `bvh-bake` makes `.cbvh` files
+//! from meshes, and `bvh-query` maps them and answers collision and distance queries. Both stand on this crate. Use it
+//! yourself to inspect files, to check them, or to write another baker, viewer or query.
 //!
-//! The way through a file:
+//! The normative text is `spec/format.md`. A test compares its tables with the types here.
+//!
+//! # The way through a file
 //!
 //! ```text
 //! bytes ─ header, sections ─ objects ─ Layout ┬ Page ─ anchors, Links ─ decode ─ slabs
 //!                                             ├ leaf block ─ Packet
 //!                                             └ id block
 //! ```
+//!
+//! 1. [`Layout::read`] checks the header page and the object table, and reads nothing else, however long the file is.
+//! 2. A [page] of 4 KiB is found by its number. [`page::check_page`] checks it when it is first needed, and then
+//!    [`page::Page`] reads it without any further check.
+//! 3. A [treelet] in a page holds the bounds of up to eight children, and [`treelet::Links`] says where each
+//!    child is: in the same page, in a later page, or a packet of triangles.
+//! 4. [`decode::decode_child`] turns the bounds of a child into [slabs], given the slabs of its parent.
+//! 5. The [leaf] block of a page holds its triangles, and the [ids] block their numbers in the input.
+//!
+//! [`validate::validate`] checks a whole file against all [rules](Rule) but R35, and [`bounds::check_bounds`] proves that
+//! bounds contain their triangles (R35). A breach is a [`FormatError`]: it names the rule, the byte, what was expected,
+//! what was found, and the remedy. No function panics on the bytes of a file, whatever they are.
+//!
+//! [`page::PageWriter`] writes pages and stands beside the reader; [`leaf::encode_block`], [`ids::encode_ids`],
+//! [`object::write_objects`] and [`header::write_header`] write the rest.
+//!
+//! # Example
+//!
+//! This lists the objects of a file. The program `examples/inspect.rs` goes on from here, and walks the trees.
+//!
+//! ```
+//! use bvh_format::Layout;
+//!
+//! fn list(bytes: &[u8]) -> Result<(), bvh_format::FormatError> {
+//!     let layout = Layout::read(bytes)?;
+//!     for object in &layout.objects {
+//!         let (centre, radius) = object.bounding_sphere();
+//!         println!("{}: {} triangles within {radius} of {centre:?}", object.name(), object.triangles());
+//!     }
+//!     Ok(())
+//! }
+//!
+//! assert_eq!(list(b"not a mesh").unwrap_err().rule, bvh_format::Rule::Magic);
+//! ```
 #![forbid(unsafe_code)]
 
-pub mod bits;
+mod bits;
 pub mod bounds;
 pub mod checksum;
 pub mod decode;
@@ -27,13 +64,18 @@ pub mod object;
 pub mod page;
 pub mod profile;
 pub mod quantize;
+pub mod realign;
 mod rule;
 pub mod slabs;
 pub mod source;
-pub mod support;
 pub mod treelet;
 pub mod validate;
 
 pub use error::FormatError;
 pub use layout::Layout;
 pub use rule::Rule;
+
+/// Compiles the example of the crate's README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

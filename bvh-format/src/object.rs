@@ -1,23 +1,23 @@
-//! The object table: one record per named mesh in the file, then their names.
+//! The object table: a head, one record per object, and the names of the objects.
 //!
-//! The section starts with `u32` number of objects, `u32` bytes of names and eight zero bytes; then
-//! come the records, then the names (UTF-8, no terminators).
+//! An object is a named mesh with a tree of its own. Section 3 of `spec/format.md` says where each byte stands.
 
 use crate::error::{FormatError, ensure};
+use crate::kdop::two_sum;
 use crate::leaf::TriangleEncoding;
 use crate::profile::Profile;
 use crate::rule::Rule;
 use zerocopy::byteorder::little_endian::{F32, F64, I32, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-/// The largest magnitude of a coordinate, 2^120, and of an origin.
+/// The largest magnitude of a coordinate and of an origin: 2^120 mesh units.
 pub const MAX_COORDINATE: f64 = (1u128 << 120) as f64;
-/// Exponents of f16 residuals for which every product of a code and the unit is exact.
+/// The exponents of f16 residuals with which every product of a code and the unit is exact.
 pub const F16_EXPONENTS: std::ops::RangeInclusive<i32> = -125..=112;
 /// Bytes before the first record.
 const TABLE_HEAD: usize = 16;
 
-/// An object's record. Lengths are in mesh units; coordinates are around `origin`.
+/// The record of an object as stored. Lengths are in mesh units, and coordinates are relative to `origin`.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ObjectRecord {
@@ -25,11 +25,11 @@ pub struct ObjectRecord {
     pub name_offset: U32,
     /// Bytes of the name.
     pub name_length: U32,
-    /// A vertex of the mesh is `origin + v`, exact in f64.
+    /// The origin: a vertex of the mesh is `origin + v`, which is exact in f64.
     pub origin: [F64; 3],
     /// Lower corner of the axis-aligned box of all v.
     pub box_lo: [F32; 3],
-    /// Upper corner.
+    /// Upper corner of that box.
     pub box_hi: [F32; 3],
     /// Triangles stored.
     pub triangles: U64,
@@ -37,21 +37,21 @@ pub struct ObjectRecord {
     pub packets: U64,
     /// Treelets.
     pub treelets: U64,
-    /// Number of the first page; its first root is the object's root.
+    /// Number of the first page, whose first root is the root of the object.
     pub first_page: U32,
     /// Pages of the object.
     pub pages: U32,
-    /// Largest move of a vertex by rounding to `origin + f32`.
+    /// The largest distance by which rounding to `origin + f32` moved a vertex.
     pub max_vertex_rounding: F64,
-    /// Largest move of a vertex by quantisation to a grid; 0 but for `quantized`.
+    /// The largest further distance by which `quantized` moved a vertex; 0 for other encodings.
     pub max_quantization_error: F64,
-    /// Triangles of the input, of which ids are drawn.
+    /// Triangles of the input, whose numbers are the ids.
     pub input_triangles: U64,
     /// Zero-area triangles among those stored.
     pub degenerate: U64,
-    /// Exact duplicates left out.
+    /// Exact duplicates that were left out.
     pub duplicates: U64,
-    /// f16 residuals count 2^this.
+    /// The binary logarithm of the unit of f16 residuals.
     pub f16_exponent: I32,
     /// Number of the `Profile`.
     pub profile: u8,
@@ -59,9 +59,9 @@ pub struct ObjectRecord {
     pub triangle_encoding: u8,
     /// Zero.
     pub reserved: [u8; 2],
-    /// Centre of a sphere around all v.
+    /// Centre of a sphere that contains all v.
     pub sphere_centre: [F32; 3],
-    /// Its radius, rounded up.
+    /// The radius of that sphere, rounded up.
     pub sphere_radius: F32,
     /// Zero.
     pub reserved_end: [u8; 40],
@@ -69,26 +69,84 @@ pub struct ObjectRecord {
 
 const _: () = assert!(size_of::<ObjectRecord>() == 192);
 
-/// An object of an opened file.
+/// An object of an opened file: a named mesh with a tree of its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// Its name, possibly empty.
-    pub name: String,
-    /// How its nodes are written.
-    pub profile: Profile,
-    /// How its triangles are written.
-    pub triangle_encoding: TriangleEncoding,
-    /// 2^`f16_exponent`.
-    pub f16_scale: f32,
-    /// The record.
-    pub record: ObjectRecord,
+    pub(crate) name: String,
+    pub(crate) profile: Profile,
+    pub(crate) triangle_encoding: TriangleEncoding,
+    pub(crate) f16_scale: f32,
+    pub(crate) record: ObjectRecord,
 }
 
 impl Object {
-    /// The numbers of its pages.
+    /// The name, which may be empty. Several objects of a file may have the same name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The number of triangles stored, at least 1. Exact duplicates that the baker left out are not among them.
+    pub fn triangles(&self) -> u64 {
+        self.record.triangles.get()
+    }
+
+    /// The origin in mesh units. Coordinates in the file are `f32` numbers around it, and `origin + v` is exact in
+    /// `f64` for every stored vertex.
+    #[inline]
+    pub fn origin(&self) -> [f64; 3] {
+        self.record.origin.map(|value| value.get())
+    }
+
+    /// The lower and the upper corner of the axis-aligned box of all stored vertices, in mesh units. The box is exact,
+    /// and flat along an axis on which all vertices have the same coordinate.
+    pub fn bounding_box(&self) -> [[f64; 3]; 2] {
+        let origin = self.origin();
+        let corner = |v: [F32; 3]| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis].get()));
+        [corner(self.record.box_lo), corner(self.record.box_hi)]
+    }
+
+    /// The centre and the radius of a sphere that contains all stored vertices, in mesh units. The radius is at least 0
+    /// and rounded up, so that no vertex lies outside. The sphere is a good one, but not the smallest.
+    pub fn bounding_sphere(&self) -> ([f64; 3], f64) {
+        let (origin, mut moved) = (self.origin(), 0.0);
+        let centre = [0, 1, 2].map(|axis| {
+            let (sum, error) = two_sum(origin[axis], f64::from(self.record.sphere_centre[axis].get()));
+            moved += error.abs();
+            sum
+        });
+        let radius = f64::from(self.record.sphere_radius.get());
+        // Rounding has moved the centre by `moved` at most; the next number covers the roundings of the sums.
+        (centre, if moved > 0.0 { (radius + moved).next_up() } else { radius })
+    }
+
+    /// The profile: how the nodes of the tree are stored.
+    #[inline]
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// How the triangles are stored.
+    #[inline]
+    pub fn triangle_encoding(&self) -> TriangleEncoding {
+        self.triangle_encoding
+    }
+
+    /// The unit of f16 residuals, a power of two, in mesh units.
+    #[inline]
+    pub fn f16_scale(&self) -> f32 {
+        self.f16_scale
+    }
+
+    /// The numbers of the object's pages in the node section, at least one.
     pub fn pages(&self) -> std::ops::Range<u32> {
         let first = self.record.first_page.get();
         first..first + self.record.pages.get()
+    }
+
+    /// The record of the object table, for those who need its bytes or the numbers that have no accessor.
+    #[inline]
+    pub fn record(&self) -> &ObjectRecord {
+        &self.record
     }
 }
 
@@ -110,11 +168,11 @@ pub fn write_objects(objects: &[(String, ObjectRecord)]) -> Vec<u8> {
     section
 }
 
-/// Reads the object section, which starts at byte `at` of the file.
+/// Reads the object section, which starts at byte `at` of a file whose node section has `node_pages` pages.
 ///
 /// # Errors
-/// The first of rules 11 to 14 that does not hold; `node_pages` is the length of the node section.
-pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Object>, FormatError> {
+/// The first of rules 11 to 14 that does not hold.
+pub(crate) fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Object>, FormatError> {
     let table = |found: String| FormatError::new(Rule::ObjectTable, at, "a whole object table", found);
     let (head, rest) =
         <[U32; 4]>::ref_from_prefix(section).map_err(|_| table(format!("{} bytes", section.len())))?;
@@ -123,10 +181,13 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
         .map_err(|_| table(format!("{count} objects in {} bytes", section.len())))?;
     let whole = count >= 1 && names.len() == head[1].get() as usize;
     ensure(whole, Rule::ObjectTable, at, || {
-        (format!("an object and {} bytes of names", head[1]), format!("{count}, {}", names.len()))
+        (
+            format!("at least one object, and {} bytes of names", head[1]),
+            format!("{count} objects, {} bytes", names.len()),
+        )
     })?;
     let mut next_page = 0;
-    // Copied names are no longer than the file: records that share theirs would multiply its size.
+    // Copies of the names must not be longer than the file: records that share a name would multiply its size.
     let mut names_left = names.len();
     let mut objects = Vec::with_capacity(count);
     for (index, record) in records.iter().enumerate() {
@@ -135,7 +196,10 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
         let first = u64::from(record.first_page.get());
         let follows = first == next_page && record.pages.get() > 0;
         ensure(follows, Rule::ObjectPages, at + 80, || {
-            (format!("pages from {next_page}"), format!("{} from {first}", record.pages))
+            (
+                format!("pages from page {next_page} on"),
+                format!("{} pages from page {first} on", record.pages),
+            )
         })?;
         next_page += u64::from(record.pages.get());
         objects.push(read_object(record, names, &mut names_left, at)?);
@@ -146,7 +210,7 @@ pub fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<Vec<Obje
     Ok(objects)
 }
 
-/// `names_left` is how many bytes the names of this record and of those behind it may have together.
+/// Reads one object. `names_left` is the number of bytes that the names of this record and of all later ones may have.
 fn read_object(
     record: &ObjectRecord,
     names: &[u8],
@@ -159,7 +223,10 @@ fn read_object(
         .and_then(|name| std::str::from_utf8(name).ok())
         .ok_or_else(|| FormatError::new(Rule::ObjectTable, at, "a UTF-8 name among the names", start))?;
     ensure(name.len() <= *names_left, Rule::ObjectTable, at + 4, || {
-        (format!("at most {names_left} bytes of name behind the earlier ones"), name.len().to_string())
+        (
+            format!("at most {names_left} bytes of name after those of the earlier objects"),
+            name.len().to_string(),
+        )
     })?;
     *names_left -= name.len();
     let unknown = |at, what, found| FormatError::new(Rule::ObjectProfile, at, what, found);
@@ -171,9 +238,9 @@ fn read_object(
     Ok(Object { name: name.to_owned(), profile, triangle_encoding, f16_scale, record: *record })
 }
 
-/// True for multiples of 2^-149, the smallest positive f32.
+/// Returns true for multiples of 2^-149, the smallest positive f32.
 fn is_multiple_of_smallest(value: f64) -> bool {
-    // At most 2^269: exact.
+    // The product is at most 2^269, and exact.
     (value * 2f64.powi(149)).fract() == 0.0
 }
 
@@ -207,9 +274,9 @@ mod tests {
     use super::*;
     use zerocopy::FromZeros;
 
-    /// Names that lie over each other would make a file of n bytes one of n^2 in memory.
+    /// Names that overlap could make a file of n bytes take n^2 bytes of memory.
     #[test]
-    fn names_are_together_no_longer_than_their_bytes() {
+    fn names_that_share_bytes_are_refused() {
         let mut record = ObjectRecord::new_zeroed();
         record.triangles = 1.into();
         record.packets = 1.into();
@@ -226,6 +293,27 @@ mod tests {
         section[TABLE_HEAD + 192 + 4] = 1;
         let error = read_objects(&section, 0, 3).unwrap_err();
         assert_eq!((error.rule, error.offset), (Rule::ObjectTable, TABLE_HEAD as u64 + 2 * 192 + 4));
+    }
+
+    #[test]
+    fn boxes_and_spheres_are_placed_at_the_origin() {
+        let mut record = ObjectRecord::new_zeroed();
+        record.origin = [1e6, -0.5, 0.0].map(Into::into);
+        record.box_lo = [-1.0, -2.0, -3.0].map(Into::into);
+        record.box_hi = [1.0, 2.0, 3.0].map(Into::into);
+        record.sphere_centre = [0.25, 0.5, -0.25].map(Into::into);
+        record.sphere_radius = 4.0.into();
+        let (profile, triangle_encoding) = (Profile::Dop14U8, TriangleEncoding::F32);
+        let object =
+            |record| Object { name: "a".to_owned(), profile, triangle_encoding, f16_scale: 1.0, record };
+        let exact = object(record);
+        assert_eq!(exact.bounding_box(), [[999_999.0, -2.5, -3.0], [1_000_001.0, 1.5, 3.0]]);
+        assert_eq!(exact.bounding_sphere(), ([1_000_000.25, 0.0, -0.25], 4.0));
+        // The last bits of the centre do not fit beside the origin: the radius makes up for them.
+        record.sphere_centre[0] = 1e-12.into();
+        let (centre, radius) = object(record).bounding_sphere();
+        assert_eq!(centre[0], 1e6);
+        assert!(radius > 4.0 + 1e-12 && radius < 4.0 + 2e-12, "{radius}");
     }
 
     #[test]

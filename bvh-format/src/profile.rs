@@ -1,21 +1,24 @@
-//! The profiles of a treelet: direction set, encoding of residuals, number of children, size.
+//! The profiles of treelets. A profile sets the directions, the encoding of residuals, the most children, and the size.
 
 use crate::kdop::DirectionSet;
 
-/// How a child's slab ends are written.
+/// How the slab ends of a child are stored. The list is as complete as that of [`Profile`], and not non-exhaustive either.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Encoding {
-    /// 4-bit residual in 1/15 of the parent's slab.
+    /// A residual of 4 bits, in units of 1/15 of the parent's slab.
     U4,
-    /// 8-bit residual in 1/255 of the parent's slab.
+    /// A residual of 8 bits, in units of 1/255 of the parent's slab.
     U8,
-    /// 16-bit floating-point residual in units of the object's power of two.
+    /// A floating-point residual of 16 bits, in units of the object's power of two.
     F16,
-    /// The slab ends themselves, 32-bit: the uncompressed baseline.
+    /// The slab ends themselves in 32 bits: the uncompressed baseline.
     F32,
 }
 
-/// A treelet layout.
+/// The layout of treelets.
+///
+/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that a decoder that has
+/// code for each profile does not compile until a new one is dealt with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Profile {
@@ -37,12 +40,12 @@ pub enum Profile {
     Dop14F16Wide = 7,
     /// 26-DOP, 8-bit residuals, 4 children, 128 bytes.
     Dop26U8Wide = 8,
-    /// 14-DOP, f32 slabs, 4 children, 256 bytes: the baseline of reports.
+    /// 14-DOP, f32 slabs, 4 children, 256 bytes: the baseline that others are compared with.
     Dop14F32 = 9,
 }
 
 impl Profile {
-    /// All profiles, by number on disk.
+    /// All profiles in the order of their numbers on disk.
     pub const ALL: [Profile; 10] = [
         Self::Dop14U8,
         Self::Dop6U8,
@@ -56,8 +59,8 @@ impl Profile {
         Self::Dop14F32,
     ];
 
-    /// The profile of a number on disk.
-    pub fn from_number(number: u8) -> Option<Self> {
+    /// Returns the profile of a number on disk.
+    pub(crate) fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()
     }
 
@@ -82,12 +85,12 @@ impl Profile {
         }
     }
 
-    /// The profile of a name on the command line.
+    /// Returns the profile of a name on the command line.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|profile| profile.name() == name)
     }
 
-    /// The directions its k-DOPs have.
+    /// The directions of its k-DOPs.
     #[inline]
     pub const fn directions(self) -> DirectionSet {
         match self {
@@ -99,7 +102,7 @@ impl Profile {
         }
     }
 
-    /// How residuals are written.
+    /// How slab ends are stored.
     pub const fn encoding(self) -> Encoding {
         match self {
             Self::Dop14U4 | Self::Dop26U4 => Encoding::U4,
@@ -109,7 +112,7 @@ impl Profile {
         }
     }
 
-    /// The most children a treelet has: 2, 4 or 8.
+    /// The most children that a treelet can have: 2, 4 or 8.
     #[inline]
     pub const fn width(self) -> usize {
         const WIDTHS: [u8; 10] = [4, 8, 4, 2, 8, 4, 2, 4, 4, 4];
@@ -119,12 +122,12 @@ impl Profile {
     /// Bytes of a treelet: 64, 128 or 256.
     #[inline]
     pub const fn treelet_bytes(self) -> usize {
-        // A table, not a match: this is asked at every node of a traversal.
+        // A table is faster than a match, and each node of a traversal asks.
         const BYTES: [u16; 10] = [64, 64, 64, 64, 64, 64, 64, 128, 128, 256];
         BYTES[self as usize] as usize
     }
 
-    /// Bytes of a subtree root's anchor: 64, or 128 for 26-DOPs.
+    /// Bytes of the anchor of a subtree root: 64, or 128 for 26-DOPs.
     pub const fn anchor_bytes(self) -> usize {
         match self.directions() {
             DirectionSet::Dop26 => 128,
@@ -132,7 +135,7 @@ impl Profile {
         }
     }
 
-    /// Groups of four children a treelet is decoded in: 2 at width 8, else 1.
+    /// The number of groups of four children in which a treelet is decoded: 2 at width 8, else 1.
     #[inline]
     pub const fn groups(self) -> usize {
         if self.width() == 8 { 2 } else { 1 }

@@ -1,13 +1,12 @@
-//! The predictor-corrector: a child's slab end is its parent's *decoded* end moved inward by a residual.
+//! The predictor: the end of a child's slab is the *decoded* end of its parent's slab, moved inward by a residual.
 //!
-//! Decoder and encoder stand side by side. The encoder searches the largest residual whose decoded
-//! value, computed by the decoder's own operations, still lies outside the true value; so a decoded
-//! slab always contains the true one, and because the prediction starts from the decoded parent,
-//! errors of successive levels do not add up. Method: Tan, Weller, Zachmann, arXiv 2012.05348,
-//! section 4, with the rounding made explicit.
+//! Decoder and encoder stand side by side. The encoder searches for the largest residual whose decoded value, computed
+//! by the decoder's own operations, still lies outside the true value. So a decoded slab always contains the true one.
+//! Since the prediction starts from the decoded parent, the errors of successive levels do not add up. The method is that
+//! of Tan, Weller and Zachmann (arXiv 2012.05348, section 4), with explicit rounding.
 //!
-//! A quantisation step has 16 significant bits, a code at most 8: their product is exact in `f32`,
-//! so that a decoder may or may not fuse the product with the sum and gets the same bits.
+//! A quantisation step has 16 significant bits and a code at most 8, so their product is exact in `f32`: a decoder gets
+//! the same bits whether it fuses the product with the sum or not.
 
 use crate::profile::Encoding;
 use half::f16;
@@ -25,8 +24,8 @@ pub fn round_step_up(step: f32) -> f32 {
     f32::from_bits(step.to_bits().wrapping_add(0xff) & !0xff)
 }
 
-/// The unit that the integer codes of one slab count, from the parent's decoded slab.
-/// `object_scale` is the object's power of two, used by `F16` alone.
+/// Returns the unit of the residuals of one slab, given the parent's decoded slab. `object_scale` is the object's power
+/// of two, which only `F16` uses.
 #[inline]
 pub fn residual_unit(encoding: Encoding, parent_lo: f32, parent_hi: f32, object_scale: f32) -> f32 {
     match encoding {
@@ -37,9 +36,9 @@ pub fn residual_unit(encoding: Encoding, parent_lo: f32, parent_hi: f32, object_
     }
 }
 
-/// How far inward from the parent's end a code leads, in mesh units along the direction.
+/// Returns how far a code moves the parent's end inward, in mesh units along the direction.
 #[inline]
-pub fn residual(encoding: Encoding, code: u16, unit: f32) -> f32 {
+fn residual(encoding: Encoding, code: u16, unit: f32) -> f32 {
     match encoding {
         Encoding::U4 | Encoding::U8 => f32::from(code) * unit,
         Encoding::F16 => f16::from_bits(code).to_f32() * unit,
@@ -59,22 +58,22 @@ pub fn decode_max(encoding: Encoding, code: u16, parent_hi: f32, unit: f32) -> f
     parent_hi - residual(encoding, code, unit)
 }
 
-/// The largest code whose decoded lower end is at most `true_lo`. Needs `parent_lo <= true_lo`.
+/// Returns the largest code whose decoded lower end is at most `true_lo`, which must be at least `parent_lo`.
 pub fn encode_min_outward(encoding: Encoding, true_lo: f32, parent_lo: f32, unit: f32) -> u16 {
     largest_code(encoding, true_lo - parent_lo, unit, |code| {
         decode_min(encoding, code, parent_lo, unit) <= true_lo
     })
 }
 
-/// The largest code whose decoded upper end is at least `true_hi`. Needs `parent_hi >= true_hi`.
+/// Returns the largest code whose decoded upper end is at least `true_hi`, which must be at most `parent_hi`.
 pub fn encode_max_outward(encoding: Encoding, true_hi: f32, parent_hi: f32, unit: f32) -> u16 {
     largest_code(encoding, parent_hi - true_hi, unit, |code| {
         decode_max(encoding, code, parent_hi, unit) >= true_hi
     })
 }
 
-/// Searches from a guess: codes are ordered by the residual they stand for, and `fits` holds for a
-/// prefix of them that includes 0.
+/// Searches for the last code that fits, from a guess. Codes are in the order of their residuals, and those that fit
+/// are a prefix of all codes that includes 0.
 fn largest_code(encoding: Encoding, gap: f32, unit: f32, fits: impl Fn(u16) -> bool) -> u16 {
     let (guess, last) = match encoding {
         Encoding::U4 => (saturated(gap / unit, 15), 15),
@@ -89,7 +88,7 @@ fn largest_code(encoding: Encoding, gap: f32, unit: f32, fits: impl Fn(u16) -> b
     search(guess, last, fits)
 }
 
-/// The last code that fits.
+/// Steps from a guess to the last code that fits.
 fn search(guess: u16, last: u16, fits: impl Fn(u16) -> bool) -> u16 {
     let mut code = guess;
     while code > 0 && !fits(code) {
@@ -101,33 +100,33 @@ fn search(guess: u16, last: u16, fits: impl Fn(u16) -> bool) -> u16 {
     code
 }
 
-/// The integer part of a quotient, 0 where there is none (0 / 0), at most `last`.
+/// The integer part of a quotient, at most `last`; 0 for 0 / 0.
 fn saturated(quotient: f32, last: u16) -> u16 {
     (quotient as u16).min(last)
 }
 
-/// The codes of four lower ends at a time, as `encode_min_outward` gives them, for integer codes up to `last`; those
-/// of upper ends, if these and the parent's come negated. Needs `parent <= ends` in each lane.
+/// Encodes four lower ends at a time, as `encode_min_outward` does one, with integer codes up to `last`. Each end must
+/// be at least the parent's. For upper ends, negate them and those of the parent.
 pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], unit: [f32; 4]) -> [u16; 4] {
-    /// Added, it leaves the nearest whole number.
-    const WHOLE: f32 = 8_388_608.0;
-    let most = f32::from(last);
+    /// 2^23: adding and subtracting it rounds to the nearest whole number.
+    const ROUNDER: f32 = 8_388_608.0;
+    let max_code = f32::from(last);
     let mut codes = [0; 4];
     let mut unsettled = [0u32; 4];
-    // No branches: compilers take the lanes at once.
+    // Without branches, compilers turn the lanes into vector code.
     for lane in 0..4 {
         let fits = |code: f32| parent[lane] + code * unit[lane] <= ends[lane];
         let quotient = (ends[lane] - parent[lane]) / unit[lane];
-        // Where nothing is divided by nothing, every code fits.
-        let guess = (if quotient < most { quotient } else { most }) + WHOLE - WHOLE;
+        // In a flat slab 0 / 0 is NaN, and every code fits.
+        let guess = (if quotient < max_code { quotient } else { max_code }) + ROUNDER - ROUNDER;
         let code = if fits(guess) { guess } else { guess - 1.0 };
-        let next_fits = u32::from(fits(code + 1.0)) & u32::from(code < most);
+        let next_fits = u32::from(fits(code + 1.0)) & u32::from(code < max_code);
         unsettled[lane] = u32::from(!fits(code)) | next_fits;
-        // The last bits of the sum.
-        codes[lane] = (code + WHOLE).to_bits() as u16;
+        // The low bits of the sum are the code.
+        codes[lane] = (code + ROUNDER).to_bits() as u16;
     }
     if unsettled != [0; 4] {
-        // Rounding of large ends moved a guess by more than one.
+        // The rounding of large ends has moved a guess by more than one.
         let fits = |lane: usize, code: u16| parent[lane] + f32::from(code) * unit[lane] <= ends[lane];
         codes = std::array::from_fn(|lane| {
             let gap = ends[lane] - parent[lane];
@@ -170,7 +169,7 @@ mod tests {
                 }
                 assert!(decode_min(encoding, code_lo, parent_lo, unit) <= lo);
                 assert!(decode_max(encoding, code_hi, parent_hi, unit) >= hi);
-                // One code further would cut, unless the codes end there.
+                // The next code would cut the true slab, unless there is none.
                 let last = match encoding {
                     Encoding::U4 => 15,
                     Encoding::U8 => 255,
@@ -206,7 +205,7 @@ mod tests {
                 let one_by_one = ends.map(|end| encode_min_outward(encoding, end, lo, unit));
                 assert_eq!(encode_four_outward(last, ends, [lo; 4], [unit; 4]), one_by_one, "{lo:e} {hi:e}");
                 assert_eq!([decode_min(encoding, 0, lo, unit), decode_max(encoding, 0, hi, unit)], [lo, hi]);
-                // Off by a few roundings, and then rounded up to 16 bits.
+                // The last code misses the other end by a few roundings, one of them to 16 bits.
                 let width = f64::from(hi) - f64::from(lo);
                 let ends = [decode_min(encoding, last, lo, unit), decode_max(encoding, last, hi, unit)];
                 for (end, opposite) in ends.into_iter().zip([hi, lo]) {

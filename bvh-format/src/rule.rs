@@ -4,15 +4,17 @@ use std::fmt;
 
 macro_rules! rules {
     ($($name:ident = $number:literal, $text:literal;)*) => {
-        /// A numbered rule of `spec/format.md`. Errors and test files name rules by number.
+        /// A numbered rule of `spec/format.md`, section 16.2. Errors and the names of test files state its number.
+        /// Later minor versions of the format may add rules.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
         pub enum Rule { $(#[doc = $text] $name = $number,)* }
 
         impl Rule {
             /// All rules in the order of their numbers.
             pub const ALL: &'static [Rule] = &[$(Rule::$name,)*];
 
-            /// The rule in one phrase, as the specification has it.
+            /// The rule in one phrase, in the words of the specification.
             pub fn text(self) -> &'static str {
                 match self { $(Rule::$name => $text,)* }
             }
@@ -65,6 +67,16 @@ impl Rule {
     /// The rule's number in the specification, from 1.
     pub fn number(self) -> u32 {
         self as u32
+    }
+
+    /// What helps against a file that breaks the rule, in one phrase.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::Magic => "this is not a .cbvh file: bake it first",
+            // What this reader does not know, a later version may have written.
+            Self::Version | Self::SectionKnown | Self::ObjectProfile => "bake it again with this cbvh",
+            _ => "the file is damaged: copy it again, or bake it again",
+        }
     }
 }
 

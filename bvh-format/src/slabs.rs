@@ -1,16 +1,15 @@
-//! Decoded slabs: of one node, and of four children at once in the order of vector registers.
+//! Decoded slabs of one node, and of four children at once in the order of vector registers.
 
 use crate::kdop::Kdop;
 use bytemuck::{Pod, Zeroable};
 
-/// The row that holds slab `slab`: a hole after slab 6 keeps the first 7 in two registers.
+/// Returns the row that holds a slab. Row 7 stays empty, so that slab 7 begins a new register of four rows.
 #[inline]
 pub const fn row(slab: usize) -> usize {
     if slab < 7 { slab } else { slab + 1 }
 }
 
-/// The decoded slabs of one node in row order (slab `s` in row `s`, from 7 on in row `s + 1`).
-/// Rows beyond the profile's directions hold nothing of meaning.
+/// The decoded slabs of one node, by [row]. Rows that have no slab of the profile are meaningless.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeSlabs {
     /// Lower ends by row.
@@ -20,7 +19,7 @@ pub struct NodeSlabs {
 }
 
 impl NodeSlabs {
-    /// From a k-DOP.
+    /// Takes the first `slabs` slabs of a k-DOP.
     pub fn from_kdop(kdop: &Kdop, slabs: usize) -> Self {
         let mut node = Self::default();
         for slab in 0..slabs {
@@ -30,7 +29,7 @@ impl NodeSlabs {
         node
     }
 
-    /// To a k-DOP of the first `slabs` slabs; the rest is that of nothing.
+    /// Returns a k-DOP of the first `slabs` slabs. Its other slabs are those of [`Kdop::EMPTY`].
     pub fn to_kdop(&self, slabs: usize) -> Kdop {
         let mut kdop = Kdop::EMPTY;
         for slab in 0..slabs {
@@ -41,9 +40,8 @@ impl NodeSlabs {
     }
 }
 
-/// The decoded slabs of four children in register order: element `4 * r + c` of register `q` is row
-/// `4 * q + r` of child `c`. Elements of absent children and of rows beyond the profile's
-/// directions hold nothing of meaning.
+/// The decoded slabs of four children in the order of vector registers: element `4 * r + c` of register `q` is row
+/// `4 * q + r` of child `c`. Elements of absent children, and of rows that have no slab of the profile, are meaningless.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Group {
@@ -54,16 +52,16 @@ pub struct Group {
 }
 
 impl Group {
-    /// All zero.
+    /// A group of zeros.
     pub const ZERO: Self = Self { lo: [[0.0; 16]; 4], hi: [[0.0; 16]; 4] };
 
-    /// The rows one by one, four children each: lower ends in rows 0 to 15, upper ends in 16 to 31.
+    /// Returns the rows of four children each: lower ends in rows 0 to 15, upper ends in rows 16 to 31.
     #[inline(always)]
     pub fn rows(&self) -> &[[f32; 4]; 32] {
         bytemuck::cast_ref(self)
     }
 
-    /// A group of one child, the first.
+    /// Makes a group in which the first child has these slabs.
     pub fn of_one(node: &NodeSlabs) -> Self {
         let mut group = Self::ZERO;
         for row in 0..16 {

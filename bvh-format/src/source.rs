@@ -1,47 +1,46 @@
-//! The bytes of a file, in memory or read piece by piece: pages, and the blocks that belong to them.
+//! The bytes of a file, in memory or read piece by piece, and the pages and blocks among them.
 //!
-//! What goes through a file by way of a [`Source`] does the same to bytes in memory and to a file of any size, and holds
-//! a few pages of it at a time.
+//! Code that reads a file through a [`Source`] works the same on bytes in memory and on a file of any size, of which it
+//! holds a few pages at a time.
 
 use crate::checksum::{Hasher, checksum};
 use crate::error::FormatError;
-use crate::layout::Layout;
 use crate::leaf::{F32_PACKET_BYTES, LINE};
 use crate::object::Object;
-use crate::page::{PAGE, Page, PageHeader};
-use crate::rule::Rule;
+use crate::page::{PAGE, Page};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Bytes that are read at a time where there are many: they stay in a cache near the processor.
-pub const CHUNK_BYTES: usize = 1 << 16;
+/// Bytes per read where there are many: few enough to stay in a cache near the processor.
+const CHUNK_BYTES: usize = 1 << 16;
 
-/// No block that keeps the rules is longer.
-const MOST_BLOCK_BYTES: usize = 1 << 20;
+/// The most bytes of a block that keeps the rules.
+const MAX_BLOCK_BYTES: usize = 1 << 20;
 
-/// By rule 17 a page has at most 62 treelets, of 8 children.
-const MOST_PACKETS: usize = 62 * 8;
-/// A head, 65535 vertices of 96 bits, 12 indices of 16 bits a packet, the spare bytes and the rest of a line.
-const MOST_PACKED_BYTES: usize = 32 + 65535 * 12 + MOST_PACKETS * 24 + 2 * 8 + LINE;
-const _: () = assert!(MOST_PACKED_BYTES <= MOST_BLOCK_BYTES);
-const _: () = assert!(MOST_PACKETS * F32_PACKET_BYTES + LINE <= MOST_BLOCK_BYTES);
+/// The most leaf packets of a page: by rule 17 it has at most 62 treelets, which have at most 8 children.
+const MAX_PACKETS_PER_PAGE: usize = 62 * 8;
+/// The most bytes of a packed block: a head, 65535 vertices of 96 bits, 12 indices of 16 bits per packet, spare bytes
+/// and the rest of a line.
+const MAX_PACKED_BLOCK_BYTES: usize = 32 + 65535 * 12 + MAX_PACKETS_PER_PAGE * 24 + 2 * 8 + LINE;
+const _: () = assert!(MAX_PACKED_BLOCK_BYTES <= MAX_BLOCK_BYTES);
+const _: () = assert!(MAX_PACKETS_PER_PAGE * F32_PACKET_BYTES + LINE <= MAX_BLOCK_BYTES);
 
-/// The bytes of a file, from which pieces are read, by several threads at a time.
+/// The bytes of a file, of which several threads may read pieces at a time.
 pub trait Source: Sync {
-    /// Why a piece may not be there, or what is wrong with the file.
+    /// Why a piece cannot be read, or what is wrong with the file.
     type Error: From<FormatError> + Send;
 
-    /// Bytes of the file.
+    /// The length of the file in bytes.
     fn length(&self) -> u64;
 
-    /// A range within the length.
+    /// Reads a range of bytes, which must lie within the length.
     ///
     /// # Errors
-    /// Those of where the bytes are; memory has none.
+    /// The errors of the place where the bytes are. Memory has none.
     fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, Self::Error>;
 }
 
-/// Bytes in memory, which are not copied.
+/// Reads bytes in memory without copying them.
 impl Source for [u8] {
     type Error = FormatError;
 
@@ -54,105 +53,74 @@ impl Source for [u8] {
     }
 }
 
-/// A range of a file in chunks of at most [`CHUNK_BYTES`], the first of which begins where the range does.
+/// Cuts a range of a file into chunks of at most 64 KiB, in order.
 pub fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let end = range.end;
     range.step_by(CHUNK_BYTES).map(move |start| start..end.min(start.saturating_add(CHUNK_BYTES)))
 }
 
-/// The bytes of a page, not checked.
+/// The bytes of a page that has not been checked.
 pub struct PageBytes<'a>(Cow<'a, [u8]>);
 
-impl PageBytes<'_> {
-    /// The page, as of an object of this profile.
+impl<'a> PageBytes<'a> {
+    pub(crate) fn new(bytes: Cow<'a, [u8]>) -> Self {
+        Self(bytes)
+    }
+
+    /// Views the page as one of this object.
     pub fn page(&self, object: &Object) -> Page<'_> {
         const NONE: &[u8; PAGE] = &[0; PAGE];
         Page::new(self.0.first_chunk().unwrap_or(NONE), object.profile)
     }
 }
 
-/// A leaf block or an id block, not checked: all its bytes, or, if it is longer than any may be, the first of them and
-/// the checksum of all. One that is not within its section is empty.
+/// A leaf block or an id block that has not been checked. If it is longer than any block that keeps the rules, only its
+/// first bytes are here, and the checksum of all. A block that does not lie within its section is empty.
 pub struct Block<'a> {
     bytes: Cow<'a, [u8]>,
-    /// Length and checksum of one that is too long.
-    beyond: Option<(usize, u64)>,
+    /// The length and the checksum of a block that is too long.
+    too_long: Option<(usize, u64)>,
 }
 
 impl<'a> Block<'a> {
-    /// A block in memory.
+    /// Takes a block in memory.
     pub fn of_bytes(bytes: &'a [u8]) -> Self {
-        Self { bytes: Cow::Borrowed(bytes), beyond: None }
+        Self { bytes: Cow::Borrowed(bytes), too_long: None }
     }
 
-    fn read<S: Source + ?Sized>(source: &'a S, range: Option<Range<usize>>) -> Result<Self, S::Error> {
+    /// Reads a block at its place in the file; without a place it is empty.
+    ///
+    /// # Errors
+    /// The errors of the source.
+    pub(crate) fn read<S: Source + ?Sized>(
+        source: &'a S,
+        range: Option<Range<usize>>,
+    ) -> Result<Self, S::Error> {
         let range = range.unwrap_or(0..0);
-        if range.len() <= MOST_BLOCK_BYTES {
-            return Ok(Self { bytes: source.read(range)?, beyond: None });
+        if range.len() <= MAX_BLOCK_BYTES {
+            return Ok(Self { bytes: source.read(range)?, too_long: None });
         }
         let mut hasher = Hasher::default();
         for chunk in chunks(range.clone()) {
             hasher.update(&source.read(chunk)?);
         }
         let first = source.read(range.start..range.start + PAGE)?;
-        Ok(Self { bytes: first, beyond: Some((range.len(), hasher.finish())) })
+        Ok(Self { bytes: first, too_long: Some((range.len(), hasher.finish())) })
     }
 
-    /// The bytes: all those of a block that has been checked.
+    /// The bytes of the block: all of them, once the block has been checked.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Bytes of the block.
+    /// The length of the block in bytes.
     pub(crate) fn length(&self) -> usize {
-        self.beyond.map_or(self.bytes.len(), |(length, _)| length)
+        self.too_long.map_or(self.bytes.len(), |(length, _)| length)
     }
 
-    /// The checksum of all its bytes.
+    /// The checksum of all bytes of the block.
     pub(crate) fn checksum(&self) -> u64 {
-        self.beyond.map_or_else(|| checksum(&self.bytes), |(_, sum)| sum)
-    }
-}
-
-impl Layout {
-    /// Reads a page.
-    ///
-    /// # Errors
-    /// Rule 13 beyond the last page, and those of the source.
-    pub fn read_page<'a, S: Source + ?Sized>(
-        &self,
-        source: &'a S,
-        number: u32,
-    ) -> Result<PageBytes<'a>, S::Error> {
-        let at = self.page_offset(number);
-        let range = self
-            .page_range(number)
-            .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section"))?;
-        Ok(PageBytes(source.read(range)?))
-    }
-
-    /// Reads the leaf block of a page; empty if the page's header is nonsense.
-    ///
-    /// # Errors
-    /// Those of the source.
-    pub fn read_leaf_block<'a, S: Source + ?Sized>(
-        &self,
-        source: &'a S,
-        header: &PageHeader,
-    ) -> Result<Block<'a>, S::Error> {
-        Block::read(source, self.leaf_range(header))
-    }
-
-    /// Reads the id block of a page, empty without ids.
-    ///
-    /// # Errors
-    /// Those of the source.
-    pub fn read_id_block<'a, S: Source + ?Sized>(
-        &self,
-        source: &'a S,
-        header: &PageHeader,
-    ) -> Result<Block<'a>, S::Error> {
-        Block::read(source, self.id_range(header))
+        self.too_long.map_or_else(|| checksum(&self.bytes), |(_, sum)| sum)
     }
 }
 
@@ -176,13 +144,13 @@ mod tests {
 
     #[test]
     fn a_block_too_long_for_any_is_known_by_length_and_checksum() {
-        let bytes: Vec<u8> = (0..3 * MOST_BLOCK_BYTES).map(|i| ((i * i) >> 7) as u8).collect();
-        for length in [0, 100, MOST_BLOCK_BYTES, MOST_BLOCK_BYTES + 1, bytes.len() - 9] {
+        let bytes: Vec<u8> = (0..3 * MAX_BLOCK_BYTES).map(|i| ((i * i) >> 7) as u8).collect();
+        for length in [0, 100, MAX_BLOCK_BYTES, MAX_BLOCK_BYTES + 1, bytes.len() - 9] {
             let whole = &bytes[9..9 + length];
             let block = Block::read(&bytes[..], Some(9..9 + length)).unwrap();
             assert_eq!((block.length(), block.checksum()), (length, checksum(whole)));
-            assert!(whole.starts_with(block.bytes()) && block.bytes().len() <= MOST_BLOCK_BYTES);
+            assert!(whole.starts_with(block.bytes()) && block.bytes().len() <= MAX_BLOCK_BYTES);
         }
-        assert!(id_block_bytes(MOST_PACKETS, u8::MAX) <= MOST_BLOCK_BYTES);
+        assert!(id_block_bytes(MAX_PACKETS_PER_PAGE, u8::MAX) <= MAX_BLOCK_BYTES);
     }
 }

@@ -1,58 +1,75 @@
-//! A treelet: the slab residuals of up to 8 children, and where those children are.
+//! A treelet: the slab residuals of up to 8 children, and the links that lead to them.
 //!
-//! Rows run over slabs and columns over children, so that a vector register loads four slabs of four
-//! children at once. A treelet has two halves: lower ends in the first, upper ends in the second
-//! (U4 packs both into one byte and keeps slabs 0-6 in the first half and 7-12 in the second, or,
-//! at width 8, children 0-3 and 4-7). Slab 7 and up begin a new register: the row of slab `s` is
-//! `s` below 7 and `s + 1` from there on. The last four bytes of each half, which no row uses, hold
-//! the links:
+//! Rows stand for slabs and columns for children, so that a vector register loads four slabs of four children at once.
+//! A treelet has two halves: the first holds the lower ends, the second the upper ends. U4 packs both ends into one
+//! byte instead. Its first half holds slabs 0 to 6 and its second half slabs 7 to 12, or, at width 8, children 0 to 3
+//! and 4 to 7. Slab 7 and those above it begin a new register, so slab `s` stands in row `s` below 7 and in row
+//! `s + 1` from 7 on. The last four bytes of each half, which no row uses, hold the links: the kinds of the children,
+//! and where the first child of each kind is. Children of one kind are numbered consecutively from the first, in the
+//! order of the children.
 //!
-//! | bytes | what |
-//! |---|---|
-//! | last 4 of the first half | child kinds, one nibble per child, child 0 lowest |
-//! | last 4 of the second half | `u8` first treelet slot, `u8` first remote link, `u16` first leaf packet |
-//!
-//! A nibble is 0 for no child, 1 for a treelet in this page, 2 for a subtree root in another page,
-//! 4 + n - 1 for a leaf packet of n triangles (1 to 4). Children of one kind are numbered
-//! consecutively from the first, in the order of the children.
+//! Section 7 of `spec/format.md` says where each byte stands and what the kinds are.
 
 use crate::kdop::Kdop;
+use crate::leaf::PACKET;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{encode_four_outward, encode_max_outward, encode_min_outward, residual_unit};
 use crate::slabs::{Group, NodeSlabs, row};
 
-/// One child of a treelet.
+/// One child of a treelet. The list of variants is part of the major version of the format, and each reader must handle
+/// all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Child {
-    /// No child in this place.
+    /// There is no child in this place.
     Empty,
-    /// The treelet in this slot of the same page.
+    /// The treelet in a slot of the same page.
     Treelet(u8),
-    /// The subtree root that this entry of the page's remote table names.
+    /// The subtree root to which a remote link of the page leads.
     Remote(u8),
     /// A leaf packet of the page.
     Leaf {
-        /// Number of the packet within the page's leaf block.
+        /// The number of the packet in the page's leaf block.
         packet: u16,
-        /// Triangles in it, 1 to 4.
+        /// The number of its triangles, 1 to 4.
         triangles: u8,
     },
+}
+
+/// The kind of a child, from which its nibble follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ChildKind {
+    /// A treelet of the same page.
+    Treelet,
+    /// A subtree root of another page.
+    Remote,
+    /// A leaf packet of 1 to 4 triangles.
+    Leaf { triangles: usize },
 }
 
 /// The links of a treelet, as stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Links {
-    /// One nibble per child.
+    /// The kinds of the children: one nibble per child, that of child 0 lowest.
     pub kinds: u32,
-    /// Slot of the first child treelet.
+    /// The slot of the first child treelet.
     pub first_treelet: u8,
-    /// Index of the first remote link.
+    /// The number of the first remote link.
     pub first_remote: u8,
-    /// Number of the first leaf packet.
+    /// The number of the first leaf packet.
     pub first_leaf: u16,
 }
 
-const EACH: u32 = 0x1111_1111;
+/// The lowest bit of each nibble.
+const LOWEST_BITS: u32 = 0x1111_1111;
+
+/// The nibble of a child that is a treelet of the same page.
+const KIND_TREELET: u32 = 1;
+/// The nibble of a child that is a subtree root of another page.
+const KIND_REMOTE: u32 = 2;
+/// The nibble of a child that is a leaf packet of one triangle; up to three more triangles add to it.
+const KIND_LEAF: u32 = 4;
+/// The nibble of a child that is a leaf packet of four triangles.
+const KIND_LEAF_LAST: u32 = KIND_LEAF + PACKET as u32 - 1;
 
 impl Links {
     /// Reads the links of a treelet of 64, 128 or 256 bytes.
@@ -82,31 +99,48 @@ impl Links {
         treelet[end - 2..end].copy_from_slice(&self.first_leaf.to_le_bytes());
     }
 
-    /// A bit (the lowest of its nibble) for every child that is a leaf packet.
+    /// States the kind of the child in place `index`, 0 to 7, which was empty.
+    pub(crate) fn set_kind(&mut self, index: usize, kind: ChildKind) {
+        let nibble = match kind {
+            ChildKind::Treelet => KIND_TREELET,
+            ChildKind::Remote => KIND_REMOTE,
+            ChildKind::Leaf { triangles } => KIND_LEAF + triangles as u32 - 1,
+        };
+        self.kinds |= nibble << (4 * index);
+    }
+
+    /// Returns the leaf packets among the children, as the lowest bits of their nibbles.
     #[inline]
     pub fn leaves(&self) -> u32 {
-        (self.kinds >> 2) & EACH
+        (self.kinds >> 2) & LOWEST_BITS
     }
 
-    /// A bit (the lowest of its nibble) for every child that is a treelet of this page.
+    /// Returns the treelets of this page among the children, as the lowest bits of their nibbles.
     #[inline]
     pub fn treelets(&self) -> u32 {
-        self.kinds & EACH & !self.leaves()
+        self.kinds & LOWEST_BITS & !self.leaves()
     }
 
-    /// A bit (the lowest of its nibble) for every child in another page.
+    /// Returns the children in other pages, as the lowest bits of their nibbles.
     #[inline]
     pub fn remotes(&self) -> u32 {
-        (self.kinds >> 1) & EACH & !self.leaves()
+        (self.kinds >> 1) & LOWEST_BITS & !self.leaves()
     }
 
-    /// Number of children, if there are no gaps.
+    /// Returns true if the kinds of the first `children` children are known ones.
+    pub(crate) fn kinds_are_known(&self, children: usize) -> bool {
+        let kind = |child: usize| self.kinds >> (4 * child) & 15;
+        (0..children)
+            .all(|child| matches!(kind(child), KIND_TREELET | KIND_REMOTE | KIND_LEAF..=KIND_LEAF_LAST))
+    }
+
+    /// Returns the number of children, if there are no gaps between them.
     #[inline]
     pub fn children(&self) -> usize {
         8 - self.kinds.leading_zeros() as usize / 4
     }
 
-    /// The child in place `index`, 0 to 7.
+    /// Returns the child in place `index`, 0 to 7.
     #[inline]
     pub fn child(&self, index: usize) -> Child {
         let shift = 4 * (index as u32 & 7);
@@ -114,36 +148,36 @@ impl Links {
         let rank = |of: u32| (of & before).count_ones();
         let kind = (self.kinds >> shift) & 15;
         match kind {
-            1 => Child::Treelet(self.first_treelet.wrapping_add(rank(self.treelets()) as u8)),
-            2 => Child::Remote(self.first_remote.wrapping_add(rank(self.remotes()) as u8)),
-            4..=7 => Child::Leaf {
+            KIND_TREELET => Child::Treelet(self.first_treelet.wrapping_add(rank(self.treelets()) as u8)),
+            KIND_REMOTE => Child::Remote(self.first_remote.wrapping_add(rank(self.remotes()) as u8)),
+            KIND_LEAF..=KIND_LEAF_LAST => Child::Leaf {
                 packet: self.first_leaf.wrapping_add(rank(self.leaves()) as u16),
-                triangles: kind as u8 - 3,
+                triangles: (kind - KIND_LEAF) as u8 + 1,
             },
             _ => Child::Empty,
         }
     }
 }
 
-/// Where the two codes of a child's slab stand in a treelet.
-struct Place {
+/// Where the two codes of a child's slab stand in a treelet, in bytes.
+struct CodePlace {
     lo: usize,
     hi: usize,
 }
 
-/// Byte offsets of a residual; for U4 both ends share the byte (low nibble: lower end).
-fn place(profile: Profile, child: usize, slab: usize) -> Place {
+/// Returns where the codes of a child stand. U4 keeps both in one byte, that of the lower end in the low nibble.
+fn place(profile: Profile, child: usize, slab: usize) -> CodePlace {
     let half = profile.treelet_bytes() / 2;
     let row = row(slab);
     match (profile.encoding(), profile.width()) {
         (Encoding::U4, 8) => {
             let at = (child / 4) * half + row * 4 + child % 4;
-            Place { lo: at, hi: at }
+            CodePlace { lo: at, hi: at }
         }
-        (Encoding::U4, _) => Place { lo: row * 4 + child, hi: row * 4 + child },
+        (Encoding::U4, _) => CodePlace { lo: row * 4 + child, hi: row * 4 + child },
         (_, 8) => {
             let at = (child / 4) * half + row * 4 + child % 4;
-            Place { lo: at, hi: at + half / 2 }
+            CodePlace { lo: at, hi: at + half / 2 }
         }
         (encoding, width) => {
             let size = match encoding {
@@ -152,14 +186,14 @@ fn place(profile: Profile, child: usize, slab: usize) -> Place {
                 _ => 1,
             };
             let at = (row * width + child) * size;
-            Place { lo: at, hi: at + half }
+            CodePlace { lo: at, hi: at + half }
         }
     }
 }
 
-/// The two codes of a child's slab. For F32 the codes are 0 and `read_ends` has the values.
+/// Reads the two codes of a child's slab. For F32, which has no codes, it returns 0: see `read_ends`.
 pub(crate) fn read_codes(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (u16, u16) {
-    let Place { lo, hi } = place(profile, child, slab);
+    let CodePlace { lo, hi } = place(profile, child, slab);
     match profile.encoding() {
         Encoding::U4 => (u16::from(treelet[lo] & 15), u16::from(treelet[lo] >> 4)),
         Encoding::U8 => (u16::from(treelet[lo]), u16::from(treelet[hi])),
@@ -171,12 +205,12 @@ pub(crate) fn read_codes(profile: Profile, treelet: &[u8], child: usize, slab: u
     }
 }
 
-/// The two ends of a child's slab of the F32 profile, 0 for others.
+/// Reads the two ends of a child's slab from a treelet of encoding F32. For other encodings it returns 0.
 pub(crate) fn read_ends(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (f32, f32) {
     if profile.encoding() != Encoding::F32 {
         return (0.0, 0.0);
     }
-    let Place { lo, hi } = place(profile, child, slab);
+    let CodePlace { lo, hi } = place(profile, child, slab);
     let end = |at: usize| {
         let mut bytes = [0; 4];
         bytes.copy_from_slice(&treelet[at..at + 4]);
@@ -185,26 +219,34 @@ pub(crate) fn read_ends(profile: Profile, treelet: &[u8], child: usize, slab: us
     (end(lo), end(hi))
 }
 
-/// Writes the slabs of `children` under the decoded `parent`, rounding outward.
-///
-/// `treelet` is zeroed and of the profile's size; links are written apart. Every child's true
-/// k-DOP must lie within the parent's decoded slabs.
-pub fn encode_slabs(
+/// Writes the slabs of a treelet's children under the decoded slabs of the treelet, rounding outward.
+pub(crate) struct SlabEncoder {
     profile: Profile,
-    object_scale: f32,
-    parent: &NodeSlabs,
-    children: &[Kdop],
-    treelet: &mut [u8],
-) {
-    let encoding = profile.encoding();
-    let slabs = profile.directions().slabs();
-    let mut units = [0.0; 16];
-    for slab in 0..slabs {
-        units[slab] = residual_unit(encoding, parent.lo[row(slab)], parent.hi[row(slab)], object_scale);
+    /// The decoded slabs of the treelet.
+    pub(crate) parent: NodeSlabs,
+    /// The residual unit of each slab.
+    units: [f32; 16],
+}
+
+impl SlabEncoder {
+    /// Prepares the units of a treelet.
+    pub(crate) fn new(profile: Profile, f16_scale: f32, parent: &NodeSlabs) -> Self {
+        let mut units = [0.0; 16];
+        for slab in 0..profile.directions().slabs() {
+            let (lo, hi) = (parent.lo[row(slab)], parent.hi[row(slab)]);
+            units[slab] = residual_unit(profile.encoding(), lo, hi, f16_scale);
+        }
+        Self { profile, parent: *parent, units }
     }
-    for (index, child) in children.iter().enumerate() {
+
+    /// Writes the slabs of child `index`. The child's true k-DOP must lie within the treelet's decoded slabs, and its
+    /// codes must be zero so far.
+    pub(crate) fn encode(&self, index: usize, child: &Kdop, treelet: &mut [u8]) {
+        let Self { profile, ref parent, ref units } = *self;
+        let encoding = profile.encoding();
+        let slabs = profile.directions().slabs();
         let mut put = |slab: usize, code_lo: u16, code_hi: u16| {
-            let Place { lo, hi } = place(profile, index, slab);
+            let CodePlace { lo, hi } = place(profile, index, slab);
             match encoding {
                 Encoding::U4 => treelet[lo] = (code_lo | code_hi << 4) as u8,
                 Encoding::U8 => (treelet[lo], treelet[hi]) = (code_lo as u8, code_hi as u8),
@@ -222,7 +264,7 @@ pub fn encode_slabs(
             Encoding::U4 | Encoding::U8 => {
                 let last = if encoding == Encoding::U4 { 15 } else { 255 };
                 for first in (0..slabs).step_by(4) {
-                    // Behind the last slab any other stands in.
+                    // Lanes without a slab of their own repeat the last one.
                     let four: [usize; 4] = std::array::from_fn(|lane| (first + lane).min(slabs - 1));
                     let unit = four.map(|slab| units[slab]);
                     let (ends, parents) =
@@ -249,7 +291,7 @@ pub fn encode_slabs(
     }
 }
 
-/// The slabs of one child out of a decoded group, as the parent of the next level.
+/// Returns the slabs of one child of a decoded group, which predict those of its own children.
 #[inline]
 pub fn child_slabs(group: &Group, child: usize) -> NodeSlabs {
     let mut slabs = NodeSlabs::default();
@@ -279,7 +321,7 @@ mod tests {
             }
             for slab in 0..profile.directions().slabs() {
                 for child in 0..profile.width() {
-                    let Place { lo, hi } = place(profile, child, slab);
+                    let CodePlace { lo, hi } = place(profile, child, slab);
                     used[lo..lo + size].iter_mut().for_each(|u| *u += 1);
                     if profile.encoding() != Encoding::U4 {
                         used[hi..hi + size].iter_mut().for_each(|u| *u += 1);

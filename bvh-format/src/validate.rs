@@ -1,8 +1,8 @@
-//! Checks the structure and the checksums of a whole file by the rules, page by page.
+//! Checks the structure and all checksums of a whole file, page by page.
 //!
-//! Goes through the bytes in order, wherever they are, and holds a few pages at a time: once for the checksums of
-//! sections, once for the pages and their blocks, once for the links. What is left of a page is added to a sum, so that
-//! memory does not grow with the file.
+//! The check reads the bytes in order, wherever they are, and holds a few pages at a time. One pass is for the checksums
+//! of sections, one for the pages and their blocks, and one for the links between pages. All that stays of a page is
+//! added to sums, so memory does not grow with the file.
 
 mod counts;
 
@@ -22,25 +22,25 @@ use crate::treelet::{Child, Links};
 use counts::CountsFromStart;
 use std::ops::Range;
 
-/// Pages whose counts are in memory at a time, and that workers share.
-const BATCH: u32 = 1 << 12;
+/// Pages that workers share, and whose counts are in memory at a time.
+const PAGES_PER_BATCH: u32 = 1 << 12;
 
-/// Who does the work of [`validate_with`]: one thread, or several.
+/// How the work of [`validate_with`] is shared: by one thread, or by several.
 pub trait Workers: Sync {
-    /// Does both; the error is the first one's, if that has one.
+    /// Does both, perhaps at the same time.
     ///
     /// # Errors
-    /// Those of both.
+    /// The error of `a`, or else that of `b`.
     fn both<A: Send, B: Send, E: Send>(
         &self,
         a: impl FnOnce() -> Result<A, E> + Send,
         b: impl FnOnce() -> Result<B, E> + Send,
     ) -> Result<(A, B), E>;
 
-    /// Checks some pages; results are in their order.
+    /// Checks some pages, and returns the results in the order of the pages.
     ///
     /// # Errors
-    /// That of the first page that has one.
+    /// The error of the first page that fails.
     fn each<T: Send, E: Send>(
         &self,
         pages: Range<u32>,
@@ -48,9 +48,9 @@ pub trait Workers: Sync {
     ) -> Result<Vec<T>, E>;
 }
 
-/// One thread, which does one thing after the other.
+/// Does all work in the calling thread.
 #[derive(Debug, Clone, Copy)]
-pub struct OneThread;
+pub(crate) struct OneThread;
 
 impl Workers for OneThread {
     fn both<A, B, E>(
@@ -66,23 +66,24 @@ impl Workers for OneThread {
     }
 }
 
-/// Checks structure and checksums of the whole file: [`validate_with`] of bytes in memory, by one thread.
+/// Checks the structure and the checksums of a whole file in memory, in the calling thread.
 ///
 /// # Errors
-/// As [`validate_with`].
+/// The errors of [`validate_with`].
 pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
     validate_with(bytes, &OneThread)
 }
 
-/// Checks structure and checksums of the whole file.
+/// Checks the structure and the checksums of a whole file. It does not check bounds (rule 35): see
+/// [`crate::bounds::check_bounds`].
 ///
-/// Cost: two passes over the bytes, and one over the pages for their links, with a page read for each link. Memory: twice
-/// the object table, some 300 KiB for counts, and for each worker a page with its blocks: at most 1 MiB, and 64 KiB in
-/// files baked here.
+/// The check takes two passes over all bytes, and one over the pages for their links, with one more page read per link.
+/// It needs twice the memory of the object table, some 300 KiB for counts, and a page with its blocks for each worker:
+/// at most 1 MiB, and 64 KiB in files of `bvh-bake`.
 ///
 /// # Errors
-/// The first rule that does not hold, in the order of the specification, whoever does the work and wherever the bytes
-/// are; and those of the source. Bounds (rule 35) are [`crate::bounds::check_bounds`]' business.
+/// The first rule that does not hold, in the order of the specification, however the work is shared and wherever the
+/// bytes are; or an error of the source.
 pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> Result<Layout, S::Error> {
     let layout = Layout::read_from(source)?;
     let pages =
@@ -94,7 +95,7 @@ pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> 
 /// Checks the checksums of whole sections and of the content, and the order of duplicate ids.
 ///
 /// # Errors
-/// The first of rules 10 and 36 that does not hold, and those of the source.
+/// The first of rules 10 and 36 that does not hold, or an error of the source.
 pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(), S::Error> {
     let mut content = ContentHasher::default();
     let mut pairs = PairsInOrder::default();
@@ -130,7 +131,10 @@ fn check_object<S: Source + ?Sized>(
     let pages = object.pages();
     let batches = || {
         let end = pages.end;
-        pages.clone().step_by(BATCH as usize).map(move |start| start..end.min(start.saturating_add(BATCH)))
+        pages
+            .clone()
+            .step_by(PAGES_PER_BATCH as usize)
+            .map(move |start| start..end.min(start.saturating_add(PAGES_PER_BATCH)))
     };
     let mut counts = CountsFromStart::default();
     for batch in batches() {
@@ -146,20 +150,20 @@ fn check_object<S: Source + ?Sized>(
     Ok(counts.finish(layout, object)?)
 }
 
-/// A page that has been validated, all but where its links lead.
+/// A page that has been validated, except where its remote links lead.
 pub struct ValidatedPage<'a> {
-    /// Its bytes.
+    /// The bytes of the page.
     pub bytes: PageBytes<'a>,
-    /// Its leaf block.
+    /// The leaf block of the page.
     pub leaves: Block<'a>,
-    /// What it has.
+    /// How many parts the page has.
     pub counts: Counts,
 }
 
-/// Reads a page and its blocks and checks them value by value, all but where the links lead.
+/// Reads a page and its blocks, and checks them value by value, except where the remote links lead.
 ///
 /// # Errors
-/// The first of rules 15 to 33, 37 and 38 that does not hold, and those of the source.
+/// The first of rules 15 to 33, 37 and 38 that does not hold, or an error of the source.
 pub fn validate_page<'a, S: Source + ?Sized>(
     layout: &Layout,
     source: &'a S,
@@ -169,7 +173,7 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     let bytes = layout.read_page(source, number)?;
     let page = bytes.page(object);
     check_page(page.bytes(), number, object, layout.page_offset(number))?;
-    // Only now: blocks that a damaged page states may be of any length.
+    // The page must be checked first: a damaged one may state blocks of any length.
     let header = page.header();
     let leaves = layout.read_leaf_block(source, header)?;
     layout.check_leaf_block_of(&leaves, &page, object)?;
@@ -186,7 +190,7 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     Ok(ValidatedPage { bytes, leaves, counts })
 }
 
-/// Checks where the links of a page lead, after all pages have been checked: rule 20.
+/// Checks where the remote links of a page lead (rule 20), after all pages have been checked.
 fn check_links<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
@@ -203,7 +207,7 @@ fn check_links<S: Source + ?Sized>(
     Ok(())
 }
 
-/// Checks the values in a page's checked leaf and id blocks; returns the number of its triangles.
+/// Checks the values in the leaf and id blocks of a page, and returns the number of its triangles.
 fn check_values(
     layout: &Layout,
     object: &Object,
@@ -224,7 +228,7 @@ fn check_values(
         for lane in 0..if ids.is_empty() { 0 } else { count } {
             let id = u64::from(decode_id(ids, usize::from(packet), lane));
             ensure(id < object.record.input_triangles.get(), Rule::IdRange, at + 32, || {
-                (format!("below {}", object.record.input_triangles), id.to_string())
+                (format!("an id below {}", object.record.input_triangles), id.to_string())
             })?;
         }
     }
@@ -236,13 +240,27 @@ fn check_indices(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError
     for place in 0..3 * PACKET {
         let index = head.index(block, packet, place);
         ensure(index < u32::from(head.vertices), Rule::PackedIndex, at + 24, || {
-            (format!("below {}", head.vertices), index.to_string())
+            (format!("a vertex index below {}", head.vertices), index.to_string())
         })?;
     }
     Ok(())
 }
 
 fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), FormatError> {
+    // All at once, which compilers turn into vector code. Only what breaks a rule is looked for one by one.
+    let mut all_keep_the_rules = true;
+    for corner in &packet.corners {
+        for axis in 0..3 {
+            for value in corner[axis].map(f64::from) {
+                let sum = origin[axis] + value;
+                let exact = (sum - origin[axis] == value) & (sum - value == origin[axis]);
+                all_keep_the_rules &= (value.abs() <= MAX_COORDINATE) & exact;
+            }
+        }
+    }
+    if all_keep_the_rules {
+        return Ok(());
+    }
     for corner in &packet.corners {
         for axis in 0..3 {
             for value in corner[axis].map(f64::from) {
@@ -252,7 +270,7 @@ fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), Form
                 let sum = origin[axis] + value;
                 let exact = sum - origin[axis] == value && sum - value == origin[axis];
                 ensure(exact, Rule::VertexOnGrid, at + 24, || {
-                    (format!("{} + v exact", origin[axis]), value.to_string())
+                    (format!("a coordinate whose sum with {} is exact", origin[axis]), value.to_string())
                 })?;
             }
         }
@@ -260,7 +278,7 @@ fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), Form
     Ok(())
 }
 
-/// The leaf packets of a checked page with their numbers of triangles, in slot order.
+/// Returns the leaf packets of a checked page in the order of slots: the number of each packet, and of its triangles.
 pub fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u16, usize)> + 'a {
     (0..page.header().treelets).flat_map(|slot| {
         let links = Links::read(page.treelet(slot));

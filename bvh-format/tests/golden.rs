@@ -1,17 +1,16 @@
-//! The frozen files of `testdata/`: `ok-*.cbvh` are valid, `bad-Rxx-*.cbvh` break rule xx and no earlier one.
+//! Checks the frozen files of `testdata/`: `ok-*.cbvh` are valid, and `bad-Rxx-*.cbvh` break rule xx and no earlier
+//! one.
 //!
-//! The bad files are made here from `ok-everything.cbvh`, each by one change, with the checksums behind which
-//! the broken rule lies made right again. With `CBVH_BLESS=1` missing ones are written; none is ever overwritten.
-//! To be small they are without the sections that the rule does not need.
-
-#[allow(dead_code, reason = "others use the rest")]
-#[path = "common/seal.rs"]
-mod seal;
+//! The test makes the bad files from `ok-everything.cbvh`, each by one change, and corrects the checksums that are
+//! checked before the broken rule. `CBVH_BLESS=1` writes the files that are missing; none is ever overwritten. To
+//! keep the files small, they omit the sections that the rule does not need.
 
 use bvh_format::checksum::checksum;
 use bvh_format::validate::validate;
 use bvh_format::{FormatError, Layout, Rule};
-use seal::{put, put_together, seal, seal_header, seal_pages, seal_sections, section, take_apart};
+use cbvh_testkit::seal::{
+    put, put_together, seal, seal_header, seal_pages, seal_sections, section, take_apart,
+};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -19,7 +18,7 @@ fn testdata() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata")
 }
 
-/// Names and bytes of the frozen files whose names start so.
+/// Returns the names and bytes of the frozen files whose names start with `start`.
 fn frozen(start: &str) -> Vec<(String, Vec<u8>)> {
     let names = std::fs::read_dir(testdata()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<_> = names.filter(|n| n.starts_with(start) && n.ends_with(".cbvh")).collect();
@@ -28,19 +27,19 @@ fn frozen(start: &str) -> Vec<(String, Vec<u8>)> {
     names.into_iter().map(read).map(|(bytes, name)| (name, bytes)).collect()
 }
 
-/// A file of some sections of `ok-everything.cbvh`, sealed after a change to its bytes.
+/// A file of some sections of `ok-everything.cbvh`, under change.
 struct Change {
     bytes: Vec<u8>,
 }
 
-/// The sections of kinds 1 to 6 by their kinds; 0 for an empty section of leaves.
+/// Changes a file that has the sections of the given kinds, from 1 to 6. 0 stands for an empty section of leaves.
 fn change(kinds: &[u32], edit: impl FnOnce(&mut Change)) -> Vec<u8> {
     let base = std::fs::read(testdata().join("ok-everything.cbvh")).unwrap();
     let mut sections = take_apart(&base);
     sections.retain(|(kind, _, _)| kinds.contains(kind) || *kind == 3 && kinds.contains(&0));
     sections.iter_mut().filter(|(kind, _, _)| *kind == 3 && kinds.contains(&0)).for_each(|s| s.2.clear());
     let mut change = Change { bytes: put_together(&sections) };
-    // Without an id section there are no id blocks.
+    // Without an id section, pages refer to no id blocks.
     if !kinds.contains(&4) && kinds.contains(&2) {
         change.page(52, &[0; 4]);
         change.page(32, &[0; 8]);
@@ -55,19 +54,19 @@ impl Change {
         put(&mut self.bytes, at, value);
     }
 
-    /// The record of the object, from its first byte.
+    /// Writes into the record of the object, at an offset from the record's first byte.
     fn record(&mut self, at: usize, value: &[u8]) {
         let start = section(&self.bytes, 1).start;
         put(&mut self.bytes, start + 16 + at, value);
     }
 
-    /// The only page.
+    /// Writes into the only page.
     fn page(&mut self, at: usize, value: &[u8]) {
         let start = section(&self.bytes, 2).start;
         put(&mut self.bytes, start + at, value);
     }
 
-    /// The root's treelet.
+    /// Writes into the root's treelet.
     fn treelet(&mut self, at: usize, value: &[u8]) {
         let line = usize::from(self.bytes[section(&self.bytes, 2).start + 61]);
         self.page(64 * line + at, value);
@@ -83,7 +82,7 @@ impl Change {
     }
 }
 
-/// A valid file but for one change that is sealed.
+/// Makes a file that is valid except for one change, and corrects its checksums.
 fn sealed(kinds: &[u32], edit: impl FnOnce(&mut Change)) -> Vec<u8> {
     change(kinds, |file| {
         edit(file);
@@ -95,7 +94,7 @@ const NODES: [u32; 3] = [1, 2, 0];
 const LEAVES: [u32; 3] = [1, 2, 3];
 const IDS: [u32; 4] = [1, 2, 3, 4];
 
-/// Header and object table: refused when a file is opened.
+/// Changes to the header and the object table, which are refused when a file is opened.
 fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     let nan = f32::NAN.to_le_bytes();
     let header = |edit: fn(&mut Change)| sealed(&[], edit);
@@ -134,7 +133,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     ]
 }
 
-/// The object table with empty sections of nodes and leaves.
+/// Makes a file of an object table with empty sections of nodes and leaves, and changes it.
 fn objects_alone(edit: impl FnOnce(&mut Change)) -> Vec<u8> {
     let objects = take_apart(&sealed(&[1], |_| ())).remove(0);
     let mut file = Change { bytes: put_together(&[objects, (2, 1, vec![]), (3, 1, vec![])]) };
@@ -143,12 +142,12 @@ fn objects_alone(edit: impl FnOnce(&mut Change)) -> Vec<u8> {
     file.bytes
 }
 
-/// A cube alone out of `ok-profiles.cbvh`, without its leaves, and a change to its page's treelet.
+/// Makes a file of one cube of `ok-profiles.cbvh`, without its leaves, and changes the treelet of its page.
 fn cube_of_profile(number: usize, at: usize, value: &[u8]) -> Vec<u8> {
     let all = take_apart(&std::fs::read(testdata().join("ok-profiles.cbvh")).unwrap());
     let record = &all[0].2[16 + 192 * number..][..192];
     let mut objects = [&[1, 0, 0, 0][..], &[0; 12], record].concat();
-    // No name, and the first page of the file.
+    // The object has no name and starts at the first page of the file.
     put(&mut objects, 16, &[0; 8]);
     put(&mut objects, 16 + 80, &[0; 4]);
     let mut page = all[1].2[4096 * number..][..4096].to_vec();
@@ -160,7 +159,7 @@ fn cube_of_profile(number: usize, at: usize, value: &[u8]) -> Vec<u8> {
     file.bytes
 }
 
-/// Pages: refused when one is touched. The cube's page has one root, at line 2.
+/// Changes to pages, which are refused when a query touches the page. The cube's page has one root, at line 2.
 fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
     let page = |edit: fn(&mut Change)| sealed(&NODES, edit);
     vec![
@@ -206,7 +205,7 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
     ]
 }
 
-/// Leaf and id blocks, and what only a look at the whole file finds.
+/// Changes to leaf and id blocks, and those that only a check of the whole file finds.
 fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
     let block = |edit: fn(&mut Change)| sealed(&LEAVES, edit);
     let infinite = (f32::INFINITY.to_bits() as i32).to_le_bytes();
@@ -223,7 +222,7 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
                 let start = section(&f.bytes, 2).start;
                 let lines = f.bytes[start + 48] + 1;
                 f.page(48, &[lines]);
-                // The section as stated in the table grows by the line.
+                // The section table states a length that is longer by one line.
                 let length = section(&f.bytes, 3).len() as u64 + 64;
                 f.header(64 + 2 * 32 + 16, &length.to_le_bytes());
             }),
@@ -243,7 +242,8 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
             29,
             "fewer-vertices",
             block(|f| {
-                // Pool and array stay where they are: the same bits for one vertex less do not fill a byte less.
+                // The pool and the array stay where they are, because the bits of one vertex less fill the same
+                // number of bytes.
                 f.leaves(0, &[1, 0]);
                 f.leaves(4, &[0; 3]);
                 let bits = f.bytes[section(&f.bytes, 3).start + 2];
@@ -300,7 +300,7 @@ fn bad_files_break_the_rule_in_their_name() {
         let found = validate(bytes);
         assert_eq!(number_of(found.clone()), *rule, "{what}: {:?}", found.err());
     }
-    // One file a rule is frozen, to keep the folder small.
+    // Only one file per rule is frozen, to keep the folder small.
     let mut frozen_rules = BTreeSet::new();
     for (rule, what, bytes) in bad.iter().filter(|(rule, _, _)| frozen_rules.insert(*rule)) {
         let name = format!("bad-R{rule:02}-{what}.cbvh");
@@ -310,7 +310,7 @@ fn bad_files_break_the_rule_in_their_name() {
         }
         assert!(std::fs::read(&path).unwrap() == *bytes, "{name} is not what was frozen");
     }
-    // Files that are no longer made, of older generations, are refused all the same.
+    // Files of older generations, which the test no longer makes, are refused as well.
     let files = frozen("bad-");
     for (name, bytes) in &files {
         let rule: u32 = name[5..7].parse().unwrap();
@@ -320,7 +320,7 @@ fn bad_files_break_the_rule_in_their_name() {
     }
     let covered: BTreeSet<u32> = bad.iter().map(|(rule, _, _)| *rule).collect();
     let missing: Vec<u32> = Rule::ALL.iter().map(|r| r.number()).filter(|r| !covered.contains(r)).collect();
-    // R35 is no business of `validate`: see `bvh-bake/tests/bake.rs`.
+    // `validate` does not check R35: see `bvh-bake/tests/bake.rs`.
     assert_eq!(missing, [35]);
 }
 

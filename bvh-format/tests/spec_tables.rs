@@ -1,7 +1,7 @@
-//! The tables of the specification say what the code does: each is read from the Markdown and compared.
+//! Checks that the tables of the specification say what the code does. Each is read from the Markdown and compared.
 //!
-//! A table is found by the comment `<!-- table: name -->` before it. Byte tables must name every
-//! field of their structure, in order, without gaps.
+//! A table is found by the comment `<!-- table: name -->` before it. Byte tables must name every field of their
+//! structure, in order and without gaps.
 
 use bvh_format::Rule;
 use bvh_format::checksum::checksum;
@@ -11,7 +11,7 @@ use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::leaf::{F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PackedHead, TriangleEncoding};
 use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
-use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, write_anchor};
+use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
@@ -25,7 +25,7 @@ fn specification(file: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The rows of a table, without its heading; cells without the backquotes around them.
+/// Returns the rows of a table without its heading. Cells lose the backquotes around them.
 fn table(file: &str, name: &str) -> Vec<Vec<String>> {
     let text = specification(file);
     let marker = format!("<!-- table: {name} -->");
@@ -40,15 +40,15 @@ fn table(file: &str, name: &str) -> Vec<Vec<String>> {
     rows[2..].to_vec()
 }
 
-/// `12` or `0xff`; text behind a space is for people.
+/// Reads a number such as `12` or `0xff`. Text after a space is for people and is ignored.
 fn number(cell: &str) -> u64 {
     let cell = cell.split(' ').next().unwrap_or_default();
     let (digits, radix) = cell.strip_prefix("0x").map_or((cell, 10), |hex| (hex, 16));
     u64::from_str_radix(digits, radix).unwrap_or_else(|_| panic!("not a number: {cell}"))
 }
 
-/// A byte table as (offset, size, type, field), after checking that it has no gaps and that sizes
-/// are those of the types.
+/// Returns a byte table as (offset, size, type, field), after checking that it has no gaps and that each size is that
+/// of its type.
 fn byte_table(name: &str, total: usize) -> Vec<(usize, usize, String, String)> {
     let mut next = 0;
     let rows = table("format.md", name).into_iter().map(|row| {
@@ -71,7 +71,7 @@ fn byte_table(name: &str, total: usize) -> Vec<(usize, usize, String, String)> {
     rows
 }
 
-/// Compares a byte table with a structure. A field left out of the list does not compile.
+/// Compares a byte table with a structure. If the list leaves out a field, the test does not compile.
 macro_rules! compare {
     ($structure:ident: $($field:ident),*) => {{
         let $structure { $($field),* } = &$structure::new_zeroed();
@@ -83,7 +83,7 @@ macro_rules! compare {
         for (row, field) in rows.iter().zip(fields) {
             assert_eq!((row.0, row.1, row.3.as_str()), (field.0, field.1, field.3));
             let kind = field.2.to_lowercase();
-            assert!(kind.contains(&row.2), "type of {}: {} is no {}", field.3, kind, row.2);
+            assert!(kind.contains(&row.2), "type of {}: {} is not {}", field.3, kind, row.2);
         }
     }};
 }
@@ -111,7 +111,7 @@ fn heads_of_blocks() {
     let section = write_objects(&[("name".into(), ObjectRecord::new_zeroed())]);
     assert_eq!([section[offset(&rows, "objects")], section[offset(&rows, "names_length")]], [1, 4]);
 
-    // Bytes that differ from each other: a value is known by the byte it starts with.
+    // All bytes differ, so that each value is known by its first byte.
     let bytes: Vec<u8> = (1..=PACKED_HEAD_BYTES as u8).collect();
     let head = PackedHead::read(&bytes).unwrap();
     macro_rules! fields {
@@ -126,7 +126,7 @@ fn heads_of_blocks() {
     assert_eq!(named.len(), fields.len());
     for (row, (name, kind, first)) in named.into_iter().zip(fields) {
         assert_eq!((row.3.as_str(), bytes[row.0]), (name, first));
-        assert!(kind.contains(&row.2), "type of {name}: {kind} is no {}", row.2);
+        assert!(kind.contains(&row.2), "type of {name}: {kind} is not {}", row.2);
     }
 
     let rows = byte_table("id-head", ID_HEAD_BYTES);
@@ -147,8 +147,12 @@ fn heads_of_blocks() {
 fn anchors() {
     let slabs = Kdop { lo: [1; 13].map(f32::from_bits), hi: [2; 13].map(f32::from_bits) };
     for (column, profile) in [(2, Profile::Dop6U8), (3, Profile::Dop14U8), (4, Profile::Dop26U8)] {
-        let mut anchor = vec![0; profile.anchor_bytes()];
-        write_anchor(profile, &slabs, Some((3, 4)), &mut anchor);
+        let mut writer = PageWriter::new(profile, 1.0, PageShape { roots: 1, remotes: 0, treelets: 1 });
+        writer.root(&slabs, Some((3, 4)));
+        writer.begin_treelet();
+        writer.leaf(&slabs, std::iter::once(([[0.0; 3]; 3], 0)));
+        let page = writer.finish(TriangleEncoding::F32, false).bytes;
+        let anchor = &page[PAGE_HEADER_BYTES..PAGE_HEADER_BYTES + profile.anchor_bytes()];
         let mut next = 0;
         for row in table("format.md", "anchor") {
             let (start, end) = row[column].split_once("..").unwrap();
@@ -239,7 +243,7 @@ fn constants() {
     assert!(text.contains(&format!("`{:#018x}`", checksum(&[]))));
 }
 
-/// Writes one code where the table says, and expects that one end of one child changes.
+/// Writes one code at the place that the table states, and expects that exactly one end of one child changes.
 #[test]
 fn places_of_codes() {
     let rows = table("format.md", "places");

@@ -1,19 +1,20 @@
-//! What can go wrong when opening and asking.
+//! What can go wrong when a file is opened and when a question is asked.
 
 use crate::isa::BackendError;
 use bvh_format::FormatError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be opened.
+/// Why a file cannot be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// The system refused the file.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
     /// The file is not a valid `.cbvh` file.
@@ -21,7 +22,7 @@ pub enum OpenError {
     Format {
         /// The file.
         path: PathBuf,
-        /// The rule broken, and where.
+        /// The rule that is broken, and where.
         source: FormatError,
     },
 }
@@ -36,19 +37,31 @@ impl OpenError {
     }
 }
 
-/// A query that has no answer. Never from geometry: only a damaged file, a budget or a missing backend.
+/// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget, a missing backend or a number
+/// that means nothing.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum QueryError {
-    /// A page that the query touched breaks the format.
+    /// A page that the query touched breaks a rule of the format.
     #[error(transparent)]
     Damaged(#[from] FormatError),
-    /// The query needs more than [`crate::Querier::set_budget`] allows; nothing is known of its answer.
-    #[error("expected an answer within {visits} visits, found more to visit")]
+    /// The query needs more visits than [`crate::Querier::set_budget`] allows. Nothing is known of its answer.
+    #[error("expected an answer within {visits} visits, found more to visit; raise the budget")]
     Budget {
         /// The budget.
         visits: u64,
     },
-    /// The backend asked for cannot be had.
+    /// A number given with the question means nothing, such as a distance of NaN.
+    #[error("{name}: expected {expected}, found {found}")]
+    Number {
+        /// The parameter.
+        name: &'static str,
+        /// The numbers that are allowed.
+        expected: &'static str,
+        /// The number given.
+        found: f64,
+    },
+    /// The backend asked for is not available.
     #[error(transparent)]
     Backend(#[from] BackendError),
 }

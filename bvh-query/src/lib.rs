@@ -1,21 +1,32 @@
 //! Exact collision and distance queries between `.cbvh` meshes.
 //!
-//! [`Bvh`] opens a file (mapped, read, from memory, or embedded with [`include_cbvh!`]), [`Pose`] places one
-//! mesh in the frame of another, and a [`Querier`] answers:
+//! [`Bvh`] opens a file (mapped, read, in memory, or embedded with [`include_cbvh!`]), [`Pose`] places one mesh in the
+//! frame of another, and a [`Querier`] answers:
 //!
 //! | question | method | answer |
 //! |---|---|---|
 //! | do they touch? | [`Querier::collide`] | `bool`, exact |
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
-//! | how far apart? | [`Querier::distance`] | distance, both closest points, both triangle ids |
-//! | nearer than d? | [`Querier::within`] | `bool` |
+//! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
+//! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //!
-//! [`Tracker`] asks the same questions about poses that follow a path, for less, and [`Batch`] about many poses on all
-//! cores. The feature `parallel`, on by default, brings the latter and the dependency on rayon.
+//! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
+//! all cores. `Batch` needs the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
+//! `mint` converts matrices and quaternions of other crates to a [`Pose`].
 //!
-//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by
-//! AVX-512, AVX2 or portable code; what the filters cannot decide goes to `f64` and exact predicates.
-//! So answers are bit-identical on every backend and in every order of queries.
+//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or
+//! portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have the same bits on
+//! every backend and in every order of queries.
+//!
+//! # Examples
+//! Programs to start from are in the folder `examples` of this crate; each runs without arguments from the root of the
+//! workspace:
+//!
+//! - `cargo run --release --example collide`: two meshes in one pose, touching or how far apart.
+//! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
+//! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
+//!
+//! In short:
 //!
 //! ```
 //! use bvh_query::{Bvh, Pose, Querier};
@@ -36,36 +47,32 @@
 //! ```
 #![deny(unsafe_code)]
 
-mod bvh;
 mod error;
+mod file;
 mod isa;
 mod leaf;
-#[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
-mod mapped;
 mod narrow;
 mod pose;
 mod query;
 mod traverse;
 
-pub use bvh::{Bvh, Shape};
 pub use error::{OpenError, QueryError};
+pub use file::bvh::Bvh;
+pub use file::mapped::ReadAhead;
+pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
-pub use mapped::ReadAhead;
 pub use pose::{Pose, PoseError};
+pub use query::answers::{Contact, Distance, QueryStats};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
+pub use query::options::DistanceOptions;
+pub use query::querier::Querier;
 pub use query::tracker::Tracker;
-pub use query::{Contact, Distance, DistanceOptions, Querier, QueryStats};
-
-/// The examples of the README, compiled.
-#[cfg(all(doctest, feature = "parallel"))]
-#[doc = include_str!("../../README.md")]
-struct Readme;
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
-/// The path is as for `include_bytes!`; with a file that a build script baked, it is
-/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. Nothing is copied, and any alignment will do.
+/// The path is that of `include_bytes!`. For a file that a build script baked, it is
+/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. Nothing is copied, whatever the alignment.
 #[macro_export]
 macro_rules! include_cbvh {
     ($path:expr $(,)?) => {
@@ -73,4 +80,12 @@ macro_rules! include_cbvh {
     };
 }
 
-pub use bvh_format::{FormatError, Rule};
+pub use bvh_format::leaf::TriangleEncoding;
+pub use bvh_format::object::Object;
+pub use bvh_format::profile::Profile;
+pub use bvh_format::{FormatError, Layout, Rule};
+
+/// Compiles the example of the crate's README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -5,50 +5,68 @@
 /// A placed vertex is, coordinate by coordinate, the f64 value `((R0 * x + R1 * y) + R2 * z) + t` with
 /// each product and sum rounded to nearest, never fused; queries are about these points exactly.
 /// For that arithmetic to be exact where it must be, entries are canonical: a rotation entry below
-/// 2^-64 in magnitude counts as 0, a translation below 2^-213 too.
+/// 2^-64 in magnitude counts as 0, and so does a translation below 2^-213.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
 }
 
-/// How far from orthonormal a rotation may be: the largest entry of `R R^T - I`. Ten digits more
-/// than a product of a few f64 rotations loses, five fewer than would let a wrong matrix through.
-const RIGID_TOLERANCE: f64 = 1.0 / (1u64 << 20) as f64;
-/// The largest translation, as large as the largest coordinate of the format.
+/// How far from orthonormal a rotation may be: the largest entry of `R R^T - I`. This is ten digits more than a product
+/// of a few f64 rotations loses, and five fewer than a wrong matrix is off by.
+const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 20) as f64;
+/// A matrix closer to orthonormal than this, 2^-10, is not called scaled: its factor would round to 1 for a reader, and
+/// the remedy for a rounded rotation is another.
+const MIN_SCALED_ERROR: f64 = 1.0 / 1024.0;
+/// The largest translation along an axis, as large as the largest coordinate of the format.
 const MAX_TRANSLATION: f64 = bvh_format::object::MAX_COORDINATE;
-/// 2^-64: see `Pose`.
-const TINY_ROTATION: f64 = 1.0 / (1u128 << 64) as f64;
-/// 2^-213: see `Pose`.
-const TINY_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
+/// Rotation entries below this, 2^-64, count as 0: see `Pose`.
+const MIN_ROTATION_ENTRY: f64 = 1.0 / (1u128 << 64) as f64;
+/// Translations below this, 2^-213, count as 0: see `Pose`.
+const MIN_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
 
 impl Pose {
-    /// A in B's place: no motion.
+    /// No motion: B's frame is A's.
     pub const IDENTITY: Self =
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// From the rows of a rotation matrix and a translation in mesh units.
+    /// Creates a pose from the rows of a rotation matrix and a translation in mesh units.
     ///
     /// # Errors
-    /// If an entry is not finite, the translation beyond 2^120, or the rotation further than 2^-20
-    /// from orthonormal or a reflection; the error says by how much.
+    /// [`PoseError`] if an entry is not finite, if the translation exceeds 2^120 along an axis, or if the matrix is not a
+    /// rotation to within 2^-20.
     pub fn new(rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Result<Self, PoseError> {
-        if !rotation.iter().flatten().chain(&translation).all(|v| v.is_finite()) {
-            return Err(PoseError::NotFinite);
+        for row in 0..3 {
+            let entries = rotation[row].into_iter().chain([translation[row]]);
+            if let Some((column, found)) = entries.enumerate().find(|(_, entry)| !entry.is_finite()) {
+                return Err(PoseError::NotFinite { row: row + 1, column: column + 1, found });
+            }
         }
         if let Some(&far) = translation.iter().find(|v| v.abs() > MAX_TRANSLATION) {
             return Err(PoseError::TooFar(far));
         }
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let mut worst = 0.0f64;
-        for i in 0..3 {
-            for j in 0..3 {
-                let error = dot(rotation[i], rotation[j]) - f64::from(u8::from(i == j));
-                worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
+        // How far R R^T is from a multiple of I.
+        let departure = |multiple: f64| {
+            let mut worst = 0.0f64;
+            for i in 0..3 {
+                for j in 0..3 {
+                    let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
+                    worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
+                }
             }
-        }
-        if worst.is_nan() || worst > RIGID_TOLERANCE {
-            return Err(PoseError::NotRigid(worst));
+            worst
+        };
+        let worst = departure(1.0);
+        if worst.is_nan() || worst > MAX_RIGID_ERROR {
+            let squared = dot(rotation[0], rotation[0]);
+            let is_multiple = squared > 0.0 && departure(squared) <= MAX_RIGID_ERROR * squared;
+            let is_scaled = worst > MIN_SCALED_ERROR && is_multiple;
+            return Err(if is_scaled {
+                PoseError::Scaled(squared.sqrt())
+            } else {
+                PoseError::NotRigid(worst)
+            });
         }
         let [x, y, z] = rotation;
         let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
@@ -57,30 +75,30 @@ impl Pose {
         }
         let flush = |tiny: f64| move |v: f64| if v.abs() < tiny { 0.0 } else { v };
         Ok(Self {
-            rotation: rotation.map(|row| row.map(flush(TINY_ROTATION))),
-            translation: translation.map(flush(TINY_TRANSLATION)),
+            rotation: rotation.map(|row| row.map(flush(MIN_ROTATION_ENTRY))),
+            translation: translation.map(flush(MIN_TRANSLATION)),
         })
     }
 
-    /// From the 12 numbers of a row-major 3x4 matrix `[R | t]`.
+    /// Creates a pose from the 12 numbers of a row-major 3x4 matrix `[R | t]`.
     ///
     /// # Errors
-    /// As `new`.
+    /// The errors of [`Pose::new`].
     pub fn from_rows(m: &[f64; 12]) -> Result<Self, PoseError> {
         Self::new([[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]], [m[3], m[7], m[11]])
     }
 
-    /// Rows of the rotation.
+    /// Returns the rows of the rotation.
     pub fn rotation(&self) -> &[[f64; 3]; 3] {
         &self.rotation
     }
 
-    /// The translation in mesh units.
+    /// Returns the translation in mesh units.
     pub fn translation(&self) -> [f64; 3] {
         self.translation
     }
 
-    /// Where a point of B is in A's frame: the definition of a placed vertex.
+    /// Returns where a point of B is in A's frame. This is the definition of a placed vertex.
     #[inline]
     pub fn place(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = point;
@@ -92,21 +110,48 @@ impl Pose {
     }
 }
 
-/// A matrix that is not a rigid placement.
+/// Why a matrix is not a rigid placement.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PoseError {
     /// An entry is NaN or infinite.
-    #[error("expected finite pose entries, found NaN or infinity")]
-    NotFinite,
-    /// The translation is beyond the format's range.
-    #[error("expected a translation of at most 2^120, found {0:e}")]
+    #[error("row {row}, column {column}: expected a finite number, found {}", name(*.found))]
+    NotFinite {
+        /// The row of the 3x4 matrix, from 1 on.
+        row: usize,
+        /// The column of the 3x4 matrix, from 1 on; the fourth is the translation.
+        column: usize,
+        /// The entry.
+        found: f64,
+    },
+    /// The translation exceeds the format's range.
+    #[error(
+        "expected a translation of at most 2^120 along each axis, found {0:e}; move both meshes near the origin"
+    )]
     TooFar(f64),
-    /// Rows are not orthonormal; the largest entry of R R^T - I.
-    #[error("expected a rigid pose, found a matrix {0:e} away from orthonormal (limit 2^-20)")]
+    /// The matrix is a rotation, or a reflection, times this factor.
+    #[error("expected a rotation, found a matrix scaled by {}; bake the mesh at its size", *.0 as f32)]
+    Scaled(f64),
+    /// The rows are not orthonormal; the number is the largest entry of R R^T - I.
+    #[error(
+        "expected a rotation, found a matrix {0:e} away from orthonormal (limit 2^-20); if it shears or stretches, \
+         bake the deformed mesh, if it is rounded, orthonormalise it"
+    )]
     NotRigid(f64),
-    /// Determinant -1.
-    #[error("expected a rotation, found a reflection")]
+    /// The matrix has determinant -1.
+    #[error("expected a rotation, found a reflection; bake the mirrored mesh")]
     Reflection,
+    /// The last row of a 4x4 matrix is another one.
+    #[error("row 4: expected 0 0 0 1, found {} {} {} {}; is the matrix transposed, or a projection?", .0[0], .0[1], .0[2], .0[3])]
+    LastRow([f64; 4]),
+    /// The length of a quaternion is not 1.
+    #[error("expected a quaternion of length 1, found length {}; normalise it", *.0 as f32)]
+    Quaternion(f64),
+}
+
+/// Names a number that is not finite.
+fn name(found: f64) -> &'static str {
+    if found.is_nan() { "NaN" } else { "infinity" }
 }
 
 #[cfg(feature = "mint")]
@@ -125,8 +170,12 @@ mod mint_conversions {
     impl TryFrom<mint::ColumnMatrix4<f64>> for Pose {
         type Error = PoseError;
 
-        /// The last row is taken to be 0 0 0 1.
+        /// Converts a 4x4 matrix, the last row of which must be 0 0 0 1.
         fn try_from(m: mint::ColumnMatrix4<f64>) -> Result<Self, PoseError> {
+            let last = [m.x.w, m.y.w, m.z.w, m.w.w];
+            if last != [0.0, 0.0, 0.0, 1.0] {
+                return Err(PoseError::LastRow(last));
+            }
             Self::new(
                 [[m.x.x, m.y.x, m.z.x], [m.x.y, m.y.y, m.z.y], [m.x.z, m.y.z, m.z.z]],
                 [m.w.x, m.w.y, m.w.z],
@@ -137,17 +186,23 @@ mod mint_conversions {
     impl TryFrom<(mint::Quaternion<f64>, mint::Vector3<f64>)> for Pose {
         type Error = PoseError;
 
-        /// A unit quaternion and a translation.
+        /// Converts a unit quaternion and a translation.
         fn try_from((q, t): (mint::Quaternion<f64>, mint::Vector3<f64>)) -> Result<Self, PoseError> {
             let (x, y, z, w) = (q.v.x, q.v.y, q.v.z, q.s);
-            Self::new(
+            let pose = Self::new(
                 [
                     [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
                     [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
                     [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
                 ],
                 [t.x, t.y, t.z],
-            )
+            );
+            pose.map_err(|error| match error {
+                PoseError::Scaled(_) | PoseError::NotRigid(_) | PoseError::Reflection => {
+                    PoseError::Quaternion((x * x + y * y + z * z + w * w).sqrt())
+                }
+                other => other,
+            })
         }
     }
 }
@@ -164,11 +219,27 @@ mod tests {
             matches!(Pose::new(rows, [0.0; 3]), Err(PoseError::NotRigid(e)) if (e - 2.001e-3).abs() < 1e-6)
         );
         rows[0][0] = f64::NAN;
-        assert_eq!(Pose::new(rows, [0.0; 3]), Err(PoseError::NotFinite));
+        let refused = Pose::new(rows, [0.0; 3]).unwrap_err();
+        assert_eq!(refused.to_string(), "row 1, column 1: expected a finite number, found NaN");
+        let refused = Pose::new(Pose::IDENTITY.rotation, [0.0, 0.0, f64::NEG_INFINITY]).unwrap_err();
+        assert_eq!(refused, PoseError::NotFinite { row: 3, column: 4, found: f64::NEG_INFINITY });
         rows[0][0] = -1.0;
         assert_eq!(Pose::new(rows, [0.0; 3]), Err(PoseError::Reflection));
         assert!(matches!(Pose::new(Pose::IDENTITY.rotation, [1e300, 0.0, 0.0]), Err(PoseError::TooFar(_))));
         assert!(matches!(Pose::new([[1e200; 3]; 3], [0.0; 3]), Err(PoseError::NotRigid(_))));
+    }
+
+    #[test]
+    fn a_scaled_matrix_is_named_with_its_factor() {
+        let turned = ROWS.map(|row| row.map(|entry| entry / 121.0));
+        for factor in [2.0, 1e-3, 25.4, -2.0] {
+            let refused = Pose::new(turned.map(|row| row.map(|entry| factor * entry)), [0.0; 3]).unwrap_err();
+            let expected = format!("found a matrix scaled by {}; bake the mesh at its size", factor.abs());
+            assert!(refused.to_string().contains(&expected), "{refused}");
+        }
+        let stretched = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(Pose::new(stretched, [0.0; 3]), Err(PoseError::NotRigid(3.0)));
+        assert_eq!(Pose::new([[0.0; 3]; 3], [0.0; 3]), Err(PoseError::NotRigid(1.0)));
     }
 
     #[test]
@@ -255,5 +326,26 @@ mod tests {
         let vector = mint::Vector3 { x: 1.0 / 11.0, y: 2.0 / 11.0, z: 4.0 / 11.0 };
         let translation = mint::Vector3 { x: 5.0, y: 7.0, z: -9.0 };
         check_turn((mint::Quaternion { v: vector, s: 10.0 / 11.0 }, translation).try_into());
+    }
+
+    #[test]
+    #[cfg(feature = "mint")]
+    fn projections_and_long_quaternions_of_mint_are_refused() {
+        let unit = |k: usize| {
+            let one = |i: usize| if i == k { 1.0 } else { 0.0 };
+            mint::Vector4 { x: one(0), y: one(1), z: one(2), w: one(3) }
+        };
+        let identity = mint::ColumnMatrix4 { x: unit(0), y: unit(1), z: unit(2), w: unit(3) };
+        assert_eq!(Pose::try_from(identity), Ok(Pose::IDENTITY));
+        let mut transposed = identity;
+        transposed.x.w = 5.0;
+        assert_eq!(Pose::try_from(transposed), Err(PoseError::LastRow([5.0, 0.0, 0.0, 1.0])));
+        let mut scaled = identity;
+        scaled.w.w = 2.0;
+        assert_eq!(Pose::try_from(scaled), Err(PoseError::LastRow([0.0, 0.0, 0.0, 2.0])));
+        let quaternion = mint::Quaternion { v: mint::Vector3 { x: 0.0, y: 3.0, z: 0.0 }, s: 4.0 };
+        let origin = mint::Vector3 { x: 0.0, y: 0.0, z: 0.0 };
+        let refused = Pose::try_from((quaternion, origin)).unwrap_err();
+        assert_eq!(refused.to_string(), "expected a quaternion of length 1, found length 5; normalise it");
     }
 }

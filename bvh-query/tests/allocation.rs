@@ -1,4 +1,4 @@
-//! A warm query allocates nothing: counted by the allocator itself.
+//! Checks that a warm query allocates nothing. The allocator itself counts.
 
 use bvh_bake::mesh::Mesh;
 use bvh_query::{Bvh, Pose, Querier, Tracker};
@@ -12,8 +12,8 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting touches a thread-local
-// integer that needs no allocation and has no destructor.
+// SAFETY: every call is passed to the system's allocator unchanged. Counting touches only a thread-local integer,
+// which needs no allocation and has no destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// A bumpy sheet of 2 * n * n triangles.
+/// Bakes a bumpy sheet of 2 * n * n triangles.
 fn sheet(n: u32) -> Bvh {
     let height = |x: u32, y: u32| f64::from((x * 7 + y * 13) % 11) / 40.0;
     let positions =
@@ -78,7 +78,7 @@ fn warm_queries_allocate_nothing() {
     let warm = ask(&poses);
     assert_eq!(ALLOCATIONS.get(), before);
     assert_eq!(warm, cold);
-    // The counter does count.
+    // The counter counts.
     drop(std::hint::black_box(vec![0u8; 100]));
     assert!(ALLOCATIONS.get() > before);
 }

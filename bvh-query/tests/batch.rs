@@ -1,4 +1,4 @@
-//! Batches answer as a querier does one by one, and end where it would, on any number of threads.
+//! Checks that batches answer as a querier does pose by pose, and stop at the same pose, on any number of threads.
 #![cfg(feature = "parallel")]
 
 mod common;
@@ -9,17 +9,17 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Backend, Batch, Bvh, Pose, Querier, QueryError, Tracker};
 use common::shapes::{cube, dirty, moved, soup, sphere, torus};
-use common::{Random, backends, bake, mesh, options, translation};
+use common::{Random, backends, bake, mesh, options, random_pose, translation};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 fn pools() -> Vec<ThreadPool> {
     [1, 2, 3, 8].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap()).into()
 }
 
-/// First along a line through the mesh, then anywhere.
+/// Makes poses, first along a line through the mesh, then anywhere.
 fn poses(random: &mut Random, count: usize) -> Vec<Pose> {
     let along = |i: usize| translation(3.0 - i as f64 / 64.0, 0.25, 0.125);
-    (0..count).map(|i| if i < count / 2 { along(i) } else { random.pose(2.5) }).collect()
+    (0..count).map(|i| if i < count / 2 { along(i) } else { random_pose(random, 2.5) }).collect()
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn batches_answer_as_one_by_one() {
     }
 }
 
-/// Which of many contacts is met first by some thread must not matter.
+/// Of many contacts, it must not matter which one some thread finds first.
 #[test]
 fn the_first_collision_is_the_first_wherever_it_is() {
     let a = bake(&mesh(&sphere(3)), &Options::default());
@@ -75,7 +75,7 @@ fn the_first_collision_is_the_first_wherever_it_is() {
     }
 }
 
-/// Two cubes as two objects, at -3 and at 3; a byte of the second one's page is wrong.
+/// Bakes two cubes as two objects, at -3 and at 3, and changes one byte in the page of the second one.
 fn half_damaged() -> Bvh {
     let mut split = Mesh::default();
     for (number, x) in [(0, -3.0), (1, 3.0)] {
@@ -84,8 +84,8 @@ fn half_damaged() -> Bvh {
         object.triangle_ids = (12 * number..12 * (number + 1)).collect();
         split.objects.push(object);
     }
-    let good = bake(&split, &Options { split_objects: true, ..Options::default() });
-    let page = good.objects()[1].record.first_page.get();
+    let good = bake(&split, &Options::default().split_objects(true));
+    let page = good.objects()[1].record().first_page.get();
     let mut bytes = good.bytes().to_vec();
     bytes[good.layout().page_offset(page) as usize + 100] ^= 1;
     Bvh::from_bytes(bytes).unwrap()
@@ -130,7 +130,8 @@ fn a_batch_ends_at_its_first_error_or_contact() {
     }
 }
 
-/// The error of the first pose that has one, not of the first that a thread came by: pages differ.
+/// A batch returns the error of the first pose that fails, not the error that a thread met first. Different poses
+/// need different pages.
 #[test]
 fn the_error_is_that_of_the_first_pose() {
     let good = bake(&mesh(&soup(900, 1)), &options(Profile::Dop14U8, TriangleEncoding::F32));
@@ -142,9 +143,9 @@ fn the_error_is_that_of_the_first_pose() {
     let mut random = Random::new(2);
     let mut errors = Vec::new();
     for _ in 0..40 {
-        let poses: Vec<_> = (0..100).map(|_| random.pose(1.0)).collect();
+        let poses: Vec<_> = (0..100).map(|_| random_pose(&mut random, 1.0)).collect();
         let mut querier = Querier::new().unwrap();
-        // Without a tracker: contacts have none.
+        // There is no tracker here, because contacts do not use one.
         let one_by_one: Result<Vec<_>, _> =
             poses.iter().map(|pose| querier.contacts(&damaged, &other, pose)).collect();
         let batch = Batch::new(&damaged, &other).unwrap();
@@ -174,7 +175,8 @@ fn budgets_hold_for_each_pose_and_end_batches_alike_on_any_number_of_threads() {
         batch.set_budget(budget);
         let answers: Vec<_> = pools().iter().map(|pool| pool.install(|| batch.distance(&poses))).collect();
         assert!(answers.iter().all(|answer| *answer == answers[0]), "budget {budget}");
-        // Runs shorter than this one tracker's change what is visited, but not that nothing fits in nothing.
+        // Each thread's run is shorter than this tracker's, which changes the visits. Still, no query fits in a
+        // budget of 0.
         assert!(budget > 0 || (answers[0].is_err() && ends(&mut querier, budget) == Some(0)));
     }
     batch.set_budget(u64::MAX);

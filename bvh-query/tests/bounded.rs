@@ -1,7 +1,9 @@
-//! What a forged file can cost: time by the product of both trees, memory by the treelets and the file's bytes.
+//! Bounds the cost of forged files: time by the product of both trees, memory by the number of treelets and the
+//! file's bytes.
 //!
-//! Counted by the allocator itself, in the worst files that the rules let through: every bound the same and around
-//! all of the other mesh, so that nothing is ever pruned, and tables that state what is not there.
+//! The allocator itself counts the memory. The tests use the worst files that the rules allow: files in which every
+//! bound is the same and encloses the whole other mesh, so that nothing is ever pruned, and tables that state numbers
+//! of things that are not there.
 
 mod common;
 
@@ -14,7 +16,7 @@ use bvh_format::profile::Profile;
 use bvh_format::treelet::Links;
 use bvh_format::validate::validate;
 use bvh_query::{Backend, Bvh, Querier, QueryError};
-use common::seal::{put, put_together, seal, take_apart};
+use cbvh_testkit::seal::{put, put_together, seal, take_apart};
 use common::shapes::{cube, soup};
 use common::{mesh, options, translation};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -22,22 +24,22 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 
 thread_local! {
-    /// Bytes that this thread holds, and the most that it held.
+    /// The bytes that this thread holds, and the most bytes that it has held.
     static HELD: Cell<[isize; 2]> = const { Cell::new([0; 2]) };
 }
 
 struct Counting;
 
 fn count(bytes: isize) {
-    // A thread that ends has no counter any more.
+    // A thread that is ending has no counter any more.
     let _ = HELD.try_with(|held| {
         let [now, most] = held.get();
         held.set([now + bytes, most.max(now + bytes)]);
     });
 }
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting touches thread-local integers
-// that need no allocation and have no destructor.
+// SAFETY: every call is passed to the system's allocator unchanged. Counting touches only thread-local integers,
+// which need no allocation and have no destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as isize);
@@ -55,7 +57,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// The most bytes that this thread held at once while `work` ran, beyond those that it held before.
+/// Returns the most bytes that this thread held at once while `work` ran, beyond those that it held before.
 fn peak<R>(work: impl FnOnce() -> R) -> (usize, R) {
     let [before, _] = HELD.get();
     HELD.set([before, before]);
@@ -63,9 +65,10 @@ fn peak<R>(work: impl FnOnce() -> R) -> (usize, R) {
     ((HELD.get()[1] - before) as usize, result)
 }
 
-/// A file all of whose inner nodes are from -1000 to 1000: with codes of 0 each is as large as its root. Leaf packets
-/// are flat at the upper end of y, so that pairs of inner nodes overlap more and come first, nearest as they are.
-/// Profiles of u8 in 64 bytes.
+/// Forges a file in which every inner node reaches from -1000 to 1000: with codes of 0, each node is as large as its
+/// root. Leaf packets are flat at the upper end of y. Pairs of inner nodes therefore overlap more than pairs of
+/// packets and are visited first, because nearer pairs are visited first. Works for profiles of `u8` codes in
+/// 64 bytes.
 fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
     let mut bytes =
         to_bytes(&mesh(&soup(triangles, seed)), &options(profile, TriangleEncoding::Packed)).unwrap().0;
@@ -92,7 +95,7 @@ fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
             put(&mut bytes, at + 64 * usize::from(header.treelet_line) + usize::from(slot) * size, &treelet);
         }
     }
-    // The box and the sphere, too.
+    // The object's box and sphere are enlarged, too.
     let record = layout.sections[0].range.start + 16;
     for end in 0..6 {
         let value = if end < 3 { -1000.0f32 } else { 1000.0 };
@@ -103,9 +106,9 @@ fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
     bytes
 }
 
-/// Treelets and leaf packets of the only object.
+/// Returns the numbers of treelets and of leaf packets of the only object.
 fn sizes(bvh: &Bvh) -> (u64, u64) {
-    let record = &bvh.objects()[0].record;
+    let record = bvh.objects()[0].record();
     (record.treelets.get(), record.packets.get())
 }
 
@@ -118,7 +121,7 @@ fn a_walk_of_all_pairs_ends_in_bounded_memory() {
         }
         let [a, b] = files.map(|file| Bvh::from_bytes(file).unwrap());
         let ((treelets_a, packets_a), (treelets_b, packets_b)) = (sizes(&a), sizes(&b));
-        // The triangles themselves are far apart: only bounds overlap.
+        // The triangles themselves are far apart, and only their bounds overlap.
         let pose = translation(100.0, 0.0, 0.0);
         for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
             let mut querier = Querier::with_backend(backend);
@@ -127,7 +130,7 @@ fn a_walk_of_all_pairs_ends_in_bounded_memory() {
             let (memory, distance) = peak(|| querier.distance(&a, &b, &pose).unwrap().distance);
             let stats = querier.stats();
             assert!(distance > 50.0 && memory as u64 <= most_memory, "{memory} bytes, not {most_memory}");
-            // Everything was visited once: the leaf pair of the first dive twice.
+            // Everything was visited once, except for the leaf pair of the first dive, which was visited twice.
             assert_eq!(stats.packet_tests, packets_a * packets_b + 1, "{profile:?}");
             assert!(stats.node_tests <= 4 * most_pairs, "{stats:?}, not {most_pairs}");
             let (memory, found) = peak(|| querier.collide(&a, &b, &pose).unwrap());
@@ -139,7 +142,7 @@ fn a_walk_of_all_pairs_ends_in_bounded_memory() {
     }
 }
 
-/// The same files under a budget: an error as soon as it is spent, the answer where it suffices.
+/// Queries the same files with a budget: a query fails as soon as the budget is spent, and answers if it suffices.
 #[test]
 fn a_budget_ends_any_query() {
     let files = [1, 2].map(|seed| blown_up(1500, seed, Profile::Dop14U8));
@@ -161,12 +164,12 @@ fn a_budget_ends_any_query() {
             querier.set_budget(budget);
             assert_eq!(ask(&mut querier), Err(QueryError::Budget { visits: budget }));
         }
-        // Every pair of nodes, the first dive twice, and the pair of objects.
+        // The budget covers every pair of nodes, the first dive a second time, and the pair of objects.
         querier.set_budget((treelets_a + packets_a) * (treelets_b + packets_b) + 100);
         assert_eq!(ask(&mut querier), free);
         querier.set_budget(u64::MAX);
     }
-    // Pairs of objects that their spheres set apart cost a visit each.
+    // A pair of objects whose spheres are apart costs one visit.
     let far = translation(1e6, 0.0, 0.0);
     querier.set_budget(1);
     assert_eq!(querier.collide(&a, &b, &far), Ok(false));
@@ -174,7 +177,7 @@ fn a_budget_ends_any_query() {
     assert_eq!(querier.collide(&a, &b, &far), Err(QueryError::Budget { visits: 0 }));
 }
 
-/// Triangles that all have the id to which all duplicates belong: each contact would be that of thousands.
+/// Gives all triangles the same id, to which all duplicates belong. Each contact would stand for thousands.
 #[test]
 fn contacts_without_number_are_refused() {
     let plain = to_bytes(&mesh(&cube()), &options(Profile::Dop14U8, TriangleEncoding::F32)).unwrap().0;
@@ -182,7 +185,7 @@ fn contacts_without_number_are_refused() {
     let mut sections = take_apart(&plain);
     sections.retain(|section| section.0 < 4);
     let nodes = sections.iter_mut().find(|section| section.0 == 2).unwrap();
-    // One page: all its lanes have id 0, in no bits.
+    // The file has one page. All its lanes get id 0, which takes no bits.
     put(&mut nodes.2, 32, &0u64.to_le_bytes());
     put(&mut nodes.2, 52, &2u32.to_le_bytes());
     sections.push((4, 0, vec![0; 16]));
@@ -199,14 +202,15 @@ fn contacts_without_number_are_refused() {
     assert_eq!(calls, (1984 + 2999) * (1984 + 2999));
 }
 
-/// Memory of opening and checking goes by the bytes that are there, not by the numbers that they state.
+/// The memory for opening and checking depends on the bytes that are there, not on the numbers that they state.
 #[test]
 fn stated_numbers_allocate_nothing() {
     let (honest, _) =
         to_bytes(&mesh(&soup(3000, 1)), &options(Profile::Dop14U8, TriangleEncoding::Packed)).unwrap();
     let objects = FileLayout::read(&honest).unwrap().sections[0].range.start;
     let nodes = FileLayout::read(&honest).unwrap().page_offset(0) as usize;
-    // Every 32-bit word of header, section table, object table and first page header at its most.
+    // Every 32-bit word of the header, the section table, the object table and the first page header is set to large
+    // values.
     let places = (8..40).step_by(4).chain((64..256).step_by(4));
     let places = places.chain((0..16 + 192).step_by(4).map(|at| objects + at));
     let places: Vec<usize> = places.chain((0..64).step_by(4).map(|at| nodes + at)).collect();
@@ -230,7 +234,7 @@ fn stated_numbers_allocate_nothing() {
     }
 }
 
-/// Names that all lie over each other would take the square of the file.
+/// Copies of names that all share the same bytes would take memory quadratic in the file's size.
 #[test]
 fn shared_names_are_not_copied() {
     let golden = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh")).unwrap();

@@ -1,8 +1,8 @@
-//! Tens of thousands of damaged files, the same ones each time: flipped, spliced, truncated, with blocks doubled,
-//! and their checksums made right up to any level.
+//! Queries thousands of damaged files, the same ones in each run: bytes are flipped, files are spliced and truncated,
+//! blocks are doubled, and checksums are corrected up to any level.
 //!
-//! Where no checksum was forged, a question is refused or has the answer of the undamaged file. Where some was,
-//! there is an answer or an error, in little time. `CBVH_MUTATIONS=100000` makes as many files as it says.
+//! Where no checksum was corrected, a query either is refused or gives the answer of the undamaged file. Where some
+//! were, a query ends in little time with an answer or an error. `CBVH_TEST_DEPTH` increases the number of files.
 
 mod common;
 
@@ -10,17 +10,19 @@ use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes, verify};
 use bvh_format::validate::validate;
 use bvh_query::{Bvh, Pose};
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::forge::{Input, forge};
+use cbvh_testkit::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
 use common::asked::{Answers, ask, victims};
-use common::forge::{Input, forge};
-use common::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
 use common::shapes::sphere;
-use common::{Random, mesh, queriers, translation};
+use common::{Random, mesh, queriers, random_pose, translation};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-const FILES: usize = 60_000;
+/// The number of files in an everyday run.
+const FILES: u64 = 6000;
 
-/// Which checksums are made right again.
+/// The checksums that are corrected after the damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Seal {
     None,
@@ -50,14 +52,14 @@ impl Seal {
     }
 }
 
-/// A place in a file, more often where something is: at the start of a page.
+/// Returns a place in the file, more often one that is in use, at the start of a page.
 fn place(bytes: &[u8], random: &mut Random) -> usize {
     let page = 4096 * random.below(bytes.len().div_ceil(4096));
     let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
     (page + within).min(bytes.len() - 1)
 }
 
-/// Damages a file in one of these ways; `other` is a second valid file.
+/// Damages a file in one of these ways. `other` is a second valid file.
 fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static str {
     let at = place(bytes, random);
     match random.below(6) {
@@ -76,7 +78,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
             "limit"
         }
         2 => {
-            // A stretch of another file, at the same place or at any.
+            // A stretch of another file replaces bytes, at the same place or at any place.
             let most = 2 << random.below(13);
             let length = (1 + random.below(most)).min(bytes.len() - at);
             let from = if random.below(2) == 0 { at } else { place(other, random) };
@@ -93,7 +95,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
             "truncated"
         }
         4 => {
-            // A page, line or word over another one.
+            // A page, line or word replaces another one.
             let unit = [4096, 64, 8][random.below(3)];
             let (to, from) = (at / unit * unit, place(bytes, random) / unit * unit);
             let length = unit.min(bytes.len() - to).min(bytes.len() - from);
@@ -101,7 +103,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
             "doubled"
         }
         _ => {
-            // A page, line or byte more or less: all behind it moves.
+            // A page, line or byte is inserted or removed, and everything after it moves.
             let unit = [4096, 64, 1][random.below(3)];
             let end = (at + unit).min(bytes.len());
             if random.below(2) == 0 {
@@ -115,7 +117,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
     }
 }
 
-/// What became of a file, for the table that the test prints.
+/// Returns the outcome for one file, as a row of the table that the test prints.
 fn outcome(answers: &Option<[Answers; 2]>, expected: &[Answers; 2]) -> &'static str {
     match answers {
         None => "refused when opened",
@@ -127,10 +129,10 @@ fn outcome(answers: &Option<[Answers; 2]>, expected: &[Answers; 2]) -> &'static 
 
 #[test]
 fn no_mutation_does_harm() {
-    let files = std::env::var("CBVH_MUTATIONS").map_or(FILES, |files| files.parse().unwrap());
+    let files = rounds(FILES);
     let cube: Mesh = mesh(&sphere(1));
     let good = Bvh::from_bytes(to_bytes(&cube, &Options::default()).unwrap().0).unwrap();
-    let poses = [Pose::IDENTITY, translation(1.5, 0.25, 0.0), Random::new(3).pose(2.5)];
+    let poses = [Pose::IDENTITY, translation(1.5, 0.25, 0.0), random_pose(&mut Random::new(3), 2.5)];
     let mut queriers = queriers();
     let mut random = Random::new(79);
     let victims = victims();
@@ -138,7 +140,7 @@ fn no_mutation_does_harm() {
         .iter()
         .map(|victim| poses.map(|pose| ask(&mut queriers[0], victim, &good, &pose).unwrap()))
         .collect();
-    let mut table: BTreeMap<_, usize> = BTreeMap::new();
+    let mut table: BTreeMap<_, u64> = BTreeMap::new();
     let mut slowest = Duration::ZERO;
     for number in 0..files {
         let (which, pose) = (random.below(victims.len()), random.below(poses.len()));
@@ -152,7 +154,7 @@ fn no_mutation_does_harm() {
         seal.apply(&mut bytes);
         let whole = validate(&bytes);
         if number % 8 == 0 {
-            assert!(verify(&bytes, &cube).is_err(), "file {number}: it never was this mesh");
+            assert!(verify(&bytes, &cube).is_err(), "file {number}: it is not a file of this mesh");
         }
         let backend = random.below(queriers.len());
         let start = Instant::now();
@@ -174,7 +176,7 @@ fn no_mutation_does_harm() {
     println!("{files} files, the slowest took {slowest:?}");
     let count = |seal, outcome| table.get(&(seal, outcome)).copied().unwrap_or(0);
     assert_eq!(count(Seal::None, "other answers"), 0);
-    // All ways are taken, and often.
+    // Every way of damaging files occurs, and often.
     for (seal, outcome) in [
         (Seal::None, "refused when opened"),
         (Seal::None, "refused when asked"),
@@ -188,34 +190,34 @@ fn no_mutation_does_harm() {
     assert!(slowest < Duration::from_secs(20), "{slowest:?}");
 }
 
-/// Trees of the right shape with any content at all, in pairs.
+/// Fills trees of the right shape with arbitrary content, and queries them in pairs.
 #[test]
 fn forged_pairs_do_no_harm() {
-    let pairs = std::env::var("CBVH_MUTATIONS").map_or(FILES, |files| files.parse().unwrap()) / 10;
+    let pairs = rounds(FILES / 10);
     let mut queriers = queriers();
     let mut random = Random::new(80);
     let (mut opened, mut answered, mut slowest) = (0, 0, Duration::ZERO);
     for _ in 0..pairs {
         let forged = |random: &mut Random| {
-            // Mostly small numbers: limits are rare enough for some files to be sound.
+            // Most numbers are small, so that they exceed limits rarely enough for some files to be valid.
             let bytes: Vec<u8> = (0..1200)
-                .map(|_| if random.below(40) == 0 { random.next() as u8 } else { random.below(64) as u8 })
+                .map(|_| if random.below(40) == 0 { random.bits() as u8 } else { random.below(64) as u8 })
                 .collect();
             forge(&mut Input(&bytes))
         };
         let (a, b) = (forged(&mut random), forged(&mut random));
         let (a_valid, b_valid) = (validate(&a).is_ok(), validate(&b).is_ok());
         let Ok(b) = Bvh::from_bytes(b) else { continue };
-        let pose = random.pose(4.0);
+        let pose = random_pose(&mut random, 4.0);
         let backend = random.below(queriers.len());
         let start = Instant::now();
         let answers = ask(&mut queriers[backend], &a, &b, &pose);
         slowest = slowest.max(start.elapsed());
-        opened += usize::from(answers.is_some());
+        opened += u64::from(answers.is_some());
         if let Some(answers) = answers {
             let refused = answers.iter().any(Answers::is_refused);
             assert!(!refused || !a_valid || !b_valid, "valid, but {answers:?}");
-            answered += usize::from(!refused);
+            answered += u64::from(!refused);
         }
     }
     println!("{pairs} forged pairs: {opened} opened, {answered} answered, the slowest took {slowest:?}");

@@ -1,8 +1,8 @@
-//! Every bound of `spec/numerics.md` names code and a test that are there.
+//! Checks that every bound of `spec/numerics.md` names code and a test that exist.
 
 use std::path::Path;
 
-/// The path and the name in a cell of the form `` `path` `name` ``.
+/// Returns the path and the name in a cell of the form `` `path` `name` ``.
 fn reference(cell: &str) -> Option<(&str, &str)> {
     let mut quoted = cell.split('`').skip(1).step_by(2);
     Some((quoted.next()?, quoted.next()?))
@@ -27,7 +27,7 @@ fn code_and_tests_of_all_bounds_exist() {
             };
             assert!(source.match_indices(name).any(stands_alone), "{path} has no {name}");
         }
-        // The test is a test.
+        // The named test must be declared as a function.
         let (path, name) = reference(cells[2]).unwrap();
         let source = std::fs::read_to_string(root.join(path)).unwrap();
         let declared = [format!("fn {name}("), format!("def {name}(")];

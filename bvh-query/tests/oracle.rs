@@ -1,4 +1,4 @@
-//! Every answer against brute force over all pairs of triangles with exact predicates, for all profiles,
+//! Checks every answer against brute force over all pairs of triangles with exact predicates, for all profiles,
 //! triangle encodings and backends.
 
 mod common;
@@ -9,10 +9,12 @@ use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier};
 use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
 use common::truth::Truth;
-use common::{Random, Triangle, bake, mesh, options, queriers, rotation, shared_mesh, stored, translation};
+use common::{
+    Random, Triangle, bake, mesh, options, queriers, random_pose, rotation, shared_mesh, stored, translation,
+};
 use std::ops::ControlFlow;
 
-/// A mesh in files of each profile, lossless encodings in turn.
+/// Bakes a mesh into one file per profile. The lossless encodings take turns.
 fn files(triangles: &[Triangle], encodings: &[TriangleEncoding]) -> Vec<Bvh> {
     let mesh = mesh(triangles);
     let all = Profile::ALL.into_iter().flat_map(|profile| encodings.iter().map(move |&e| (profile, e)));
@@ -21,8 +23,8 @@ fn files(triangles: &[Triangle], encodings: &[TriangleEncoding]) -> Vec<Bvh> {
 
 const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding::Packed];
 
-/// Asks every file of A against the same and another one of B, on every backend: all must be right, and the
-/// same but for the pair of triangles that is named when meshes touch.
+/// Queries every file of A against the same and one other file of B, on every backend. All answers must be right, and
+/// all must be equal, except that different triangles may be named when the meshes touch.
 fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose], queriers: &mut [Querier]) {
     let (stored_a, stored_b) = (stored(&a[0]), stored(&b[0]));
     for pose in poses {
@@ -47,7 +49,7 @@ fn baking_keeps_every_triangle() {
             let stored = stored(&file);
             assert_eq!(stored.len(), triangles.len());
             for (id, (input, stored)) in triangles.iter().zip(&stored).enumerate() {
-                // A duplicate is given the corners of the one that stands for it.
+                // A duplicate gets the corners of the triangle that was kept for it.
                 let sorted = |mut t: Triangle| {
                     t.sort_by(|p, q| p.partial_cmp(q).unwrap());
                     t
@@ -73,8 +75,8 @@ fn random_poses() {
     let mut queriers = queriers();
     let mut random = Random::new(11);
     for (a, b) in [(0, 1), (1, 3), (2, 2), (3, 4), (4, 0), (5, 2), (6, 5), (3, 3), (1, 1), (6, 2)] {
-        // From deep inside to a few sizes away.
-        let poses: Vec<_> = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random.pose(reach)).to_vec();
+        // The poses range from deep inside to a few sizes away.
+        let poses: Vec<_> = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random_pose(&mut random, reach)).to_vec();
         check(&files[a], &files[b], &poses, &mut queriers);
     }
 }
@@ -99,7 +101,7 @@ fn touching_in_a_face_an_edge_a_corner_and_just_not() {
     let mut poses = Vec::new();
     for x in [2.0, -2.0] {
         poses.extend([translation(x, 0.0, 0.0), translation(x, 2.0, 0.0), translation(x, -2.0, 2.0)]);
-        // One rounding unit away; half of one inside.
+        // The meshes are one rounding unit apart, then half of one inside each other.
         let (out, inside) = (x * (1.0 + f64::EPSILON), x * (1.0 - f64::EPSILON / 2.0));
         poses.extend([
             translation(0.5, out, 0.25),
@@ -112,7 +114,7 @@ fn touching_in_a_face_an_edge_a_corner_and_just_not() {
     poses.push(Pose::new(turned, [0.0, 0.0, 2.0]).unwrap());
     let mut queriers = queriers();
     check(&cube, &cube, &poses, &mut queriers);
-    // A corner of the octahedron on faces, edges and corners of the plate, above and below.
+    // A corner of the octahedron is placed on faces, edges and corners of the plate, from above and from below.
     let plate = files(&dirty(&plate(4), 1), &LOSSLESS);
     let octahedron = files(&dirty(&sphere(0), 2), &LOSSLESS);
     let above = |x: f64, y: f64| [1.0, 1.0 + 1e-15, 1.0 - 1e-15, -1.0].map(|z| translation(x, y, z));
@@ -126,7 +128,7 @@ fn nested_surfaces_do_not_collide() {
     let inner = files(&moved(&sphere(1), 0.25, [0.125, 0.25, 0.0]), &LOSSLESS);
     let mut queriers = queriers();
     let mut random = Random::new(3);
-    let poses: Vec<_> = (0..4).map(|_| random.pose(0.2)).collect();
+    let poses: Vec<_> = (0..4).map(|_| random_pose(&mut random, 0.2)).collect();
     for pose in &poses {
         assert!(!queriers[0].collide(&outer[0], &inner[0], pose).unwrap());
         assert!(queriers[0].distance(&outer[0], &inner[0], pose).unwrap().distance > 0.1);
@@ -141,10 +143,10 @@ fn a_few_triangles() {
     let mut random = Random::new(8);
     for count in 1..=5 {
         let (a, b) = (soup(count, 20 + count as u64), soup(6 - count, 30 + count as u64));
-        let poses: Vec<_> = [0.2, 0.6, 2.0].map(|reach| random.pose(reach)).to_vec();
+        let poses: Vec<_> = [0.2, 0.6, 2.0].map(|reach| random_pose(&mut random, reach)).to_vec();
         check(&files(&a, &LOSSLESS), &files(&b, &LOSSLESS), &poses, &mut queriers);
     }
-    // Points and segments alone.
+    // Meshes of points and segments only.
     let point = vec![[[0.5, 0.25, 0.0]; 3]];
     let segments = vec![[[0.0; 3], [1.0, 0.5, 0.0], [0.0; 3]], [[0.0; 3], [2.0, 2.0, 2.0], [1.0; 3]]];
     let poses = [Pose::IDENTITY, translation(0.5, 0.25, 0.0), translation(-0.5, 0.0, 1e-7)];
@@ -160,20 +162,21 @@ fn tiny_and_huge_meshes() {
         let a = files(&moved(&dirty(&sphere(1), 1), scale, [0.0; 3]), &LOSSLESS);
         let b = files(&moved(&soup(40, 2), scale, [0.0; 3]), &LOSSLESS);
         let mut random = Random::new(5);
-        let poses: Vec<_> = [0.5, 1.0, 2.0, 3.0].map(|reach| random.pose(reach * scale)).to_vec();
+        let poses: Vec<_> =
+            [0.5, 1.0, 2.0, 3.0].map(|reach| random_pose(&mut random, reach * scale)).to_vec();
         check(&a, &b, &poses, &mut queriers);
     }
 }
 
 #[test]
 fn a_mesh_of_several_bricks() {
-    // 320,000 triangles, more than the baker takes into one tree.
+    // The mesh has 320,000 triangles, more than the baker puts into one tree.
     let large = terrain(400, 21);
     let small = sphere(0);
     let [large, small] = [large, small].map(|triangles| vec![bake(&mesh(&triangles), &Options::default())]);
     let mut queriers = queriers();
     let mut random = Random::new(22);
-    let poses: Vec<_> = [0.5, 1.5, 3.0].map(|reach| random.pose(reach)).to_vec();
+    let poses: Vec<_> = [0.5, 1.5, 3.0].map(|reach| random_pose(&mut random, reach)).to_vec();
     check(&large, &small, &poses, &mut queriers);
 }
 
@@ -186,16 +189,16 @@ fn far_from_the_origin_in_f64() {
         triangles.into_iter().map(|t| t.map(point)).collect()
     };
     let (a, b) = (files(&far(dirty(&sphere(1), 1)), &LOSSLESS), files(&far(soup(40, 3)), &LOSSLESS));
-    assert_ne!(a[0].objects()[0].record.origin[0].get(), 0.0);
+    assert_ne!(a[0].objects()[0].origin()[0], 0.0);
     let near = files(&soup(40, 3), &LOSSLESS);
     let mut random = Random::new(6);
     let poses: Vec<_> =
         [0.5, 1.5, 4.0].map(|reach| translation(random.signed() * reach, 0.0, reach)).to_vec();
     check(&a, &b, &poses, &mut queriers);
-    // Turned about its own place: the translation brings it back.
+    // The mesh is turned about its own place, because the translation brings it back.
     let turned: Vec<_> = [0.5, 1.0, 3.0]
         .map(|reach| {
-            let pose = random.pose(reach);
+            let pose = random_pose(&mut random, reach);
             let back = pose.place(offset);
             let translation = [0, 1, 2].map(|k| offset[k] - back[k] + 2.0 * pose.translation()[k]);
             Pose::new(*pose.rotation(), translation).unwrap()
@@ -212,7 +215,7 @@ fn quantized_files_are_about_the_moved_triangles() {
     let mut random = Random::new(12);
     let quantized = |triangles: &[Triangle]| files(triangles, &[TriangleEncoding::Quantized]);
     let (a, b) = (quantized(&dirty(&sphere(2), 1)), quantized(&soup(60, 3)));
-    let poses: Vec<_> = [0.3, 1.5, 3.0].map(|reach| random.pose(reach)).to_vec();
+    let poses: Vec<_> = [0.3, 1.5, 3.0].map(|reach| random_pose(&mut random, reach)).to_vec();
     check(&a, &b, &poses, &mut queriers);
     check(&a, &files(&torus(8, 6), &LOSSLESS), &poses, &mut queriers);
     check(&b, &b, &[Pose::IDENTITY], &mut queriers);
@@ -234,12 +237,11 @@ fn several_objects_answer_as_one() {
     let other = files(&terrain(6, 4), &LOSSLESS);
     let mut queriers = queriers();
     let mut random = Random::new(13);
-    let poses: Vec<_> = [0.5, 2.0, 4.0, 4.0].map(|reach| random.pose(reach)).to_vec();
+    let poses: Vec<_> = [0.5, 2.0, 4.0, 4.0].map(|reach| random_pose(&mut random, reach)).to_vec();
     let mut all = Vec::new();
     for profile in Profile::ALL {
         let one = bake(&split, &options(profile, TriangleEncoding::F32));
-        let several =
-            bake(&split, &Options { split_objects: true, ..options(profile, TriangleEncoding::Packed) });
+        let several = bake(&split, &options(profile, TriangleEncoding::Packed).split_objects(true));
         assert_eq!((one.objects().len(), several.objects().len()), (1, 3));
         for pose in &poses {
             let querier = &mut queriers[0];
@@ -255,7 +257,7 @@ fn several_objects_answer_as_one() {
             assert_eq!(pairs(as_one), pairs(as_several));
             let distance = querier.distance(&several, &other[0], pose).unwrap().distance;
             assert_eq!(querier.distance(&one, &other[0], pose).unwrap().distance, distance);
-            // One object alone is at least as far away as all, and one of them just as far.
+            // A single object is at least as far away as all together, and one of them is exactly as far.
             let alone =
                 |number| querier.distance(several.object(number).unwrap(), &other[0], pose).unwrap().distance;
             assert_eq!([0, 1, 2].map(alone).into_iter().fold(f64::INFINITY, f64::min), distance);
@@ -279,7 +281,7 @@ fn real_meshes() {
             let choose = |i: usize| options(Profile::ALL[i], LOSSLESS[i % 2]);
             (0..10).map(|i| bake(mesh, &choose(i))).collect()
         };
-        let poses: Vec<_> = (0..4).map(|_| random.pose(reach)).collect();
+        let poses: Vec<_> = (0..4).map(|_| random_pose(&mut random, reach)).collect();
         check(&bakes(&a), &bakes(&b), &poses, &mut queriers);
     }
 }
@@ -290,10 +292,10 @@ fn without_ids_places_name_triangles() {
     let mut random = Random::new(15);
     for profile in Profile::ALL {
         let file = |triangles: &[Triangle]| {
-            bake(&mesh(triangles), &Options { ids: false, ..options(profile, TriangleEncoding::F32) })
+            bake(&mesh(triangles), &options(profile, TriangleEncoding::F32).ids(false))
         };
         let (a, b) = (file(&dirty(&sphere(1), 1)), file(&torus(8, 4)));
-        let poses = [0.5, 3.0].map(|reach| random.pose(reach));
+        let poses = [0.5, 3.0].map(|reach| random_pose(&mut random, reach));
         check(&[a], &[b], &poses, &mut queriers);
     }
 }
@@ -313,5 +315,49 @@ fn a_visit_of_contacts_ends_when_told() {
             assert_eq!((calls, seen.len()), (Ok(most as u64), most));
             assert!(seen.iter().all(|contact| all.binary_search(contact).is_ok()));
         }
+    }
+}
+
+/// Places the unit ball `gap` above the middle of a triangle of a ball a thousand times as large.
+fn beside(triangle: &Triangle, gap: f64, random: &mut Random) -> Pose {
+    let middle = [0, 1, 2].map(|axis| triangle.iter().map(|corner| corner[axis]).sum::<f64>() / 3.0);
+    let length = middle.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let shift = middle.map(|x| x * (1.0 + (1.0 + gap) / length));
+    Pose::new(*random_pose(random, 0.0).rotation(), shift).unwrap()
+}
+
+/// The triangles of A are larger than B, so that they are bounded one by one against nodes of B; and the other way
+/// round.
+#[test]
+fn a_mesh_a_thousand_times_larger_than_the_other() {
+    let (large, small) = (moved(&sphere(2), 1000.0, [0.0; 3]), sphere(4));
+    let (files_large, files_small) = (files(&large, &LOSSLESS), files(&small, &LOSSLESS));
+    let mut random = Random::new(31);
+    let gaps = [-1.0, -0.01, 0.001, 0.3, 60.0];
+    let poses: Vec<Pose> = gaps.iter().map(|&gap| beside(&large[37], gap, &mut random)).collect();
+    check(&files_large, &files_small, &poses, &mut queriers());
+    let inverse = |pose: &Pose| {
+        let r = pose.rotation();
+        let t = pose.translation();
+        let rows = [0, 1, 2].map(|i| [r[0][i], r[1][i], r[2][i]]);
+        Pose::new(rows, rows.map(|row| -(row[0] * t[0] + row[1] * t[1] + row[2] * t[2]))).unwrap()
+    };
+    let poses: Vec<Pose> = poses.iter().map(inverse).collect();
+    check(&files_small, &files_large, &poses, &mut queriers());
+}
+
+/// Without bounds of single triangles, every packet of the small mesh is tested.
+#[test]
+fn a_small_mesh_beside_a_large_triangle_takes_few_tests() {
+    let (large, small) = (moved(&sphere(2), 1000.0, [0.0; 3]), sphere(5));
+    let pose = beside(&large[37], 0.01, &mut Random::new(32));
+    let (large, small) = (bake(&mesh(&large), &Options::default()), bake(&mesh(&small), &Options::default()));
+    for mut querier in queriers() {
+        assert!(!querier.collide(&large, &small, &pose).unwrap());
+        let tests = querier.stats().packet_tests;
+        assert!(tests < 500, "{tests} packet tests, of some 2,000 packets");
+        assert!(querier.distance(&large, &small, &pose).unwrap().distance > 0.0);
+        let tests = querier.stats().packet_tests;
+        assert!(tests < 1000, "{tests} packet tests, of some 2,000 packets");
     }
 }

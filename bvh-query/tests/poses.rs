@@ -1,7 +1,9 @@
-//! Real meshes in poses with known answers, from `shared/`: skipped, and said so, where it is not there.
+//! Queries real meshes from `shared/` in poses whose answers are known. Where that folder is missing, the tests say
+//! so and skip.
 //!
-//! The labels were computed on the numbers of the OBJ text, whereas a file holds `f32`: a distance may differ
-//! from its label by 1e-8 of the size. A sample is checked to 1e-12 against brute force on what is stored.
+//! The labels were computed from the numbers in the OBJ text, whereas a file holds `f32`, so that a distance may
+//! differ from its label by 1e-8 of the size. A sample of the answers is checked to 1e-12 by brute force on the
+//! stored triangles.
 
 mod common;
 
@@ -9,16 +11,17 @@ use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Pose, Querier};
+use cbvh_testkit::depth::step;
 use common::truth::Truth;
 use common::{bake, options, queriers, shared, shared_mesh, stored};
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-/// By preset: how many poses to check by brute force.
+/// For each preset, the number of poses that are checked by brute force.
 const PRESETS: [(&str, usize); 7] =
     [("d0pen", 0), ("d0sep", 2), ("d0.5", 2), ("d1", 1), ("d5", 1), ("d10", 1), ("overlap", 0)];
 
-/// A mesh of `shared/meshes`, baked once for all tests.
+/// Returns a mesh of `shared/meshes`, which is baked once for all tests.
 fn baked(name: &str) -> Option<&'static Bvh> {
     static BAKED: Mutex<Option<HashMap<String, &'static Bvh>>> = Mutex::new(None);
     let mut guard = BAKED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -35,14 +38,15 @@ fn pose(numbers: &str) -> Pose {
     Pose::from_rows(&rows.try_into().unwrap()).unwrap()
 }
 
-/// The diagonal of the box of A.
+/// Returns the diagonal of the box of A.
 fn diagonal(bvh: &Bvh) -> f64 {
-    let record = &bvh.objects()[0].record;
+    let record = bvh.objects()[0].record();
     let side = |axis: usize| f64::from(record.box_hi[axis].get()) - f64::from(record.box_lo[axis].get());
     (0..3).map(|axis| side(axis).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Asks all backends; a distance of 0 goes with collision, any other is within 1e-8 of the size of `label`.
+/// Queries all backends. A distance of 0 must agree with collision, and any other must be within 1e-8 of the size of
+/// `label`.
 fn check(a: &Bvh, b: &Bvh, pose: &Pose, label: f64, size: f64, queriers: &mut [Querier], what: &str) {
     let first = queriers[0].distance(a, b, pose).unwrap();
     assert_eq!(first.distance == 0.0, label == 0.0, "{what}: {first:?}, not {label}");
@@ -70,15 +74,16 @@ fn check_pair(name: &str, mesh_a: &str, mesh_b: &str) {
     for (preset, sample) in PRESETS {
         let Some(path) = shared(&format!("poses/{name}_{preset}.txt")) else { return };
         let text = std::fs::read_to_string(path).unwrap();
-        // One of a1hand's has 99.
+        // One file of a1hand has 99 poses.
         assert!(text.lines().count() >= 99);
-        for (number, line) in text.lines().enumerate() {
+        for (number, line) in text.lines().enumerate().step_by(step(5)) {
             let (numbers, label) = line.split_once('#').unwrap();
             let label: f64 = label.trim().strip_prefix("dist ").unwrap().parse().unwrap();
             let pose = pose(numbers);
             let what = format!("{name} {preset} {number}");
             assert_eq!(label == 0.0, matches!(preset, "d0pen" | "overlap"), "{what}");
-            // All backends where the meshes are small; elsewhere the fastest, and all on every fourth pose.
+            // Small meshes are queried on all backends. Others are queried on the fastest, and on every fourth pose
+            // on all of them.
             let asked = if small || number % 4 == 0 { &mut queriers[..] } else { &mut queriers[fastest..] };
             check(a, b, &pose, label, diagonal(a), asked, &what);
             if number < sample {
@@ -133,9 +138,9 @@ fn fcl() {
     check_pair("fcl", "fclenv.obj", "fclrob.obj");
 }
 
-/// Poses on which at least one well-known library answers wrongly. The list's bunny has coordinates of six
-/// decimals: those of `bunny.obj` printed so, as the labels show (without, they are off by 3e-6 of the size;
-/// with, by 3e-9).
+/// Checks poses for which at least one well-known library answers wrongly. The labels show that the list's bunny has
+/// coordinates of six decimals, namely those of `bunny.obj` printed so: without the rounding, the labels are off by
+/// 3e-6 of the size, and with it by 3e-9.
 #[test]
 fn poses_on_which_libraries_disagree() {
     let Some(path) = shared("disagree/poses.txt") else { return };
@@ -164,7 +169,8 @@ fn poses_on_which_libraries_disagree() {
         let what = head[..3].join(" ");
         let (mut label, size, pose) = (field("dist="), field("size="), pose(numbers));
         if what == "bunny d0pen 148" {
-            // It goes in by 1e-9 of the size, less than what six decimals lose when they become f32: apart.
+            // The stated penetration is 1e-9 of the size. Six decimals lose more when they become `f32`, so the
+            // meshes are apart.
             let answer = queriers[0].distance(&a[0], &b[0], &pose).unwrap();
             Truth::within(&stored(&a[0]), &stored(&b[0]), &pose, 2.0 * answer.distance)
                 .check_distance(&answer);
@@ -176,7 +182,7 @@ fn poses_on_which_libraries_disagree() {
             check(a, b, &pose, label, size, &mut queriers, &what);
             answers.push(queriers[0].distance(a, b, &pose).unwrap());
         }
-        // Which triangles are named when the meshes touch depends on the tree.
+        // When the meshes touch, it depends on the tree which triangles are named.
         assert!(label == 0.0 || answers[0] == answers[1], "{what}: {answers:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! What becomes of an open file when others replace, remove or truncate it: what `Bvh::open` says.
+//! Checks what `Bvh::open` says about open files that others replace, remove or truncate.
 #![cfg(unix)]
 
 mod common;
@@ -12,7 +12,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// In the child: the file that it opens, truncates and asks. The test runs itself.
+/// Names, for the child process, the file that it opens, truncates and queries. The test starts itself as the child.
 const VICTIM: &str = "CBVH_TRUNCATION_VICTIM";
 const SIGBUS: i32 = 7;
 
@@ -29,7 +29,7 @@ fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn truncate(path: &Path) {
-    // To the header page: all that opening has read is still there.
+    // Everything that opening has read, which is the header page, stays there.
     OpenOptions::new().write(true).open(path).unwrap().set_len(4096).unwrap();
 }
 
@@ -38,7 +38,7 @@ fn contacts(bvh: &Bvh) -> usize {
     Querier::new().unwrap().contacts(bvh, &good, &Pose::IDENTITY).unwrap().len()
 }
 
-/// Does nothing by itself: the process that `a_truncated_map_ends_the_process` starts.
+/// Does nothing in a normal test run; `a_truncated_map_ends_the_process` runs it as a process of its own.
 #[test]
 fn the_child_process() {
     let Ok(path) = std::env::var(VICTIM) else { return };
@@ -49,7 +49,7 @@ fn the_child_process() {
 
 #[test]
 fn a_truncated_map_ends_the_process() {
-    // Other systems number the signal otherwise, or have none.
+    // Other systems have another number for the signal, or do not have the signal.
     if !cfg!(target_os = "linux") {
         println!("skipped: SIGBUS is tested on Linux only");
         return;
@@ -81,7 +81,7 @@ fn a_file_that_was_read_may_be_truncated() {
     truncate(&path);
     assert_eq!(contacts(&bvh), expected);
     assert!(expected > 0);
-    // What is left is no file any more.
+    // The rest is not a valid file any more.
     assert!(Bvh::read(&path).is_err() && Bvh::open(&path).is_err());
     assert!(Bvh::read(path.with_extension("none")).is_err());
 }

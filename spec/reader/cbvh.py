@@ -1,8 +1,8 @@
-"""Decodes a .cbvh file: bytes in, structures and numbers out, as spec/format.md states them.
+"""Decodes the bytes of a .cbvh file to structures and numbers, as spec/format.md states.
 
-Nothing is judged here. `rules.py` checks, in the order of the specification, and calls what is here only once the
-checks before it have made it safe. Numbers in comments are sections of the specification. Arithmetic that it calls
-f32 is done on numpy arrays of float32, each operation rounded by itself; numpy fuses none.
+This module checks nothing. `rules.py` checks in the order of the specification, and calls a function of this module
+only after earlier checks have made the call safe. Numbers in comments are sections of the specification. Arithmetic
+that the specification calls f32 uses numpy arrays of float32; each operation rounds by itself, and numpy fuses none.
 """
 
 from collections import namedtuple
@@ -160,14 +160,14 @@ def row_of(slab):
 
 
 def places_of_codes(profile):
-    """Offsets in a treelet of the codes of lower ends, for each child and slab; upper ends are `hi` further."""
+    """Offsets in a treelet of the codes of lower ends [child, slab]; those of upper ends are `hi` bytes further."""
     child = np.arange(profile.width)[:, None]
     row = np.array([row_of(slab) for slab in range(profile.slabs)])
     return profile.block * (child // 4) + profile.row * row + profile.child * (child % 4)
 
 
 def bit_values(data, at, first_bit, stride, width, count):
-    """`count` values of `width` bits, `stride` bits apart, in the little-endian number that begins at `at` (1.4)."""
+    """Reads `count` values of `width` bits, `stride` bits apart, from the little-endian number at byte `at` (1.4)."""
     if width == 0 or count == 0:
         return np.zeros(count, np.uint64)
     bits = first_bit + stride * np.arange(count, dtype=np.uint64)
@@ -177,7 +177,7 @@ def bit_values(data, at, first_bit, stride, width, count):
 
 
 class Record:
-    """One structure: its fields as attributes, and where in the file each of them stands."""
+    """One structure: its fields as attributes, and the place of each field in the file."""
 
     def __init__(self, dtype, data, at):
         self.dtype, self.at = dtype, at
@@ -191,7 +191,7 @@ class Record:
 
 
 class File:
-    """What a file holds. The caller (`rules.open_file`) says when it is safe to read what."""
+    """The contents of a file. The caller (`rules.open_file`) decides when each part is safe to read."""
 
     def __init__(self, data):
         self.data = data
@@ -226,7 +226,7 @@ class File:
         return np.frombuffer(self.bytes_of(DUPLICATES), "<u4").reshape(-1, 2)
 
     def provenance(self):
-        """Keys and values (14)."""
+        """The keys and values of the provenance (14)."""
         lines = self.bytes_of(PROVENANCE).decode("utf-8", "replace").split("\n")
         return dict(line.split("=", 1) for line in lines if "=" in line)
 
@@ -251,12 +251,12 @@ class Object(Record):
         return range(self.first_page, self.first_page + self.pages)
 
     def lanes_of(self, decode):
-        """What `decode` gives for the pages, joined: one row for each triangle stored."""
+        """Joins a result per lane over all pages: one row for each stored triangle."""
         rows = [decode(page)[page.lanes_used()] for page in self.pages_read]
         return np.concatenate(rows)
 
     def triangles_f32(self):
-        """All triangles around the origin: [triangle, corner, axis], in the order of places."""
+        """All triangles relative to the origin: [triangle, corner, axis], in the order of places."""
         return self.lanes_of(Page.triangles)
 
     def ids(self):
@@ -264,7 +264,7 @@ class Object(Record):
 
 
 class Page(Record):
-    """4096 bytes of the node section, with the leaf and id blocks that it names (6)."""
+    """A page of 4096 bytes of the node section, with the leaf and id blocks that it names (6)."""
 
     def __init__(self, owner, number):
         self.owner, self.number, self.layout = owner, number, owner.layout
@@ -277,7 +277,7 @@ class Page(Record):
         return self.at + LINE + root * self.layout.anchor_bytes
 
     def anchor(self, root):
-        """Lower and upper ends of all slabs, in f32."""
+        """The lower and upper ends of all slabs, in f32."""
         slabs = self.layout.slabs
         ends = np.frombuffer(self.data, "<f4", 2 * slabs, self.anchor_at(root))
         return ends[:slabs], ends[slabs:]
@@ -286,7 +286,7 @@ class Page(Record):
         return self.anchor_at(root) + self.layout.anchor_bytes - 8
 
     def parent(self, root):
-        """Page and number of the remote link that leads to the root."""
+        """The page and number of the remote link that leads to the root."""
         at = self.parent_at(root)
         return int.from_bytes(self.data[at : at + 4], "little"), self.data[at + 4]
 
@@ -294,7 +294,7 @@ class Page(Record):
         return self.anchor_at(self.roots) + 4 * link
 
     def remote(self, link):
-        """Page and root that a remote link leads to."""
+        """The page and root to which a remote link leads."""
         at = self.remote_at(link)
         reference = int.from_bytes(self.data[at : at + 4], "little")
         return reference >> 6, reference & 63
@@ -315,14 +315,14 @@ class Page(Record):
         return [word >> 4 * child & 15 for child in range(8)]
 
     def children(self, slot):
-        """How many nibbles count: up to the highest that is not 0."""
+        """The number of children: one more than the index of the highest nibble that is not 0."""
         return max((child + 1 for child, kind in enumerate(self.kinds(slot)) if kind), default=0)
 
     def links(self, slot):
         return Record(LINKS, self.data, self.treelet_at(slot) + self.layout.links_at)
 
     def targets(self, slot):
-        """For each child its kind, and the number of the slot, remote link or packet that it leads to."""
+        """For each child, its kind and the number of the slot, remote link or packet to which it leads."""
         links = self.links(slot)
         following = {TREELET: links.first_treelet, REMOTE: links.first_remote, LEAF: links.first_leaf}
         found = []
@@ -333,12 +333,12 @@ class Page(Record):
         return found
 
     def lanes_used(self):
-        """True for the lanes of each packet that hold triangles: [packet, lane]."""
+        """Which lanes of each packet hold triangles: [packet, lane]."""
         counts = [kind - 3 for slot in range(self.treelets) for kind in self.kinds(slot) if kind >= LEAF]
         return np.arange(PACKET) < np.array(counts, int).reshape(-1, 1)
 
     def codes(self):
-        """Codes of lower and upper ends as they are stored: [slot, child, slab] each."""
+        """The codes of lower and upper ends as they are stored, each [slot, child, slab]."""
         profile = self.layout
         places, size = places_of_codes(profile), profile.code_bytes
         stored = np.ascontiguousarray(self.treelet_bytes()).view({1: "u1", 2: "<u2", 4: "<f4"}[size])
@@ -346,7 +346,7 @@ class Page(Record):
         return (lo & 15, hi >> 4) if profile.encoding == "u4" else (lo, hi)
 
     def decode(self):
-        """Slabs of the treelets [slot, slab], and of their children [slot, child, slab], lower and upper (8)."""
+        """Lower and upper ends of the slabs of treelets [slot, slab] and of their children [slot, child, slab] (8)."""
         profile = self.layout
         code_lo, code_hi = self.codes()
         own_lo = np.empty((self.treelets, profile.slabs), np.float32)
@@ -372,7 +372,7 @@ class Page(Record):
         return self.owner.file.sections[LEAVES].offset + LINE * self.leaf_line
 
     def leaf_block(self):
-        """The whole lines of the block; no bytes if it leaves the section."""
+        """The whole lines of the block; no bytes if the block does not lie within the section."""
         entry = self.owner.file.sections[LEAVES]
         inside = LINE * (self.leaf_line + self.leaf_lines) <= entry.length
         at = self.leaf_block_at()
@@ -382,7 +382,7 @@ class Page(Record):
         return Record(PACKED_HEAD, self.data, self.leaf_block_at())
 
     def indices_at(self, head):
-        """Where the index array has to start, counted from the block (11.2)."""
+        """The offset in the block at which the index array must start (11.2)."""
         return PACKED_HEAD_BYTES + ceil_div(head.vertices * int(head.bits.sum(dtype=int)), 8)
 
     def leaf_bytes_needed(self):
@@ -392,13 +392,13 @@ class Page(Record):
         return self.indices_at(head) + ceil_div(12 * self.packets * head.index_bits, 8) + 8
 
     def packed_indices(self, head):
-        """Pool indices in the order of the array: [packet, corner, lane]."""
+        """The pool indices in the order of the array: [packet, corner, lane]."""
         at = self.leaf_block_at() + head.indices_at
         values = bit_values(self.data, at, 0, head.index_bits, head.index_bits, 12 * self.packets)
         return values.astype(np.intp).reshape(-1, 3, PACKET)
 
     def packed_numbers(self, head):
-        """n of each vertex and axis, as i32 (11.2)."""
+        """The number n of each vertex and axis, as i32 (11.2)."""
         at = self.leaf_block_at() + PACKED_HEAD_BYTES
         first_bit, stride = 0, int(head.bits.sum(dtype=int))
         numbers = np.empty((head.vertices, 3), np.int32)
@@ -409,7 +409,7 @@ class Page(Record):
         return numbers
 
     def packed_pool(self, head):
-        """The block's vertices [vertex, axis], in f32."""
+        """The vertices of the block [vertex, axis], in f32."""
         numbers = self.packed_numbers(head)
         pool = np.empty(numbers.shape, np.float32)
         for axis, exponent in enumerate(head.exponent.tolist()):
@@ -423,13 +423,13 @@ class Page(Record):
         return pool
 
     def triangles(self):
-        """All lanes of all packets, around the origin: [packet, lane, corner, axis], in f32."""
+        """All lanes of all packets, relative to the origin: [packet, lane, corner, axis], in f32."""
         if self.packets == 0:
             return np.empty((0, PACKET, 3, 3), np.float32)
         if self.is_packed():
             head = self.packed_head()
             indices = self.packed_indices(head).transpose(0, 2, 1)
-            return self.packed_pool(head).take(indices, axis=0, mode="clip")  # safe before R29 is checked, too
+            return self.packed_pool(head).take(indices, axis=0, mode="clip")  # also safe before R29 is checked
         rows = np.frombuffer(self.data, "<f4", 36 * self.packets, self.leaf_block_at())
         return rows.reshape(-1, 3, 3, PACKET).transpose(0, 3, 1, 2)
 
@@ -446,7 +446,7 @@ class Page(Record):
         return ID_HEAD_BYTES + ceil_div(PACKET * self.packets * head.bits, 8) + 8
 
     def ids(self):
-        """All lanes of all packets: [packet, lane]. Without an id section they are all 0."""
+        """The ids in all lanes of all packets: [packet, lane]. Without an id section they are all 0."""
         if self.id_words == 0:
             return np.zeros((self.packets, PACKET), np.uint32)
         head = self.id_head()
@@ -456,13 +456,13 @@ class Page(Record):
 
 
 def round_up_to_16_bits(t):
-    """`up` of section 8: f32 numbers to 16 significant bits, away from zero."""
+    """Rounds f32 numbers to 16 significant bits, away from zero: the function `up` of section 8."""
     bits = np.asarray(t, np.float32).view(np.uint32)
     return (bits + np.uint32(0xFF) & np.uint32(0xFFFFFF00)).view(np.float32)
 
 
 def decode_slabs(profile, f16_exponent, own_lo, own_hi, code_lo, code_hi):
-    """Children's slabs [child, slab] from their codes and the slabs [slab] of their treelet (8)."""
+    """Decodes children's slabs [child, slab] from their codes and the slabs [slab] of their treelet (8)."""
     if profile.encoding == "f32":
         return code_lo, code_hi
     with np.errstate(all="ignore"):  # a damaged treelet may decode to anything

@@ -1,12 +1,13 @@
-"""Checks .cbvh files against the specification, or asks two of them a query: the command of the reader.
+"""The command of the reader: checks .cbvh files against the specification, or answers queries between two files.
 
-    python3 check.py FILE...                                      every rule, R35 included
-    python3 check.py --strict FILE...                             and what writers must do beyond the rules
-    python3 check.py --query collide|contacts|distance A B POSES  one answer a line
+    python3 check.py FILE...                                      checks every rule, including R35
+    python3 check.py --strict FILE...                             also checks what binds only writers
+    python3 check.py --query collide|contacts|distance A B POSES  prints one answer per line
     python3 check.py --query ... A B --pose "12 numbers"
 
-A pose places B in A's frame: 12 numbers, the rows of a 3x4 matrix; a pose file has one pose a line, # starts a comment.
-Exit codes as those of `cbvh`: 0 all is well, 1 usage, 2 a file cannot be read, 3 a file is refused.
+A pose places B in A's frame. It is 12 numbers, the rows of a 3x4 matrix. A pose file has one pose per line, and #
+starts a comment. Exit codes are those of `cbvh`: 0 success, 1 wrong usage, 2 a file cannot be read, 3 a file is
+refused.
 """
 
 import argparse
@@ -26,7 +27,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def load(path):
-    """The file, if no rule is broken."""
+    """Returns the file if it breaks no rule."""
     with open(path, "rb") as stream:
         file = rules.validate(stream.read())
     rules.verify(file)
@@ -43,18 +44,18 @@ def summary(file):
 
 
 def check(path, strict):
-    """Prints what is to be said of a file; true if it is accepted."""
+    """Prints the verdict on a file and returns whether it is accepted."""
     try:
         file = load(path)
     except rules.Broken as broken:
         print(f"{path}: {broken}")
         return False
-    lapses = list(musts.lapses(file)) if strict else []
-    for lapse in lapses:
-        print(f"{path}: {lapse}")
-    if not lapses:
+    violations = list(musts.violations(file)) if strict else []
+    for violation in violations:
+        print(f"{path}: {violation}")
+    if not violations:
         print(f"{path}: ok: {summary(file)}")
-    return not lapses
+    return not violations
 
 
 def ask(mode, paths, pose, limit):
@@ -82,10 +83,10 @@ def main(arguments):
     parser.add_argument("--strict", action="store_true")
     parser.add_argument("--query", choices=["collide", "contacts", "distance"])
     parser.add_argument("--pose")
-    parser.add_argument("--limit", type=int, help="ask only the first so many poses")
+    parser.add_argument("--limit", type=int, help="use only the first LIMIT poses")
     options = parser.parse_args(arguments)
     if options.query and (len(options.files) < 2 or (len(options.files) < 3 and not options.pose)):
-        parser.error("a query needs two files, and poses")
+        parser.error("a query needs two files and poses")
     try:
         if not options.query:
             accepted = [check(path, options.strict) for path in options.files]

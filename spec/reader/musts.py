@@ -1,6 +1,7 @@
-"""What spec/format.md asks of writers without a rule: readers accept files that lack it, bakers must not make them.
+"""Checks the requirements of spec/format.md that have no rule: they bind writers, and readers do not check them.
 
-`lapses` yields one line for each lapse of a validated file. Numbers in brackets are sections of the specification.
+`violations` yields one line for each violation in a validated file. Numbers in brackets are sections of the
+specification.
 """
 
 from fractions import Fraction
@@ -12,7 +13,7 @@ from cbvh import LEAF, LINE, PACKET, PAGE, WORD
 from query import minus, outer
 
 
-def lapses(file):
+def violations(file):
     yield from of_header_page(file)
     yield from of_sections(file)
     yield from of_object_table(file)
@@ -37,7 +38,7 @@ def lapses(file):
 def of_header_page(file):
     table_end = LINE + cbvh.SECTION_ENTRY.itemsize * len(file.entries)
     if file.header.reserved.any() or any(file.data[table_end:PAGE]):
-        yield "(1.2) reserved bytes of the header page"
+        yield "(1.2) nonzero reserved bytes in the header page"
 
 
 def of_sections(file):
@@ -50,11 +51,11 @@ def of_sections(file):
             yield f"(2.1) section {entry.kind}: required is {entry.required}"
         end = entry.offset + entry.length
     if len(file.data) != PAGE * cbvh.ceil_div(end, PAGE) or any(file.data[end:]):
-        yield "(2) something other than zeros to the next page follows the last section"
+        yield "(2) the last section is not followed by zeros up to the next page and then the end of the file"
     if kinds != sorted(kinds):
         yield f"(2.1) order of kinds {kinds}"
     if cbvh.DUPLICATES in kinds and (cbvh.IDS not in kinds or not file.sections[cbvh.DUPLICATES].length):
-        yield "(13) duplicates that are empty or without ids"
+        yield "(13) a duplicates section that is empty, or without an id section"
 
 
 def of_object_table(file):
@@ -65,9 +66,9 @@ def of_object_table(file):
             yield f"(3) object {one.number}: name at {one.name_offset}, expected at {end}"
         end += one.name_length
         if one.reserved.any() or one.reserved_end.any():
-            yield f"(1.2) object {one.number}: reserved bytes"
+            yield f"(1.2) object {one.number}: nonzero reserved bytes"
     if end != head.names_length or head.reserved.any():
-        yield "(3) bytes behind the names, or reserved bytes of the head"
+        yield "(3) bytes after the names, or nonzero reserved bytes in the head"
 
 
 def of_object(one):
@@ -89,7 +90,7 @@ def of_object(one):
 
 
 def sphere_holds(one, vertices):
-    """Exactly, for the vertices that f64 finds within a millionth of the farthest."""
+    """Decides exactly, for those vertices whose squared distance in f64 is within a millionth of the greatest."""
     squares = ((vertices.astype(np.float64) - one.sphere_centre) ** 2).sum(1)
     centre, radius = [Fraction(float(c)) for c in one.sphere_centre], Fraction(one.sphere_radius)
     far = np.unique(vertices[squares >= squares.max() * (1 - 1e-6)], axis=0)
@@ -97,10 +98,11 @@ def sphere_holds(one, vertices):
 
 
 def maybe_flat(corners):
-    """True for triangles whose normal f64 does not find to be other than 0 beyond doubt.
+    """True for triangles whose normal may be 0, as far as f64 can tell.
 
-    Differences of f32 are rounded once, products once, and a coordinate of the normal is one more difference: 4
-    roundings of the magnitudes; 8 cover the rounding of these. An underflow leaves doubt as well.
+    Differences of f32 are rounded once, products once, and a coordinate of the normal is one more difference. That
+    makes 4 roundings of the magnitudes; a bound of 8 also covers the rounding of the magnitudes. The constant covers
+    underflow.
     """
     u, v = ((corners[:, i].astype(np.float64) - corners[:, 0]) for i in (1, 2))
     sizes = np.abs(u[:, [1, 2, 0]] * v[:, [2, 0, 1]]) + np.abs(u[:, [2, 0, 1]] * v[:, [1, 2, 0]])
@@ -113,7 +115,7 @@ def is_flat(triangle):
 
 
 def of_page(page):
-    """Bytes of the page that no table gives a meaning are zero; fields without use are as 6, 7.2 and 10 say."""
+    """Bytes to which no table gives a meaning are zero, and unused fields are as sections 6, 7.2 and 10 require."""
     layout, where = page.layout, f"page {page.number}"
     used = np.zeros(PAGE, bool)
     used[:LINE] = True
@@ -132,7 +134,7 @@ def of_page(page):
         used[at + layout.kinds_at :][:4] = True
         used[at + layout.links_at :][:4] = True
     if np.frombuffer(page.data, "u1", PAGE, page.at)[~used].any():
-        yield f"(1.2) {where}: bytes without meaning"
+        yield f"(1.2) {where}: bytes without meaning are not zero"
     counters = {cbvh.TREELET: page.roots, cbvh.REMOTE: 0, LEAF: 0}
     for slot in range(page.treelets):
         links = page.links(slot)
@@ -147,7 +149,7 @@ def of_page(page):
 
 
 def of_slabs(page):
-    """(8) decoded slabs are ordered, below 2^122, and those of residuals within the treelet's."""
+    """(8) Decoded slabs are ordered and below 2^122, and those decoded from residuals lie within the treelet's."""
     own_lo, own_hi, lo, hi = page.decode()
     for slot in range(page.treelets):
         present = page.children(slot)
@@ -156,7 +158,7 @@ def of_slabs(page):
         if page.layout.encoding != "f32":
             good &= (own_lo[slot] <= child_lo) & (child_hi <= own_hi[slot])
         if not good.all():
-            yield f"(8) page {page.number}, slot {slot}: slabs out of order or of their treelet's"
+            yield f"(8) page {page.number}, slot {slot}: slabs out of order, or outside those of the treelet"
 
 
 def of_leaf_block(page, lines):
@@ -169,7 +171,7 @@ def of_leaf_block(page, lines):
     last = used.sum(axis=1) - 1
     repeated = lanes[np.arange(page.packets), last][:, None]
     if (lanes.view(np.uint32) != repeated.view(np.uint32))[~used].any():
-        yield f"(10) page {page.number}: lanes beyond the last triangle do not repeat it"
+        yield f"(10) page {page.number}: lanes after the last triangle do not repeat it"
     block = page.leaf_block()
     if not page.is_packed():
         if any(block[page.leaf_bytes_needed() :]):
@@ -177,13 +179,13 @@ def of_leaf_block(page, lines):
         return
     head = page.packed_head()
     if head.reserved or head.reserved_2 or head.reserved_3.any() or head.fixed > 7:
-        yield f"{where}: reserved bytes or bits of the head"
+        yield f"{where}: nonzero reserved bytes or bits in the head"
     pool_bits = head.vertices * int(head.bits.sum(dtype=int))
     index_bits = 12 * page.packets * head.index_bits
     pool = int.from_bytes(block[cbvh.PACKED_HEAD_BYTES : head.indices_at], "little")
     rest = int.from_bytes(block[head.indices_at :], "little")
     if pool >> pool_bits or rest >> index_bits:
-        yield f"{where}: bits behind an array are not zero"
+        yield f"{where}: bits after an array are not zero"
     for axis in range(3):
         exponent, fixed = int(head.exponent[axis]), head.fixed >> axis & 1
         if (exponent < -126) if fixed else exponent:
@@ -204,9 +206,9 @@ def of_id_block(page, words):
     at = page.id_block_at() + cbvh.ID_HEAD_BYTES
     array = int.from_bytes(page.data[at : page.id_block_at() + WORD * page.id_words], "little")
     if head.reserved.any() or array >> PACKET * page.packets * head.bits:
-        yield f"(12) {where}: reserved bytes, or bits behind the array"
+        yield f"(12) {where}: nonzero reserved bytes, or nonzero bits after the array"
     if (page.ids()[~page.lanes_used()] != head.base).any():
-        yield f"(12) {where}: values of lanes beyond the triangles"
+        yield f"(12) {where}: nonzero values in lanes after the last triangle"
 
 
 def of_ids(file):
@@ -219,10 +221,10 @@ def of_ids(file):
     if not np.isin(kept, ids).all():
         yield "(13) the first id of a pair is not stored"
     if len(dropped) != sum(one.duplicates for one in file.objects):
-        yield f"(13) {len(dropped)} duplicates listed, the records state others"
+        yield f"(13) {len(dropped)} duplicates listed, but the records state a different number"
     inputs = {one.input_triangles for one in file.objects}
     if len(inputs) > 1 or (dropped >= min(inputs)).any():
-        yield "(12, 13) an id beyond the input, or objects of different inputs"
+        yield "(12, 13) an id that is not below the input's number of triangles, or objects of different inputs"
 
 
 def of_provenance(file):
@@ -234,4 +236,4 @@ def of_provenance(file):
         return
     keys = [line.split("=", 1)[0] for line in lines[:-1]]
     if lines[-1] or len(set(keys)) != len(keys) or any("=" not in line for line in lines[:-1]):
-        yield "(14) provenance: lines without end or key, or a key twice"
+        yield "(14) provenance: a line without a line feed or a key, or a key that occurs twice"

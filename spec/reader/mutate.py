@@ -2,9 +2,11 @@
 
     python3 mutate.py CBVH COUNT SEED FILE...
 
-CBVH is the command's path, the files are valid. Most mutants are sealed: their checksums are made right again, so that
-the rules behind them have their turn; some are sealed in part, some not. Prints the rules broken and how often, and
-every mutant on which the two differ (which is kept); exit code 1 if there is one.
+CBVH is the path of the command, and the files must be valid. Most mutants are sealed: their checksums are corrected,
+so that the rules checked after the checksums are reached. Some mutants are sealed only in part, and some not at all.
+
+Prints how often each rule was broken. Prints and keeps every mutant on which the two readers differ; the exit code is 1
+if there is one.
 """
 
 import collections
@@ -20,12 +22,12 @@ import cbvh
 import rules
 from xxh3 import xxh3_64
 
-LEAF_SUMS, ID_SUMS, PAGE_SUMS, ALL = 1, 2, 4, 7  # what `seal` seals besides sections and header
+LEAF_SUMS, ID_SUMS, PAGE_SUMS, ALL = 1, 2, 4, 7  # what `seal` corrects besides sections and header
 EXTREMES = (0, 1, 0x7F800000, 0x7FC00000, 0x80000000, (1 << 64) - 1)
 
 
 def places(data):
-    """Bytes of a valid file worth damaging, by what stands there: each sort is drawn equally often."""
+    """Offsets of bytes worth damaging in a valid file, by what they hold; each group is drawn equally often."""
     file = rules.validate(data)
     sorts = collections.defaultdict(list)
     sorts["table"] += range(cbvh.LINE + 32 * len(file.entries) + 32)
@@ -54,7 +56,7 @@ def places(data):
 
 
 def mutant(chance, data, sorts):
-    """A copy with one to three changes, seldom of another length."""
+    """Returns a copy with one to three changes, and rarely with a different length."""
     data = bytearray(data)
     for _ in range(chance.choice((1, 1, 1, 2, 3))):
         at = chance.choice(chance.choice(sorts))
@@ -79,7 +81,7 @@ def mutant(chance, data, sorts):
 
 
 def seal(data, sums=ALL):
-    """Makes checksums right, as far as the damaged numbers lead to bytes of the file."""
+    """Corrects checksums, as far as the damaged numbers still lead to bytes of the file."""
     if len(data) < cbvh.PAGE:
         return
 
@@ -118,7 +120,7 @@ def seal(data, sums=ALL):
 
 
 def verdict(data):
-    """The rule broken, 0 for none."""
+    """Returns the number of the broken rule, or 0 for a valid file."""
     try:
         rules.validate(bytes(data))
     except rules.Broken as broken:
@@ -135,7 +137,7 @@ def verdict_of_command(command, path):
 
 
 def compare(command, count, seed, paths, folder):
-    """How often each rule was broken, and (file, mutant, this verdict, that verdict) of those that differ."""
+    """Counts how often each rule was broken, and lists (file, mutant, this verdict, that verdict) where they differ."""
     chance = random.Random(seed)
     originals = []
     for path in paths:

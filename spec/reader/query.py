@@ -1,10 +1,11 @@
-"""Answers queries by brute force: every pair of triangles of two meshes whose boxes do not rule it out.
+"""Answers queries by brute force, over every pair of triangles of two meshes whose boxes do not rule it out.
 
 A vertex of an object is `origin + v` (format.md, 15.1). Mesh B is placed by a pose, the rows of a 3x4 matrix [R | t]:
 coordinate i of a placed vertex is ((R[i][0] x + R[i][1] y) + R[i][2] z) + t[i], each product and sum rounded to f64 and
-never fused, after entries of R below 2^-64 and of t below 2^-213 in magnitude are taken as 0. Contacts are decided
-exactly on these points: touching counts, and a triangle without area is the segment or point that it is. A filter in
-f64 decides what it can with a bound on its rounding; integers decide the rest. The distance is plain f64.
+never fused. Before that, entries of R below 2^-64 and of t below 2^-213 in magnitude are replaced by 0. Contacts are
+decided exactly on these points: touching counts, and a triangle without area stands for the segment or point that it
+is. A filter in f64 decides what it can with a bound on its rounding, and integers decide the rest. The distance is
+computed in plain f64.
 """
 
 from itertools import product
@@ -20,12 +21,12 @@ CORNERS = ((0, 1), (1, 2), (2, 0))
 
 
 def corners(file):
-    """All stored triangles of all objects, with their origins: [triangle, corner, axis] in f64."""
+    """All stored triangles of all objects, with the origins added: [triangle, corner, axis] in f64."""
     return np.concatenate([one.triangles_f32().astype(np.float64) + one.origin for one in file.objects])
 
 
 def weights(file):
-    """How many triangles of the input each stored one stands for: itself, and its duplicates as far as listed (13)."""
+    """How many triangles of the input each stored one represents: itself and its listed duplicates (13)."""
     if cbvh.IDS not in file.sections:
         return np.ones(sum(one.triangles for one in file.objects), int)
     ids = np.concatenate([one.ids() for one in file.objects])
@@ -36,7 +37,7 @@ def weights(file):
 
 
 def read_poses(text):
-    """One pose [3, 4] for each line of 12 numbers; # starts a comment."""
+    """Parses one pose [3, 4] from each line of 12 numbers; # starts a comment."""
     rows = [line.split("#")[0].split() for line in text.splitlines()]
     return [np.array(row, np.float64).reshape(3, 4) for row in rows if row]
 
@@ -51,7 +52,7 @@ def place(triangles, pose):
 
 
 def gaps_of_boxes(a, b):
-    """Squares of the distances between boxes, for blocks of rows: first row, [rows of a, triangles of b]."""
+    """Squared distances between boxes, in blocks of rows: yields the first row and [rows of a, triangles of b]."""
     a_lo, a_hi, b_lo, b_hi = a.min(1), a.max(1), b.min(1), b.max(1)
     step = max(1, ROWS // len(b))
     for first in range(0, len(a), step):
@@ -64,7 +65,7 @@ def gaps_of_boxes(a, b):
 
 
 def contacts(a, b):
-    """The pairs of triangles that have a point in common: their numbers in a, and in b."""
+    """Finds the pairs of triangles that have a point in common. Returns their numbers in a and in b."""
     found = [(np.empty(0, int), np.empty(0, int))]
     for first, gaps in gaps_of_boxes(a, b):
         of_a, of_b = np.nonzero(gaps <= 0.0)
@@ -85,10 +86,11 @@ def dot(u, v):
 
 
 def are_apart(a, b):
-    """True for pairs that a plane separates beyond doubt.
+    """True for pairs that a plane certainly separates.
 
-    Any axis n that separates will do, however it was rounded. A projection n·(p - o) takes a rounded difference, a
-    product and two sums, so it is off by at most 4 roundings of the sum of |n||p - o|; 8 cover the rounding of that.
+    Any separating axis n is valid, however it was rounded. A projection n·(p - o) takes a rounded difference, a
+    product and two sums, so it is off by at most 4 roundings of the sum of |n||p - o|. A bound of 8 also covers the
+    rounding of that sum.
     """
     from_o = np.concatenate([a, b], axis=1) - a[:, :1]
     edges_a, edges_b = (t[:, [1, 2, 0]] - t for t in (a, b))
@@ -107,10 +109,10 @@ def are_apart(a, b):
 
 
 def side(p, q, r, s):
-    """Sign of the volume of tetrahedra p, q, r, s; 0 where rounding leaves it open.
+    """The signs of the volumes of tetrahedra p, q, r, s; 0 where rounding leaves the sign undecided.
 
-    A term takes 3 rounded differences, 2 products and 3 sums: 8 roundings of the sum of its magnitudes; 16 cover
-    the rounding of that sum.
+    A term takes 3 rounded differences, 2 products and 3 sums, which makes 8 roundings of the sum of its magnitudes. A
+    bound of 16 also covers the rounding of that sum.
     """
     u, v, w = q - p, r - p, s - p
     terms = [u[:, i] * (v[:, j] * w[:, k]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
@@ -120,7 +122,7 @@ def side(p, q, r, s):
 
 
 def do_cross(a, b):
-    """True for pairs where an edge of the first crosses the inside of the second beyond doubt."""
+    """True for pairs where an edge of the first triangle certainly crosses the interior of the second."""
     cross = np.zeros(len(a), bool)
     sides = [side(b[:, 0], b[:, 1], b[:, 2], a[:, i]) for i in range(3)]
     for i, j in CORNERS:
@@ -148,7 +150,9 @@ NOTHING = (0, 0, 0)
 
 
 def have_common_point(a, b):
-    """Exactly. Triangles meet just if an edge of one meets the other: extreme points of what they share are such."""
+    """Decides exactly whether two triangles meet. They do if and only if an edge of one meets the other, because the
+    extreme points of their intersection lie on such edges.
+    """
     ratios = [float(value).as_integer_ratio() for value in np.concatenate([a, b]).ravel()]
     scale = max(below for _, below in ratios)  # all are powers of two
     whole = [above * (scale // below) for above, below in ratios]
@@ -163,7 +167,7 @@ def segment_meets_triangle(p, q, triangle):
         of_p, of_q = (inner(normal, minus(end, triangle[0])) for end in (p, q))
         if of_p * of_q > 0:
             return False
-        # Where the line meets the plane, times `weight`; p itself if the segment lies in the plane.
+        # The point where the line meets the plane, times `weight`; p itself if the segment lies in the plane.
         weight, share = (of_p - of_q, of_p) if of_p != of_q else (1, 0)
         if weight < 0:
             weight, share = -weight, -share
@@ -197,14 +201,14 @@ def is_on(x, r, s):
 
 
 def least_distance(a, b):
-    """0 if the meshes meet; else the least distance of two triangles, in f64."""
+    """Returns 0 if the meshes meet, else the least distance of two triangles, in f64."""
     if len(contacts(a, b)[0]):
         return 0.0
     best = np.inf
     for first, gaps in gaps_of_boxes(a, b):
         flat = gaps.ravel()
         near = np.nonzero(flat < best)[0]
-        if len(near) > PAIRS:  # a first bound from the nearest boxes, then what it leaves
+        if len(near) > PAIRS:  # a first bound from the nearest boxes, then the pairs that it leaves
             head = near[np.argpartition(flat[near], PAIRS // 4)[: PAIRS // 4]]
             best = min(best, squares_of_pairs(a, b, first, head))
             near = near[flat[near] < best]
@@ -223,13 +227,14 @@ def squares_of_pairs(a, b, first, places):
 
 
 def squares_of_distances(a, b):
-    """For each pair the least square over edges and edges, corners and edges, corners and faces.
+    """For each pair, the least squared distance over edges and edges, corners and edges, and corners and faces.
 
-    Each is that of two points which certainly lie on the triangles, so that no rounding of where they are makes it too
-    small. Corners and edges come separately because the search on two edges is ill-conditioned where they are parallel.
+    Each candidate is the distance of two points that certainly lie on the triangles, so rounding of their places cannot
+    make it too small. Corners against edges are separate because the search on two edges is ill-conditioned where they
+    are parallel.
     """
     best = np.full(len(a), np.inf)
-    with np.errstate(all="ignore"):  # edges and faces without extent give NaN, which `fmin` and `clip01` pass over
+    with np.errstate(all="ignore"):  # edges and faces without extent give NaN, which `fmin` and `clip01` ignore
         for (i, j), (k, m) in product(CORNERS, repeat=2):
             best = np.fmin(best, edge_to_edge(a[:, i], a[:, j], b[:, k], b[:, m]))
         for one, other in ((a, b), (b, a)):

@@ -1,7 +1,7 @@
-"""The rules R01 to R38 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R38 of spec/format.md, section 16, in the order in which a reader reports them.
 
-Each function is one of the moments of 16.1. The first rule found broken ends it with `Broken`, which names the rule,
-the byte of the file, what was expected and what was found. What stands after a check relies on it.
+Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
+exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ LARGEST_F16 = 0x7BFF
 
 
 class Broken(Exception):
-    """A rule that a file breaks."""
+    """Raised for the first rule that a file breaks."""
 
     def __init__(self, rule, at, expected, found):
         super().__init__(f"R{rule:02} at byte {at}: expected {expected}, found {found}")
@@ -34,7 +34,7 @@ def need_checksum(rule, at, stated, data):
 
 
 def is_within(values, limit):
-    """No NaN, and at most `limit` in magnitude."""
+    """True if no number is NaN or exceeds `limit` in magnitude."""
     return bool((np.abs(values) <= limit).all())
 
 
@@ -134,14 +134,14 @@ def check_objects(file):
 
 
 def check_numbers(one):
-    """R12 of an object record."""
+    """Checks R12 for an object record."""
 
     def need_field(field, holds, expected):
         need(holds, 12, one.place(field), expected, getattr(one, field))
 
     for field in ("origin", "box_lo", "box_hi", "sphere_centre"):
         need_field(field, is_within(getattr(one, field), MAX_COORDINATE), "at most 2^120 in magnitude")
-    # At most 2^269: exact.
+    # The product is at most 2^269, so it is exact.
     need_field("origin", bool((np.modf(one.origin * 2.0**149)[0] == 0).all()), "multiples of 2^-149")
     need_field("box_lo", bool((one.box_lo <= one.box_hi).all()), "at most box_hi")
     need_field("max_vertex_rounding", 0 <= one.max_vertex_rounding <= MAX_COORDINATE, "0 to 2^120")
@@ -157,7 +157,7 @@ def check_numbers(one):
 
 
 def touch(one, number):
-    """A page of an object, once its own bytes are checked."""
+    """Checks the bytes of a page of an object and returns the page."""
     at = one.file.sections[NODES].offset + PAGE * number
     page = cbvh.Page(one, number)
     need_checksum(15, at, page.checksum, page.data[at + 8 : at + PAGE])
@@ -237,7 +237,7 @@ def check_numbering(page):
 
 
 def cross(page, link, pages):
-    """What a remote link leads to names it. `pages` are those of the object, all touched."""
+    """Checks that the root to which a remote link leads names that link. `pages` are the object's, all touched."""
     target, root = page.remote(link)
     other = pages[target - page.owner.first_page]
     need(root < other.roots, 20, page.remote_at(link), f"a root below {other.roots}", root)
@@ -292,7 +292,7 @@ def check_id_block(page):
 
 
 def validate(data):
-    """The file, if every rule but R35 holds."""
+    """Returns the file if every rule except R35 holds."""
     file = open_file(data)
     for entry in file.entries:
         if entry.kind in file.sections:
@@ -319,7 +319,7 @@ def validate_object(one):
 
 
 def check_packets(page):
-    """Indices, coordinates and ids of a page: R29; R30 and R37 value by value; R33; packet by packet."""
+    """Checks each packet of a page in turn: indices (R29), each coordinate (R30 and R37), and ids (R33)."""
     bad_index = np.zeros((page.packets, 12), bool)
     if page.is_packed() and page.packets:
         head = page.packed_head()
@@ -328,7 +328,7 @@ def check_packets(page):
     values = page.triangles().transpose(0, 2, 3, 1)  # packet, corner, axis, lane: the order of the block
     origin = np.broadcast_to(page.owner.origin[:, None], values.shape)
     too_large = ~(np.abs(values) <= MAX_COORDINATE)
-    with np.errstate(invalid="ignore"):  # infinities are too large in any case
+    with np.errstate(invalid="ignore"):  # infinities are found by `too_large`
         bad_value = too_large | (error_of_sum(origin, values.astype(np.float64)) != 0)
     ids = page.ids()
     bad_id = (ids >= page.owner.input_triangles) & page.lanes_used() & (page.id_words > 0)
@@ -351,7 +351,7 @@ def check_packets(page):
 
 
 def check_counts(one):
-    """R34: the sums over an object's pages."""
+    """Checks R34: the sums over an object's pages."""
     packets = 0
     for page in one.pages_read:
         need(page.first_packet == packets, 34, page.place("first_packet"), packets, page.first_packet)
@@ -365,7 +365,7 @@ def check_counts(one):
 
 
 def error_of_sum(a, b):
-    """What the rounded sum of f64 numbers lacks to the exact one: Knuth's two-sum, exact short of overflow."""
+    """The exact sum of f64 numbers minus their rounded sum, by Knuth's two-sum. Exact unless it overflows."""
     total = a + b
     part = total - a
     return (a - (total - part)) + (b - part)
@@ -388,9 +388,9 @@ def check_duplicates(file):
 
 
 def verify(file):
-    """R35 of a validated file: every decoded slab contains the triangles below it, in exact arithmetic."""
+    """Checks R35 for a validated file: every decoded slab contains the triangles below it, in exact arithmetic."""
     for one in file.objects:
-        below = {}  # by page and root: what the projections of the triangles reach
+        below = {}  # by page and root: the range of the projections of the triangles
         for page in reversed(one.pages_read):
             verify_page(page, below)
         reach_lo, reach_hi = below[one.first_page, 0]
@@ -428,10 +428,10 @@ def need_contained(at, what, lo, hi, reach_lo, reach_hi):
 
 
 def reach_of_packets(page):
-    """Least and greatest projection of each packet on each direction of the profile, rounded outward to f64.
+    """The least and greatest projection of each packet on each direction of the profile, rounded outward to f64.
 
-    An f32 end, being an f64 number too, is at most the exact projection just if it is at most the projection
-    rounded down. So the comparison with what is returned here is exact.
+    An f32 end is also an f64 number. It is therefore at most the exact projection if and only if it is at most the
+    projection rounded down, so comparing it with the result is exact.
     """
     corners = page.triangles().astype(np.float64)
     directions = cbvh.DIRECTIONS[: page.layout.slabs]
@@ -445,10 +445,10 @@ def reach_of_packets(page):
 
 
 def exact_sum_outward(x, y, z):
-    """x + y + z, rounded down and rounded up to f64.
+    """Returns x + y + z rounded down to f64, and rounded up.
 
-    Two-sums give the sum as three numbers of which each is the rounding of itself and those after it, so the sign
-    of what the first one lacks is that of the first of the others that is not 0.
+    Two-sums give the sum as three numbers. Each is the rounded sum of itself and the numbers after it. The sign of the
+    error of the first one is therefore the sign of the first of the others that is not 0.
     """
     s, e = x + y, error_of_sum(x, y)
     total, f = s + z, error_of_sum(s, z)

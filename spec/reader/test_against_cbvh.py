@@ -1,9 +1,10 @@
-"""The reader and the command `cbvh` agree: on baked files, on what is in them, on damage, and on queries.
+"""Tests that the reader and the command `cbvh` agree on baked files and their contents, on damage, and on queries.
 
     CBVH=target/release/cbvh python3 -m unittest discover -s spec/reader
 
-Skipped without the variable. CBVH_MUTANTS says how many damaged files to compare (1000 if unset). Larger meshes come
-from a folder `shared` beside the repository; where that is missing, their tests are skipped and say so.
+Without the variable CBVH, all tests are skipped. CBVH_MUTANTS sets how many damaged files to compare (1000 by default).
+Larger meshes come from a folder `shared` beside the repository. If it is missing, tests that need it are skipped and
+say so.
 """
 
 import itertools
@@ -32,7 +33,7 @@ IDENTITY = np.eye(3, 4)
 
 
 def read_obj(path):
-    """Corners of the triangles, [triangle, corner, axis] in f64. Triangles only."""
+    """Reads the corners of the triangles, [triangle, corner, axis] in f64. Faces must be triangles."""
     vertices, faces = [], []
     with open(path, encoding="utf-8") as stream:
         for words in map(str.split, stream):
@@ -44,7 +45,7 @@ def read_obj(path):
 
 
 def write_obj(path, parts):
-    """`parts`: pairs of a name and triangles as `read_obj` returns them."""
+    """Writes `parts`, pairs of a name and triangles as `read_obj` returns them."""
     with open(path, "w", encoding="utf-8") as stream:
         count = 0
         for name, triangles in parts:
@@ -75,7 +76,7 @@ def distances(points, others):
 
 
 def same_f32(numbers, expected):
-    """Numbers in the shortest decimal form that gives the f32 back."""
+    """True if the decimal numbers round to exactly these f32."""
     return np.array(numbers, np.float64).astype(np.float32).tobytes() == np.ascontiguousarray(expected).tobytes()
 
 
@@ -102,15 +103,15 @@ class AgainstCbvh(unittest.TestCase):
         return path
 
     def check_bake(self, path, mesh):
-        """Rules, musts, decoded triangles against the mesh's, and what `dump` and `validate` say."""
+        """Checks rules, requirements on writers, triangles, and the output of `dump` and `validate`."""
         file = load(path)
-        self.assertEqual(list(musts.lapses(file)), [], path)
+        self.assertEqual(list(musts.violations(file)), [], path)
         self.check_triangles(file, read_obj(mesh))
         self.check_facts(file, path)
         self.check_decoding(file, path)
 
     def check_triangles(self, file, expected):
-        """Each triangle by its id: corners in the order of the input, moved no further than the record says."""
+        """Checks triangles by id: corners keep their order, and moved no further than the record states."""
         ids = np.concatenate([one.ids() for one in file.objects])
         kept, dropped = file.duplicates().T
         self.assertEqual(sorted([*ids, *dropped]), list(range(len(expected))))
@@ -121,9 +122,9 @@ class AgainstCbvh(unittest.TestCase):
             limit = one.max_vertex_rounding + one.max_quantization_error
             stored = corners.astype(np.float64) + one.origin
             moved = distances(stored, given).max()
-            # Differences are exact here, and the stated bounds above by more than squares and root are rounded.
+            # Differences are exact here. The stated bounds exceed the distances by more than the rounding below.
             self.assertLessEqual(moved, limit)
-            # Duplicates, moved, have the corners of the triangle that is kept, in some order.
+            # After moving, duplicates have the corners of the triangle that is kept, in some order.
             places = {triangle: place for place, triangle in enumerate(one.ids().tolist())}
             here = np.isin(kept, one.ids())
             originals = stored[[places[triangle] for triangle in kept[here].tolist()]]
@@ -160,7 +161,7 @@ class AgainstCbvh(unittest.TestCase):
                 self.assertEqual(facts[field], getattr(one, field), field)
 
     def check_decoding(self, file, path):
-        """The bits of decoded slabs, and links, of a few treelets drawn at random."""
+        """Compares the bits of decoded slabs, and links, of a few treelets drawn at random."""
         places = [(page, slot) for one in file.objects for page in one.pages_read for slot in range(page.treelets)]
         for number in self.chance.sample(range(len(places)), min(4, len(places))):
             page, slot = places[number]
@@ -183,7 +184,7 @@ class AgainstCbvh(unittest.TestCase):
                 self.assertTrue(same_f32(ends[0], low) and same_f32(ends[1], high), (path, number))
 
     def answers(self, mode, path_a, path_b, poses):
-        """What `cbvh query` says, as text."""
+        """Returns the answers of `cbvh query` as text."""
         pose_file = os.path.join(self.folder, "poses.txt")
         with open(pose_file, "w", encoding="utf-8") as stream:
             for pose in poses:
@@ -203,7 +204,7 @@ class AgainstCbvh(unittest.TestCase):
             of_a, of_b = query.contacts(a, placed)
             self.assertEqual(int(found[0]), int(len(of_a) > 0))
             self.assertEqual(int(found[1]), (weights_a[of_a] * weights_b[of_b]).sum())
-            # Both are f64 on the same points: a few roundings of coordinates apart.
+            # Both are computed in f64 from the same points, so they differ by a few roundings of coordinates.
             size = max(np.abs(a).max(), np.abs(placed).max())
             self.assertAlmostEqual(float(found[2]), query.least_distance(a, placed), delta=1e-12 * size)
 
@@ -234,12 +235,12 @@ class AgainstCbvh(unittest.TestCase):
     def test_without_ids(self):
         path = self.bake(ROBOT, "dop26-u8-wide", "packed", "--no-ids")
         file = load(path)
-        self.assertEqual(list(musts.lapses(file)), [])
+        self.assertEqual(list(musts.violations(file)), [])
         self.assertNotIn(cbvh.IDS, file.sections)
         self.check_facts(file, path)
 
     def test_bounds_of_coordinates_that_cancel(self):
-        """1 + 2^-60 - 1: the upper end along (1, 1, 1) must not be 0."""
+        """The sum is 1 + 2^-60 - 1, so the upper end along (1, 1, 1) must not be 0."""
         mesh = os.path.join(self.folder, "cancel.obj")
         write_obj(mesh, [("cancel", np.array([[[1, 2.0**-60, -1], [-1, 0, -1], [0, -1, -1]]]))])
         self.check_bake(self.bake(mesh, "dop14-u8", "f32"), mesh)
@@ -251,14 +252,14 @@ class AgainstCbvh(unittest.TestCase):
                 self.check_bake(self.bake(mesh, profile, triangles), mesh)
 
     def test_queries_near_contact(self):
-        """Poses of the robot at its distance from a point of the room: apart, touching by roundings, and inside."""
+        """Poses bring a corner of the robot to one of the room: apart, touching within roundings, or inside."""
         paths = self.bake(ROOM, "dop26-u4", "packed"), self.bake(ROBOT, "dop6-f16", "f32")
         room = query.corners(load(paths[0])).reshape(-1, 3)
         robot = query.corners(load(paths[1])).reshape(-1, 3)
         poses = []
         for _ in range(12):
             rotation = random_rotation(self.chance)
-            # Corner on corner, then away from it by nothing, an ulp or so, or more.
+            # A corner on a corner, then moved away from it by nothing, about an ulp, or more.
             goal = room[self.chance.randrange(len(room))]
             moved = rotation @ robot[self.chance.randrange(len(robot))]
             step = self.chance.choice((0, 1e-12, 1e-3, 30, 300))
@@ -266,7 +267,7 @@ class AgainstCbvh(unittest.TestCase):
         self.check_queries(*paths, poses)
 
     def test_queries_on_a_grid(self):
-        """Small integers: most contacts are touching, many triangles are segments, points or coplanar."""
+        """Coordinates are small integers: most contacts are touching, many triangles are degenerate or coplanar."""
         paths = []
         for name in "ab":
             triangles = np.array([[self.chance.randrange(5) for _ in range(9)] for _ in range(50)], float).reshape(

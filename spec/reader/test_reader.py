@@ -1,8 +1,9 @@
-"""The reader by itself: its tables are the specification's, its arithmetic is right, golden files get their verdict.
+"""Tests the reader by itself: its tables are those of the specification, its arithmetic is right, and it judges each
+golden file as the file's name states.
 
     python3 -m unittest discover -s spec/reader
 
-runs this and test_against_cbvh.py.
+runs these tests and those of test_against_cbvh.py.
 """
 
 import glob
@@ -27,7 +28,7 @@ TESTDATA = os.path.join(SPEC, "..", "testdata")
 
 
 def table(name):
-    """The rows of a table of format.md without its heading, cells without backquotes."""
+    """Returns the rows of a table of format.md, without the heading and without backquotes around cells."""
     with open(os.path.join(SPEC, "format.md"), encoding="utf-8") as stream:
         lines = stream.read().split(f"<!-- table: {name} -->\n")[1].split("\n\n")[0].splitlines()[2:]
     return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines]
@@ -41,7 +42,7 @@ def golden(pattern):
 
 
 def type_name(dtype):
-    """As the tables write it: u8[24], f32."""
+    """Names a type as the tables do: u8[24], f32."""
     base, shape = dtype.subdtype or (dtype, ())
     return f"{base.kind}{8 * base.itemsize}" + "".join(f"[{n}]" for n in shape)
 
@@ -109,7 +110,7 @@ class Tables(unittest.TestCase):
 
 class Arithmetic(unittest.TestCase):
     def test_checksum(self):
-        """Lengths around every change of method, on the input of xxHash's own sanity check."""
+        """Tests lengths on both sides of each change of method, with the input of xxHash's own sanity check."""
         state, data = 2654435761, bytearray()
         for _ in range(2367):
             data.append(state >> 56)
@@ -202,7 +203,7 @@ class Golden(unittest.TestCase):
             with self.subTest(name):
                 file = rules.validate(data)
                 rules.verify(file)
-                self.assertEqual(list(musts.lapses(file)), [])
+                self.assertEqual(list(musts.violations(file)), [])
                 count += 1
         self.assertGreater(count, 0)
 
@@ -218,7 +219,7 @@ class Golden(unittest.TestCase):
         self.assertEqual(seen, set(range(1, 39)) - {35})
 
     def test_bounds_that_cut(self):
-        """R35 has no golden file: here every code of ok-plain that is not 0 is made to cut, without new checksums."""
+        """R35 has no golden file. Here, codes of ok-plain are raised so that bounds cut, without new checksums."""
         (_, data) = next(golden("ok-plain.cbvh"))
         file = rules.validate(data)
         page = file.objects[0].pages_read[0]

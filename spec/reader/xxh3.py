@@ -1,8 +1,8 @@
-"""XXH3 with a 64-bit result, seed 0 and the default secret: the checksum of every part of a file (format.md, 1.3).
+"""Computes XXH3 with a 64-bit result, seed 0 and the default secret, the checksum of files (format.md, 1.3).
 
-Written from the algorithm's public specification (xxHash 0.8). Input above 240 bytes is read in blocks of 1024: what
-the 16 stripes of a block add to the eight accumulators does not depend on the accumulators, so numpy sums it for many
-blocks at once, and only the mixing between blocks is a loop.
+The code follows the algorithm's public specification (xxHash 0.8). Input above 240 bytes is read in blocks of 1024. The
+16 stripes of a block add to the eight accumulators amounts that do not depend on the accumulators. numpy therefore
+computes these sums for many blocks at once, and only the mixing between blocks is a loop.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ PRIME64_4, PRIME64_5 = 0x85EBCA77C2B2AE63, 0x27D4EB2F165667C5
 PRIME_MX1, PRIME_MX2 = 0x165667919E3779F9, 0x9FB21C651E98DF25
 MASK = (1 << 64) - 1
 
-STRIPE, STRIPES_A_BLOCK = 64, 16
-BLOCK = STRIPE * STRIPES_A_BLOCK
+STRIPE, STRIPES_PER_BLOCK = 64, 16
+BLOCK = STRIPE * STRIPES_PER_BLOCK
 BLOCKS_AT_ONCE = 1024  # 1 MiB of input, so that numpy's temporaries stay small
 
 
@@ -31,7 +31,7 @@ def read(data, at, size=8):
 
 
 def fold(a, b):
-    """The two halves of the 128-bit product, one XORed with the other."""
+    """XORs the two halves of the 128-bit product."""
     product = (a & MASK) * (b & MASK)
     return (product & MASK) ^ (product >> 64)
 
@@ -86,17 +86,17 @@ def middle(data):
 
 
 def keys_at(starts):
-    """Eight words of the secret from each of these bytes on."""
+    """Reads eight words of the secret from each of these bytes on."""
     return np.array([np.frombuffer(SECRET, "<u8", 8, at) for at in starts])
 
 
-KEYS = keys_at(8 * i for i in range(STRIPES_A_BLOCK))
+KEYS = keys_at(8 * i for i in range(STRIPES_PER_BLOCK))
 KEYS_OF_SCRAMBLE = keys_at([len(SECRET) - 64])[0]
 KEYS_OF_LAST = keys_at([len(SECRET) - 64 - 7])
 
 
 def sums_of_stripes(words, keys):
-    """What stripes [blocks, stripes, 8 words] add to the accumulators, for each block."""
+    """The sums that stripes [blocks, stripes, 8 words] add to the accumulators, for each block."""
     keyed = words ^ keys
     products = (keyed & np.uint64(0xFFFFFFFF)) * (keyed >> np.uint64(32))
     products += words[..., [1, 0, 3, 2, 5, 4, 7, 6]]
@@ -112,7 +112,7 @@ def long(data):
     for first in range(0, blocks, BLOCKS_AT_ONCE):
         count = min(BLOCKS_AT_ONCE, blocks - first)
         words = np.frombuffer(data, "<u8", count * BLOCK // 8, first * BLOCK)
-        for block in sums_of_stripes(words.reshape(count, STRIPES_A_BLOCK, 8), KEYS):
+        for block in sums_of_stripes(words.reshape(count, STRIPES_PER_BLOCK, 8), KEYS):
             accumulators += block
             accumulators ^= accumulators >> np.uint64(47)
             accumulators ^= KEYS_OF_SCRAMBLE
@@ -130,7 +130,7 @@ def long(data):
 
 
 def xxh3_64(data):
-    """The checksum of these bytes."""
+    """Returns the checksum of these bytes."""
     data = bytes(data)
     if len(data) <= 16:
         return short(data)

@@ -1,39 +1,34 @@
-//! The command `cbvh`: bakes meshes into `.cbvh` files, looks into them, checks them and queries them.
+//! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
-//! Each command is a module with a function `run`, which prints through `output` and returns what went
-//! wrong; this file turns that into one line and an exit code. What scripts may rely on is in
+//! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
+//! `report`. They stand on `options` (what several commands accept), `process` (memory and signals) and `console` (what
+//! is printed, and how a command ends). Imports lead from the former to the latter only. What scripts may rely on is in
 //! `cbvh --help` and in the help of each command.
 
 mod arguments;
+mod assets;
 mod bake;
+mod check;
+mod console;
 mod dump;
-mod error;
-mod from_disk;
-mod manifest;
-mod opened;
-mod output;
+mod options;
+mod process;
 mod query;
 mod report;
-mod resident;
-mod signals;
-mod validate;
-mod verify;
 
 use arguments::{Arguments, Command};
-use clap::Parser;
-use error::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let result =
-        Arguments::try_parse().map_err(Failure::from_clap).and_then(|arguments| match arguments.command {
-            Command::Bake(arguments) => bake::run(&arguments),
-            Command::Dump(arguments) => dump::run(&arguments),
-            Command::Validate(arguments) => validate::run(&arguments),
-            Command::Verify(arguments) => verify::run(&arguments),
-            Command::Query(arguments) => query::run(&arguments),
-            Command::Report(arguments) => report::run(&arguments),
-        });
+    let result = Arguments::of_process().and_then(|arguments| match arguments.command {
+        Command::Bake(arguments) if assets::are_many(&arguments) => assets::run(&arguments),
+        Command::Bake(arguments) => bake::run(&arguments),
+        Command::Dump(arguments) => dump::run(&arguments),
+        Command::Validate(arguments) => check::validate(&arguments),
+        Command::Verify(arguments) => check::verify(&arguments),
+        Command::Query(arguments) => query::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.tell(),

@@ -1,4 +1,4 @@
-//! bake, validate, verify and dump on small meshes.
+//! Tests bake, validate, verify and dump on small meshes.
 
 mod common;
 
@@ -176,6 +176,64 @@ fn several_inputs_are_baked_as_one() {
     let names: Vec<_> =
         dump["objects"].as_array().unwrap().iter().map(|object| object["name"].clone()).collect();
     assert_eq!(names, ["cube", "torus"]);
+}
+
+#[test]
+fn objects_without_names_are_named_after_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let unnamed = |text: String| text.lines().skip(1).map(|line| format!("{line}\n")).collect::<String>();
+    fs::write(directory.join("left.obj"), unnamed(cube())).unwrap();
+    fs::write(directory.join("right.v2.obj"), unnamed(torus(10, 8))).unwrap();
+    fs::write(directory.join("named.obj"), cube()).unwrap();
+    let bake = |more: &[&str]| {
+        let bake = ["bake", "left.obj", "named.obj", "right.v2.obj", "-o", "all.cbvh", "--json", "-q"];
+        let skipped = cbvh_in(directory, &[&bake[..], more].concat()).done().json()["skipped"] == true;
+        let dump = cbvh_in(directory, &["dump", "all.cbvh", "--json"]).done().json();
+        let objects = dump["objects"].as_array().unwrap().iter();
+        (skipped, objects.map(|object| object["name"].as_str().unwrap().to_owned()).collect::<Vec<_>>())
+    };
+    let names = ["left", "cube", "right.v2"].map(str::to_owned).to_vec();
+    assert_eq!(bake(&["--split-objects"]), (false, names.clone()));
+    assert_eq!(bake(&["--split-objects", "--max-memory", "100MiB"]), (true, names.clone()));
+    assert_eq!(bake(&["--split-objects", "--max-memory", "100MiB", "--force"]), (false, names));
+    // Objects that were joined have no name.
+    assert_eq!(bake(&[]), (false, vec![String::new()]));
+    // A file of the same bytes with another name is baked again.
+    let is_skipped = |input: &str| {
+        let bake = ["bake", input, "-o", "one.cbvh", "--split-objects", "--json", "-q"];
+        cbvh_in(directory, &bake).done().json()["skipped"] == true
+    };
+    assert_eq!((is_skipped("left.obj"), is_skipped("left.obj")), (false, true));
+    fs::rename(directory.join("left.obj"), directory.join("up.obj")).unwrap();
+    assert!(!is_skipped("up.obj"));
+}
+
+#[test]
+fn a_max_error_that_collapses_the_mesh_is_refused_and_a_coarse_one_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("t.obj"), torus(90, 60)).unwrap();
+    for budget in [&[][..], &["--max-memory", "100MiB"]] {
+        let bake = |max_error: &str, more: &[&str]| {
+            let bake =
+                ["bake", "t.obj", "-o", "t.cbvh", "--force", "--triangles", "quantized", "--max-error"];
+            cbvh_in(directory, &[&bake[..], &[max_error], budget, more].concat())
+        };
+        // The diagonal is about 7.3, and there are 10,800 triangles.
+        bake("1000", &[]).failed(1, &["t.obj: object \"torus\": expected a max error of at most 7.", "1e3"]);
+        bake("0.08", &[]).failed(1, &["hundredth of the diagonal"]);
+        assert_eq!(names(directory), ["t.obj"]);
+        let fine = bake("0.005", &["--json", "-q"]).done().json();
+        assert!(fine["warning"].is_null(), "{fine}");
+        let coarse = bake("0.05", &["--json"]);
+        let warning = coarse.json()["warning"].as_str().unwrap().to_owned();
+        assert!(warning.contains("is coarse for this mesh: of 10800 triangles"), "{warning}");
+        assert!(coarse.err.ends_with(&format!("{{\"warning\":{warning:?}}}\n")), "{}", coarse.err);
+        let coarse = bake("0.05", &[]);
+        assert_eq!((coarse.code, coarse.err), (0, format!("cbvh: warning: {warning}\n")));
+        fs::remove_file(directory.join("t.cbvh")).unwrap();
+    }
 }
 
 #[test]

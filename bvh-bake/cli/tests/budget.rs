@@ -1,4 +1,4 @@
-//! Baking and checking within a budget of memory: the same results, and the memory promised.
+//! Bakes and checks within a memory budget: the results are the same, and the memory stays within the budget.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -19,7 +19,7 @@ fn bake(directory: &Path, input: &str, more: &[&str]) -> Value {
 fn budgets_jobs_and_formats_do_not_show() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
-    // Three bricks.
+    // The mesh has three bricks.
     let side = 500;
     let mut all = Vec::new();
     for input in ["sheet.stl", "sheet.ply", "sheet.obj"] {
@@ -79,7 +79,8 @@ fn memory_of_checks_stays_within_the_budget() {
     assert!(threads > 16 || length > (5 * least) << 20, "{length} bytes");
     within(&["validate", "out.cbvh"], least);
     within(&["verify", "out.cbvh", "sheet.stl"], 46 + threads);
-    // Who may not have more addresses than this holds no more memory; a thread has but its stack.
+    // A process with a limited address space cannot hold more memory than that. Each further thread needs only its
+    // stack.
     for way in ["--json", "--page 7", "--treelet 9999"] {
         let command = format!("ulimit -v 65536; exec {} dump out.cbvh {way}", env!("CARGO_BIN_EXE_cbvh"));
         let ended = Command::new("sh").args(["-c", &command]).current_dir(directory).output().unwrap();
@@ -89,7 +90,7 @@ fn memory_of_checks_stays_within_the_budget() {
         assert_eq!(told, cbvh_in(directory, &arguments).done().out);
     }
     assert!(length > 64 << 20);
-    // A damaged byte near the end is found.
+    // A damaged byte near the end of the file is found.
     let mut bytes = fs::read(directory.join("out.cbvh")).unwrap();
     let at = bytes.len() / 20 * 19;
     bytes[at] ^= 1;

@@ -1,4 +1,4 @@
-//! What goes wrong ends with the right code, one line, and nothing left behind.
+//! Checks that every failure ends with the right exit code and one line, and leaves nothing behind.
 
 mod common;
 
@@ -51,8 +51,10 @@ fn wrong_usage_is_1() {
         &["verify", "cube.cbvh", "cube.obj", "--max-memory", "lots"],
         &["query", "cube.obj", "cube.obj"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--pose", pose],
-        &["query", "cube.obj", "cube.obj", "--pose", "1 2 3"],
-        &["query", "cube.obj", "cube.obj", "--pose", "2 0 0 0 0 1 0 0 0 0 1 0"],
+        &["query", "cube.obj", "cube.obj", "--pose", pose, "--json"],
+        &["query", "cube.obj", "cube.obj", "--pose", pose, "--jobs", "2"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--jobs", "-1"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--budget", "nan"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "touch"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--mode", "within"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--within", "1"],
@@ -89,6 +91,11 @@ fn what_the_system_refuses_is_2() {
     io(&["bake", "missing.obj", "-o", "o.cbvh"], "missing.obj");
     io(&["bake", "folder", "-o", "o.cbvh"], "folder");
     io(&["bake", "cube.obj", "-o", "missing/o.cbvh"], "missing/o.cbvh");
+    io(
+        &["bake", "cube.obj", "-o", "missing/o.cbvh"],
+        "expected the folder missing, found none; create it first",
+    );
+    io(&["bake", "cube.obj", "-o", "o.cbvh", "--max-memory", "1GiB", "--scratch", "missing"], "missing");
     io(&["bake", "cube.obj", "-o", "folder"], "folder");
     io(&["bake", "cube.obj", "-o", "cube.obj/o.cbvh"], "cube.obj/o.cbvh");
     for command in ["dump", "validate"] {
@@ -98,7 +105,8 @@ fn what_the_system_refuses_is_2() {
     io(&["verify", "missing.cbvh", "cube.obj"], "missing.cbvh");
     cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh"]).done();
     io(&["verify", "cube.cbvh", "missing.obj"], "missing.obj");
-    io(&["verify", "cube.cbvh", "folder"], "folder");
+    io(&["verify", "cube.cbvh", "folder"], "folder: expected a readable file, found a folder");
+    io(&["verify", "cube.cbvh", "cube.obj", "--scratch", "missing"], "missing");
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "p.txt");
     fs::write(directory.join("p.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "missing.cbvh");
@@ -136,15 +144,30 @@ fn invalid_input_is_3() {
     let good = "1 0 0 0 0 1 0 0 0 0 1 0";
     for (text, line, word) in [
         (format!("{good}\n1 2 3\n"), 2, "found 3"),
-        (format!("# ok\n\n{good} 13 14\n1 0 0 0 0 1 0 0 0 0 1 # 0\n"), 4, "found 11"),
-        ("1 0 0 0 0 1 0 0 0 0 1.1 0\n".to_owned(), 1, "rigid"),
+        (format!("# ok\n\n{good} # 13 14\n1 0 0 0 0 1 0 0 0 0 1 # 0\n"), 4, "found 11"),
+        (format!("{good} 0 0 0 1\n"), 1, "found 16; a 4 by 4 matrix? write its first three rows"),
+        ("0 0 0 1 5 0 0\n".to_owned(), 1, "found 7; a quaternion and a translation? write"),
+        ("2 0 0 5 0 2 0 0 0 0 2 0\n".to_owned(), 1, "scaled by 2; bake the mesh at its size"),
+        ("1 0 0 0 0 1 0 0 0 0 1.1 0\n".to_owned(), 1, "away from orthonormal"),
         ("1 0 0 0 0 1 0 0 0 0 -1 0\n".to_owned(), 1, "reflection"),
         ("1 0 0 nan 0 1 0 0 0 0 1 0\n".to_owned(), 1, "finite"),
         ("1 0 0 zero 0 1 0 0 0 0 1 0\n".to_owned(), 1, "zero"),
     ] {
         write("p.txt", &text);
-        let place = format!("p.txt: line {line}: expected");
-        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"]).failed(3, &[&place, word]);
+        let place = format!("p.txt: line {line}: ");
+        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"])
+            .failed(3, &[&place, "expected", word]);
+        // A wrong pose has the same exit code on the command line.
+        let wrong = text.lines().find(|text| !text.contains('#') && !text.is_empty() && *text != good);
+        if let Some(pose) = wrong {
+            let query = ["query", "cube.obj", "cube.obj", "--pose", pose];
+            cbvh_in(directory, &query).failed(3, &["--pose: ", "expected", word]);
+        }
+    }
+    for none in ["", "\n", "# no pose\n\n"] {
+        write("p.txt", none);
+        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"])
+            .failed(3, &["p.txt: expected at least one line of 12 numbers", "found no pose"]);
     }
     assert_eq!(names(directory), ["bad.obj", "cube.obj", "empty.stl", "mesh.xyz", "p.txt"]);
 }

@@ -1,4 +1,4 @@
-//! Files that readers stumble over: each bakes to something that verifies, or is refused in one line.
+//! Bakes files that readers often mishandle: each gives an output that verifies, or is refused in one line.
 
 mod common;
 
@@ -34,7 +34,7 @@ fn hard_files_bake_or_are_refused() {
             }
             assert!(names(directory).is_empty(), "{name}");
         }
-        // Both sides at once: hard meshes are no harder to query.
+        // The mesh is queried against itself, which must end like any other query.
         let pose = "1 0 0 0.5 0 1 0 0.25 0 0 1 0.125";
         for mode in ["contacts", "distance"] {
             let asked = cbvh_in(directory, &["query", input, input, "--mode", mode, "--pose", pose]);

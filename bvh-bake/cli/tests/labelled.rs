@@ -1,11 +1,11 @@
-//! Poses whose distance is known, from conservative advancement with another library.
+//! Queries poses whose distance is known from another library's conservative advancement.
 
 mod common;
 
 use common::{cbvh_in, shared, skip};
 use std::fs;
 
-/// Pair, A, B.
+/// For each pair, its name, mesh A and mesh B.
 const PAIRS: [[&str; 3]; 2] = [["fcl", "fclenv.obj", "fclrob.obj"], ["piano", "apartment.obj", "piano.obj"]];
 const PRESETS: [&str; 7] = ["d0pen", "d0sep", "d0.5", "d1", "d5", "d10", "overlap"];
 
@@ -47,12 +47,12 @@ fn answers_are_those_of_the_labels() {
     }
 }
 
-/// The distance in a line's comment.
+/// Returns the distance in a line's comment.
 fn label(line: &str) -> Option<f64> {
     line.split_once("# dist ")?.1.trim().parse().ok()
 }
 
-/// The diagonal of an OBJ file's box.
+/// Returns the diagonal of the box of an OBJ file.
 fn diagonal(text: &str) -> f64 {
     let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for line in text.lines().filter_map(|line| line.strip_prefix("v ")) {

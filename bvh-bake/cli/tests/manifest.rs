@@ -1,4 +1,5 @@
-//! Many assets: each with its line, whatever becomes of the others; in shards; twice; ended in between.
+//! Bakes many assets: each gets its line, whatever happens to the others, also in shards, twice, and after
+//! interruptions.
 
 mod common;
 
@@ -10,13 +11,13 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A tetrahedron, a little different for each number.
+/// Returns a tetrahedron that is a little different for each number.
 fn tetrahedron(number: usize) -> String {
     let corners = format!("v 0 0 0\nv {} 0 0\nv 0 1 0\nv 0 0 1\n", number + 1);
     corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 }
 
-/// Writes meshes and a manifest of them, in which an asset is as `line` says.
+/// Writes meshes and a manifest of them. `line` returns the manifest's line for each asset.
 fn write_assets(directory: &Path, count: usize, line: impl Fn(usize) -> Value) {
     fs::create_dir_all(directory.join("meshes")).unwrap();
     let mut manifest = String::new();
@@ -56,7 +57,7 @@ fn ten_broken_ones_do_not_stop_a_thousand() {
     for number in (0..1000).filter(|&number| is_broken(number)) {
         let path = directory.join(format!("meshes/{number}.obj"));
         match number {
-            // The system's fault, among those of the input.
+            // One failure is the system's, among failures of the input.
             107 => fs::remove_file(path).unwrap(),
             207 => fs::write(path, "").unwrap(),
             _ => fs::write(path, tetrahedron(number) + "f 1 2 99\n").unwrap(),
@@ -94,7 +95,7 @@ fn ten_broken_ones_do_not_stop_a_thousand() {
     assert!(first.iter().zip(&again).all(|(a, b)| a["content_xxh3"] == b["content_xxh3"]));
     assert_eq!(names(&directory.join("baked")).len(), 990);
     assert_eq!(names(directory), ["baked", "in.jsonl", "meshes", "out.jsonl"]);
-    // Only what has changed is baked again.
+    // Only assets that changed are baked again.
     fs::write(directory.join("meshes/5.obj"), tetrahedron(5000)).unwrap();
     fs::remove_file(directory.join("baked/6.cbvh")).unwrap();
     let lines = run_counts(directory, 2, 988);
@@ -221,7 +222,7 @@ fn shards_are_parts_of_the_whole() {
     cbvh_in(directory, &["bake", "meshes/1.obj", "-o", "o.cbvh", "--shard", "1/2"]).failed(1, &["--shard"]);
 }
 
-/// The second example of `many-assets.md`, which must stand there as it is run here.
+/// Runs the second example of `many-assets.md`, which must be in that file exactly as it is run here.
 #[cfg(unix)]
 #[test]
 fn shards_run_side_by_side_under_xargs() {
@@ -275,7 +276,7 @@ fn two_assets_with_one_output_are_refused_before_the_work() {
         };
         let line = |number| json!({"input": format!("meshes/{number}.obj"), "output": output(number)});
         write_assets(directory, 5, line);
-        // Of the whole, whatever the shard.
+        // The whole manifest is checked, whatever the shard.
         for more in [&[][..], &["--shard", "1/5"]] {
             bake(directory, "out.jsonl", more).failed(3, &["o.cbvh", "asset 4", "that of asset 2"]);
         }
@@ -351,7 +352,7 @@ fn only_the_systems_faults_are_exit_code_2_and_limits_4() {
     counts(&ended.json(), 3, 2, 0, 1);
     let ended = bake(directory, "out.jsonl", &["--force", "--max-memory", "1MiB"]);
     assert_eq!(ended.code, 4, "{ended:?}");
-    // Found out before the file that is missing.
+    // The lack of memory is found before the missing file.
     counts(&ended.json(), 3, 0, 0, 3);
     assert!(ended.err.contains("bytes of memory"), "{ended:?}");
 }
@@ -362,7 +363,7 @@ fn memory_of_all_stays_within_the_budget() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
     write_assets(directory, 60, usual);
-    // Large ones among small ones.
+    // A few large meshes among small ones.
     let side = 300;
     let mut large = String::new();
     (0..side * side).for_each(|i| large += &format!("v {} {} {}\n", i % side, i / side, i % 7));
@@ -405,7 +406,7 @@ fn what_is_done_when_the_process_is_killed_stays_done() {
         assert!(!directory.join("out.jsonl").exists());
         told = whole_lines();
     }
-    // The lines of both runs, the last of each perhaps cut off.
+    // The file has the lines of both runs, and the last line of each run may be cut off.
     let left = fs::read_to_string(&part).unwrap();
     let done: BTreeSet<_> = left
         .lines()
@@ -421,6 +422,6 @@ fn what_is_done_when_the_process_is_killed_stays_done() {
     assert_eq!(lines.len(), 600);
     assert!(done.iter().all(|&line| lines[line as usize - 1]["skipped"] == true));
     assert_eq!(names(directory), ["baked", "in.jsonl", "meshes", "out.jsonl"]);
-    // Of an output that was half-written, nothing is left either.
+    // No half-written output is left either.
     assert_eq!(names(&directory.join("baked")).len(), 600);
 }

@@ -1,4 +1,5 @@
-//! Queries of files that are not in memory, or not all of them: the same answers, and what is read for them.
+//! Queries files that are not in memory, or only in part: the answers are the same, and the bytes read are as
+//! expected.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -9,13 +10,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A folder on a disk: what is in a file system in memory cannot be forgotten.
+/// Returns a folder on a disk, because files of a file system in memory cannot be evicted from the page cache.
 fn folder_on_disk() -> tempfile::TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
 }
 
-/// Writes a sheet of `side` by `side` squares with small waves, as binary STL, and bakes it as `sheet.cbvh`; and a
-/// torus as `torus.cbvh`, with poses above the sheet and in it.
+/// Writes a sheet of `side` by `side` squares with small waves, as binary STL, and bakes it as `sheet.cbvh`. Bakes
+/// also a torus as `torus.cbvh`, and writes poses above the sheet and in it.
 fn bake(directory: &Path, side: u32) {
     let height = |x: u32, y: u32| ((x * 7 + y * 13) % 32) as f32 / 64.0;
     let mut stl = vec![b' '; 80];
@@ -73,21 +74,21 @@ fn cold_queries_have_the_same_answers_and_say_what_they_read() {
             let (Some(read), Some(resident), Some(touched)) =
                 (mean("read_bytes_mean"), mean("resident_bytes_mean"), mean("touched_bytes_mean"))
             else {
-                println!("not all figures: this system does not tell {cold}");
+                println!("not all figures: this system does not report them: {cold}");
                 continue;
             };
             assert!(resident <= length as f64 + 8192.0, "{cold}");
             if read == 0.0 {
-                println!("no bytes: this system does not forget files {cold}");
+                println!("no bytes: this system does not evict files from the page cache: {cold}");
             } else if how == "sparse" {
-                // Each page is asked for by itself or with its block, and none in vain: what else is read is of the
-                // file system, and of the program where its pages are not there yet.
+                // Each page is read by itself or with its block, and none is read in vain. All other bytes read
+                // belong to the file system, and to pages of the program that were not loaded yet.
                 const OTHERS: f64 = 262144.0;
                 assert!(resident <= read + OTHERS && read <= resident + OTHERS, "{cold}");
                 // Pages that a query touches again are among those that it touched first.
                 assert!(touched <= resident, "{cold}");
                 if touched == 0.0 {
-                    println!("no marks: this system does not tell what is touched {cold}");
+                    println!("no marks: this system does not report which pages are touched: {cold}");
                 }
                 assert!(resident < 0.1 * length as f64, "{cold}");
             }
@@ -112,15 +113,15 @@ fn cold_is_about_files() {
     assert_eq!((&same["queries"], &same["requested"]), (&1.into(), &3.into()));
 }
 
-/// A group of processes that may have so much memory together, pages of files included.
+/// A group of processes with a common limit on memory, which includes cached pages of files.
 struct Limited {
     group: PathBuf,
-    /// The file with the most that the group had.
+    /// The name of the file with the most memory that the group used.
     peak: &'static str,
 }
 
 impl Limited {
-    /// `None` where this process may not make one.
+    /// Returns `None` if this process may not make such a group.
     fn new(bytes: u64) -> Option<Self> {
         let name = format!("cbvh-test-{}", std::process::id());
         let second = Path::new("/sys/fs/cgroup").join(&name);
@@ -162,7 +163,7 @@ impl Limited {
 
 impl Drop for Limited {
     fn drop(&mut self) {
-        // It is empty: the commands have ended.
+        // The group is empty, because the commands have ended.
         let _ = fs::remove_dir(&self.group);
     }
 }
@@ -176,12 +177,12 @@ fn a_file_larger_than_memory_is_queried_rightly() {
     let length = fs::metadata(directory.join("sheet.cbvh")).unwrap().len();
     assert!(length > 3 * MOST, "{length}");
     let Some(limited) = Limited::new(MOST) else {
-        println!("skipped: this process may not make a group of limited memory");
+        println!("skipped: this process cannot create a group with limited memory");
         return;
     };
     for mode in ["collide", "distance", "contacts"] {
         let free = query(directory, mode, &[]);
-        // What others have read counts as theirs: it has to be forgotten, which the first of these does.
+        // Pages that other processes have read count as theirs. The first command evicts them from the page cache.
         for more in [&["--cold", "--read-ahead", "sparse"][..], &["--cold"], &["--read-ahead", "sparse"], &[]]
         {
             let asked = ["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--mode", mode];

@@ -1,4 +1,4 @@
-//! query on small meshes: the protocol, and the same answers however they are found.
+//! Tests query on small meshes: the protocol, and that answers do not depend on how they are found.
 
 mod common;
 
@@ -120,7 +120,7 @@ fn answers_do_not_depend_on_how_they_are_found() {
             let forced = cbvh_with_isa(directory, isa, &[&query[..], within].concat()).done().json();
             assert_eq!((&forced["isa"], &forced["answers_xxh3"]), (&(*isa).into(), &expected[0]));
         }
-        // Meshes baked in memory, with any profile that does not move vertices.
+        // The meshes are baked in memory, with any profile that does not move vertices.
         for profile in ["auto", "dop6-u8", "dop26-u4"] {
             let query = ["query", "torus.obj", "cube.obj", "near.txt", "--mode", mode, "--profile", profile];
             let baked = cbvh_in(directory, &[&query[..], within].concat()).done().json();
@@ -144,10 +144,6 @@ fn limits_and_budgets_cut_runs_short() {
         let raw = fs::read_to_string(directory.join("cut_near.txt")).unwrap();
         assert_eq!(raw.lines().count() as u64, answered);
     }
-    fs::write(directory.join("none.txt"), "# no pose\n\n").unwrap();
-    let none =
-        cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "none.txt", "--jobs", "3"]).done().json();
-    assert_eq!((&none["queries"], &none["ns_median"]), (&0.into(), &0.into()));
     let exact = ask(directory, &["--mode", "distance"])[1]["sum"].as_f64().unwrap();
     let rough = &ask(directory, &["--mode", "distance", "--rel-err", "0.5", "--abs-err", "0.1"])[1];
     let sum = rough["sum"].as_f64().unwrap();
@@ -158,7 +154,7 @@ fn limits_and_budgets_cut_runs_short() {
 fn an_object_can_be_named() {
     let folder = world();
     let directory = folder.path();
-    // Numbers of the second object's vertices follow the first one's.
+    // The vertex numbers of the second object follow those of the first.
     let shifted: String = torus(48, 24)
         .lines()
         .map(|line| match line.strip_prefix("f ") {
@@ -183,6 +179,39 @@ fn an_object_can_be_named() {
         assert_eq!(ask(file, &[])["tris_a"], 2316);
     }
     assert_eq!(ask("both.cbvh", &["--object", "cube"])["tris_a"], 12);
+}
+
+/// Runs the command in `script`, which is a terminal for it.
+#[cfg(target_os = "linux")]
+#[test]
+fn on_a_terminal_each_pose_has_a_line_and_the_timing_follows() {
+    let folder = world();
+    let directory = folder.path();
+    fs::write(directory.join("two.txt"), "1 0 0 5 0 1 0 0 0 0 1 0\n1 0 0 2 0 1 0 0 0 0 1 0\n").unwrap();
+    let on_a_terminal = |more: &str| {
+        let command = format!("{} query cube.cbvh cube.cbvh two.txt {more}", env!("CARGO_BIN_EXE_cbvh"));
+        let script = ["-qec", &command, "/dev/null"];
+        let ended = std::process::Command::new("script").args(script).current_dir(directory).output().ok()?;
+        assert!(ended.status.success(), "{ended:?}");
+        Some(String::from_utf8(ended.stdout).unwrap())
+    };
+    for (mode, first, second) in [
+        ("collide", "not touching", "touching"),
+        ("contacts", "0 pairs of triangles in contact", "pairs of triangles in contact"),
+        ("distance", "3.0 mesh units apart", "0 mesh units apart, touching"),
+        ("within --within 3", "at most 3.0 mesh units apart", "at most 3.0 mesh units apart"),
+    ] {
+        let Some(shown) = on_a_terminal(&format!("--mode {mode}")) else {
+            return common::skip("the command `script` is missing");
+        };
+        let lines: Vec<&str> = shown.lines().collect();
+        let [one, two, timing] = lines[..] else { panic!("{shown}") };
+        assert_eq!(one, format!("pose 1: {first}"));
+        assert!(two.starts_with("pose 2: ") && two.ends_with(second), "{two}");
+        assert!(timing.starts_with("two: answered 2 of 2 poses, ") && timing.contains("median"), "{timing}");
+    }
+    let json: Value = serde_json::from_str(&on_a_terminal("--json").unwrap()).unwrap();
+    assert_eq!((&json["peer"], &json["queries"]), (&"cbvh".into(), &2.into()));
 }
 
 #[test]
@@ -213,7 +242,7 @@ fn one_pose_is_answered_for_a_person() {
         .map(|line| line.split(' ').map(|number| number.parse().unwrap()).collect())
         .collect();
     assert_eq!(vertices.len(), 8);
-    // Which of the triangles at that distance is not said here; each has a corner on the near face.
+    // Several triangles are at that distance, and any may be named. Each has a corner on the near face.
     let near = |range: std::ops::Range<usize>, x: f64| vertices[range].iter().any(|vertex| vertex[0] == x);
     assert!(near(0..3, 1.0) && near(3..6, 4.0), "{witness}");
     assert_eq!((vertices[6][0], vertices[7][0]), (1.0, 4.0));

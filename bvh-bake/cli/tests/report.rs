@@ -1,87 +1,164 @@
-//! `cbvh report --hard`: three files, no wrong answer of this library, and a fair account of others'.
+//! Tests `cbvh report PAIRS`: its four files show the same figures, and errors take one line.
 
 mod common;
 
-use common::{cbvh_in, names};
+use common::documents::{elements, number, same_figures};
+use common::{cbvh_in, names, poses, torus};
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
-/// Longer than other commands may take: it bakes thousands of meshes.
-fn report(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_cbvh")).args(["report", "--hard"]).args(arguments).output().unwrap()
-}
+const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
-fn json(folder: &Path) -> serde_json::Value {
-    serde_json::from_slice(&fs::read(folder.join("hard.json")).unwrap()).unwrap()
-}
-
-#[cfg(unix)]
-fn program(path: &Path, text: &str) {
-    use std::os::unix::fs::PermissionsExt;
-    fs::write(path, text).unwrap();
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
-}
-
-/// One other library always says 0, one has no answer.
-#[cfg(unix)]
-#[test]
-fn all_answers_are_right_and_others_are_judged() {
-    let folder = tempfile::tempdir().unwrap();
-    let (out, build) = (folder.path().join("new/out"), folder.path().join("build"));
-    fs::create_dir_all(build.join("bin")).unwrap();
-    let zero = "#!/bin/sh\necho 0 1 > raw_pose.txt\necho '{\"version\":\"7.5\"}'\n";
-    program(&build.join("bin/peer_ode"), zero);
-    program(&build.join("bin/peer_cgal"), "#!/bin/sh\nexit 3\n");
-    let ended = report(&["--out", out.to_str().unwrap(), "--peers", build.to_str().unwrap()]);
-    assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
-    assert_eq!(names(&out), ["hard.csv", "hard.json", "hard.md"]);
-
-    let record = json(&out);
-    let cases = record["cases"].as_array().unwrap();
-    assert!(cases.len() >= 200);
-    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../spec/hard-cases.md");
-    let page = fs::read_to_string(page).unwrap();
-    let (mut touching, mut asked) = (0, 0);
-    for case in cases {
-        let name = case["name"].as_str().unwrap();
-        assert!(page.contains(&format!("| **{name}**: ")), "spec/hard-cases.md is older than {name}");
-        for order in case["orders"].as_array().unwrap() {
-            assert_eq!(order["own"]["wrong"].as_array().unwrap().len(), 0, "{case}");
-            assert_eq!(order["own"]["differ"].as_array().unwrap().len(), 0, "{case}");
-            if let Some(is_touching) = case["truth"]["touching"].as_bool() {
-                touching += u64::from(is_touching);
-                asked += 1;
-                assert_eq!(order["own"]["collide"], is_touching, "{case}");
-            } else {
-                assert!(
-                    order["own"]["refusal"].is_string() && order["others"].as_array().unwrap().is_empty()
-                );
-            }
-        }
-    }
-    let count = |peer: usize, what: &str| record["peers"][peer]["modes"][0][what].as_u64().unwrap();
-    assert_eq!([count(0, "asked"), count(0, "crashes"), count(0, "wrong")], [asked, asked, 0], "cgal-rigid");
-    assert_eq!(
-        [count(1, "asked"), count(1, "crashes"), count(1, "wrong")],
-        [asked, 0, touching],
-        "ode-opcode"
-    );
-    assert_eq!(record["peers"][1]["version"], "7.5");
-
-    let lines = fs::read_to_string(out.join("hard.csv")).unwrap().lines().count();
-    let orders: usize = cases.iter().map(|case| case["orders"].as_array().unwrap().len()).sum();
-    assert_eq!(lines, 1 + orders);
-    assert!(fs::read_to_string(out.join("hard.md")).unwrap().contains("**0 wrong answers**"));
+/// Runs the report, which may take longer than other commands because it bakes and measures 30 layouts.
+fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
+    command.arg("report").args(arguments).current_dir(directory).env_remove("CBVH_ISA").output().unwrap()
 }
 
 #[test]
-fn what_cannot_be_had_is_told_before_the_work() {
+fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
-    fs::write(directory.join("file"), "").unwrap();
-    cbvh_in(directory, &["report", "--hard", "--out", "file"]).failed(2, &["file", "expected a folder"]);
-    cbvh_in(directory, &["report", "--hard", "--out", "o", "--peers", "missing"])
-        .failed(2, &["missing", "expected programs peer_*, found none"]);
-    assert_eq!(names(directory), ["file"]);
+    fs::write(directory.join("torus.obj"), torus(24, 12)).unwrap();
+    cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "--no-ids"]).done();
+    fs::write(directory.join("p.txt"), poses(8, 0.0, 6.0)).unwrap();
+    for mesh in ["fclenv.obj", "fclrob.obj"] {
+        fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();
+    }
+    let list =
+        "# name a b poses\nfcl fclenv.obj fclrob.obj\n\ntori torus.cbvh torus.cbvh p.txt # with poses\n";
+    fs::write(directory.join("pairs.txt"), list).unwrap();
+    let ended = report(directory, &["pairs.txt", "--out", "new/out", "--quick"]);
+    assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
+    let out = directory.join("new/out");
+    assert_eq!(names(&out), ["report.csv", "report.html", "report.json", "report.svg"]);
+    let [csv, html, json, svg] = ["csv", "html", "json", "svg"]
+        .map(|extension| fs::read_to_string(out.join(format!("report.{extension}"))).unwrap());
+    for text in [&csv, &html, &json, &svg] {
+        assert!(!text.contains("NaN") && !text.contains("inf,") && !text.contains(">inf"));
+        assert!(!text.contains(directory.to_str().unwrap()), "a path of this machine");
+    }
+
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
+    let rows = json["rows"].as_array().unwrap();
+    // There are two pairs, 30 layouts and 5 questions.
+    assert_eq!(rows.len(), 2 * 30 * 5);
+    same_figures(&csv, rows);
+    for row in rows {
+        check(row);
+    }
+
+    let find = |pair: &str, layout: &str, question: &str, rel_err: f64| {
+        let is_it = |row: &&Value| {
+            row["pair"] == pair
+                && row["layout"] == layout
+                && row["question"] == question
+                && number(row, "rel_err").unwrap_or(0.0) == rel_err
+        };
+        rows.iter().find(is_it).unwrap()
+    };
+    let in_page = elements(&html);
+    let (mut pair, mut layout, mut shown) = ("", "", 0);
+    for (name, attributes) in &in_page {
+        if name == "tr" && attributes.contains_key("data-pair") {
+            (pair, layout) = (&attributes["data-pair"], &attributes["data-layout"]);
+        }
+        if let Some(field) = attributes.get("data-field") {
+            let rel_err = attributes["data-rel-err"].parse().unwrap();
+            let row = find(pair, layout, &attributes["data-question"], rel_err);
+            assert_eq!(number(row, field), attributes["data-value"].parse().ok(), "{attributes:?}");
+            shown += 1;
+        }
+    }
+    // Per pair, 20 lossless layouts are in tables of 5, 8 and 11 columns, and 10 others in a table of 8.
+    assert!(shown > 2 * (20 * (5 + 8 + 8) + 10 * 6), "{shown}");
+    // Each table begins with the fastest layout.
+    let ranked = |at: &&(String, _)| at.0 == "tr";
+    assert!(in_page.iter().filter(ranked).count() > 2 * 70);
+    for document in [&in_page, &elements(&svg)] {
+        // A mark is a polygon. There are 30 layouts in two plots by bytes, and with 4 allowed errors in a plot by
+        // error.
+        let marks = document.iter().filter(|(name, _)| name == "polygon").count();
+        assert!(marks >= 2 * (2 * 30 + 4 * 30), "{marks}");
+    }
+    // The page fetches nothing from elsewhere.
+    let outside = ["src", "xlink:href"];
+    for (name, attributes) in &in_page {
+        assert!(
+            name != "script" && name != "link" && outside.iter().all(|key| !attributes.contains_key(*key))
+        );
+        assert!(attributes.get("href").is_none_or(|to| to.starts_with('#')));
+    }
+    for pair in ["fcl", "tori"] {
+        let tests = |layout| number(find(pair, layout, "distance", 0.0), "node_tests").unwrap();
+        assert!(tests("dop26-u8-wide f32") < tests("dop6-u8 f32"), "{pair}");
+    }
+    let pairs = &json["pairs"];
+    assert!(pairs[0]["poses_from"].as_str().unwrap().starts_with("made"));
+    assert_eq!(pairs[1]["poses_from"], "p");
+    assert_eq!(pairs[1]["a"]["triangles"], 2 * 24 * 12);
+    assert_eq!(pairs[1]["a"]["chosen_layout"], pairs[1]["b"]["chosen_layout"]);
+    let said = String::from_utf8(ended.stdout).unwrap();
+    assert!(said.contains("0 wrong answers") && said.contains("Without options cbvh bake chooses"), "{said}");
+}
+
+/// Checks what holds for every row.
+fn check(row: &Value) {
+    let at = |field| number(row, field);
+    for always in ["ns_median", "ns_p90", "node_tests", "packet_tests", "exact_tests"] {
+        assert!(at(always).is_some(), "{row}");
+    }
+    assert!(at("ns_q1") <= at("ns_median") && at("ns_median") <= at("ns_q3"), "{row}");
+    assert!(at("width_inflation").unwrap() >= 1.0 && at("volume_inflation").unwrap() >= 1.0, "{row}");
+    assert!(at("node_bytes_per_tri").unwrap() > 0.0, "{row}");
+    if row["question"] == "collide" {
+        assert_eq!(at("distance_error_max"), None, "{row}");
+        return;
+    }
+    if row["triangles"] != "quantized" {
+        // The only error is that of rounding to f32.
+        assert!(at("vertex_error").unwrap() < if row["pair"] == "fcl" { 1e-4 } else { 1e-6 }, "{row}");
+        let (max, allowed) = (at("distance_error_max").unwrap(), at("rel_err").unwrap());
+        assert!(max <= allowed * 1.000001 && at("distance_error_median").unwrap() <= max, "{row}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_told_in_one_line_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("bad.obj", "v 0 0 0\nf 1 2 3\n");
+    write("good.txt", "one one.obj one.obj\n");
+    write("empty.txt", "# nothing\n");
+    write("p.txt", "1 2 3\n");
+    write("bad.txt", "a one.obj one.obj\nb one.obj\n");
+    write("twice.txt", "a one.obj one.obj\n\na one.obj one.obj\n");
+    write("mesh.txt", "a one.obj bad.obj\n");
+    write("lost.txt", "a one.obj missing.obj\n");
+    write("poses.txt", "a one.obj one.obj p.txt\n");
+    write("void.txt", "a one.obj one.obj empty.txt\n");
+    let fails = |code: i32, arguments: &[&str], words: &[&str]| {
+        cbvh_in(directory, &[&["report"], arguments].concat()).failed(code, words);
+    };
+    fails(1, &["good.txt"], &["--out"]);
+    fails(1, &["--out", "o"], &["PAIRS"]);
+    fails(1, &["good.txt", "--quick", "--rounds", "3", "--out", "o"], &["--quick"]);
+    fails(1, &["good.txt", "--out", "o", "--isa", "mmx"], &["mmx"]);
+    fails(1, &["good.txt", "--out", "o", "--rounds", "0"], &["--rounds"]);
+    fails(2, &["missing.txt", "--out", "o"], &["missing.txt"]);
+    fails(2, &["lost.txt", "--out", "o"], &["missing.obj"]);
+    fails(2, &["good.txt", "--poses", "%s.poses", "--out", "o"], &["one.poses"]);
+    fails(2, &["good.txt", "--out", "one.obj"], &["one.obj", "expected a folder"]);
+    fails(3, &["empty.txt", "--out", "o"], &["empty.txt", "NAME A B"]);
+    fails(3, &["bad.txt", "--out", "o"], &["bad.txt: line 2", "found 2 words"]);
+    fails(3, &["twice.txt", "--out", "o"], &["twice.txt: line 3", "again"]);
+    fails(3, &["mesh.txt", "--out", "o"], &["bad.obj: line 2"]);
+    fails(3, &["poses.txt", "--out", "o"], &["p.txt: line 1", "found 3"]);
+    fails(3, &["void.txt", "--out", "o"], &["empty.txt: expected poses, found none"]);
+    assert!(!directory.join("o").exists());
 }

@@ -1,9 +1,9 @@
-//! Any bytes as OBJ: a mesh or an error.
+//! Reads any bytes as OBJ, which must give a mesh or an error.
 #![no_main]
 
 mod reader;
 
-use bvh_bake::io::MeshFormat;
+use bvh_bake::input::MeshFormat;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -1,13 +1,10 @@
-//! A `.cbvh` file of any bytes, its checksums made right, against the mesh of a cube: `verify` says whether
-//! it is one, and `prove_bounds` runs on whatever has been validated.
+//! Verifies a `.cbvh` file of any bytes, with corrected checksums, against the mesh of a cube. `prove_bounds` runs on
+//! whatever is valid.
 #![no_main]
-
-#[allow(dead_code, reason = "tests use the rest")]
-#[path = "../../../bvh-format/tests/common/seal.rs"]
-mod seal;
 
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{prove_bounds, validate_in_parallel, verify};
+use cbvh_testkit::seal::seal;
 use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 
@@ -23,7 +20,7 @@ fuzz_target!(|bytes: &[u8]| {
         return;
     }
     let mut bytes = bytes.to_vec();
-    seal::seal(&mut bytes);
+    seal(&mut bytes);
     let _ = verify(&bytes, &CUBE);
     if let Ok(layout) = validate_in_parallel(&bytes[..]) {
         let _ = prove_bounds(&layout, &bytes[..]);

@@ -1,7 +1,7 @@
-//! Decodes all of a file, page by page, whether or not the whole of it is valid.
+//! Decodes a whole file page by page, even if the file is not valid.
 
-use bvh_format::bounds::check_bounds;
 use bvh_format::Layout;
+use bvh_format::bounds::check_bounds;
 use bvh_format::decode::decode_child;
 use bvh_format::ids::decode_id;
 use bvh_format::kdop::Kdop;
@@ -22,27 +22,27 @@ pub fn decode(bytes: &[u8]) {
             let page_bytes = layout.page_bytes(bytes, number).expect("the pages of objects are there");
             let checked = check_page(page_bytes, number, object, layout.page_offset(number));
             assert!(checked.is_ok() || !valid);
-            // What is behind a check must hold; but what has not been checked may be read, too.
-            let page = Page::new(page_bytes, object.profile);
+            // Code that follows a check relies on it, but bytes that were not checked may be read, too.
+            let page = Page::new(page_bytes, object.profile());
             let header = page.header();
             let blocks = layout.check_leaf_block(bytes, &page, object).is_ok()
                 && layout.check_id_block(bytes, &page).is_ok();
             let (leaves, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
             for (packet, triangles) in packets(&page) {
-                let _ = decode_packet(object.triangle_encoding, leaves, usize::from(packet));
+                let _ = decode_packet(object.triangle_encoding(), leaves, usize::from(packet));
                 let _ = decode_id(ids, usize::from(packet), triangles - 1);
             }
             for slot in 0..header.treelets {
                 let treelet = page.treelet(slot);
                 let node = page.anchor(slot % header.roots.max(1)).slabs;
-                for child in 0..Links::read(treelet).children().min(object.profile.width()) {
-                    let _ = decode_child(object.profile, object.f16_scale, treelet, child, &node);
+                for child in 0..Links::read(treelet).children().min(object.profile().width()) {
+                    let _ = decode_child(object.profile(), object.f16_scale(), treelet, child, &node);
                 }
             }
             for link in 0..header.remotes {
                 let to = page.remote(link);
                 if let Some(target) = layout.page_bytes(bytes, to.page()) {
-                    let target = Page::new(target, object.profile);
+                    let target = Page::new(target, object.profile());
                     let _ = check_crossing(&target, to, number, link, 0);
                 }
             }

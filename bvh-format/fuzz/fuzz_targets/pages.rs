@@ -1,15 +1,11 @@
-//! A tree of the right shape with any slabs, vertices and ids, and some bytes poked into it: validated and decoded.
+//! Validates and decodes a tree of the right shape with any slabs, vertices and ids, and some changed bytes.
 #![no_main]
 
 mod decode;
-#[path = "../../tests/common/forge.rs"]
-mod forge;
-#[allow(dead_code, reason = "tests use the rest")]
-#[path = "../../tests/common/seal.rs"]
-mod seal;
 
+use cbvh_testkit::forge::{Input, forge};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    decode::decode(&forge::forge(&mut forge::Input(bytes)));
+    decode::decode(&forge(&mut Input(bytes)));
 });

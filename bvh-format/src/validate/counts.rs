@@ -1,11 +1,11 @@
-//! What the pages of an object have, summed up in either order and compared with the object's record.
+//! Sums up how many treelets, packets and so on the pages of an object have, and compares the sums with its record.
 
 use crate::error::{FormatError, ensure, require};
 use crate::layout::Layout;
 use crate::object::Object;
 use crate::rule::Rule;
 
-/// What a page has.
+/// How many parts a page has, or the pages of an object together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     pub(super) first_packet: u64,
@@ -16,8 +16,8 @@ pub struct Counts {
     pub(super) remotes: u64,
 }
 
-/// Sums for those who go through an object's pages from the first to the last. The first breach is kept for the end,
-/// since links are checked before.
+/// Sums up the pages of an object from the first to the last. A breach is reported at the end, since the rules for links
+/// come before it.
 #[derive(Debug, Default)]
 pub(super) struct CountsFromStart {
     sum: Counts,
@@ -25,7 +25,7 @@ pub(super) struct CountsFromStart {
 }
 
 impl CountsFromStart {
-    /// Adds the page behind the one added last.
+    /// Adds the page that follows the one added last.
     pub(super) fn add(&mut self, layout: &Layout, number: u32, counts: &Counts) {
         if self.breach.is_none() {
             self.breach = check_first(layout, number, self.sum.packets, counts.first_packet).err();
@@ -33,7 +33,7 @@ impl CountsFromStart {
         self.sum.add(counts);
     }
 
-    /// After the last page of the object.
+    /// Compares the sums with the record, after the last page of the object.
     ///
     /// # Errors
     /// Rule 34.
@@ -43,16 +43,16 @@ impl CountsFromStart {
     }
 }
 
-/// Sums for those who go through an object's pages from the last to the first.
+/// Sums up the pages of an object from the last to the first.
 #[derive(Debug, Default)]
 pub struct CountsFromEnd {
     sum: Counts,
-    /// `first_packet` of the page added last, with its number.
+    /// The number of the page added last, and its `first_packet`.
     next: Option<(u32, u64)>,
 }
 
 impl CountsFromEnd {
-    /// Adds the page before the one added last.
+    /// Adds the page that precedes the one added last.
     ///
     /// # Errors
     /// Rule 34.
@@ -65,7 +65,7 @@ impl CountsFromEnd {
         Ok(())
     }
 
-    /// After the first page of the object.
+    /// Compares the sums with the record, after the first page of the object.
     ///
     /// # Errors
     /// Rule 34.
@@ -91,12 +91,12 @@ impl Counts {
         self.remotes += page.remotes;
     }
 
-    /// Compares the sum over an object's pages with its record.
+    /// Compares the sums over the pages of an object with its record.
     fn check(&self, layout: &Layout, object: &Object) -> Result<(), FormatError> {
         let record = &object.record;
         let at = layout.page_offset(record.first_page.get());
-        // Each link has been followed to a root that names it back: no two share a root, so that equal
-        // numbers leave no root without a way to it.
+        // Each link leads to a root that names the link, so no two links share a root. If the numbers agree, each root
+        // but the object's has its link.
         require(Rule::Counts, at, self.remotes + 1, self.roots)?;
         let found = [self.treelets, self.packets, self.triangles];
         let stated = [record.treelets.get(), record.packets.get(), record.triangles.get()];

@@ -1,6 +1,6 @@
 //! The vector operations that kernels are written in, and the choice of a backend at run time.
 //!
-//! A backend is a zero-sized token that can only be had on a CPU with the features it stands for.
+//! A backend is a zero-sized token that can be created only on a CPU with the features it stands for.
 //! Kernels are generic over the token and `#[inline(always)]`; each backend has one function with
 //! the features enabled, into which a whole query is inlined. Registers are 16 lanes wide (`V`: four
 //! children of A against four of B) or 4 lanes (`H`: four children or triangles of one side).
@@ -23,7 +23,7 @@ use std::sync::OnceLock;
 
 /// A set of equal lanes of `f32`.
 pub(crate) trait Lanes: Copy {
-    /// One truth value a lane.
+    /// One truth value per lane.
     type Mask: Copy;
 
     fn sub(self, other: Self) -> Self;
@@ -50,7 +50,7 @@ pub(crate) trait Lanes: Copy {
 }
 
 /// Rows of a group that are picked from together. The places in a part are those of four lower ends, then those of
-/// the upper ends of the same four slabs; and 8 added to the place for four slabs more.
+/// the upper ends of the same four slabs. Four more slabs follow, at places 8 higher.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     /// Rows 0 to 3.
@@ -126,8 +126,20 @@ pub(crate) trait Isa: Copy {
         }
     }
 
-    /// Asks for bytes that will soon be read.
-    fn prefetch(self, bytes: &[u8]);
+    /// Prefetches the cache line of a byte that will soon be read.
+    fn prefetch_line(self, byte: &u8);
+
+    /// Prefetches bytes that will soon be read. They may start anywhere in a line, so that the last byte may be in a line
+    /// that no multiple of 64 bytes from the first is in.
+    #[inline(always)]
+    fn prefetch(self, bytes: &[u8]) {
+        for line in bytes.chunks(64) {
+            self.prefetch_line(&line[0]);
+        }
+        if let Some(last) = bytes.last() {
+            self.prefetch_line(last);
+        }
+    }
 
     /// Runs a task with the features of the backend enabled.
     fn run<T: Task>(self, task: T) -> T::Output;
@@ -142,6 +154,7 @@ pub(crate) trait Task {
 
 /// A vector backend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Backend {
     /// Portable code.
     Scalar,
@@ -155,11 +168,11 @@ impl Backend {
     /// All backends, the slowest first.
     pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
 
-    /// The fastest backend of this CPU, or the one that the environment variable `CBVH_ISA` names.
-    /// Decided once.
+    /// Returns the fastest backend of this CPU, or the one that the environment variable `CBVH_ISA` names. This is decided
+    /// once per process.
     ///
     /// # Errors
-    /// If `CBVH_ISA` names no backend or one that the CPU lacks.
+    /// [`BackendError`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
     pub fn detect() -> Result<Self, BackendError> {
         static CHOICE: OnceLock<Result<Backend, BackendError>> = OnceLock::new();
         let choose = || match std::env::var("CBVH_ISA") {
@@ -169,17 +182,17 @@ impl Backend {
         CHOICE.get_or_init(choose).clone()
     }
 
-    /// The backend called `scalar`, `avx2` or `avx512`, if the CPU has it.
+    /// Returns the backend called `scalar`, `avx2` or `avx512`, if the CPU has it.
     ///
     /// # Errors
-    /// If there is no such name or the CPU lacks the features.
+    /// [`BackendError`] if there is no backend of this name, or if the CPU lacks its features.
     pub fn from_name(name: &str) -> Result<Self, BackendError> {
         let backend = Self::ALL.into_iter().find(|backend| backend.name() == name);
         let backend = backend.ok_or_else(|| BackendError::Unknown(name.to_owned()))?;
         if backend.is_available() { Ok(backend) } else { Err(BackendError::Missing(backend)) }
     }
 
-    /// The name on the command line and in `CBVH_ISA`.
+    /// Returns the name on the command line and in `CBVH_ISA`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -188,7 +201,7 @@ impl Backend {
         }
     }
 
-    /// True if this CPU can run it.
+    /// Returns whether this CPU can run it.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
@@ -227,14 +240,17 @@ impl fmt::Display for Backend {
     }
 }
 
-/// A backend that cannot be had.
+/// Why a backend is not available.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BackendError {
     /// No backend has this name.
     #[error("expected a backend scalar, avx2 or avx512, found {0:?}")]
     Unknown(String),
     /// The CPU lacks its features.
-    #[error("this CPU lacks the instructions of the backend {0}")]
+    #[error(
+        "this CPU lacks the instructions of the backend {0}; choose scalar, or leave the choice to the program"
+    )]
     Missing(Backend),
 }
 

@@ -1,8 +1,8 @@
 //! Which of 16 triangle pairs may intersect: separating axes in two stages.
 //!
 //! Stage one looks at the two face planes of each pair of a packet pair and settles most of them.
-//! What is left is queued, so that stage two, the nine cross products of edges, has full lanes.
-//! Axes are not normalised. What stage two leaves goes to exact arithmetic.
+//! The remaining pairs are queued, so that stage two, the nine cross products of edges, has full lanes.
+//! Axes are not normalised. The pairs that stage two cannot separate go to exact arithmetic.
 //!
 //! Error. Let e bound the error of every coordinate, r the sum of the magnitudes of a coordinate of
 //! A and one of B (`Local`), and E the largest edge component. A product of two edge components is
@@ -11,18 +11,18 @@
 //! Together that stays below `E r (48 e + 112 u E)`. Squares of numbers below 2^-75 vanish; the frame's
 //! unit makes 2^-120 far less than any projection that matters, and it is added.
 
+use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
 use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, largest_of, max3, min3, project, sub};
-use crate::leaf::queue::{Candidate, Queue};
-use crate::traverse::opened::Leaf;
+use crate::leaf::queue::{TrianglePair, TriangleQueue};
 
 /// 2^-120: more than all underflows of a projection together.
 const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
 
 /// Stage two: the candidates of a queue, in the order of arrival, that no edge axis separates.
 #[inline(always)]
-pub(crate) fn drain<I: Isa>(isa: I, queue: &mut Queue) -> Survivors {
+pub(crate) fn drain<I: Isa>(isa: I, queue: &mut TriangleQueue) -> Survivors {
     let (a, b) = queue.corners(isa);
     let mask = queue.filled() & !edge_axes(isa, &a, &b, queue.error(isa), queue.reach(isa));
     Survivors { candidates: queue.take(), mask }
@@ -30,14 +30,14 @@ pub(crate) fn drain<I: Isa>(isa: I, queue: &mut Queue) -> Survivors {
 
 /// Candidates left by stage two.
 pub(crate) struct Survivors {
-    candidates: [Option<Candidate>; 16],
+    candidates: [Option<TrianglePair>; 16],
     mask: u16,
 }
 
 impl Iterator for Survivors {
-    type Item = Candidate;
+    type Item = TrianglePair;
 
-    fn next(&mut self) -> Option<Candidate> {
+    fn next(&mut self) -> Option<TrianglePair> {
         if self.mask == 0 {
             return None;
         }
@@ -49,7 +49,7 @@ impl Iterator for Survivors {
 
 /// Stage one: the lanes of a packet pair that neither face plane separates.
 #[inline(always)]
-pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: Leaf, b: Leaf) -> u16 {
+pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: LeafPacket, b: LeafPacket) -> u16 {
     let (lanes_a, lanes_b) = local.lanes(isa);
     let plane_a = Plane::new(isa, &Local::quads(isa, &local.a), local);
     let (offset, error) = (isa.repeat(&plane_a.offset), isa.repeat(&plane_a.error));

@@ -17,18 +17,18 @@
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, splat4, tile};
 use crate::leaf::math::{Corners, Vec3, along, cross, dot, edges, max3, min3, project, sub};
-use crate::leaf::queue::Queue;
+use crate::leaf::queue::TriangleQueue;
 
 /// Bounds on 16 distances, in units of the local frame.
 pub(crate) struct Bounds {
     pub(crate) lower: [f32; 16],
     pub(crate) upper: [f32; 16],
-    /// From the point on A to the point on B.
+    /// The direction from the point on A to the point on B.
     pub(crate) direction: [[f32; 16]; 3],
 }
 
 /// 2^-100: the least square of a guess that is certified.
-const LEAST_SQUARE: f32 = f32::from_bits((127 - 100) << 23);
+const MIN_CERTIFIED_SQUARE: f32 = f32::from_bits((127 - 100) << 23);
 
 /// The error of a bound: see above. `Local` charges 2^-140 to every coordinate.
 #[inline(always)]
@@ -115,7 +115,7 @@ fn gap<V: Lanes>([lo_a, hi_a]: [V; 2], [lo_b, hi_b]: [V; 2]) -> V {
 /// tell nothing; those that overflow compare as they should.
 #[inline(always)]
 fn far_along<I: Isa>(isa: I, gap: I::V, squared: I::V, limit_squared: I::V) -> u16 {
-    let (gap, least) = (gap.max(isa.splat(0.0)), isa.splat(LEAST_SQUARE));
+    let (gap, least) = (gap.max(isa.splat(0.0)), isa.splat(MIN_CERTIFIED_SQUARE));
     let gap_squared = gap.mul(gap);
     let far = I::V::bits(limit_squared.mul(squared).lt(gap_squared));
     far & I::V::bits(least.le(gap_squared)) & I::V::bits(least.le(squared))
@@ -142,7 +142,7 @@ impl<V: Lanes> Guess<V> {
 
 /// Bounds the distances of all pairs in a queue.
 #[inline(always)]
-pub(crate) fn bounds<I: Isa>(isa: I, queue: &Queue) -> Bounds {
+pub(crate) fn bounds<I: Isa>(isa: I, queue: &TriangleQueue) -> Bounds {
     let (a, b) = queue.corners(isa);
     let slack = queue.error(isa).mul_add(isa.splat(4.0), queue.reach(isa).mul(isa.splat(16.0 * U)));
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
@@ -178,7 +178,7 @@ fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
     value.max(zero).min(one)
 }
 
-/// One over the squared length of each edge.
+/// Returns the inverse of the squared length of each edge.
 #[inline(always)]
 fn inverse_squares<V: Lanes>(one: V, edges: Corners<V>) -> Vec3<V> {
     let [x, y, z] = edges;
@@ -215,7 +215,7 @@ fn corners_on_face<I: Isa>(
 
 #[inline(always)]
 fn certify<I: Isa>(isa: I, slack: I::V, a: &Corners<I::V>, b: &Corners<I::V>, guess: Guess<I::V>) -> Bounds {
-    let least = isa.splat(LEAST_SQUARE);
+    let least = isa.splat(MIN_CERTIFIED_SQUARE);
     let length = guess.squared.max(least).sqrt();
     let n = guess.direction;
     let gap = min3(project(b, n)).sub(max3(project(a, n)));

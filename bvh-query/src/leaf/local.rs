@@ -15,7 +15,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::math::{Corners, Vec3};
-use crate::traverse::align::Placement;
+use crate::traverse::placement::Placement;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 
@@ -25,7 +25,7 @@ pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
 /// Absolute error charged to each coordinate: 2^-140 units of the frame.
 const UNDERFLOW: f32 = f32::from_bits(1 << 9);
 
-/// What all packet pairs of a query share.
+/// The frame that all pairs of packets of a query share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalFrame {
     rotation: [[f64; 3]; 3],
@@ -41,7 +41,7 @@ pub(crate) struct LocalFrame {
 impl LocalFrame {
     pub(crate) fn new(placement: &Placement, a: &Object, b: &Object) -> Self {
         let size = |object: &Object| {
-            let record = &object.record;
+            let record = object.record();
             (0..3).fold(0.0f64, |m, i| {
                 m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
             })

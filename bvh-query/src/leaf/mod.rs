@@ -1,10 +1,9 @@
 //! Tests 16 triangle pairs at a time in f32: filters with derived error bounds.
 //!
-//! Nothing is decided here but what certainly does not matter: pairs that are certainly apart, or
-//! certainly farther apart than others. The rest goes to `narrow`.
+//! The filters discard only pairs that cannot matter: pairs that are certainly apart, or certainly farther
+//! apart than others. The rest goes to `narrow`.
 
 pub(crate) mod collide;
-pub(crate) mod decoded;
 pub(crate) mod distance;
 pub(crate) mod local;
 pub(crate) mod math;

@@ -1,40 +1,41 @@
 //! Triangle pairs of several packet pairs, gathered until they fill all lanes of a register.
 //!
-//! Of the 16 pairs of two packets, cheap tests leave one or two. What is costly is done for 16 of these at once.
+//! Cheap tests leave one or two of the 16 pairs of two packets. The costly tests are done for 16 of the remaining pairs at
+//! once.
 
+use crate::file::place::LeafPacket;
 use crate::isa::Isa;
 use crate::leaf::local::Local;
 use crate::leaf::math::Corners;
-use crate::traverse::opened::Leaf;
 
-/// A triangle pair that cheap tests do not settle.
+/// A pair of triangles that the cheap tests do not decide.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
-    pub(crate) a: Leaf,
-    pub(crate) b: Leaf,
+pub(crate) struct TrianglePair {
+    pub(crate) a: LeafPacket,
+    pub(crate) b: LeafPacket,
     pub(crate) lane_a: u8,
     pub(crate) lane_b: u8,
 }
 
-impl Candidate {
-    /// The pair in a lane of two packets: element `4 * a + b`.
+impl TrianglePair {
+    /// Returns the pair in a lane of two packets: element `4 * a + b`.
     #[inline(always)]
-    pub(crate) fn in_lane(a: Leaf, b: Leaf, lane: u8) -> Self {
+    pub(crate) fn in_lane(a: LeafPacket, b: LeafPacket, lane: u8) -> Self {
         Self { a, b, lane_a: lane >> 2 & 3, lane_b: lane & 3 }
     }
 }
 
 /// Up to 16 candidates with their local corners.
-pub(crate) struct Queue {
+pub(crate) struct TriangleQueue {
     /// `[side][corner][axis]`
     corners: [[[[f32; 16]; 3]; 3]; 2],
     error: [f32; 16],
     reach: [f32; 16],
-    candidates: [Option<Candidate>; 16],
+    candidates: [Option<TrianglePair>; 16],
     len: usize,
 }
 
-impl Default for Queue {
+impl Default for TriangleQueue {
     fn default() -> Self {
         Self {
             corners: [[[[0.0; 16]; 3]; 3]; 2],
@@ -46,7 +47,7 @@ impl Default for Queue {
     }
 }
 
-impl Queue {
+impl TriangleQueue {
     pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
@@ -59,7 +60,7 @@ impl Queue {
         self.len == 16
     }
 
-    pub(crate) fn push(&mut self, local: &Local, candidate: Candidate) {
+    pub(crate) fn push(&mut self, local: &Local, candidate: TrianglePair) {
         let at = self.len & 15;
         let (lane_a, lane_b) = (usize::from(candidate.lane_a & 3), usize::from(candidate.lane_b & 3));
         for corner in 0..3 {
@@ -74,7 +75,7 @@ impl Queue {
         self.len = at + 1;
     }
 
-    /// Corners of both sides.
+    /// Returns the corners of both sides.
     #[inline(always)]
     pub(crate) fn corners<I: Isa>(&self, isa: I) -> (Corners<I::V>, Corners<I::V>) {
         (self.side(isa, 0), self.side(isa, 1))
@@ -90,27 +91,27 @@ impl Queue {
         ]
     }
 
-    /// The bounds on the error of coordinates: see `Local`.
+    /// Returns the bounds on the error of the coordinates: see `Local`.
     #[inline(always)]
     pub(crate) fn error<I: Isa>(&self, isa: I) -> I::V {
         isa.load(&self.error)
     }
 
-    /// The bounds on the magnitude of coordinates.
+    /// Returns the bounds on the magnitude of the coordinates.
     #[inline(always)]
     pub(crate) fn reach<I: Isa>(&self, isa: I) -> I::V {
         isa.load(&self.reach)
     }
 
-    /// The lanes that hold a candidate.
+    /// Returns the lanes that hold a pair.
     #[inline(always)]
     pub(crate) fn filled(&self) -> u16 {
         ((1u32 << self.len) - 1) as u16
     }
 
-    /// Empties the queue.
+    /// Empties the queue, and returns its pairs.
     #[inline(always)]
-    pub(crate) fn take(&mut self) -> [Option<Candidate>; 16] {
+    pub(crate) fn take(&mut self) -> [Option<TrianglePair>; 16] {
         self.len = 0;
         self.candidates
     }

@@ -49,7 +49,7 @@ pub(crate) struct Closest {
 /// it from zero, the distance is still positive but may be as small as the smallest normal number. A triangle
 /// without area is the segment or point that its corners span. Constant cost.
 ///
-/// The same bits whatever it is compiled for: nothing is fused, and lanes do not meet.
+/// The result has the same bits whatever the target: no operation is fused, and no operation combines lanes.
 #[must_use]
 #[inline(always)]
 pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
@@ -64,7 +64,7 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
     }
     let (distance, upper) = differences.length(&closest);
     // Between two features that are about as near, the direction of either may be far off that of the gap.
-    let lower = if distance - lower > WEAK * (upper - distance) {
+    let lower = if distance - lower > MAX_ERROR_ASYMMETRY * (upper - distance) {
         differences.widest(&closest).max(lower)
     } else {
         lower
@@ -83,7 +83,7 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
 }
 
 /// A lower bound this many times as far below the distance as the upper bound is above is not taken as it is.
-const WEAK: f64 = 8.0;
+const MAX_ERROR_ASYMMETRY: f64 = 8.0;
 
 /// A point of a triangle: `corner + along * (next - corner) + across * (previous - corner)`.
 ///
@@ -166,7 +166,7 @@ impl Differences {
         })
     }
 
-    /// The same with the roles of the triangles exchanged.
+    /// Returns the differences with the roles of the triangles exchanged.
     fn swapped(&self) -> Self {
         Self {
             gaps: [self.gaps_to(0), self.gaps_to(1), self.gaps_to(2)],

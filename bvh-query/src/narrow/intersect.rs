@@ -15,7 +15,7 @@ use robust::{Coord, Coord3D};
 
 use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
 
-/// Whether two closed triangles share at least one point.
+/// Returns whether two closed triangles share at least one point.
 ///
 /// Exact under the precondition of [`narrow`](super). Touching in a vertex, along an edge or in a plane
 /// counts; a triangle without area is the segment or point that its corners span. The answer depends neither
@@ -195,7 +195,7 @@ fn segments_intersect(a: &Hull, b: &Hull) -> bool {
     lexicographic(p, s).is_le() && lexicographic(r, q).is_le()
 }
 
-/// Whether two convex hulls in one plane meet, decided in the projection along `axis`, which must map that
+/// Returns whether two convex hulls in one plane meet, decided in the projection along `axis`, which must map that
 /// plane one to one; the hulls must not all lie on one line.
 ///
 /// If they are disjoint, then the difference of the hulls is a convex polygon (with area) without the origin,
@@ -204,7 +204,7 @@ fn coplanar_intersect(a: &[Point], b: &[Point], axis: usize) -> bool {
     !has_separating_edge(a, b, axis) && !has_separating_edge(b, a, axis)
 }
 
-/// Whether the line of an edge of `a` has all of `b` strictly on one side and `a` on the other, closed side.
+/// Returns whether the line of an edge of `a` has all of `b` strictly on one side and `a` on the other, closed side.
 fn has_separating_edge(a: &[Point], b: &[Point], axis: usize) -> bool {
     let edges = match a.len() {
         1 => 0,

@@ -1,31 +1,33 @@
-//! Many poses of one pair of meshes, on all cores.
+//! Asks about many poses of one pair of meshes, on all cores.
 //!
-//! Poses are cut into runs; each thread takes the next run, has one querier for all of its runs and a fresh tracker
-//! for each. How poses are cut depends on their number alone, so that what a query reads, and hence which errors
-//! there are, is the same on any number of threads. Answers are, whatever is read.
+//! Poses are cut into runs. Each thread takes the next run; it has one querier for all of its runs, and a fresh tracker
+//! for each run. How poses are cut depends on their number alone, so that what a query reads, and hence which errors
+//! there are, is the same on any number of threads. The answers are the same whatever is read.
 //!
-//! A batch ends at the first pose, in order, that ends it: an error, or the contact that was looked for. Runs are taken
-//! in order, and one is left out only if it lies behind an end that is known. So every pose before the first end has
-//! been asked about, and threads work on what is needed for all but the last few runs.
+//! A batch ends at the first pose, in their order, that ends it: by an error, or by the contact that was looked for. Runs
+//! are taken in order, and a run is left out only if it lies behind a known end. So every pose before the first end is
+//! asked about, and only the last few runs can be work in vain.
 
-use super::tracker::Tracker;
-use super::{Contact, Distance, Querier};
-use crate::bvh::Shape;
 use crate::error::QueryError;
+use crate::file::shape::Shape;
 use crate::isa::Backend;
 use crate::pose::Pose;
+use crate::query::answers::{Contact, Distance};
+use crate::query::options::check_distance;
+use crate::query::querier::Querier;
+use crate::query::tracker::Tracker;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Asks about many poses of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
-/// Answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads. Poses that
-/// follow a path are best given in its order, since neighbours share a [`Tracker`]; others cost what they do one by
-/// one. Memory is that of a querier a thread, and of the answers.
+/// The answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads. Give poses
+/// that follow a path in the order of the path, because neighbours share a [`Tracker`]; other poses cost what they cost
+/// one by one. A batch needs the memory of one querier per thread, and of the answers.
 ///
 /// # Errors
-/// A method fails as the first pose does, in their order, that cannot be answered: if a page that its query touches
-/// is damaged, or the budget of a pose does not suffice. Poses behind it may not be looked at.
+/// Each method returns the error of the first pose, in their order, that has no answer: because a page that its query
+/// touches is damaged, or because the budget per pose does not suffice. Later poses may not be looked at.
 ///
 /// ```
 /// use bvh_query::{Batch, Bvh, Pose};
@@ -50,72 +52,75 @@ pub struct Batch<'a> {
     budget: u64,
 }
 
-/// The most poses in a run: longer ones gain nothing that shows.
-const LONGEST_RUN: usize = 16;
-/// Short batches are cut into this many runs, so that threads end at about the same time.
-const RUNS: usize = 32;
+/// The most poses in a run. Longer runs gain nothing that can be measured.
+const MAX_POSES_PER_RUN: usize = 16;
+/// The fewest runs that a batch is cut into, if it has as many poses, so that threads end at about the same time.
+const MIN_RUNS_PER_BATCH: usize = 32;
 
 impl<'a> Batch<'a> {
-    /// With the fastest backend of this CPU, or the one that `CBVH_ISA` names.
+    /// Creates a batch with the fastest backend of this CPU, or with the one that the environment variable `CBVH_ISA`
+    /// names.
     ///
     /// # Errors
-    /// If `CBVH_ISA` names no backend or one that the CPU lacks.
+    /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
     pub fn new(a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>) -> Result<Self, QueryError> {
         Ok(Self::with_backend(a, b, Backend::detect()?))
     }
 
-    /// With a backend; one that the CPU lacks is replaced by the scalar one.
+    /// Creates a batch with a backend. The portable backend replaces one that the CPU lacks.
     pub fn with_backend(a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>, backend: Backend) -> Self {
         Self { a: a.into(), b: b.into(), backend, budget: u64::MAX }
     }
 
-    /// Bounds the work for each pose, as [`Querier::set_budget`].
+    /// Bounds the work per pose, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
         self.budget = visits;
     }
 
-    /// [`Querier::collide`] of each pose.
+    /// Answers [`Querier::collide`] for each pose.
     ///
     /// # Errors
-    /// That of the first pose that has one.
+    /// Returns the error of the first pose that fails.
     pub fn collide(&self, poses: &[Pose]) -> Result<Vec<bool>, QueryError> {
         self.each(poses, |querier, tracker, pose| tracker.collide(querier, self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
 
-    /// [`Querier::contacts`] of each pose.
+    /// Answers [`Querier::contacts`] for each pose.
     ///
     /// # Errors
-    /// That of the first pose that has one.
+    /// Returns the error of the first pose that fails.
     pub fn contacts(&self, poses: &[Pose]) -> Result<Vec<Vec<Contact>>, QueryError> {
         self.each(poses, |querier, _, pose| querier.contacts(self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
 
-    /// [`Querier::distance`] of each pose.
+    /// Answers [`Querier::distance`] for each pose.
     ///
     /// # Errors
-    /// That of the first pose that has one.
+    /// Returns the error of the first pose that fails.
     pub fn distance(&self, poses: &[Pose]) -> Result<Vec<Distance>, QueryError> {
         self.each(poses, |querier, tracker, pose| tracker.distance(querier, self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
 
-    /// [`Querier::within`] of each pose; `d` in mesh units.
+    /// Answers [`Querier::within`] for each pose; `d` is in mesh units.
     ///
     /// # Errors
-    /// That of the first pose that has one.
+    /// [`QueryError::Number`] if `d` is negative, NaN or infinite; else the error of the first pose that fails.
     pub fn within(&self, poses: &[Pose], d: f64) -> Result<Vec<bool>, QueryError> {
+        check_distance(d)?;
         self.each(poses, |querier, tracker, pose| tracker.within(querier, self.a, self.b, pose, d))
             .map_err(|(_, error)| error)
     }
 
-    /// The first pose, in their order, in which the meshes touch: whether a motion sampled by poses is free.
+    /// Returns the number of the first pose, in their order, in which the meshes touch. So it tells whether a motion that is
+    /// sampled by poses is free.
     ///
-    /// Poses behind it cost next to nothing: each thread looks at no more than those of the run it is in.
+    /// Poses behind that one cost next to nothing: each thread looks at no more than those of the run it is in.
     ///
     /// # Errors
-    /// That of the first pose that has one, if none before it touches.
+    /// Returns the error of the first pose that fails, if the meshes touch in no earlier pose.
     pub fn first_collision(&self, poses: &[Pose]) -> Result<Option<usize>, QueryError> {
         let ended =
             self.each(poses, |querier, tracker, pose| match tracker.collide(querier, self.a, self.b, pose) {
@@ -130,13 +135,13 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// What `ask` says of every pose, or the first pose that ends the batch and what it ended with.
+    /// Returns what `ask` answers for every pose, or the first pose that ends the batch and what it ended with.
     fn each<T: Send, E: Send>(
         &self,
         poses: &[Pose],
         ask: impl Fn(&mut Querier, &mut Tracker, &Pose) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, (usize, E)> {
-        let length = (poses.len() / RUNS).clamp(1, LONGEST_RUN);
+        let length = (poses.len() / MIN_RUNS_PER_BATCH).clamp(1, MAX_POSES_PER_RUN);
         let runs = poses.len().div_ceil(length);
         let shared = Shared { next: AtomicUsize::new(0), end: AtomicUsize::new(usize::MAX) };
         let threads = rayon::current_num_threads().min(runs);
@@ -155,7 +160,7 @@ impl<'a> Batch<'a> {
                         Err(end) => {
                             shared.end_at(index);
                             share.end = Some((index, end));
-                            // What it would take next is behind this.
+                            // The next runs are behind this pose.
                             return share;
                         }
                     }
@@ -177,13 +182,13 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// What a thread has done.
+/// What one thread has done.
 struct Share<T, E> {
     answers: Vec<(usize, T)>,
     end: Option<(usize, E)>,
 }
 
-/// What threads know of each other. Each number stands for itself, so relaxed accesses will do.
+/// What threads know of each other. The numbers do not depend on each other, so that relaxed accesses suffice.
 struct Shared {
     /// The next run to take.
     next: AtomicUsize,
@@ -192,13 +197,13 @@ struct Shared {
 }
 
 impl Shared {
-    /// The first pose of the next run of `length`, if there is one that is needed.
+    /// Returns the first pose of the next run of `length`, if a run is left that is needed.
     fn take(&self, length: usize, poses: usize) -> Option<usize> {
         let start = self.next.fetch_add(1, Ordering::Relaxed).checked_mul(length)?;
         (start < poses && self.is_needed(start)).then_some(start)
     }
 
-    /// False for poses behind an end.
+    /// Returns whether no end before the pose is known.
     fn is_needed(&self, index: usize) -> bool {
         index < self.end.load(Ordering::Relaxed)
     }

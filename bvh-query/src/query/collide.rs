@@ -1,27 +1,33 @@
-//! Do the meshes touch? Also the first contact in the order of the trees.
+//! Decides whether the meshes touch, and finds the first contact in the order of the trees.
 
-use super::{Found, Querier, QueryStats, Scene, Traversal, each_pair, surely_apart};
-use crate::bvh::Shape;
 use crate::error::QueryError;
+use crate::file::packet_cache::PacketCache;
+use crate::file::place::LeafPacket;
+use crate::file::shape::Shape;
 use crate::isa::Isa;
 use crate::leaf::collide::{drain, face_planes};
-use crate::leaf::decoded::Decoded;
 use crate::leaf::local::Local;
-use crate::leaf::queue::{Candidate, Queue};
+use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
-use crate::traverse::opened::Leaf;
-use crate::traverse::pair::{Measure, Order, Visitor};
+use crate::query::answers::QueryStats;
+use crate::query::bounding_volumes::surely_apart;
+use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
+use crate::query::querier::Querier;
+use crate::traverse::node_test::Measure;
+use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
 impl Querier {
-    /// True if the meshes touch or intersect with B placed by `pose` in A's frame.
+    /// Returns whether the meshes touch or intersect, with B placed by `pose` in A's frame.
     ///
-    /// Exact: equals exact predicates on the placed vertices, for all pairs of triangles. Touching
-    /// counts; a mesh wholly inside another without touching it does not (meshes are surfaces).
+    /// The answer is exact: that of exact predicates on the placed vertices, for all pairs of triangles. Touching
+    /// counts as collision. Meshes are surfaces, so that a mesh wholly inside another one without touching it
+    /// does not collide with it.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged.
+    /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
+    /// suffice.
     pub fn collide<'a>(
         &mut self,
         a: impl Into<Shape<'a>>,
@@ -32,41 +38,41 @@ impl Querier {
         Ok(self.any_contact(a.into(), b.into(), pose)?.is_some())
     }
 
-    /// One pair of triangles in contact, whichever is found first.
+    /// Returns one pair of triangles in contact: whichever is found first.
     pub(super) fn any_contact(
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
     ) -> Result<Option<Found>, QueryError> {
-        each_pair(a, b, pose, |scene| {
-            let pair = self.find_contact(scene, Order::Nearest)?;
-            Ok(pair.map(|pair| Found { numbers: scene.numbers, pair }))
+        each_pair(a, b, pose, |placed| {
+            let pair = self.find_contact(placed, Order::Nearest)?;
+            Ok(pair.map(|pair| Found { numbers: placed.numbers, pair }))
         })
     }
 
-    /// One pair of triangles in contact. In `Order::Tree` it is the same on every backend.
+    /// Returns one pair of triangles in contact. In `Order::Tree` it is the same pair on every backend.
     pub(super) fn find_contact(
         &mut self,
-        scene: &Scene<'_>,
+        placed: &PlacedPair<'_>,
         order: Order,
-    ) -> Result<Option<Candidate>, QueryError> {
-        self.stack.visit()?;
-        if surely_apart(&scene.pair) {
+    ) -> Result<Option<TrianglePair>, QueryError> {
+        self.memory.visit()?;
+        if surely_apart(&placed.pair) {
             return Ok(None);
         }
         self.queue.clear();
-        self.decoded.iter_mut().for_each(Decoded::start);
-        let mut visitor = Contacts {
-            scene,
+        self.packets.iter_mut().for_each(PacketCache::start);
+        let mut visitor = ContactVisitor {
+            placed,
             queue: &mut self.queue,
-            decoded: &mut self.decoded,
+            packets: &mut self.packets,
             order,
             stats: QueryStats::default(),
             visit: |candidate| Ok(ControlFlow::Break(candidate)),
             found: None,
         };
-        let task = Traversal { pair: scene.pair, stack: &mut self.stack, visitor: &mut visitor };
+        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let (found, stats) = (visitor.found, visitor.stats);
         self.stats.add(tests, stats);
@@ -74,28 +80,20 @@ impl Querier {
     }
 }
 
-impl QueryStats {
-    /// Adds what a traversal did.
-    pub(super) fn add(&mut self, node_tests: u64, other: Self) {
-        self.node_tests += node_tests;
-        self.packet_tests += other.packet_tests;
-        self.exact_tests += other.exact_tests;
-    }
-}
-
-/// Decides triangle pairs exactly and hands those in contact to `visit`, until it breaks.
-pub(super) struct Contacts<'a, F> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) queue: &'a mut Queue,
-    pub(super) decoded: &'a mut [Decoded; 2],
+/// Decides pairs of triangles exactly and passes those in contact to `visit`, until it breaks.
+pub(super) struct ContactVisitor<'a, F> {
+    pub(super) placed: &'a PlacedPair<'a>,
+    pub(super) queue: &'a mut TriangleQueue,
+    /// Of A and of B.
+    pub(super) packets: &'a mut [PacketCache; 2],
     pub(super) order: Order,
     pub(super) stats: QueryStats,
     pub(super) visit: F,
     /// What `visit` broke with.
-    pub(super) found: Option<Candidate>,
+    pub(super) found: Option<TrianglePair>,
 }
 
-impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts<'_, F> {
+impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> ContactVisitor<'_, F> {
     #[inline(always)]
     fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         if self.queue.is_empty() {
@@ -110,10 +108,10 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts
     }
 
     #[inline(never)]
-    fn decide(&mut self, candidate: Candidate) -> Result<ControlFlow<()>, QueryError> {
+    fn decide(&mut self, candidate: TrianglePair) -> Result<ControlFlow<()>, QueryError> {
         self.stats.exact_tests += 1;
-        let a = self.scene.triangle_a(candidate.a, candidate.lane_a)?;
-        let b = self.scene.triangle_b(candidate.b, candidate.lane_b)?;
+        let a = self.placed.triangle_a(candidate.a, candidate.lane_a)?;
+        let b = self.placed.triangle_b(candidate.b, candidate.lane_b)?;
         if triangles_intersect(&a, &b)
             && let ControlFlow::Break(found) = (self.visit)(candidate)?
         {
@@ -124,7 +122,9 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Contacts
     }
 }
 
-impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor for Contacts<'_, F> {
+impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Visitor
+    for ContactVisitor<'_, F>
+{
     const MEASURE: Measure = Measure::Overlap;
 
     fn order(&self) -> Order {
@@ -140,20 +140,20 @@ impl<F: FnMut(Candidate) -> Result<ControlFlow<Candidate>, QueryError>> Visitor 
     fn leaves<I: Isa>(
         &mut self,
         isa: I,
-        (a, b): (Leaf, Leaf),
+        (a, b): (LeafPacket, LeafPacket),
         _at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
-        let pair = &self.scene.pair;
-        let [decoded_a, decoded_b] = &mut *self.decoded;
-        let packet_a = pair.bvh_a.packet_again(pair.object_a, a, decoded_a)?;
-        let packet_b = pair.bvh_b.packet_again(pair.object_b, b, decoded_b)?;
-        let local = Local::new(isa, self.scene.frame(), packet_a, packet_b);
+        let pair = &self.placed.pair;
+        let [packets_a, packets_b] = &mut *self.packets;
+        let packet_a = pair.bvh_a.cached_packet(pair.object_a, a, packets_a)?;
+        let packet_b = pair.bvh_b.cached_packet(pair.object_b, b, packets_b)?;
+        let local = Local::new(isa, self.placed.frame(), packet_a, packet_b);
         let mut mask = face_planes(isa, &local, a, b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            self.queue.push(&local, Candidate::in_lane(a, b, lane));
+            self.queue.push(&local, TrianglePair::in_lane(a, b, lane));
             if self.queue.is_full() && self.drain(isa)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }

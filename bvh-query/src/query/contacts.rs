@@ -1,13 +1,18 @@
-//! All pairs of triangles in contact.
+//! Finds all pairs of triangles in contact.
 
-use super::collide::Contacts;
-use super::{Contact, Querier, QueryStats, Scene, Traversal, each_pair, surely_apart};
-use crate::bvh::{Bvh, Shape, TrianglePlace};
 use crate::error::QueryError;
-use crate::leaf::decoded::Decoded;
-use crate::leaf::queue::Candidate;
+use crate::file::bvh::Bvh;
+use crate::file::packet_cache::PacketCache;
+use crate::file::place::TrianglePlace;
+use crate::file::shape::Shape;
+use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
-use crate::traverse::pair::Order;
+use crate::query::answers::{Contact, QueryStats};
+use crate::query::bounding_volumes::surely_apart;
+use crate::query::collide::ContactVisitor;
+use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
+use crate::query::querier::Querier;
+use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
@@ -15,14 +20,14 @@ use bvh_format::{FormatError, Rule};
 use std::ops::ControlFlow;
 
 impl Querier {
-    /// All pairs of triangles in contact, in ascending order.
+    /// Returns all pairs of triangles in contact, in ascending order.
     ///
-    /// Equals exact predicates on all pairs of the input's triangles: an exact duplicate that the
-    /// baker left out is in contact wherever the triangle is that stands for it (if the file has
-    /// ids).
+    /// The answer is that of exact predicates on all pairs of the input's triangles. An exact duplicate that the baker
+    /// left out is in contact wherever the triangle that replaces it is, if the file has ids.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged.
+    /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
+    /// suffice.
     pub fn contacts<'a>(
         &mut self,
         a: impl Into<Shape<'a>>,
@@ -38,11 +43,11 @@ impl Querier {
         Ok(contacts)
     }
 
-    /// Calls `visit` once for each pair of triangles in contact, in no particular order, until it
-    /// breaks. Returns the number of calls.
+    /// Calls `visit` once for each pair of triangles in contact, in no particular order, until it breaks. Returns the
+    /// number of calls.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged.
+    /// The errors of [`Querier::contacts`].
     pub fn visit_contacts<'a>(
         &mut self,
         a: impl Into<Shape<'a>>,
@@ -52,10 +57,10 @@ impl Querier {
     ) -> Result<u64, QueryError> {
         self.start();
         let (a, b) = (a.into(), b.into());
-        let most = most_triangles(a).saturating_mul(most_triangles(b));
+        let most = max_triangles(a).saturating_mul(max_triangles(b));
         let (mut calls, mut too_many) = (0, false);
-        each_pair(a, b, pose, |scene| {
-            let found = self.contacts_of(scene, &mut |contact| {
+        each_pair(a, b, pose, |placed| {
+            let found = self.contacts_of(placed, &mut |contact| {
                 too_many = calls == most;
                 if too_many {
                     return ControlFlow::Break(());
@@ -70,25 +75,25 @@ impl Querier {
 
     fn contacts_of(
         &mut self,
-        scene: &Scene<'_>,
+        placed: &PlacedPair<'_>,
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
-    ) -> Result<Option<Candidate>, QueryError> {
-        self.stack.visit()?;
-        if surely_apart(&scene.pair) {
+    ) -> Result<Option<TrianglePair>, QueryError> {
+        self.memory.visit()?;
+        if surely_apart(&placed.pair) {
             return Ok(None);
         }
         self.queue.clear();
-        self.decoded.iter_mut().for_each(Decoded::start);
-        let mut visitor = Contacts {
-            scene,
+        self.packets.iter_mut().for_each(PacketCache::start);
+        let mut visitor = ContactVisitor {
+            placed,
             queue: &mut self.queue,
-            decoded: &mut self.decoded,
+            packets: &mut self.packets,
             order: Order::Tree,
             stats: QueryStats::default(),
-            visit: |candidate| report(scene, candidate, visit),
+            visit: |candidate| report(placed, candidate, visit),
             found: None,
         };
-        let task = Traversal { pair: scene.pair, stack: &mut self.stack, visitor: &mut visitor };
+        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let (found, stats) = (visitor.found, visitor.stats);
         self.stats.add(tests, stats);
@@ -96,19 +101,19 @@ impl Querier {
     }
 }
 
-/// No fewer than the triangles of a side, duplicates included, whatever its file states: what its pages have
-/// room for. In a forged file any number of triangles may have the id that all duplicates belong to, and pairs
-/// of them would be without number.
-fn most_triangles(side: Shape<'_>) -> u64 {
-    let pages: u64 = side.objects().iter().map(|object| u64::from(object.record.pages.get())).sum();
+/// Returns an upper bound of the triangles of a side, duplicates included, whatever its file states: what its pages have
+/// room for. In a forged file any number of triangles may have the id that all duplicates belong to, so that the
+/// number of their pairs would have no bound.
+fn max_triangles(side: Shape<'_>) -> u64 {
+    let pages: u64 = side.objects().iter().map(|object| u64::from(object.record().pages.get())).sum();
     let (layout, bytes) = (side.bvh().layout(), side.bvh().bytes());
-    pages * MOST_TRIANGLES_A_PAGE + layout.duplicate_ids(bytes).len() as u64
+    pages * MAX_TRIANGLES_PER_PAGE + layout.duplicate_ids(bytes).len() as u64
 }
 
-/// 62 treelets of 8 children, each a packet.
-const MOST_TRIANGLES_A_PAGE: u64 = 62 * 8 * PACKET as u64;
+/// A page has at most 62 treelets of 8 children, each of which may be a packet.
+const MAX_TRIANGLES_PER_PAGE: u64 = 62 * 8 * PACKET as u64;
 
-/// The breach behind more contacts than there are pairs of triangles.
+/// Returns the rule that is broken where there are more contacts than pairs of triangles.
 #[cold]
 fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
     let sections = [a, b].map(|side| &side.bvh().layout().sections);
@@ -119,16 +124,16 @@ fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
 
 /// Reports a pair of stored triangles and all pairs of duplicates that they stand for.
 fn report(
-    scene: &Scene<'_>,
-    candidate: Candidate,
+    placed: &PlacedPair<'_>,
+    candidate: TrianglePair,
     visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
-) -> Result<ControlFlow<Candidate>, QueryError> {
-    let pair = &scene.pair;
+) -> Result<ControlFlow<TrianglePair>, QueryError> {
+    let pair = &placed.pair;
     let id_a = triangle_id(pair.bvh_a, pair.object_a, candidate.place_a())?;
     let id_b = triangle_id(pair.bvh_b, pair.object_b, candidate.place_b())?;
     for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)?) {
         for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)?) {
-            let (object_a, object_b) = scene.numbers;
+            let (object_a, object_b) = placed.numbers;
             if visit(Contact { object_a, triangle_a, object_b, triangle_b }).is_break() {
                 return Ok(ControlFlow::Break(candidate));
             }
@@ -141,13 +146,13 @@ fn triangle_id(bvh: &Bvh, object: &Object, place: TrianglePlace) -> Result<u32, 
     bvh.triangle_id(object, place)
 }
 
-impl Candidate {
-    /// Where the triangle of A is stored.
+impl TrianglePair {
+    /// Returns where the triangle of A is stored.
     pub(super) fn place_a(&self) -> TrianglePlace {
         TrianglePlace { page: self.a.page, packet: self.a.packet, lane: self.lane_a }
     }
 
-    /// Where the triangle of B is stored.
+    /// Returns where the triangle of B is stored.
     pub(super) fn place_b(&self) -> TrianglePlace {
         TrianglePlace { page: self.b.page, packet: self.b.packet, lane: self.lane_b }
     }

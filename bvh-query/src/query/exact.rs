@@ -1,34 +1,34 @@
-//! From a stored triangle to its exactly defined corners in A's frame.
+//! Places stored triangles: their corners in A's frame are defined exactly.
 
-use crate::bvh::Bvh;
 use crate::error::QueryError;
+use crate::file::bvh::Bvh;
+use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
 use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
-use crate::query::Scene;
-use crate::traverse::opened::Leaf;
+use crate::query::placed_pair::PlacedPair;
 use bvh_format::object::Object;
 
-impl Scene<'_> {
-    /// A triangle of A.
-    pub(crate) fn triangle_a(&self, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
+impl PlacedPair<'_> {
+    /// Returns a triangle of A.
+    pub(crate) fn triangle_a(&self, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
         stored(self.pair.bvh_a, self.pair.object_a, leaf, lane)
     }
 
-    /// A triangle of B, placed.
-    pub(crate) fn triangle_b(&self, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
+    /// Returns a triangle of B, placed in A's frame.
+    pub(crate) fn triangle_b(&self, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
         Ok(placed(&stored(self.pair.bvh_b, self.pair.object_b, leaf, lane)?, self.pose))
     }
 }
 
-/// A triangle in its own file's frame: origin plus stored offset, which is exact.
-pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: Leaf, lane: u8) -> Result<Triangle, QueryError> {
+/// Returns a triangle in the frame of its own file: origin plus stored offset, a sum that is exact.
+pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
     let corners = bvh.triangle(object, leaf, lane & 3)?;
-    let origin = object.record.origin.map(|o| o.get());
+    let origin = object.origin();
     Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
 }
 
-/// `triangle_distance`, with the features of a backend: its 42 candidates fill vector registers.
+/// Runs `triangle_distance` with the features of a backend: its 42 candidates fill vector registers.
 pub(super) struct TriangleDistance<'a>(pub(super) &'a Triangle, pub(super) &'a Triangle);
 
 impl Task for TriangleDistance<'_> {
@@ -40,7 +40,7 @@ impl Task for TriangleDistance<'_> {
     }
 }
 
-/// Where a pose puts a triangle of B.
+/// Returns a triangle of B, placed in A's frame.
 pub(super) fn placed(triangle: &Triangle, pose: &Pose) -> Triangle {
     triangle.map(|corner| pose.place(corner))
 }

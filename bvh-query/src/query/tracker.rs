@@ -1,44 +1,47 @@
-//! Temporal coherence: what the last answers about two meshes tell of the next one.
+//! Temporal coherence: reuses the last answers about two meshes for the next pose.
 //!
-//! Two things are kept, and neither shows in an answer:
+//! A tracker keeps two things, and neither shows in an answer:
 //!
 //! - *A pair of triangles*, the last that was closest, near or in contact. Whatever the pose, it is one of the pairs
-//!   that the question is about. If it meets in the new pose, so do the meshes. Else its distance there, measured in
-//!   f64 with its certified upper bound, limits the walk before it begins, and the direction between its closest
-//!   points is the first witness axis. It is no answer itself: the walk prunes strictly beyond the limit, comes by
-//!   this pair or a nearer one, and decides as it always does.
-//! - *A clearance*: certified bounds of the distance in the pose of that time. No vertex of B is moved farther than
-//!   [`motion`] from there to a new pose, so the new distance is within that of the old one. Where this says that
-//!   the meshes are apart, or within d, or not, nothing is walked.
+//!   that the question is about. If it meets in the new pose, so do the meshes. Otherwise its distance in the new pose,
+//!   measured in f64 with a certified upper bound, limits the walk before it begins, and the direction between its
+//!   closest points is the first witness direction. The pair is no answer itself: the walk prunes strictly beyond the
+//!   limit, meets this pair or a nearer one, and decides as it always does.
+//! - *A clearance*: certified bounds of the distance in an earlier pose. No vertex of B moves farther than
+//!   [`motion`] from that pose to a new one, so that the distance changes by no more. Where the bounds decide the
+//!   question, there is no walk.
 //!
-//! Both belong to two open files and the objects asked about, and are forgotten when others come.
+//! Both belong to two open files and the objects asked about. They are forgotten when a question is about others.
 //!
-//! A walk that only looks for contact learns nothing of clearance. So after the answer no, the tracker at times asks
-//! further whether the meshes come as near as [`AHEAD`] times the last motion, with no more work than the question
-//! took. If not, some next answers are known; if they do or that is too much work, it waits longer each time.
+//! A walk that only looks for contact learns nothing of the clearance. So after the answer no, the tracker at times asks
+//! whether the meshes come as near as [`LOOK_AHEAD_MOTIONS`] times the last motion, with no more work than the question
+//! took. If they do not, the next few answers are known. If they do, or if that takes too much work, the tracker waits
+//! longer before it asks again.
 //! Conservative advancement bounds motion in the same way: B. Mirtich, "Impulse-based Dynamic Simulation of Rigid
 //! Body Systems", 1996, section 2.3.2.
 
-use super::distance::{DistanceOptions, Search, no_answer};
-use super::exact::TriangleDistance;
-use super::exact::{placed, stored};
-use super::{Distance, Found, Querier};
-use crate::bvh::Shape;
 use crate::error::QueryError;
+use crate::file::shape::Shape;
 use crate::narrow::{Triangle, triangles_intersect, triangles_within};
 use crate::pose::Pose;
-use crate::traverse::align::POSE_ERROR;
-use bvh_format::object::Object;
+use crate::query::answers::Distance;
+use crate::query::distance::no_answer;
+use crate::query::exact::{TriangleDistance, placed, stored};
+use crate::query::motion::{motion, size};
+use crate::query::options::{DistanceOptions, check_distance};
+use crate::query::placed_pair::Found;
+use crate::query::querier::Querier;
+use crate::query::search::Search;
 
 /// Remembers the last answers about two meshes, so that the next one, about a pose near by, costs less.
 ///
-/// Its questions are those of [`Querier`], and so are the answers, bit for bit. Keep one for each pair of meshes
-/// that moves along a path. It may be asked about any meshes and poses in any order: what does not fit what it
-/// remembers costs a look at two triangles, and other meshes make it forget. It holds some 300 bytes, borrows
-/// nothing, and allocates nothing that the querier would not.
+/// A tracker asks the questions of [`Querier`] and gives the same answers, bit for bit. Keep one tracker for each pair of
+/// meshes that moves along a path. It may be asked about any meshes and poses in any order: a pose far from the last one
+/// costs a look at two triangles, and other meshes make it forget. A tracker holds some 300 bytes, borrows nothing, and
+/// allocates nothing that the querier would not.
 ///
-/// A query through a tracker visits less, so that it may have an answer where the querier alone comes upon a damaged
-/// page or the end of its budget.
+/// A query through a tracker visits less, so that it may have an answer where the querier alone meets a damaged page or
+/// exceeds its budget.
 ///
 /// ```
 /// use bvh_query::{Bvh, Pose, Querier, Tracker};
@@ -63,8 +66,9 @@ pub struct Tracker {
     last: Option<Asked>,
     pair: Option<Found>,
     clearance: Option<Clearance>,
-    /// Questions to let pass before looking ahead again, and how many that was the last time.
+    /// How many questions to let pass before looking ahead again.
     wait: u32,
+    /// The value that `wait` was last set to.
     waited: u32,
 }
 
@@ -74,7 +78,7 @@ struct Asked {
     pose: Pose,
 }
 
-/// Certified bounds of the distance in a pose, mesh units.
+/// Certified bounds of the distance in a pose, in mesh units.
 #[derive(Debug, Clone, Copy)]
 struct Clearance {
     pose: Pose,
@@ -82,24 +86,24 @@ struct Clearance {
     upper: f64,
 }
 
-/// How many motions like the last one to look ahead.
-const AHEAD: f64 = 8.0;
-/// Beyond this fraction of B's size a motion is no small step: a pair that was near need not be, and looking ahead is
-/// in vain.
-const SMALL: f64 = 1.0 / 16.0;
-/// The most questions to let pass.
-const PATIENCE: u32 = 64;
+/// How far to look ahead, in motions as long as the last one.
+const LOOK_AHEAD_MOTIONS: f64 = 8.0;
+/// The longest motion that counts as a small step, as a fraction of B's size. After a longer one, a pair that was near may
+/// be anywhere, and looking ahead is in vain.
+const MAX_STEP_PER_SIZE: f64 = 1.0 / 16.0;
+/// The most questions to let pass between two looks ahead.
+const MAX_QUESTIONS_BETWEEN_LOOKS: u32 = 64;
 
 impl Tracker {
-    /// One that remembers nothing.
+    /// Creates a tracker that remembers nothing.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// [`Querier::collide`], by `querier`.
+    /// Answers [`Querier::collide`], by means of `querier`.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged, or the budget does not suffice.
+    /// The errors of [`Querier::collide`].
     pub fn collide<'a>(
         &mut self,
         querier: &mut Querier,
@@ -127,10 +131,10 @@ impl Tracker {
         Ok(contact.is_some())
     }
 
-    /// [`Querier::distance`], by `querier`.
+    /// Answers [`Querier::distance`], by means of `querier`.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged, or the budget does not suffice.
+    /// The errors of [`Querier::distance`].
     pub fn distance<'a>(
         &mut self,
         querier: &mut Querier,
@@ -154,7 +158,7 @@ impl Tracker {
         }
         let best = match found {
             Some(best) => best,
-            // Nothing near by is remembered, or a triangle that no walk leads to, as a forged file may have it.
+            // No pair near by is remembered, or one that no walk leads to, as a forged file may have it.
             None => {
                 limited = search();
                 querier.nearest(a, b, pose, &mut limited)?.ok_or_else(|| no_answer(a))?
@@ -166,10 +170,10 @@ impl Tracker {
         Ok(answer)
     }
 
-    /// [`Querier::within`], by `querier`; `d` in mesh units.
+    /// Answers [`Querier::within`], by means of `querier`; `d` is in mesh units.
     ///
     /// # Errors
-    /// If a page that the query touches is damaged, or the budget does not suffice.
+    /// The errors of [`Querier::within`].
     pub fn within<'a>(
         &mut self,
         querier: &mut Querier,
@@ -178,12 +182,10 @@ impl Tracker {
         pose: &Pose,
         d: f64,
     ) -> Result<bool, QueryError> {
+        check_distance(d)?;
         let (a, b) = (a.into(), b.into());
         if d == 0.0 {
             return self.collide(querier, a, b, pose);
-        }
-        if d.is_nan() || d < 0.0 || d == f64::INFINITY {
-            return querier.within(a, b, pose, d);
         }
         querier.start();
         let moved = self.turn_to(a, b, pose);
@@ -211,7 +213,8 @@ impl Tracker {
         Ok(search.done)
     }
 
-    /// Forgets what is not about these meshes. Returns how far B has moved since the last question.
+    /// Forgets what is not about these meshes. Returns how far B has moved since the last question, if that was about them
+    /// too.
     fn turn_to(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Option<f64> {
         let sides = [a.identity(), b.identity()];
         let last = self.last.filter(|last| last.sides == sides);
@@ -222,14 +225,14 @@ impl Tracker {
         last.map(|last| motion(b, &last.pose, pose))
     }
 
-    /// Certified bounds of the distance in a new pose.
+    /// Returns certified bounds of the distance in a new pose.
     fn bounds(&self, b: Shape<'_>, pose: &Pose) -> Option<(f64, f64)> {
         let held = self.clearance.as_ref()?;
         let moved = motion(b, &held.pose, pose);
         Some(((held.lower - moved).next_down(), (held.upper + moved).next_up()))
     }
 
-    /// The pair of triangles in a new pose. A page that is damaged is left for the walk to find.
+    /// Returns the remembered pair of triangles in a new pose. A damaged page is left for the walk to find.
     fn triangles(
         &self,
         querier: &mut Querier,
@@ -245,8 +248,8 @@ impl Tracker {
         Some((triangle_a, placed(&triangle_b, pose)))
     }
 
-    /// Asks, of meshes more than `beyond` apart that moved by `moved`, whether there is room for more of that.
-    /// Takes at most as many visits as the query did, and nothing that goes wrong matters.
+    /// Asks of meshes more than `beyond` apart, the last motion of which was `moved`, whether there is room for several
+    /// motions more. This takes at most as many visits as the query did, and its errors do not matter.
     fn look_ahead(
         &mut self,
         querier: &mut Querier,
@@ -260,130 +263,22 @@ impl Tracker {
             self.wait -= 1;
             return;
         }
-        let room = beyond + AHEAD * moved;
+        let room = beyond + LOOK_AHEAD_MOTIONS * moved;
         let mut search = Search::new(DistanceOptions::default(), room);
-        querier.stack.allow_as_much_again();
+        querier.memory.allow_as_much_again();
         if querier.search(a, b, pose, &mut search).is_ok() && !search.done {
             self.clearance = Some(Clearance { pose: *pose, lower: room, upper: f64::INFINITY });
             self.waited = 0;
         } else {
-            // The nearest that is known, and so perhaps the first to touch.
+            // The nearest pair known is perhaps the first to touch.
             self.pair = search.best.map(|best| best.found).or(self.pair);
-            self.waited = (2 * self.waited + 1).min(PATIENCE);
+            self.waited = (2 * self.waited + 1).min(MAX_QUESTIONS_BETWEEN_LOOKS);
             self.wait = self.waited;
         }
     }
 }
 
-/// False for a motion that is not known, too.
+/// Returns whether a motion is known and a small step.
 fn is_small(moved: Option<f64>, b: Shape<'_>) -> bool {
-    moved.is_some_and(|moved| moved <= SMALL * size(b))
-}
-
-/// The largest side of the boxes of a shape's objects, mesh units.
-fn size(side: Shape<'_>) -> f64 {
-    let of = |object: &Object| half_sides(object).into_iter().fold(0.0, f64::max);
-    2.0 * side.objects().iter().map(of).fold(0.0, f64::max)
-}
-
-fn half_sides(object: &Object) -> [f64; 3] {
-    let (lo, hi) = (&object.record.box_lo, &object.record.box_hi);
-    [0, 1, 2].map(|axis| (f64::from(hi[axis].get()) - f64::from(lo[axis].get())) / 2.0)
-}
-
-/// An upper bound of how far any vertex of B moves from one pose to another, mesh units.
-///
-/// A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
-/// moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.
-///
-/// Rounding: let m be the sum, over the axes, of the magnitudes of the origin, of both ends of the box and of both
-/// translations; rows of rotations have entries of at most 1 + 2^-20. Each placed vertex is off by at most 8u m along an
-/// axis, twice; centre, half sides and the changes by 8u m, the products and sums above by 16u m; u = 2^-53. That is
-/// below 2^-47 m, and over the three axes below 2^-46 m, which is charged. Squares underflow below 2^-511, which is
-/// charged too.
-fn motion(b: Shape<'_>, from: &Pose, to: &Pose) -> f64 {
-    let mut change = [[0.0; 3]; 3];
-    let mut shift = [0.0; 3];
-    let mut translations = 0.0;
-    for i in 0..3 {
-        let (t_from, t_to) = (from.translation()[i], to.translation()[i]);
-        shift[i] = t_to - t_from;
-        translations += t_from.abs() + t_to.abs();
-        for j in 0..3 {
-            change[i][j] = to.rotation()[i][j] - from.rotation()[i][j];
-        }
-    }
-    let of = |object: &Object| {
-        let record = &object.record;
-        let h = half_sides(object);
-        let (mut c, mut m) = ([0.0; 3], translations);
-        for axis in 0..3 {
-            let (lo, hi) = (f64::from(record.box_lo[axis].get()), f64::from(record.box_hi[axis].get()));
-            let origin = record.origin[axis].get();
-            c[axis] = origin + (lo + hi) / 2.0;
-            m += origin.abs() + lo.abs() + hi.abs();
-        }
-        let mut squared = 0.0;
-        for i in 0..3 {
-            let d = change[i];
-            let centre = d[0] * c[0] + d[1] * c[1] + d[2] * c[2] + shift[i];
-            let turn = d[0].abs() * h[0] + d[1].abs() * h[1] + d[2].abs() * h[2];
-            squared += (centre.abs() + turn).powi(2);
-        }
-        let root = f64::sqrt(squared) * (1.0 + 2f64.powi(-50));
-        root + 4.0 * POSE_ERROR * m + 2f64.powi(-511)
-    };
-    b.objects().iter().map(of).fold(0.0, f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bvh::Bvh;
-    use crate::traverse::opened::Leaf;
-
-    /// Of the golden file's vertices, none goes farther than the bound; and the bound is not much farther than the
-    /// farthest goes, and what is charged for rounding, of an origin at 2^22.
-    #[test]
-    fn no_vertex_moves_farther_than_the_bound() {
-        let bvh = Bvh::from_static(include_bytes!("../../../testdata/ok-everything.cbvh")).unwrap();
-        let mut state = 7u64;
-        let mut signed = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
-        for round in 0..200 {
-            let scale = 10f64.powi(-(round % 16));
-            let angles = [signed() * 3.0, 0.0].map(|angle| angle + scale * signed());
-            let translation = [signed(), signed(), signed()].map(|x| 1e3 * x);
-            let poses = angles.map(|angle| {
-                let (sin, cos) = angle.sin_cos();
-                let moved = translation.map(|x| x + scale * signed());
-                Pose::new([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]], moved).unwrap()
-            });
-            let [from, to] = if round % 5 == 0 { [poses[0]; 2] } else { poses };
-            let bound = motion(bvh.all(), &from, &to);
-            let mut farthest = 0.0f64;
-            for object in bvh.objects() {
-                let h = half_sides(object);
-                for number in object.pages() {
-                    let page = bvh.page(object, number).unwrap();
-                    for packet in 0..page.header().packets.get() {
-                        let origin = object.record.origin.map(|o| o.get());
-                        let leaf = Leaf { page: number, packet, triangles: 4 };
-                        for v in (0..4).flat_map(|lane| bvh.triangle(object, leaf, lane).unwrap()) {
-                            let point = [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]));
-                            let (p, q) = (from.place(point), to.place(point));
-                            let squared: f64 = (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum();
-                            farthest = farthest.max(squared.sqrt());
-                        }
-                    }
-                }
-                assert!(farthest <= bound, "{farthest} beyond {bound}");
-                assert!(h.iter().all(|h| *h >= 0.0));
-            }
-            assert!(round % 5 != 0 || bound < 1e-6, "{bound} on the spot");
-            assert!(bound <= 1e-6 + 100.0 * (farthest + scale), "{bound} for {farthest}");
-        }
-    }
+    moved.is_some_and(|moved| moved <= MAX_STEP_PER_SIZE * size(b))
 }

@@ -1,7 +1,7 @@
 //! Re-aligns the k-DOPs of B to the directions of A under a pose.
 //!
 //! Along a direction `d` of A, seen from B as `d' = R^T d`, the ends of a node of B follow from three of
-//! its slabs: see `bvh_format::support`.
+//! its slabs: see `bvh_format::realign`.
 //!
 //! Rounding: with u = 2^-24, all ends at most M in magnitude, three rounded coefficients, three
 //! products and three sums, the computed end is within 8u (M sum |c_j| + |t|) of the exact one, where
@@ -12,18 +12,15 @@
 //! nothing for it.
 
 use crate::isa::{FourRows, Isa, Lanes, Part, Task};
-use crate::pose::Pose;
+use crate::traverse::placement::Placement;
 use bvh_format::kdop::{DirectionSet, FACTORS};
-use bvh_format::object::Object;
+use bvh_format::realign::{cone, magnitudes, rows_by_cone};
 use bvh_format::slabs::{Group, row};
-use bvh_format::support::{cone, magnitudes, rows_by_cone};
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
 /// Absolute error charged to an end, mesh units: 2^-147, twice what four roundings of subnormal numbers give.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
-/// Relative error charged to all f64 work of a pose: 32 roundings, three times what there are at most.
-pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end
 /// has the same coefficients over the other ends of the slabs.
@@ -85,74 +82,8 @@ const PLACES: [[u32; 64]; 3] = {
     places
 };
 
-/// The pose of object B in the frame of object A, both around their origins.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Placement {
-    pub(crate) rotation: [[f64; 3]; 3],
-    /// R origin_b + t - origin_a.
-    pub(crate) translation: [f64; 3],
-    /// Bound on the f64 error of translation and of placed vertices, mesh units.
-    pub(crate) error: f64,
-}
-
-impl Placement {
-    /// Of no pose yet.
-    pub(crate) const NONE: Self = Self { rotation: [[0.0; 3]; 3], translation: [0.0; 3], error: 0.0 };
-
-    pub(crate) fn new(pose: &Pose, a: &Object, b: &Object) -> Self {
-        let (record_a, record_b) = (&a.record, &b.record);
-        let mut origin = [[0.0; 3]; 2];
-        let mut magnitude = 0.0;
-        for axis in 0..3 {
-            origin[0][axis] = record_a.origin[axis].get();
-            origin[1][axis] = record_b.origin[axis].get();
-            magnitude += origin[0][axis].abs() + origin[1][axis].abs() + pose.translation()[axis].abs();
-            // Three times the largest coordinate, and more: the sum over the axes of both ends.
-            for record in [record_a, record_b] {
-                let (lo, hi) = (record.box_lo[axis].get(), record.box_hi[axis].get());
-                magnitude += 3.0 * f64::from(lo.abs() + hi.abs());
-            }
-        }
-        let placed = pose.place(origin[1]);
-        let [x, y, z] = origin[0];
-        Self {
-            rotation: *pose.rotation(),
-            translation: [placed[0] - x, placed[1] - y, placed[2] - z],
-            error: magnitude * POSE_ERROR,
-        }
-    }
-
-    /// The placement of A in the frame of B.
-    ///
-    /// A rotation may be 2^-20 off, so this is the inverse, not the transpose. With v = 2^-53, its entries are
-    /// within 16v of exact ones: 3v from a difference of products, 12v from the determinant's inverse, v from
-    /// their product. Along a direction of up to three entries that moves a projection by 54v of the
-    /// coordinates and 64v of the translation's, together less than 2^-45 of the magnitudes that `error`
-    /// is 2^-48 of. Alignment charges three times the error; four times as much here covers all.
-    pub(crate) fn inverse(&self) -> Self {
-        let [x, y, z] = self.rotation;
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        };
-        let columns = [cross(y, z), cross(z, x), cross(x, y)];
-        let scale = 1.0 / (x[0] * columns[0][0] + x[1] * columns[0][1] + x[2] * columns[0][2]);
-        let rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i] * scale));
-        let t = self.translation;
-        let translation = rotation.map(|row: [f64; 3]| -(row[0] * t[0] + row[1] * t[1] + row[2] * t[2]));
-        Self { rotation, translation, error: 4.0 * self.error }
-    }
-
-    /// A direction of A's frame as B sees it.
-    #[inline(always)]
-    pub(crate) fn seen_from_b(&self, d: [f64; 3]) -> [f64; 3] {
-        let r = &self.rotation;
-        let along = |i: usize| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2];
-        [along(0), along(1), along(2)]
-    }
-}
-
 impl Alignment {
-    /// Of no pose yet.
+    /// An empty alignment, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
         rows: [[0; 16]; 3],
         lanes: [[[0; 16]; 4]; 3],
@@ -162,7 +93,7 @@ impl Alignment {
         set: DirectionSet::Dop6,
     };
 
-    /// Prepares a pose, in place: it is as much as 50 lines of memory. `reach_b` bounds the slab ends of B's nodes.
+    /// Prepares a pose in place, because an alignment takes 50 cache lines. `reach_b` bounds the slab ends of B's nodes.
     #[inline(always)]
     pub(crate) fn prepare<I: Isa>(
         &mut self,
@@ -181,7 +112,7 @@ impl Alignment {
     #[inline(always)]
     fn prepare_set<I: Isa>(&mut self, isa: I, placement: &Placement, set: DirectionSet, reach_b: f32) {
         let (r, t) = (&placement.rotation, &placement.translation);
-        // One array a quantity, so that all directions go through vector registers at once.
+        // One array per quantity, so that all directions go through vector registers at once.
         let mut cones = [0; 16];
         let mut coefficients = [[0.0f32; 16]; 3];
         let (mut offset_lo, mut offset_hi) = ([0.0; 16], [0.0; 16]);
@@ -234,7 +165,7 @@ impl Alignment {
         self.set = set;
     }
 
-    /// The ends of four nodes of B along the directions `to` of A, outward.
+    /// Computes the ends of four nodes of B along the directions `to` of A, outward.
     #[inline(always)]
     pub(crate) fn align<I: Isa>(&self, isa: I, to: DirectionSet, group: &Group, aligned: &mut Group) {
         match self.set {
@@ -248,7 +179,7 @@ impl Alignment {
         }
     }
 
-    /// The same, given the part of a group that each term takes its ends from.
+    /// Aligns four nodes, given the part of a group that each term takes its ends from.
     #[inline(always)]
     fn align_terms<I: Isa>(
         &self,
@@ -289,7 +220,7 @@ impl Alignment {
     }
 }
 
-/// Each value four times: for the four nodes of its row.
+/// Repeats each value four times, for the four nodes of its row.
 #[inline(always)]
 fn spread<I: Isa>(isa: I, values: &[f32; 16], to: &mut [[f32; 16]; 4]) {
     for (register, values) in to.iter_mut().zip(values.as_chunks::<4>().0) {
@@ -297,7 +228,7 @@ fn spread<I: Isa>(isa: I, values: &[f32; 16], to: &mut [[f32; 16]; 4]) {
     }
 }
 
-/// Prepares a pose, called from where it is not worth its own place in the code.
+/// Prepares a pose in a task, compiled apart from its caller, which rarely needs it.
 pub(crate) struct Prepare<'a> {
     pub(crate) alignment: &'a mut Alignment,
     pub(crate) placement: &'a Placement,
@@ -322,7 +253,7 @@ pub(crate) fn form_error([x, y, z]: [f32; 3], reach: f32, offset: f64) -> f64 {
     10.0 * U * (terms + offset.abs()) + UNDERFLOW
 }
 
-/// The nearest f32 at or above.
+/// Returns the least f32 that is not below `value`.
 pub(crate) fn round_up(value: f64) -> f32 {
     let nearest = value as f32;
     if f64::from(nearest) < value { nearest.next_up() } else { nearest }
@@ -332,6 +263,8 @@ pub(crate) fn round_up(value: f64) -> f32 {
 mod tests {
     use super::*;
     use crate::isa::Backend;
+    use crate::pose::Pose;
+    use crate::traverse::placement::POSE_ERROR;
     use bvh_format::kdop::Kdop;
     use bvh_format::slabs::NodeSlabs;
     use bvh_format::treelet::child_slabs;

@@ -2,7 +2,9 @@
 
 pub(crate) mod align;
 pub(crate) mod decode;
+pub(crate) mod large_leaf;
+pub(crate) mod node_cache;
 pub(crate) mod node_test;
-pub(crate) mod opened;
-pub(crate) mod pair;
-pub(crate) mod pairs;
+pub(crate) mod placement;
+pub(crate) mod walk;
+pub(crate) mod worklist;

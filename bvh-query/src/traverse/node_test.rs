@@ -1,11 +1,20 @@
-//! The node test: 16 pairs of nodes at a time along A's directions.
+//! The node test: bounds 16 pairs of nodes at a time along A's directions and, later in a walk, along B's.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{Alignment, Placement, Prepare, form_error};
-use crate::traverse::pair::{Measure, Pair};
+use crate::traverse::align::{Alignment, Prepare, form_error};
+use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::DirectionSet;
+use bvh_format::realign::{Form, upper_form};
 use bvh_format::slabs::{Group, NodeSlabs, row};
-use bvh_format::support::{Form, upper_form};
+
+/// What the bound of a pair means.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Measure {
+    /// Only its sign counts: it is positive if the nodes are apart.
+    Overlap,
+    /// It is a lower bound of the distance, in mesh units.
+    Distance,
+}
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
 const INVERSE_LENGTHS: [f32; 13] = {
@@ -14,7 +23,7 @@ const INVERSE_LENGTHS: [f32; 13] = {
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
 };
 
-/// A bound on the slab ends of all nodes: that of the root's. Rows of no slab are zero.
+/// Returns a bound on the slab ends of all nodes, from those of the root. Rows without a slab are zero.
 #[inline(always)]
 fn reach(root: &NodeSlabs) -> f32 {
     let mut reach = [0.0f32; 16];
@@ -30,7 +39,7 @@ fn reach(root: &NodeSlabs) -> f32 {
     reach[0]
 }
 
-/// A direction in A's frame as one more pair of slab ends to compare.
+/// A direction in A's frame along which one more pair of slab ends is compared.
 #[derive(Clone, Copy)]
 pub(crate) struct Witness {
     direction: [f32; 3],
@@ -45,7 +54,7 @@ pub(crate) struct Witness {
 pub(crate) struct NodeTest {
     /// B along A's directions.
     alignment: Alignment,
-    /// A along B's directions, once that pays.
+    /// A along B's directions, prepared once that pays.
     inverse: Alignment,
     looks_along_b: bool,
     placement: Placement,
@@ -56,7 +65,7 @@ pub(crate) struct NodeTest {
 }
 
 impl NodeTest {
-    /// Of no pose yet.
+    /// An empty test, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
         alignment: Alignment::NONE,
         inverse: Alignment::NONE,
@@ -73,18 +82,19 @@ impl NodeTest {
     pub(crate) fn prepare<I: Isa>(
         &mut self,
         isa: I,
-        pair: &Pair<'_>,
+        pair: &ObjectPair<'_>,
         root_a: &NodeSlabs,
         root_b: &NodeSlabs,
     ) {
         self.looks_along_b = false;
         self.placement = *pair.placement;
-        (self.set_a, self.set_b) = (pair.object_a.profile.directions(), pair.object_b.profile.directions());
+        (self.set_a, self.set_b) =
+            (pair.object_a.profile().directions(), pair.object_b.profile().directions());
         (self.reach_a, self.reach_b) = (reach(root_a), reach(root_b));
         self.alignment.prepare(isa, pair.placement, self.set_b, self.reach_b);
     }
 
-    /// Takes over a new witness direction.
+    /// Adopts a new witness direction.
     #[inline(always)]
     pub(crate) fn update_witness(&self, witness: &mut Option<Witness>, direction: Option<[f32; 3]>) {
         if let Some(direction) = direction
@@ -107,7 +117,13 @@ impl NodeTest {
         Witness { direction, form_a, form_b, offset: (offset - error) as f32 }
     }
 
-    /// From now on there is a test along B's directions, too.
+    /// Returns bounds on the slab ends of A's nodes and of B's.
+    #[inline(always)]
+    pub(crate) fn reaches(&self) -> (f32, f32) {
+        (self.reach_a, self.reach_b)
+    }
+
+    /// Prepares the test along B's directions, too.
     #[inline(always)]
     pub(crate) fn look_along_b<I: Isa>(&mut self, isa: I) {
         let placement = self.placement.inverse();
@@ -116,19 +132,19 @@ impl NodeTest {
         self.looks_along_b = true;
     }
 
-    /// True if there is a test along B's directions.
+    /// Returns whether the test along B's directions has been prepared.
     #[inline(always)]
     pub(crate) fn looks_along_b(&self) -> bool {
         self.looks_along_b
     }
 
-    /// B's slab ends along A's directions, outward.
+    /// Computes B's slab ends along A's directions, rounded outward.
     #[inline(always)]
     pub(crate) fn align_b<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Group) {
         self.alignment.align(isa, self.set_a, group, aligned);
     }
 
-    /// A's slab ends along B's directions, outward, after `look_along_b`.
+    /// Computes A's slab ends along B's directions, rounded outward, after `look_along_b`.
     #[inline(always)]
     pub(crate) fn align_a<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Group) {
         self.inverse.align(isa, self.set_b, group, aligned);
@@ -154,7 +170,7 @@ impl NodeTest {
         I::V::bits(gaps.le(isa.splat(limit)))
     }
 
-    /// The same along B's directions: raises the bounds that `run` has found.
+    /// Tests the same pairs along B's directions: raises the bounds that `run` has found.
     #[inline(always)]
     pub(crate) fn run_along_b<I: Isa>(
         &self,
@@ -185,7 +201,7 @@ impl Witness {
     }
 }
 
-/// A form over the rows of a group, plus an offset.
+/// Evaluates a form over the rows of a group, and adds an offset.
 #[inline(always)]
 fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
     let rows = group.rows();
@@ -197,7 +213,7 @@ fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
     sum
 }
 
-/// The signed gap of each of 16 pairs, four nodes of A and four of B, along one direction of both groups.
+/// Returns the signed gap of each of 16 pairs, four nodes of A and four of B, along one direction of both groups.
 #[inline(always)]
 fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::V {
     let (rows_a, rows_b) = (group_a.rows(), group_b.rows());
@@ -206,7 +222,7 @@ fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::
     lo_a.sub(hi_b).max(lo_b.sub(hi_a))
 }
 
-/// `gaps` for the directions of a set.
+/// Runs `gaps` for the directions of a set.
 #[inline(always)]
 fn gaps_along<I: Isa>(isa: I, measure: Measure, set: DirectionSet, ends: (&Group, &Group)) -> I::V {
     match set {
@@ -216,7 +232,7 @@ fn gaps_along<I: Isa>(isa: I, measure: Measure, set: DirectionSet, ends: (&Group
     }
 }
 
-/// The gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
+/// Returns the gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
 /// `Distance` a lower bound of the distance.
 #[inline(always)]
 fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Group)) -> I::V {

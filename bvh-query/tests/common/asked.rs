@@ -1,4 +1,4 @@
-//! Everything that a file of any bytes can be asked, and the valid files that tests damage.
+//! Asks a file of any bytes every query, and provides the valid files that tests damage.
 
 use super::shapes::{dirty, soup};
 use super::{mesh, options};
@@ -9,7 +9,7 @@ use bvh_query::{Bvh, Contact, Distance, Pose, Querier, QueryError};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// What a file answers: everything that can be asked, errors included.
+/// The answers of a file to every query, errors included.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answers {
     pub(crate) collide: Result<bool, QueryError>,
@@ -23,7 +23,7 @@ impl Answers {
         self.collide.is_err() || self.contacts.is_err() || self.distance.is_err() || self.within.is_err()
     }
 
-    /// True if each of these either was refused or is the answer of the undamaged file.
+    /// Returns whether each answer either was refused or is that of the undamaged file.
     pub(crate) fn are_refused_or(&self, other: &Self) -> bool {
         (self.collide.is_err() || self.collide == other.collide)
             && (self.distance.is_err() || self.distance == other.distance)
@@ -32,8 +32,8 @@ impl Answers {
     }
 }
 
-/// Asks a file that may be anything, on both sides. At most some thousand contacts: a forged file may have any
-/// number of equal triangles.
+/// Asks every query with the file as A and as B. Visits at most some thousand contacts, because a forged file may
+/// have any number of equal triangles.
 pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) -> Option<[Answers; 2]> {
     let bvh = Bvh::from_bytes(bytes.to_vec()).ok()?;
     let mut ask = |a: &Bvh, b: &Bvh| {
@@ -53,7 +53,7 @@ pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) 
     Some([ask(&bvh, good), ask(good, &bvh)])
 }
 
-/// The valid files to damage: the golden ones, and one of several pages.
+/// Returns the valid files to damage: the golden ones, and one of several pages.
 pub(crate) fn victims() -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
     let golden = ["plain", "everything", "profiles"].map(|name| format!("ok-{name}.cbvh"));

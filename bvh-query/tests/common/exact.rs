@@ -1,6 +1,7 @@
-//! The oracles: do two triangles meet, and how far apart are they, in exact integers from the definition.
+//! The oracles that decide in exact integers, from the definition, whether two triangles meet and how far apart they
+//! are.
 //!
-//! Nothing is shared with the library. Triangles are closed; zero-area ones are segments and points.
+//! They share no code with the library. Triangles are closed; those without area are segments and points.
 
 use super::Triangle;
 use dashu_int::IBig;
@@ -22,7 +23,7 @@ fn cross(p: &Vector, q: &Vector) -> Vector {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-/// Both triangles in integers, in units of 2^`exponent`.
+/// Returns both triangles as integers, in units of 2^`exponent`.
 fn integers(a: &Triangle, b: &Triangle) -> ([Vector; 3], [Vector; 3], i32) {
     let lowest = a.iter().chain(b).flatten().map(|&x| parts(x).1).min().unwrap();
     let integer = |x: f64| match parts(x) {
@@ -32,7 +33,7 @@ fn integers(a: &Triangle, b: &Triangle) -> ([Vector; 3], [Vector; 3], i32) {
     (a.map(|p| p.map(integer)), b.map(|p| p.map(integer)), lowest)
 }
 
-/// Mantissa and exponent; that of 0 is high, so as never to be the lowest.
+/// Returns mantissa and exponent. The exponent of 0 is so high that it is never the lowest.
 fn parts(x: f64) -> (i64, i32) {
     let bits = x.to_bits();
     let (field, fraction) = ((bits >> 52 & 0x7ff) as i32, (bits & ((1 << 52) - 1)) as i64);
@@ -52,12 +53,12 @@ fn separates(a: &[Vector; 3], b: &[Vector; 3], axis: &Vector) -> bool {
     p[2] < q[0] || q[2] < p[0]
 }
 
-/// Whether two closed triangles share a point: whether no direction separates them.
+/// Returns whether two closed triangles share a point, which is the case if no direction separates them.
 ///
-/// The differences of points of both make a convex polytope P, and the triangles are disjoint if the origin is
-/// outside it. A face of P is parallel to two edges. If P is flat, its plane or an edge in that plane has the
-/// origin on one side; if P is a segment, the origin is off its line or beyond an end; if P is a point, it is
-/// the direction.
+/// The differences between points of the two form a convex polytope P, and the triangles are disjoint if the origin
+/// is outside of P. A face of P is parallel to two edges. If P is flat, the origin is on one side of its plane, or of
+/// an edge within that plane. If P is a segment, the origin is off its line or beyond one end. If P is a point, the
+/// direction to that point separates.
 pub(crate) fn intersect(a: &Triangle, b: &Triangle) -> bool {
     let (a, b, _) = integers(a, b);
     let edges: Vec<_> = [&a, &b]
@@ -77,16 +78,18 @@ pub(crate) fn intersect(a: &Triangle, b: &Triangle) -> bool {
     !(in_plane || off_line || edges.iter().any(apart) || apart(&across))
 }
 
-/// The exact distance of two triangles.
+/// The exact distance between two triangles.
 pub(crate) struct Exact {
-    /// Numerator and denominator of the square, in units of 4^`exponent`.
+    /// The numerator and denominator of the squared distance, in units of 4^`exponent`.
     square: (IBig, IBig),
     exponent: i32,
 }
 
-/// Triangles are as far apart as the origin is from the hull of the nine differences of their corners. The
-/// nearest point of a hull is, for some affinely independent subset of at most four of its points, the foot
-/// of the perpendicular on their affine hull. So all subsets are tried.
+/// Returns the exact distance between two triangles.
+///
+/// The distance is that of the origin from the convex hull of the nine differences between their corners. The nearest
+/// point of a hull is the foot of the perpendicular on the affine hull of some affinely independent subset of at most
+/// four of its points. So all subsets are tried.
 pub(crate) fn distance(a: &Triangle, b: &Triangle) -> Exact {
     let (a, b, exponent) = integers(a, b);
     let gaps: Vec<Vector> = a.iter().flat_map(|p| b.iter().map(|q| subtract(q, p))).collect();
@@ -95,7 +98,7 @@ pub(crate) fn distance(a: &Triangle, b: &Triangle) -> Exact {
         let mut members = (0..9).filter(|i| subset >> i & 1 == 1).map(|i| &gaps[i]);
         let base = members.next().unwrap();
         let edges: Vec<_> = members.map(|p| subtract(p, base)).collect();
-        // Rows of edges that are not there are those of the identity.
+        // Where there are fewer edges, rows of the identity matrix take their place.
         let entry = |i: usize, j: usize| match (edges.get(i), edges.get(j)) {
             (Some(p), Some(q)) => dot(p, q),
             _ => IBig::from(u8::from(i == j)),
@@ -106,7 +109,7 @@ pub(crate) fn distance(a: &Triangle, b: &Triangle) -> Exact {
         if whole == IBig::ZERO {
             continue;
         }
-        // Cramer's rule; the matrix is symmetric, so rows do for columns.
+        // Cramer's rule; the matrix is symmetric, so rows can be replaced instead of columns.
         let weights = [0, 1, 2].map(|k| {
             let mut replaced = gram.clone();
             replaced[k] = right.clone();
@@ -126,7 +129,7 @@ pub(crate) fn distance(a: &Triangle, b: &Triangle) -> Exact {
 }
 
 impl Exact {
-    /// How the distance compares with `x`.
+    /// Compares the distance with `x`.
     pub(crate) fn compare(&self, x: f64) -> Ordering {
         let (mantissa, of_x) = parts(x);
         if mantissa <= 0 {
@@ -143,7 +146,7 @@ impl Exact {
         left.cmp(&right)
     }
 
-    /// Whether it is `x` to within `tolerance`.
+    /// Returns whether the distance is `x` to within `tolerance`.
     pub(crate) fn is(&self, x: f64, tolerance: f64) -> bool {
         self.compare(x - tolerance).is_ge() && self.compare(x + tolerance).is_le()
     }

@@ -1,14 +1,10 @@
-//! What the tests share: meshes, poses, baked files and what is stored in them.
+//! The code that the tests share: meshes, poses, baked files and the triangles stored in them.
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 pub(crate) mod asked;
 pub(crate) mod exact;
-#[path = "../../../bvh-format/tests/common/forge.rs"]
-pub(crate) mod forge;
 pub(crate) mod nearest;
-#[path = "../../../bvh-format/tests/common/seal.rs"]
-pub(crate) mod seal;
 pub(crate) mod shapes;
 pub(crate) mod truth;
 
@@ -20,54 +16,15 @@ use bvh_format::page::Page;
 use bvh_format::profile::Profile;
 use bvh_format::validate::packets;
 use bvh_query::{Backend, Bvh, Pose, Querier};
+pub(crate) use cbvh_testkit::{Random, Triangle};
 use std::path::PathBuf;
 
-/// Three corners, mesh units.
-pub(crate) type Triangle = [[f64; 3]; 3];
-
-/// Xorshift64*: the same numbers everywhere.
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
-    }
-
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    /// From 0 to `count` - 1.
-    pub(crate) fn below(&mut self, count: usize) -> usize {
-        ((u128::from(self.next()) * count as u128) >> 64) as usize
-    }
-
-    /// From -1 to 1.
-    pub(crate) fn signed(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    pub(crate) fn point(&mut self) -> [f64; 3] {
-        [(); 3].map(|()| self.signed())
-    }
-
-    /// A random turn, and a translation of at most `reach` along each axis.
-    pub(crate) fn pose(&mut self, reach: f64) -> Pose {
-        let quaternion = loop {
-            let q = [(); 4].map(|()| self.signed());
-            let squared: f64 = q.iter().map(|x| x * x).sum();
-            if (0.1..1.0).contains(&squared) {
-                break q.map(|x| x / squared.sqrt());
-            }
-        };
-        Pose::new(rotation(quaternion), self.point().map(|x| x * reach)).unwrap()
-    }
+/// Returns a random rotation with a translation of at most `reach` along each axis.
+pub(crate) fn random_pose(random: &mut Random, reach: f64) -> Pose {
+    Pose::new(rotation(random.quaternion()), random.point().map(|x| x * reach)).unwrap()
 }
 
-/// The rows of the rotation of a unit quaternion (x, y, z, w).
+/// Returns the rows of the rotation of a unit quaternion (x, y, z, w).
 pub(crate) fn rotation([x, y, z, w]: [f64; 4]) -> [[f64; 3]; 3] {
     [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
@@ -80,44 +37,44 @@ pub(crate) fn translation(x: f64, y: f64, z: f64) -> Pose {
     Pose::new(*Pose::IDENTITY.rotation(), [x, y, z]).unwrap()
 }
 
-/// A mesh of one object, its ids in the order given.
+/// Makes a mesh of one object, with ids in the given order.
 pub(crate) fn mesh(triangles: &[Triangle]) -> Mesh {
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     Mesh::from_triangles(triangles.iter().flatten().copied().collect(), indices)
 }
 
 pub(crate) fn options(profile: Profile, encoding: TriangleEncoding) -> Options {
-    Options { profile: Some(profile), triangles: Some(encoding), ..Options::default() }
+    Options::default().profile(profile).triangles(encoding)
 }
 
 pub(crate) fn bake(mesh: &Mesh, options: &Options) -> Bvh {
     Bvh::from_bytes(to_bytes(mesh, options).unwrap().0).unwrap()
 }
 
-/// A triangle that queries are about.
+/// A stored triangle, as queries see it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stored {
-    /// Number of the object in the file.
+    /// The number of the object in the file.
     pub(crate) object: u32,
-    /// Id; without ids, the place in the order of the leaves.
+    /// The id or, without ids, the place in the order of the leaves.
     pub(crate) id: u32,
-    /// Origin plus v.
+    /// The corners: origin plus the stored coordinates.
     pub(crate) corners: Triangle,
 }
 
-/// The triangles of a file by the reference decoder, duplicates that were left out included.
+/// Returns the triangles of a file by the reference decoder, including the duplicates that were left out.
 pub(crate) fn stored(bvh: &Bvh) -> Vec<Stored> {
     let (layout, bytes) = (bvh.layout(), bvh.bytes());
     let mut triangles = Vec::new();
     for (number, object) in bvh.objects().iter().enumerate() {
-        let origin = object.record.origin.map(|o| o.get());
-        let first = object.record.first_page.get();
-        for page in first..first + object.record.pages.get() {
-            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile);
+        let origin = object.origin();
+        let first = object.record().first_page.get();
+        for page in first..first + object.record().pages.get() {
+            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile());
             let block = layout.leaf_block(bytes, page.header());
             let ids = layout.id_block(bytes, page.header());
             for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                 for lane in 0..count {
                     let corner = |v: [f32; 3]| [0, 1, 2].map(|a| origin[a] + f64::from(v[a]));
                     let corners = values.triangle(lane).map(corner);
@@ -136,17 +93,17 @@ pub(crate) fn stored(bvh: &Bvh) -> Vec<Stored> {
     triangles
 }
 
-/// The corners of the stored triangles, in the order of (object, id).
+/// Returns the corners of the stored triangles, in the order of (object, id).
 pub(crate) fn corners(stored: &[Stored]) -> Vec<Triangle> {
     stored.iter().map(|stored| stored.corners).collect()
 }
 
-/// The triangles of B where queries have them.
+/// Returns the triangles of B at the places that the pose gives them.
 pub(crate) fn placed(triangles: &[Triangle], pose: &Pose) -> Vec<Triangle> {
     triangles.iter().map(|triangle| triangle.map(|corner| pose.place(corner))).collect()
 }
 
-/// The diagonal of the box of both meshes.
+/// Returns the diagonal of the box of both meshes.
 pub(crate) fn size(a: &[Triangle], b: &[Triangle]) -> f64 {
     let side = |axis: usize| {
         let values = || a.iter().chain(b).flatten().map(move |corner| corner[axis]);
@@ -157,7 +114,7 @@ pub(crate) fn size(a: &[Triangle], b: &[Triangle]) -> f64 {
     longest * sides.iter().map(|side| (side / longest).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The backends of this CPU; says which it lacks.
+/// Returns the backends of this CPU, and notes which ones it lacks.
 pub(crate) fn backends() -> Vec<Backend> {
     let (here, missing): (Vec<_>, Vec<_>) = Backend::ALL.into_iter().partition(|b| b.is_available());
     missing.iter().for_each(|backend| note(&format!("skipped: this CPU has no {backend}")));
@@ -173,7 +130,7 @@ pub(crate) fn note(line: &str) {
     eprintln!("{line}");
 }
 
-/// A file of `shared/`, the folder beside the repository that not everyone has; says if it is not there.
+/// Returns a file of `shared/`, a folder beside the repository that not everyone has, and notes if it is missing.
 pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(name);
     if path.exists() {
@@ -183,7 +140,7 @@ pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// A mesh of `shared/meshes`.
+/// Returns a mesh of `shared/meshes`.
 pub(crate) fn shared_mesh(name: &str) -> Option<Mesh> {
-    Some(bvh_bake::io::read(&shared(&format!("meshes/{name}"))?).unwrap())
+    Some(bvh_bake::input::read(&shared(&format!("meshes/{name}"))?).unwrap())
 }

@@ -1,7 +1,7 @@
-//! Brute force over all pairs of triangles, in f64: which are near, and how far is the nearest.
+//! Finds by brute force over all pairs of triangles, in f64, which pairs are near and how far the nearest are apart.
 //!
-//! Blocks of neighbouring triangles in boxes keep larger meshes bearable; a block pair is left out only if its
-//! boxes are too far apart. Nothing is shared with the library.
+//! Triangles are grouped into blocks of neighbours with boxes, which keeps larger meshes affordable. A pair of blocks
+//! is skipped only if its boxes are too far apart. No code is shared with the library.
 
 use super::Triangle;
 
@@ -23,20 +23,20 @@ fn along(p: Point, t: f64, direction: Point) -> Point {
     [0, 1, 2].map(|k| p[k] + t * direction[k])
 }
 
-/// From 0 to 1; NaN is 0.
+/// Clamps to the range from 0 to 1; NaN becomes 0.
 fn clamp(t: f64) -> f64 {
     t.clamp(0.0, 1.0).max(0.0)
 }
 
-/// The squared distance from a point to a segment.
+/// Returns the squared distance from a point to a segment.
 fn point_segment(p: Point, a: Point, b: Point) -> f64 {
     let edge = subtract(b, a);
     let gap = subtract(p, along(a, clamp(dot(subtract(p, a), edge) / dot(edge, edge)), edge));
     dot(gap, gap)
 }
 
-/// The squared distance of two segments where both ends of the shortest line between are inside; elsewhere
-/// something larger.
+/// Returns the squared distance of two segments if both ends of the shortest line between them are inside the
+/// segments, and otherwise something larger.
 fn inner_segments(a: Point, b: Point, c: Point, d: Point) -> f64 {
     let (u, v, w) = (subtract(b, a), subtract(d, c), subtract(a, c));
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
@@ -47,7 +47,8 @@ fn inner_segments(a: Point, b: Point, c: Point, d: Point) -> f64 {
     dot(gap, gap)
 }
 
-/// The squared distance from a point to the plane of a triangle if it is over or under it; else infinite.
+/// Returns the squared distance from a point to the plane of a triangle if the point is over or under the triangle,
+/// and infinity otherwise.
 fn point_face(p: Point, [a, b, c]: Triangle) -> f64 {
     let normal = cross(subtract(b, a), subtract(c, a));
     let inside = |a: Point, b: Point| dot(cross(subtract(b, a), subtract(p, a)), normal) >= 0.0;
@@ -59,9 +60,9 @@ fn point_face(p: Point, [a, b, c]: Triangle) -> f64 {
     }
 }
 
-/// Distance of two triangles that do not meet: the least over corners and faces, and over pairs of edges.
-/// Scaled by a power of two, so that squares stay in range. Slivers cost digits; the exact oracle has the
-/// last word.
+/// Returns the distance of two triangles that do not meet: the least over corners and faces, and over pairs of edges.
+/// All numbers are scaled by a power of two, so that squares stay in range. Slivers lose digits; the exact oracle has
+/// the last word.
 pub(crate) fn distance(a: &Triangle, b: &Triangle) -> f64 {
     let largest = a.iter().chain(b).flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     let scale = f64::from_bits(largest.to_bits() & 0x7ff << 52);
@@ -79,13 +80,13 @@ pub(crate) fn distance(a: &Triangle, b: &Triangle) -> f64 {
     least.sqrt() * scale
 }
 
-/// How far a point is from a triangle.
+/// Returns the distance from a point to a triangle.
 pub(crate) fn point_triangle(p: Point, triangle: &Triangle) -> f64 {
     distance(&[p; 3], triangle)
 }
 
-/// Whether a gap along one of the common directions shows that the triangles do not meet, by far more than
-/// f64 rounds. Spares the exact oracle the easy cases.
+/// Returns whether a gap along one of the usual axes shows that the triangles do not meet, by far more than f64
+/// rounds. This saves the exact oracle the easy cases.
 fn certainly_apart(a: &Triangle, b: &Triangle) -> bool {
     let [p, q] = [a, b].map(|t| t.map(|corner| subtract(corner, a[0])));
     let edges = |t: Triangle| [subtract(t[1], t[0]), subtract(t[2], t[1]), subtract(t[0], t[2])];
@@ -120,7 +121,7 @@ impl Bounds {
         })
     }
 
-    /// At most the distance of what is inside, by more than it may be rounded.
+    /// Returns a lower bound of the distance between anything in the two boxes, rounding included.
     fn gap(&self, other: &Self) -> f64 {
         let gap = [0, 1, 2].map(|k| (self.lo[k] - other.hi[k]).max(other.lo[k] - self.hi[k]).max(0.0));
         let largest = gap.into_iter().fold(0.0, f64::max);
@@ -132,7 +133,7 @@ impl Bounds {
     }
 }
 
-/// Triangles in blocks of neighbours, each with its box.
+/// Triangles in blocks of neighbours, each block with its box.
 pub(crate) struct Blocks<'a> {
     triangles: &'a [Triangle],
     blocks: Vec<(Bounds, Vec<(usize, Bounds)>)>,
@@ -161,8 +162,8 @@ impl<'a> Blocks<'a> {
         Self { triangles, blocks }
     }
 
-    /// Calls `visit` with the numbers of all pairs whose boxes are at most as far apart as `reach`, which each
-    /// call may lower.
+    /// Calls `visit` with the numbers of each pair whose boxes are at most `reach` apart. `visit` returns a new
+    /// reach, which counts if it is lower.
     pub(crate) fn pairs(&self, other: &Self, mut reach: f64, mut visit: impl FnMut(usize, usize) -> f64) {
         for (bounds_a, block_a) in &self.blocks {
             for (bounds_b, block_b) in &other.blocks {
@@ -180,7 +181,7 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The pairs that meet, ascending.
+    /// Returns the pairs that meet, in ascending order.
     pub(crate) fn contacts(&self, other: &Self) -> Vec<(usize, usize)> {
         let mut contacts = Vec::new();
         self.pairs(other, 0.0, |a, b| {
@@ -194,8 +195,8 @@ impl<'a> Blocks<'a> {
         contacts
     }
 
-    /// The pairs of triangles nearest to each other, and all that are hardly farther (by `slack`), nearest
-    /// first, if they are nearer than `reach`.
+    /// Returns the nearest pairs of triangles, nearest first: those closer than `reach` whose distance exceeds the
+    /// least one by at most `slack`.
     pub(crate) fn nearest(&self, other: &Self, reach: f64, slack: f64) -> Vec<(f64, usize, usize)> {
         let (mut found, mut best) = (Vec::new(), reach);
         self.pairs(other, reach + slack, |a, b| {

@@ -1,19 +1,19 @@
-//! Generated meshes. Every coordinate is an `f32`, so that nothing is rounded when baking.
+//! Generates meshes. Every coordinate is an `f32`, so that baking rounds nothing.
 
 use super::{Random, Triangle};
 
-/// Each coordinate rounded to `f32`.
+/// Rounds each coordinate to `f32`.
 pub(crate) fn rounded(triangles: Vec<Triangle>) -> Vec<Triangle> {
     triangles.into_iter().map(|t| t.map(|p| p.map(|x| f64::from(x as f32)))).collect()
 }
 
-/// Scaled, then moved; rounded to `f32`.
+/// Scales the triangles, then moves them, and rounds to `f32`.
 pub(crate) fn moved(triangles: &[Triangle], scale: f64, offset: [f64; 3]) -> Vec<Triangle> {
     let point = |p: [f64; 3]| [0, 1, 2].map(|axis| p[axis] * scale + offset[axis]);
     rounded(triangles.iter().map(|t| t.map(point)).collect())
 }
 
-/// The cube from -1 to 1, 12 triangles.
+/// Makes the cube from -1 to 1, of 12 triangles.
 pub(crate) fn cube() -> Vec<Triangle> {
     let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -21,7 +21,8 @@ pub(crate) fn cube() -> Vec<Triangle> {
     faces.into_iter().flat_map(halves).map(|t| t.map(corner)).collect()
 }
 
-/// The unit octahedron, its faces split `levels` times and pushed out to the sphere: 8 * 4^levels.
+/// Makes the unit octahedron, whose faces are split `levels` times and pushed out to the sphere: 8 * 4^levels
+/// triangles.
 pub(crate) fn sphere(levels: u32) -> Vec<Triangle> {
     let axis = |i: usize, sign: f64| [0, 1, 2].map(|j| if i == j { sign } else { 0.0 });
     let mut faces = Vec::new();
@@ -44,7 +45,7 @@ pub(crate) fn sphere(levels: u32) -> Vec<Triangle> {
     rounded(faces)
 }
 
-/// A surface over a grid of `columns` by `rows` cells, two triangles each.
+/// Makes a surface over a grid of `columns` by `rows` cells, with two triangles per cell.
 fn sheet(columns: usize, rows: usize, point: impl Fn(f64, f64) -> [f64; 3]) -> Vec<Triangle> {
     let at = |i: usize, j: usize| point(i as f64 / columns as f64, j as f64 / rows as f64);
     let mut triangles = Vec::new();
@@ -57,7 +58,7 @@ fn sheet(columns: usize, rows: usize, point: impl Fn(f64, f64) -> [f64; 3]) -> V
     rounded(triangles)
 }
 
-/// Radius 1 around the z-axis, thickness 0.3.
+/// Makes a torus of radius 1 around the z-axis, 0.3 thick.
 pub(crate) fn torus(columns: usize, rows: usize) -> Vec<Triangle> {
     let turn = std::f64::consts::TAU;
     sheet(columns, rows, |u, v| {
@@ -66,13 +67,13 @@ pub(crate) fn torus(columns: usize, rows: usize) -> Vec<Triangle> {
     })
 }
 
-/// The flat square from -1 to 1 in the plane z = 0, in 2 `cells`^2 triangles on exact coordinates if
+/// Makes the flat square from -1 to 1 in the plane z = 0, of 2 `cells`^2 triangles. The coordinates are exact if
 /// `cells` is a power of two.
 pub(crate) fn plate(cells: usize) -> Vec<Triangle> {
     sheet(cells, cells, |u, v| [2.0 * u - 1.0, 2.0 * v - 1.0, 0.0])
 }
 
-/// A bumpy square.
+/// Makes a bumpy square.
 pub(crate) fn terrain(cells: usize, seed: u64) -> Vec<Triangle> {
     let heights: Vec<f64> =
         (0..=cells * cells + 2 * cells).map(|i| Random::new(seed + i as u64).signed()).collect();
@@ -82,7 +83,7 @@ pub(crate) fn terrain(cells: usize, seed: u64) -> Vec<Triangle> {
     })
 }
 
-/// Teeth 2 long and 1e-5 wide, which span the mesh whatever box they are in.
+/// Makes a comb of teeth 2 long and 1e-5 wide, which span the mesh whatever box they are in.
 pub(crate) fn comb(teeth: usize) -> Vec<Triangle> {
     let tooth = |i: usize| {
         let x = 2.0 * i as f64 / teeth as f64 - 1.0;
@@ -91,7 +92,7 @@ pub(crate) fn comb(teeth: usize) -> Vec<Triangle> {
     rounded((0..teeth).map(tooth).collect())
 }
 
-/// Triangles of all sizes anywhere between -1 and 1.
+/// Makes triangles of all sizes anywhere between -1 and 1.
 pub(crate) fn soup(count: usize, seed: u64) -> Vec<Triangle> {
     let mut random = Random::new(seed);
     let triangle = |_| {
@@ -104,7 +105,7 @@ pub(crate) fn soup(count: usize, seed: u64) -> Vec<Triangle> {
     rounded((0..count).map(triangle).collect())
 }
 
-/// The mesh and, in between, points, segments and duplicates with their corners in another order.
+/// Mixes points, segments and duplicates with their corners in another order into the mesh.
 pub(crate) fn dirty(triangles: &[Triangle], seed: u64) -> Vec<Triangle> {
     let mut random = Random::new(seed);
     let mut all = Vec::new();

@@ -1,10 +1,10 @@
-//! The right answers for two meshes in a pose, by brute force, and the comparison with what is answered.
+//! Computes the right answers for two meshes in a pose by brute force, and compares the library's answers with them.
 
 use super::nearest::{Blocks, point_triangle};
 use super::{Stored, Triangle, corners, exact, placed, size};
 use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
 
-/// How far a distance may be off, as a fraction of the size.
+/// The largest error of a distance, as a fraction of the size.
 const TOLERANCE: f64 = 1e-12;
 
 pub(crate) struct Truth {
@@ -13,7 +13,7 @@ pub(crate) struct Truth {
     corners_a: Vec<Triangle>,
     corners_b: Vec<Triangle>,
     contacts: Vec<Contact>,
-    /// Pairs that may be the nearest.
+    /// The pairs that may be the nearest.
     nearest: Vec<(f64, usize, usize)>,
     tolerance: f64,
 }
@@ -23,8 +23,8 @@ impl Truth {
         Self::within(a, b, pose, f64::INFINITY)
     }
 
-    /// As `new`, looking no farther than `reach` for the nearest pair: it is for large meshes, whose answer
-    /// is checked to be no larger than the truth by looking for something nearer.
+    /// Computes the answers as `new` does, but looks for nearest pairs only up to `reach`. This is for large meshes:
+    /// it shows that nothing is nearer than their answer.
     pub(crate) fn within(a: &[Stored], b: &[Stored], pose: &Pose, reach: f64) -> Self {
         let (corners_a, corners_b) = (corners(a), placed(&corners(b), pose));
         let (blocks_a, blocks_b) = (Blocks::new(&corners_a), Blocks::new(&corners_b));
@@ -44,7 +44,7 @@ impl Truth {
         Self { a: a.to_vec(), b: b.to_vec(), corners_a, corners_b, contacts, nearest, tolerance }
     }
 
-    /// Asks everything on all backends; returns the distance, which they agree on.
+    /// Asks every query on all backends. Returns the distance, on which they must agree.
     pub(crate) fn check(&self, a: &Bvh, b: &Bvh, pose: &Pose, queriers: &mut [Querier]) -> Distance {
         let first = queriers[0].distance(a, b, pose).unwrap();
         self.check_distance(&first);
@@ -59,18 +59,19 @@ impl Truth {
             let d = answer.distance;
             let Distance { lower, upper, .. } = answer;
             let ends = [d, lower, upper].into_iter().flat_map(|x| [x.next_down(), x, x.next_up()]);
-            let far = [0.0, -1.0, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE, d * 3.0, d * 0.5];
+            let far = [0.0, f64::MAX, f64::MIN_POSITIVE, d * 3.0, d * 0.5];
             let near = [upper * (1.0 + 1e-9), lower * (1.0 - 1e-9)];
             for limit in ends.chain(far).chain(near) {
-                // In between, integers decide: the tests with an exact oracle look there.
-                if lower <= limit && limit < upper {
+                // For limits between `lower` and `upper`, integers decide; the tests with an exact oracle cover
+                // those.
+                if limit < 0.0 || lower <= limit && limit < upper {
                     continue;
                 }
                 let within = querier.within(a, b, pose, limit).unwrap();
                 assert_eq!(within, limit >= upper, "{} within {limit}, {answer:?}", querier.backend());
             }
             for (rel_err, abs_err) in [(0.2, 0.0), (0.0, 0.1 * d), (0.05, 0.01 * d)] {
-                let options = DistanceOptions { rel_err, abs_err };
+                let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
                 let rough = querier.distance_with(a, b, pose, &options).unwrap();
                 let allowed = d * (1.0 + rel_err) + abs_err + self.tolerance;
                 assert!((d..=allowed).contains(&rough.distance), "{rough:?}, least {d}, {options:?}");
@@ -108,7 +109,7 @@ impl Truth {
         let gap = [0, 1, 2].map(|k| answer.point_a[k] - answer.point_b[k]);
         let largest = gap.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
         let length = largest * gap.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt();
-        // The points of meshes far from the origin are rounded to where f64 is coarser.
+        // Points of meshes far from the origin are rounded to the coarser spacing of f64 there.
         let magnitude = answer.point_a.iter().chain(&answer.point_b).fold(0.0, |m: f64, x| m.max(x.abs()));
         let rounding = 4.0 * f64::EPSILON * magnitude;
         assert!((length - d).abs() <= self.tolerance + rounding, "{answer:?}: the points are {length} apart");

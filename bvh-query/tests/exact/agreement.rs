@@ -1,4 +1,5 @@
-//! The oracles against each other: three ways to say whether triangles meet, three to say how far apart they are.
+//! Compares the oracles with each other: three that say whether triangles meet, and three that say how far apart they
+//! are.
 
 use super::ball::Ball;
 use super::decide::{Boxed, Decided, Triangle, certainly_farther, intersect};
@@ -8,9 +9,10 @@ use super::meet::meet;
 use super::number::Corners;
 use super::separation::widest;
 use crate::common::{Random, exact};
+use cbvh_testkit::depth::rounds;
 use proptest::prelude::*;
 
-/// A triangle on a small grid: corners coincide, edges are parallel and planes shared all the time.
+/// Returns a triangle on a small grid, where triangles often have equal corners, parallel edges and common planes.
 fn lattice(most: i64) -> impl Strategy<Value = Corners<i64>> {
     prop::array::uniform3(prop::array::uniform3(-most..=most))
 }
@@ -19,7 +21,7 @@ fn floats(t: &Corners<i64>, scale: f64) -> Triangle {
     t.map(|p| p.map(|x| x as f64 * scale))
 }
 
-/// All oracles on integers, on f64 of some scale, and the ones in `common`.
+/// Asserts that all oracles agree, on integers, on f64 at some scale, and with the oracles in `common`.
 fn agree(a: &Corners<i64>, b: &Corners<i64>, scale: f64) {
     let wide = |t: &Corners<i64>| t.map(|p| p.map(i128::from));
     let touching = meet(a, b).unwrap();
@@ -41,12 +43,12 @@ fn agree(a: &Corners<i64>, b: &Corners<i64>, scale: f64) {
     assert!(other.compare(floor).is_ge() && other.compare(floor.next_up()).is_lt(), "{a:?} {b:?}");
     assert!(length.compare(floor).is_ge() && length.compare(floor.next_up()).is_lt(), "{a:?} {b:?}");
     assert!(!certainly_farther(&boxed.0, &boxed.1, floor.next_up()), "{a:?} {b:?}");
-    // Balls are off by less than 2^-40 of the square of numbers of a few bits.
+    // Balls are off by less than 2^-40 of the square, for numbers of a few bits.
     assert!(floor == 0.0 || certainly_farther(&boxed.0, &boxed.1, floor * (1.0 - 1e-9)), "{a:?} {b:?}");
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: rounds(200) as u32, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn on_a_grid_of_three(a in lattice(1), b in lattice(1)) {
@@ -64,11 +66,11 @@ proptest! {
     }
 }
 
-/// Points, segments and slivers, whatever the order of corners.
+/// Points, segments and slivers, with their corners in any order.
 #[test]
 fn degenerate_triangles() {
     let mut random = Random::new(1);
-    for _ in 0..3000 {
+    for _ in 0..rounds(300) {
         let mut corner = |spread: usize| [(); 3].map(|()| random.below(spread) as i64);
         let points = [corner(3), corner(3), corner(4)];
         let pick = |random: &mut Random| [(); 3].map(|()| points[random.below(3)]);

@@ -1,20 +1,20 @@
-//! Every question on every backend, compared with the truth.
+//! Asks every query on every backend, and compares the answers with the truth.
 //!
-//! The promises: `collide` and `contacts` are exact on the placed corners; `distance` is 0 exactly if the meshes
-//! touch, and the true distance of the placed meshes is from `lower` to `upper`; `within` is exact on
-//! them, too; all backends say the same.
+//! These are the promises: `collide` and `contacts` are exact on the placed corners. `distance` is 0 exactly if the
+//! meshes touch, and the true distance of the placed meshes lies between `lower` and `upper`. `within` is exact on
+//! the placed meshes, too. All backends give the same answers.
 
 use super::length::Length;
 use super::tally::Tally;
 use super::truth::Truth;
 use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
 
-/// How far the distance of two triangles in f64 may be off, relative to their largest difference of two
-/// coordinates: what the tests of the narrow phase allow. The least of such distances may be that of a pair which
-/// is farther apart than another by as much.
+/// The largest error of the distance of two triangles in f64, relative to the largest difference between two of their
+/// coordinates. The tests of the narrow phase allow the same error. A pair with the least such distance may be
+/// farther apart than another pair by as much.
 const ACCURACY: f64 = 1e-14;
 
-/// Two files and who asks about them.
+/// Two files, and the queriers that ask about them.
 pub(crate) struct Asked<'a> {
     pub(crate) a: &'a Bvh,
     pub(crate) b: &'a Bvh,
@@ -22,7 +22,7 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Asks everything about one pose.
+    /// Asks every query about one pose.
     pub(crate) fn all(&mut self, truth: &Truth<'_>, pose: &Pose, tally: &mut Tally) -> Result<(), String> {
         let contacts = truth.contacts(tally);
         let touching = !contacts.is_empty();
@@ -54,10 +54,10 @@ impl Asked<'_> {
         }
         let named = named.0;
         if named.compare(lower).is_lt() || named.compare(upper).is_gt() {
-            return Err(format!("{first:?}, but the pair is {:e} apart", named.floor()));
+            return Err(format!("{first:?}, but the named pair is {:e} apart", named.floor()));
         }
         if least.compare(distance - ACCURACY * span).is_lt() {
-            return Err(format!("{first:?}, but another pair, {span:e} large, is {:e} apart", least.floor()));
+            return Err(format!("{first:?}, but another pair of size {span:e} is {:e} apart", least.floor()));
         }
         if least.compare(lower).is_lt() || least.compare(upper).is_gt() {
             tally.missed(format!("{first:?}, but the true distance is {:e}; {pose:?}", least.floor()));
@@ -77,7 +77,7 @@ impl Asked<'_> {
         Ok(())
     }
 
-    /// Asks for a distance with an allowed error; `least` is the true one, of a pair `span` large.
+    /// Asks for a distance with an allowed error. `least` is the true distance, and `span` the size of its pair.
     fn rough(
         &mut self,
         least: &Length,
@@ -89,11 +89,11 @@ impl Asked<'_> {
         for (rel_err, abs_err) in [(0.25, 0.0), (0.0, 1e-3 * size)] {
             for querier in &mut *self.queriers {
                 tally.queries += 1;
-                let options = DistanceOptions { rel_err, abs_err };
+                let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
                 let answer = querier.distance_with(self.a, self.b, pose, &options);
                 let answer = answer.map_err(|error| error.to_string())?;
                 let allowed = (least.floor().next_up() + ACCURACY * span) * (1.0 + rel_err) + abs_err;
-                // Three roundings of what is allowed.
+                // The limit itself is computed with three roundings.
                 if answer.distance <= 0.0 || answer.distance > allowed * (1.0 + 4.0 * f64::EPSILON) {
                     return Err(format!("{answer:?}, {options:?}, but {allowed:e} is allowed"));
                 }
@@ -131,7 +131,7 @@ impl Asked<'_> {
         Ok(())
     }
 
-    /// The distance, which must be the same on all backends.
+    /// Returns the distance, which must be the same on all backends.
     fn same_distance(&mut self, pose: &Pose) -> Result<Distance, String> {
         let mut first = None;
         for querier in &mut *self.queriers {
@@ -145,11 +145,11 @@ impl Asked<'_> {
     }
 }
 
-/// Which contacts are too many and which are missing.
+/// Says which contacts of the answer are wrong and which are missing.
 fn difference(answer: &[Contact], expected: &[Contact]) -> String {
     let pairs = |these: &[Contact], those: &[Contact]| -> Vec<_> {
         let missing = these.iter().filter(|contact| those.binary_search(contact).is_err());
         missing.map(|contact| (contact.triangle_a, contact.triangle_b)).take(4).collect()
     };
-    format!("too many {:?}, missing {:?}", pairs(answer, expected), pairs(expected, answer))
+    format!("wrong {:?}, missing {:?}", pairs(answer, expected), pairs(expected, answer))
 }

@@ -1,9 +1,9 @@
-//! A real number known to within a radius, in f64.
+//! A real number that is known to within a radius, in f64.
 //!
-//! With u = 2^-53 a sum rounded to nearest is off by exactly what the two-sum of Knuth returns (The Art of
-//! Computer Programming 2, 4.2.2, theorem B), and a product by at most u of the result, or if it underflows by
-//! less than the smallest normal number. A radius is computed in at most eight operations on numbers that are
-//! not negative, each off by a factor of at most 1 + u; it is enlarged by 16u in the end.
+//! With u = 2^-53, a sum rounded to nearest is off by exactly what Knuth's two-sum returns (The Art of Computer
+//! Programming 2, 4.2.2, theorem B). A product is off by at most u of the result or, if it underflows, by less than
+//! the smallest normal number. A radius is computed in at most eight operations on numbers that are not negative,
+//! each of which is off by a factor of at most 1 + u. To make up for that, it is finally enlarged by 16u.
 
 use super::number::Number;
 use std::cmp::Ordering;
@@ -21,7 +21,7 @@ impl Ball {
         Self { middle, radius: 0.0 }
     }
 
-    /// `x` times a power of two, which is exact unless it underflows.
+    /// Returns `x` times a power of two, which is exact unless it underflows.
     pub(crate) fn scaled(x: f64, power: f64) -> Self {
         let middle = x * power;
         Self { middle, radius: if middle / power == x { 0.0 } else { f64::MIN_POSITIVE } }
@@ -31,12 +31,12 @@ impl Ball {
         self.middle
     }
 
-    /// No larger than the number.
+    /// Returns a lower bound of the number.
     pub(crate) fn least(&self) -> f64 {
         (self.middle - self.radius).next_down()
     }
 
-    /// No smaller than the number.
+    /// Returns an upper bound of the number.
     pub(crate) fn most(&self) -> f64 {
         (self.middle + self.radius).next_up()
     }
@@ -75,7 +75,7 @@ impl Number for Ball {
         Self::new(product, inherited + (UNIT_ROUNDOFF * product.abs() + 4.0 * f64::MIN_POSITIVE))
     }
 
-    /// An overflow makes the radius infinite or NaN, and no sign certain.
+    /// An overflow makes the radius infinite or NaN, and then no sign is certain.
     #[inline(always)]
     fn sign(&self) -> Option<Ordering> {
         if self.middle > self.radius {

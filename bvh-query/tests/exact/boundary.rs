@@ -1,23 +1,23 @@
-//! The search: pairs of small meshes of every kind in poses that just touch, or just do not.
+//! Searches where answers change: pairs of small meshes of every kind, in poses that just touch or just do not.
 
 use super::ask::Asked;
-use super::effort::rounds;
 use super::kinds::{KINDS, turn};
 use super::tally::Tally;
 use super::truth::Surface;
 use super::walk::Walk;
-use crate::common::{Random, Triangle, bake, mesh, options, queriers, rotation, size, stored};
+use crate::common::{Random, Triangle, bake, mesh, options, queriers, random_pose, rotation, size, stored};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Pose, Querier};
+use cbvh_testkit::depth::rounds;
 
 const ENCODINGS: [TriangleEncoding; 3] =
     [TriangleEncoding::F32, TriangleEncoding::Packed, TriangleEncoding::Quantized];
 
-/// Walks for `usual` pairs of meshes of each kind, times the effort.
-fn search(name: &str, usual: u64, walk: fn(&mut Round<'_>, &mut Tally) -> Result<(), String>) {
+/// Walks for `everyday` pairs of meshes of each kind, times the depth of the tests.
+fn search(name: &str, everyday: u64, walk: fn(&mut Round<'_>, &mut Tally) -> Result<(), String>) {
     let (mut tally, mut queriers) = (Tally::default(), queriers());
-    for round in 0..rounds(usual) {
+    for round in 0..rounds(everyday) {
         for (number, (kind, make)) in KINDS.iter().enumerate() {
             let seed = 1000 * round + number as u64;
             let mut random = Random::new(seed);
@@ -55,7 +55,7 @@ impl Round<'_> {
         Walk { asked, surfaces: self.surfaces.each_ref(), pose, hint: (0, 0) }
     }
 
-    /// A point in a triangle of one side, any or a corner.
+    /// Returns a point in a triangle of one side, either any point or a corner.
     fn point(&mut self, side: usize) -> [f64; 3] {
         let corners = &self.surfaces[side].corners;
         let [p, q, r] = corners[self.random.below(corners.len())];
@@ -64,7 +64,7 @@ impl Round<'_> {
         [0, 1, 2].map(|k| p[k] + x * (q[k] - p[k]) + y * (r[k] - p[k]))
     }
 
-    /// The translation that brings a point of B to one of A.
+    /// Returns the translation that brings a point of B to a point of A.
     fn meeting(&mut self, turn: [[f64; 3]; 3]) -> [f64; 3] {
         let (to, from) = (self.point(0), self.point(1));
         [0, 1, 2].map(|k| to[k] - (turn[k][0] * from[0] + turn[k][1] * from[1] + turn[k][2] * from[2]))
@@ -76,7 +76,7 @@ impl Round<'_> {
     }
 }
 
-/// Along an axis: one number of the translation is bisected.
+/// Moves B along an axis, by bisecting one number of the translation.
 fn translate(round: &mut Round<'_>, tally: &mut Tally) -> Result<(), String> {
     let (turn, axis) = (turn(&mut round.random), round.random.below(3));
     let start = round.meeting(turn);
@@ -104,9 +104,9 @@ fn translate(round: &mut Round<'_>, tally: &mut Tally) -> Result<(), String> {
     Ok(())
 }
 
-/// About an axis through a point of B that is brought to one of A: the angle is bisected.
+/// Turns B about an axis through a point of B that is brought to a point of A, by bisecting the angle.
 fn rotate(round: &mut Round<'_>, tally: &mut Tally) -> Result<(), String> {
-    let base = *round.random.pose(0.0).rotation();
+    let base = *random_pose(&mut round.random, 0.0).rotation();
     let (to, from) = (round.point(0), round.point(1));
     let mut axis = round.random.point();
     if round.random.below(2) == 0 {
@@ -130,7 +130,7 @@ fn rotate(round: &mut Round<'_>, tally: &mut Tally) -> Result<(), String> {
         let angle = f64::from(step) * 0.5;
         let now = walk.collide(angle, tally)?;
         if now != before {
-            // Never from 0, where angles have all exponents.
+            // Starts above 0, near which angles have all exponents.
             walk.find_boundary((angle - 0.5).max(1e-12), angle, tally)?;
             return Ok(());
         }
@@ -141,10 +141,10 @@ fn rotate(round: &mut Round<'_>, tally: &mut Tally) -> Result<(), String> {
 
 #[test]
 fn translations_around_first_contact() {
-    search("translations", 12, translate);
+    search("translations", 2, translate);
 }
 
 #[test]
 fn rotations_around_first_contact() {
-    search("rotations", 8, rotate);
+    search("rotations", 1, rotate);
 }

@@ -1,4 +1,4 @@
-//! The oracles at speed: boxes and balls settle what they certainly can, integers the rest.
+//! Runs the oracles fast: boxes and balls settle the certain cases, and integers settle the rest.
 
 use super::ball::Ball;
 use super::dyadic::Integers;
@@ -24,28 +24,28 @@ impl Boxed {
         Self { corners, low: end(f64::min), high: end(f64::max) }
     }
 
-    /// Whether the boxes share a point: comparisons are exact.
+    /// Returns whether the boxes share a point. The comparisons are exact.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 
-    /// No larger than the distance of the boxes. Each gap is rounded by a factor of at most 1 + u, u = 2^-53,
-    /// and the square, two sums and the root by four more; squares that underflow only lessen it.
+    /// Returns a lower bound of the distance between the boxes. Each gap is off by a factor of at most 1 + u with u =
+    /// 2^-53, and the square, two sums and the root add four more. Squares that underflow only lessen the bound.
     pub(crate) fn gap(&self, other: &Self) -> f64 {
         let along = |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
         let [x, y, z] = [along(0), along(1), along(2)];
         (x * x + y * y + z * z).sqrt() * (1.0 - 8.0 * f64::EPSILON)
     }
 
-    /// The longest side of the box around both.
+    /// Returns the longest side of the box around both.
     pub(crate) fn span(&self, other: &Self) -> f64 {
         let side = |k: usize| self.high[k].max(other.high[k]) - self.low[k].min(other.low[k]);
         side(0).max(side(1)).max(side(2))
     }
 }
 
-/// Both triangles, and the power of two by which they are multiplied, so that the largest coordinate is from 1
-/// to 2 and products stay in range.
+/// Returns both triangles and the power of two by which they are multiplied. It brings the largest coordinate between
+/// 1 and 2, so that products stay in range.
 fn balls(a: &Triangle, b: &Triangle) -> (Corners<Ball>, Corners<Ball>, f64) {
     let largest = a.iter().chain(b).flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let exponent = (largest.to_bits() >> 52).clamp(23, 2023);
@@ -54,7 +54,7 @@ fn balls(a: &Triangle, b: &Triangle) -> (Corners<Ball>, Corners<Ball>, f64) {
     (a.map(|p| p.map(ball)), b.map(|p| p.map(ball)), scale)
 }
 
-/// How many pairs were decided by what.
+/// The number of pairs that each way decided.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Decided {
     pub(crate) by_boxes: u64,
@@ -62,7 +62,7 @@ pub(crate) struct Decided {
     pub(crate) by_integers: u64,
 }
 
-/// Whether two closed triangles share a point.
+/// Returns whether two closed triangles share a point.
 pub(crate) fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
     if !a.overlaps(b) {
         decided.by_boxes += 1;
@@ -81,9 +81,9 @@ pub(crate) fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
     }
 }
 
-/// Whether a slab wider than `limit` certainly separates the triangles.
+/// Returns whether a slab wider than `limit` certainly separates the triangles.
 ///
-/// Any direction will do, so that of a ball is taken to be its middle.
+/// Any direction is valid, so for a direction of balls its middle is used.
 pub(crate) fn certainly_farther(a: &Boxed, b: &Boxed, limit: f64) -> bool {
     if a.gap(b) > limit {
         return true;
@@ -99,7 +99,7 @@ pub(crate) fn certainly_farther(a: &Boxed, b: &Boxed, limit: f64) -> bool {
             above = above.min(height.least());
             below = below.min(-height.most());
         }
-        // The width beyond the limit: above * above > limit * limit * |direction|^2, with above > 0.
+        // A width beyond the limit means above * above > limit * limit * |direction|^2, with above > 0.
         let width = Ball::exactly(above.max(below));
         let square = limit.times(&limit).times(&dot(&direction, &direction));
         let wider = width.times(&width).minus(&square).sign();

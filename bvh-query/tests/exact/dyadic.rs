@@ -1,10 +1,10 @@
-//! f64 as what it is: an integer times a power of two. Triangles become integers on a common grid.
+//! Reads an f64 as an integer times a power of two. This turns triangles into integers on a common grid.
 
 use super::number::Corners;
 use dashu_int::IBig;
 use std::cmp::Ordering;
 
-/// An odd mantissa, or 0, and the exponent; that of 0 is high, so as never to be the lowest.
+/// Returns an odd mantissa, or 0, and the exponent. The exponent of 0 is so high that it is never the lowest.
 pub(crate) fn parts(x: f64) -> (i64, i32) {
     assert!(x.is_finite(), "{x}");
     let bits = x.to_bits();
@@ -18,13 +18,13 @@ pub(crate) fn parts(x: f64) -> (i64, i32) {
     (signed >> zeros, field.max(1) - 1075 + zeros)
 }
 
-/// The exponent of the coarsest grid that all numbers are on; 0 if all are 0.
+/// Returns the exponent of the coarsest grid that contains all numbers, or 0 if all of them are 0.
 pub(crate) fn grid(numbers: impl Iterator<Item = f64>) -> i32 {
     let lowest = numbers.map(|x| parts(x).1).min().unwrap();
     if lowest == i32::MAX / 4 { 0 } else { lowest }
 }
 
-/// A number on the grid of 2^`grid`, in its units.
+/// Returns a number on the grid of 2^`grid`, in units of that grid.
 pub(crate) fn on_grid(x: f64, grid: i32) -> IBig {
     match parts(x) {
         (0, _) => IBig::ZERO,
@@ -46,8 +46,8 @@ impl Integers {
         Self { a: integers(a), b: integers(b), grid }
     }
 
-    /// The same, each coordinate less than 2^28: there `meet`, of degree four in differences and with less
-    /// than 2^8 terms, stays below 2^127.
+    /// Returns the same triangles if each coordinate is less than 2^28. For these, `meet` stays below 2^127, as it
+    /// has degree four in the differences and less than 2^8 terms.
     pub(crate) fn narrow(&self) -> Option<(Corners<i128>, Corners<i128>)> {
         let narrow = |t: &Corners<IBig>| {
             let mut narrowed = [[0; 3]; 3];

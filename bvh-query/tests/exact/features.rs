@@ -1,7 +1,7 @@
-//! The oracle of distance from above: the least over pairs of features of the triangles.
+//! The oracle that bounds a distance from above, by the least distance over pairs of features of the triangles.
 //!
-//! Each candidate is the distance of two points that are in the triangles, so it is never too small; that it is
-//! never too large, `separation` proves.
+//! Each candidate is the distance between two points of the triangles, so the least one is never too small.
+//! `separation` proves that it is never too large.
 
 use super::meet::meet;
 use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
@@ -9,12 +9,12 @@ use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtrac
 /// A squared length: numerator and positive denominator.
 pub(crate) type Fraction<N> = (N, N);
 
-/// Whether the first is smaller.
+/// Returns whether the first fraction is smaller.
 pub(crate) fn is_less<N: Number>(p: &Fraction<N>, q: &Fraction<N>) -> Option<bool> {
     Some(p.0.times(&q.1).minus(&q.0.times(&p.1)).sign()?.is_lt())
 }
 
-/// The squared distance of two closed triangles; `zero` and `one` are what they say.
+/// Returns the squared distance of two closed triangles. `zero` and `one` are the numbers 0 and 1.
 pub(crate) fn squared_distance<N: Number>(
     a: &Corners<N>,
     b: &Corners<N>,
@@ -58,7 +58,8 @@ pub(crate) fn squared_distance<N: Number>(
     Some(least)
 }
 
-/// From a point, `gap` away from the start of an edge, straight to the edge, if that is between its ends.
+/// Returns the squared distance perpendicular to an edge, from a point that is `gap` away from the start of the edge,
+/// if the foot of the perpendicular is between the edge's ends.
 fn off_edge<N: Number>(gap: &Vector<N>, edge: &Vector<N>) -> Option<Option<Fraction<N>>> {
     let (along, whole) = (dot(gap, edge), dot(edge, edge));
     let between = along.sign()?.is_gt() && along.minus(&whole).sign()?.is_lt();
@@ -66,11 +67,12 @@ fn off_edge<N: Number>(gap: &Vector<N>, edge: &Vector<N>) -> Option<Option<Fract
     Some(between.then(|| (square(), whole.clone())))
 }
 
-/// Straight from one edge to another, `gap` from start to start, if that is between their ends.
+/// Returns the squared distance perpendicular to two edges, whose starts are `gap` apart, if both feet of the
+/// perpendicular are between the edges' ends.
 fn between_edges<N: Number>(gap: &Vector<N>, u: &Vector<N>, v: &Vector<N>) -> Option<Option<Fraction<N>>> {
     let normal = cross(u, v);
     let whole = dot(&normal, &normal);
-    // If gap = x u - y v + z normal, these are x and y, times whole.
+    // For gap = x u - y v + z normal, these parts are x and y, multiplied by `whole`.
     for part in [dot(&cross(gap, v), &normal), dot(&cross(gap, u), &normal)] {
         if part.sign()?.is_le() || part.minus(&whole).sign()?.is_ge() {
             return Some(None);

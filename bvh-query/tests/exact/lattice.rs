@@ -1,11 +1,10 @@
-//! Triangles with small integer corners in exact poses: many pairs, most of them near contact, each decided by
-//! the oracle in 64-bit integers alone.
+//! Compares triangles with small integer corners in exact poses: many pairs, most of them near contact, each decided
+//! by the oracle in 64-bit integers alone.
 //!
-//! The pose is applied in integers too, so that nothing of the library has a part in what is expected. With
-//! coordinates below 2^12 after placing, differences are below 2^13, and the oracle, of degree four in them and
-//! with less than 2^8 terms, stays below 2^60.
+//! The pose is applied in integers too, so that no code of the library takes part in the expected answers. Placed
+//! coordinates are below 2^12, so differences are below 2^13. The oracle has degree four in them and less than 2^8
+//! terms, so it stays below 2^60.
 
-use super::effort::rounds;
 use super::kinds::exact_turns;
 use super::meet::meet;
 use super::number::Corners;
@@ -14,16 +13,17 @@ use crate::common::{Random, Triangle, bake, mesh, options, queriers};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Contact, Pose};
+use cbvh_testkit::depth::rounds;
 
-/// Triangles a mesh.
+/// The number of triangles per mesh.
 const COUNT: usize = 48;
-/// Poses a pair of meshes.
+/// The number of poses per pair of meshes.
 const POSES: usize = 12;
 
 type Integers = Vec<Corners<i64>>;
 
-/// Some with a common corner or plane, some without area. `spread` is how far coordinates go, `reach` how large
-/// a triangle is.
+/// Makes triangles, some with a common corner or plane and some without area. `spread` is the range of the
+/// coordinates, `reach` the size of a triangle.
 fn triangles(random: &mut Random, spread: usize, reach: usize) -> Integers {
     let mut number = |most: usize| random.below(2 * most + 1) as i64 - most as i64;
     let mut all: Integers = Vec::new();
@@ -48,7 +48,7 @@ fn floats(triangles: &Integers, unit: f64) -> Vec<Triangle> {
     triangles.iter().map(|t| t.map(|p| p.map(|x| x as f64 * unit))).collect()
 }
 
-/// All pairs that meet, by the oracle.
+/// Returns all pairs that meet, by the oracle.
 fn expected(a: &Integers, b: &Integers) -> Vec<Contact> {
     let ends = |t: &Corners<i64>, k: usize| {
         let x = [t[0][k], t[1][k], t[2][k]];
@@ -78,11 +78,11 @@ fn all_pairs_of_lattice_triangles() {
     let (mut tally, mut queriers, mut random) = (Tally::default(), queriers(), Random::new(31));
     let turns = exact_turns();
     let encodings = [TriangleEncoding::F32, TriangleEncoding::Packed];
-    for round in 0..rounds(60) {
-        // From a few points, where nearly all pairs touch, to a thousand times as many, where few do.
+    for round in 0..rounds(6) {
+        // With the smallest spread nearly all pairs touch; with a spread over a hundred times as large, few do.
         let spread = 1 << random.below(8);
         let reach = 1 + random.below(4 * spread);
-        // Down to subnormal numbers, up to near the largest that are allowed.
+        // The units range from subnormal numbers to nearly the largest ones allowed.
         let unit = 2f64.powi(random.below(255) as i32 - 149);
         let [a, b] = [(); 2].map(|()| triangles(&mut random, spread, reach));
         let [file_a, file_b] = [&a, &b].map(|all| {

@@ -1,4 +1,4 @@
-//! The exact distance of two triangles of f64, proved, and how it compares.
+//! The exact, proved distance of two triangles of f64, and comparisons with it.
 
 use super::dyadic::{Integers, compare, parts};
 use super::features::{Fraction, squared_distance};
@@ -6,7 +6,7 @@ use super::separation::widest;
 use dashu_int::IBig;
 use std::cmp::Ordering;
 
-/// A distance by its square, in units of 4^`exponent`.
+/// A distance, by its square in units of 4^`exponent`.
 #[derive(Clone, Debug)]
 pub(crate) struct Length {
     square: Fraction<IBig>,
@@ -14,7 +14,7 @@ pub(crate) struct Length {
 }
 
 impl Length {
-    /// The distance by both oracles, which must agree.
+    /// Returns the distance according to both oracles, which must agree.
     pub(crate) fn between(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> Self {
         let integers = Integers::new(a, b);
         let square = squared_distance(&integers.a, &integers.b, &[IBig::ZERO, IBig::ONE]).unwrap();
@@ -37,9 +37,9 @@ impl Length {
         compare(one, 2 * self.exponent, two, 2 * other.exponent).is_lt()
     }
 
-    /// The largest f64 that is not larger.
+    /// Returns the largest f64 that is not larger than the distance.
     pub(crate) fn floor(&self) -> f64 {
-        // Bits of positive numbers are in the order of the numbers.
+        // The bits of positive numbers are in the order of the numbers.
         let (mut low, mut high) = (0, f64::INFINITY.to_bits());
         while high - low > 1 {
             let middle = low + (high - low) / 2;

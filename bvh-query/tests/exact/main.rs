@@ -1,8 +1,8 @@
-//! The library against an exact oracle: all answers, where they are hardest, in numbers.
+//! Compares the library with an exact oracle: all answers, where they are hardest, in large numbers.
 //!
-//! What is promised about poses is that queries are about the placed corners, each an f64 that `Pose` defines;
-//! `placement` checks that definition, and everything else is exact on those corners. The usual amount takes
-//! seconds; `CBVH_TEST_PAIRS=100` searches a hundred times as much. Counts are shown with `--nocapture`.
+//! Queries are about the placed corners, each of which is an f64 that `Pose` defines. `placement` checks that
+//! definition, and everything else is exact on those corners. The everyday amount takes seconds;
+//! `CBVH_TEST_DEPTH=100` searches a hundred times as much. `--nocapture` shows the counts.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -13,7 +13,6 @@ mod ball;
 mod boundary;
 mod decide;
 mod dyadic;
-mod effort;
 mod features;
 mod hard_cases;
 mod kinds;

@@ -1,7 +1,8 @@
 //! The oracle of contact: do two closed triangles share a point?
 //!
-//! What two triangles share is convex; if it is not empty it has an extreme point, and that lies on an edge of one
-//! or the other. So they meet exactly if an edge of one meets the other. `None` where a sign is not certain.
+//! The common part of two triangles is convex. If it is not empty, it has an extreme point, which lies on an edge of
+//! one or the other. So the triangles meet exactly if an edge of one meets the other. The answer is `None` if a sign
+//! is not certain.
 
 use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
 use std::cmp::Ordering::{Equal, Greater, Less};
@@ -25,7 +26,7 @@ fn edge_meets<N: Number>(p: &Vector<N>, q: &Vector<N>, t: &Corners<N>) -> Option
         let height = |point: &Vector<N>| dot(&normal, &subtract(point, &t[0])).sign();
         match (height(p)?, height(q)?) {
             (Greater, Greater) | (Less, Less) => return Some(false),
-            // In the plane: inside, or else across an edge.
+            // The edge is in the plane, so it starts inside the triangle or crosses one of its edges.
             (Equal, Equal) => {
                 let mut inside = true;
                 for (edge, corner) in [&first, &second, &third].into_iter().zip(t) {
@@ -35,7 +36,8 @@ fn edge_meets<N: Number>(p: &Vector<N>, q: &Vector<N>, t: &Corners<N>) -> Option
                     return Some(true);
                 }
             }
-            // One point of it is in the plane: inside, if its line passes all edges on the same side.
+            // One point of the edge is in the plane. It is inside if the edge's line passes all edges on the same
+            // side.
             _ => {
                 let along = subtract(q, p);
                 let mut sides = [Equal; 3];
@@ -47,7 +49,7 @@ fn edge_meets<N: Number>(p: &Vector<N>, q: &Vector<N>, t: &Corners<N>) -> Option
             }
         }
     }
-    // In its plane, or without area, a triangle is met if one of its edges is.
+    // A triangle without area, or in whose plane the edge lies, is met if one of its edges is met.
     for i in 0..3 {
         if edges_meet([p, q], [&t[i], &t[(i + 1) % 3]])? {
             return Some(true);
@@ -56,7 +58,7 @@ fn edge_meets<N: Number>(p: &Vector<N>, q: &Vector<N>, t: &Corners<N>) -> Option
     Some(false)
 }
 
-/// Two closed segments, each of which may be a point.
+/// Returns whether two closed segments meet, each of which may be a point.
 fn edges_meet<N: Number>([p, q]: [&Vector<N>; 2], [r, s]: [&Vector<N>; 2]) -> Option<bool> {
     let (u, v, w) = (subtract(q, p), subtract(s, r), subtract(r, p));
     let normal = cross(&u, &v);
@@ -73,7 +75,7 @@ fn edges_meet<N: Number>([p, q]: [&Vector<N>; 2], [r, s]: [&Vector<N>; 2]) -> Op
     if !is_zero(&cross(&w, &u))? || !is_zero(&cross(&w, &v))? {
         return Some(false);
     }
-    // On one line: they overlap if they do along every axis.
+    // Segments on one line overlap if they overlap along every axis.
     for axis in 0..3 {
         let beyond = |x: &[&Vector<N>; 2], y: &[&Vector<N>; 2]| {
             let mut all = true;

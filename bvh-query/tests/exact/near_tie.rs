@@ -1,5 +1,5 @@
-//! Two pairs of triangles almost equally near: the one with the least distance in f64 is not the closest, and the
-//! interval must contain the true distance of the meshes all the same.
+//! Two pairs of triangles that are almost equally near. The pair with the least distance in f64 is not the closest,
+//! and the interval must contain the true distance of the meshes all the same.
 
 use super::ask::Asked;
 use super::tally::Tally;
@@ -8,8 +8,8 @@ use crate::common::{bake, mesh, queriers, stored};
 use bvh_bake::Options;
 use bvh_query::Pose;
 
-/// In f64 the segment of B is the nearest, 7.6e-17 from the edge of A and certainly beyond 5.2e-17. But the
-/// triangle is 2.6e-32 away.
+/// In f64 the segment of B is the nearest, 7.6e-17 from the edge of A and certainly beyond 5.2e-17. But the triangle
+/// of B is 2.6e-32 away.
 #[test]
 fn an_edge_over_a_triangle_and_a_segment() {
     let a = [[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 0.0]];

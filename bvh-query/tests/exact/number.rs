@@ -1,7 +1,7 @@
-//! Numbers that an oracle is computed in: integers, exact, or balls, which may not know a sign.
+//! The numbers with which the oracles compute: integers, which are exact, or balls, whose sign may be uncertain.
 //!
-//! One text of an oracle serves all: on balls it is fast and says where it is not certain, on integers it is the
-//! last word. The test profile checks integers of fixed width for overflow.
+//! The code of an oracle serves all of them. On balls it is fast and says where it is not certain; on integers it is
+//! the last word. The test profile checks integers of fixed width for overflow.
 
 use dashu_int::IBig;
 use std::cmp::Ordering;
@@ -10,7 +10,7 @@ pub(crate) trait Number: Clone {
     fn plus(&self, other: &Self) -> Self;
     fn minus(&self, other: &Self) -> Self;
     fn times(&self, other: &Self) -> Self;
-    /// How it compares with 0; `None` where that is not certain.
+    /// Compares the number with 0, or returns `None` if the result is not certain.
     fn sign(&self) -> Option<Ordering>;
 }
 
@@ -42,7 +42,7 @@ integer!(IBig, IBig::ZERO);
 
 pub(crate) type Vector<N> = [N; 3];
 
-/// The closed triangle on three points; collinear ones make a segment, equal ones a point.
+/// The closed triangle of three points. Collinear points make a segment, equal ones a point.
 pub(crate) type Corners<N> = [Vector<N>; 3];
 
 pub(crate) fn subtract<N: Number>(p: &Vector<N>, q: &Vector<N>) -> Vector<N> {
@@ -58,7 +58,7 @@ pub(crate) fn cross<N: Number>(p: &Vector<N>, q: &Vector<N>) -> Vector<N> {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-/// Whether a vector is zero; `None` where that is not certain.
+/// Returns whether a vector is zero, or `None` if that is not certain.
 pub(crate) fn is_zero<N: Number>(p: &Vector<N>) -> Option<bool> {
     let signs = [p[0].sign(), p[1].sign(), p[2].sign()];
     if signs.iter().any(|sign| sign.is_some_and(Ordering::is_ne)) {
@@ -67,7 +67,7 @@ pub(crate) fn is_zero<N: Number>(p: &Vector<N>) -> Option<bool> {
     signs.iter().all(Option::is_some).then_some(true)
 }
 
-/// From each corner to the next.
+/// Returns the vectors from each corner to the next.
 pub(crate) fn edges<N: Number>(t: &Corners<N>) -> Corners<N> {
     [subtract(&t[1], &t[0]), subtract(&t[2], &t[1]), subtract(&t[0], &t[2])]
 }

@@ -1,7 +1,7 @@
-//! What queries are about: the placed corner is what `Pose` says it is, and how far that is from R x + t.
+//! Checks that a placed corner is what `Pose` says it is, and how far that is from R x + t.
 //!
-//! A stored coordinate is origin + v without rounding; a placed one is `((R0 x + R1 y) + R2 z) + t` with each
-//! product and sum rounded to nearest, ties to even. Both are recomputed in integers.
+//! A stored coordinate is origin + v without rounding. A placed one is `((R0 x + R1 y) + R2 z) + t`, where each
+//! product and each sum is rounded to nearest, ties to even. The tests recompute both in integers.
 
 use super::dyadic::{on_grid, parts};
 use super::kinds::turn;
@@ -38,8 +38,8 @@ impl Dyadic {
         self.plus(&Self(-other.0.clone(), other.1)).0.cmp(&IBig::ZERO)
     }
 
-    /// Whether `x` is it, rounded to nearest, ties to even: no farther away than half way to a neighbour, and at
-    /// half way only with an even mantissa.
+    /// Returns whether `x` is this number, rounded to nearest, ties to even: no farther away than half way to a
+    /// neighbour, and half way only with an even mantissa.
     fn rounds_to(&self, x: f64) -> bool {
         let twice = self.times(&Self::new(2.0));
         let half_way = |neighbour: f64| Self::new(x).plus(&Self::new(neighbour));
@@ -49,7 +49,7 @@ impl Dyadic {
     }
 }
 
-/// The exact sum of four steps, each rounded; panics where `place` was rounded otherwise.
+/// Computes the four steps exactly and rounds after each. Panics if `place` rounded otherwise.
 fn check_place(pose: &Pose, point: [f64; 3]) {
     let (placed, translation) = (pose.place(point), pose.translation());
     for k in 0..3 {
@@ -67,8 +67,9 @@ fn check_place(pose: &Pose, point: [f64; 3]) {
             "{pose:?} {point:?}"
         );
 
-        // With u = 2^-53 a product passes at most four roundings and t one: off by at most 4u of the sum of
-        // magnitudes, and a little of second order; nothing underflows, or by less than a subnormal each.
+        // With u = 2^-53, a product passes at most four roundings and t passes one. The result is off by at most 4u
+        // of the sum of the magnitudes, and a small second-order term. An underflow adds less than one subnormal
+        // number each.
         let terms = [0, 1, 2].map(|j| Dyadic::new(row[j]).times(&Dyadic::new(point[j])));
         let all = [&terms[0], &terms[1], &terms[2], &Dyadic::new(translation[k])];
         let zero = Dyadic::new(0.0);
@@ -97,7 +98,7 @@ fn placed_corners_are_rounded_step_by_step() {
     }
 }
 
-/// Entries that would underflow in exact arithmetic count as 0, and no others.
+/// Entries that would underflow in exact arithmetic count as 0, and no others do.
 #[test]
 fn entries_below_the_limits_are_zero() {
     let (tiny_turn, tiny_move) = (2f64.powi(-64), 2f64.powi(-213));
@@ -124,12 +125,12 @@ fn stored_corners_are_sums_without_rounding() {
         let profile = Profile::ALL[round % Profile::ALL.len()];
         let file = bake(&mesh(&triangles), &options(profile, encodings[round % 3]));
         let (object, layout) = (&file.objects()[0], file.layout());
-        let origin = object.record.origin.map(|x| x.get());
-        let page = object.record.first_page.get();
-        let page = Page::new(layout.page_bytes(file.bytes(), page).unwrap(), object.profile);
+        let origin = object.origin();
+        let page = object.record().first_page.get();
+        let page = Page::new(layout.page_bytes(file.bytes(), page).unwrap(), object.profile());
         let block = layout.leaf_block(file.bytes(), page.header());
         for (packet, count) in packets(&page) {
-            let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
             for corner in (0..count).flat_map(|lane| values.triangle(lane)) {
                 for k in 0..3 {
                     let (v, sum) = (f64::from(corner[k]), origin[k] + f64::from(corner[k]));

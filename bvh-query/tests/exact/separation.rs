@@ -1,14 +1,14 @@
-//! The oracle of distance from below: the widest slab that separates the triangles.
+//! The oracle that bounds a distance from below, by the widest slab that separates the triangles.
 //!
-//! A slab between the triangles is never wider than they are apart, whatever its direction. The widest one is
-//! perpendicular to the line between the closest points, which is the normal of a face or of two edges, or the
-//! gap of two corners, or such a gap without its part along an edge. So where this equals the least distance
-//! over features, both are proved right, however either was found.
+//! A slab between the triangles is never wider than their distance, whatever its direction. The widest one is
+//! perpendicular to the line between the closest points. That line is the normal of a face or of two edges, or joins
+//! two corners, or is such a join without its part along an edge. So where the widest slab equals the least distance
+//! over features, both are proved right, no matter how they were found.
 
 use super::features::{Fraction, is_less};
 use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
 
-/// From each corner of `a` to each of `b`.
+/// Returns the vectors from each corner of `a` to each corner of `b`.
 pub(crate) fn gaps<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Vec<Vector<N>> {
     a.iter().flat_map(|p| b.iter().map(|q| subtract(q, p))).collect()
 }
@@ -34,7 +34,7 @@ pub(crate) fn directions<N: Number>(
     Some(done)
 }
 
-/// The squared width of the widest slab between the triangles; `None` if there is none.
+/// Returns the squared width of the widest slab between the triangles, or `None` if there is none.
 pub(crate) fn widest<N: Number>(a: &Corners<N>, b: &Corners<N>, zero: &N) -> Option<Fraction<N>> {
     let gaps = gaps(a, b);
     let mut best: Option<Fraction<N>> = None;

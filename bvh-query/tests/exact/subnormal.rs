@@ -1,14 +1,14 @@
-//! Meshes of a few of the smallest numbers of f32, and dust beside large triangles: where products underflow,
-//! rounding is absolute, and filters must allow for it.
+//! Tests meshes whose size is a few of the smallest f32 numbers, and dust beside large triangles. Products underflow
+//! there and rounding is absolute, for which filters must allow.
 
 use super::ask::Asked;
-use super::effort::rounds;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
-use crate::common::{Random, Triangle, bake, mesh, options, queriers, stored};
+use crate::common::{Random, Triangle, bake, mesh, options, queriers, random_pose, stored};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::Pose;
+use cbvh_testkit::depth::rounds;
 
 /// The smallest positive f32.
 const UNIT: f64 = f64::from_bits((1023 - 149) << 52);
@@ -21,7 +21,7 @@ fn times(unit: f64, t: [[i32; 3]; 3]) -> Triangle {
     t.map(|p| p.map(|x| f64::from(x) * unit))
 }
 
-/// A segment and a triangle that cross by a fraction of a unit, in all profiles.
+/// A segment and a triangle cross by a fraction of a unit, in all profiles.
 #[test]
 fn two_triangles_that_cross_by_less_than_a_subnormal() {
     let a = in_units([[-2, 2, 1], [-2, 1, 0], [-2, 2, 1]]);
@@ -50,11 +50,11 @@ fn two_triangles_that_cross_by_less_than_a_subnormal() {
     tally.report("a subnormal pair");
 }
 
-/// Random triangles of a few units, turned anyhow.
+/// Compares random triangles of a few units in any rotation.
 #[test]
 fn random_triangles_of_a_few_units() {
     let (mut tally, mut queriers, mut random) = (Tally::default(), queriers(), Random::new(51));
-    for round in 0..rounds(300) {
+    for round in 0..rounds(30) {
         let (spread, reach) = (2 << random.below(4), 1 + random.below(3));
         let mut number = |most: usize| random.below(2 * most + 1) as i32 - most as i32;
         let mut triangles = || -> Vec<_> {
@@ -71,7 +71,7 @@ fn random_triangles_of_a_few_units() {
         });
         let surfaces = [&file_a, &file_b].map(|file| Surface::new(stored(file)));
         for _ in 0..4 {
-            let pose = random.pose(2.5 * spread as f64 * UNIT);
+            let pose = random_pose(&mut random, 2.5 * spread as f64 * UNIT);
             let truth = Truth::new(&surfaces[0], &surfaces[1], &pose);
             let mut asked = Asked { a: &file_a, b: &file_b, queriers: &mut queriers };
             if let Err(error) = asked.all(&truth, &pose, &mut tally) {
@@ -85,11 +85,11 @@ fn random_triangles_of_a_few_units() {
     tally.report("a few subnormal units");
 }
 
-/// Triangles around the origin far below the size of their meshes, near each other.
+/// Places triangles, far smaller than their meshes, near each other around the origin.
 #[test]
 fn dust_beside_large_triangles() {
     let (mut tally, mut queriers, mut random) = (Tally::default(), queriers(), Random::new(52));
-    for round in 0..rounds(200) {
+    for round in 0..rounds(20) {
         let exponent = -(20 + random.below(130) as i32);
         let unit = 2f64.powi(exponent);
         let reach = 1 << random.below(12);
@@ -110,7 +110,7 @@ fn dust_beside_large_triangles() {
         });
         let surfaces = [&file_a, &file_b].map(|file| Surface::new(stored(file)));
         for _ in 0..3 {
-            let turned = random.pose(8.0 * reach as f64 * unit);
+            let turned = random_pose(&mut random, 8.0 * reach as f64 * unit);
             let pose = Pose::new(*Pose::IDENTITY.rotation(), turned.translation()).unwrap();
             for pose in [turned, pose] {
                 let truth = Truth::new(&surfaces[0], &surfaces[1], &pose);

@@ -1,36 +1,37 @@
-//! What was searched: counts, widths of intervals, wrong answers.
+//! Counts what was searched: queries, widths of intervals, wrong answers.
 
 use super::decide::Decided;
 use crate::common::note;
 
-/// Wrong answers kept; the search ends with the last.
+/// The most wrong answers that are kept; the search ends when there are as many.
 const MANY: usize = 20;
 
 #[derive(Default)]
 pub(crate) struct Tally {
-    /// Poses asked about, each on all backends.
+    /// The number of poses, each of which is queried on all backends.
     pub(crate) poses: u64,
-    /// Questions to the library, all backends together.
+    /// The number of queries, on all backends together.
     pub(crate) queries: u64,
-    /// Triangle pairs whose contact was compared, once a pose.
+    /// The number of triangle pairs whose contact was compared, once per pose.
     pub(crate) pairs: u64,
-    /// Of these in contact.
+    /// The number of these pairs that are in contact.
     pub(crate) contacts: u64,
-    /// Poses next to which, within a unit in the last place, the answer changes.
+    /// The number of poses next to which, within one unit in the last place, the answer changes.
     pub(crate) boundaries: u64,
-    /// How the oracle decided contact.
+    /// The ways in which the oracle decided contact.
     pub(crate) decided: Decided,
-    /// Exact distances, each by both oracles.
+    /// The number of exact distances, each computed by both oracles.
     pub(crate) lengths: u64,
-    /// `within` inside the interval of `distance`, and of these not as the computed distance has it.
+    /// The number of `within` queries inside the interval of `distance`, and how many of them the computed distance
+    /// would have answered wrongly.
     pub(crate) within: [u64; 2],
-    /// Widths of intervals as fractions of the size of both meshes.
+    /// The widths of intervals, as fractions of the size of both meshes.
     pub(crate) widths: Vec<f64>,
-    /// Answers that are wrong.
+    /// The wrong answers.
     pub(crate) wrong: Vec<String>,
-    /// Intervals of `distance` that the true distance is not in.
+    /// The number of intervals of `distance` that do not contain the true distance.
     pub(crate) missed: u64,
-    /// The first of these.
+    /// The first of these intervals.
     first_missed: Option<String>,
 }
 
@@ -40,7 +41,8 @@ impl Tally {
         self.wrong.push(line);
     }
 
-    /// An interval without the truth. Apart from wrong answers, so that these are still looked for.
+    /// Records an interval without the true distance. It is counted apart, so that the search for wrong answers goes
+    /// on.
     pub(crate) fn missed(&mut self, line: String) {
         if self.missed < MANY as u64 {
             note(&format!("MISSED {line}"));
@@ -49,12 +51,12 @@ impl Tally {
         self.first_missed.get_or_insert(line);
     }
 
-    /// Whether to give up.
+    /// Returns whether to give up.
     pub(crate) fn is_full(&self) -> bool {
         self.wrong.len() >= MANY
     }
 
-    /// Prints all counts; fails if anything was wrong.
+    /// Prints all counts, and fails if anything was wrong.
     #[track_caller]
     pub(crate) fn report(mut self, name: &str) {
         self.widths.sort_by(f64::total_cmp);
@@ -70,7 +72,7 @@ impl Tally {
             "{name}: {poses} poses, {boundaries} of them next to a change, {queries} queries; {pairs} triangle \
              pairs, {contacts} in contact; oracle: {by_boxes} by boxes, {by_balls} by balls, {by_integers} by integers, {lengths} exact \
              distances; {count} intervals, width / size: median {median:.2e}, largest {most:.2e}; within inside \
-             an interval: {inside}, {other} other than the computed distance has it; {} intervals without the truth",
+             an interval: {inside}, {other} of them other than the computed distance says; {} intervals without the truth",
             self.missed
         ));
         assert!(self.wrong.is_empty(), "{} wrong answers, the first: {}", self.wrong.len(), self.wrong[0]);

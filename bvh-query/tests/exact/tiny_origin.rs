@@ -1,4 +1,5 @@
-//! Coordinates in f64 below all f32: where a file keeps them as its origin, contact must be exact all the same.
+//! Coordinates in f64 that are smaller than any f32: a file keeps them as its origin, and contact must still be
+//! exact.
 
 use super::ask::Asked;
 use super::tally::Tally;
@@ -7,7 +8,8 @@ use crate::common::{bake, mesh, queriers, stored};
 use bvh_bake::Options;
 use bvh_query::Pose;
 
-/// Two equal triangles in parallel planes, `gap` apart in the input; the truth is what the file holds.
+/// Queries two equal triangles in parallel planes that are `gap` apart in the input. The truth is what the file
+/// stores.
 #[test]
 fn parallel_triangles_less_than_all_f32_apart() {
     let (mut tally, mut queriers) = (Tally::default(), queriers());

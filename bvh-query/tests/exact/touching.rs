@@ -1,10 +1,9 @@
-//! Contact by construction: two triangles share a corner, a point of an edge or of a face, or just miss it.
+//! Constructs contacts: two triangles share a corner, or a point of an edge or a face, or just miss it.
 //!
-//! All coordinates are small integers times a power of two and poses are exact turns with such translations, so
-//! that placed corners are exact and the construction itself says what is right, of the oracles too.
+//! All coordinates are small integers times a power of two, and poses are exact rotations with such translations.
+//! Placed corners are therefore exact, and the construction itself says what is right, even for the oracles.
 
 use super::ask::Asked;
-use super::effort::rounds;
 use super::kinds::exact_turns;
 use super::length::Length;
 use super::tally::Tally;
@@ -12,6 +11,7 @@ use super::truth::{Surface, Truth};
 use crate::common::{Random, Triangle, bake, mesh, queriers, stored};
 use bvh_bake::Options;
 use bvh_query::{Pose, Querier};
+use cbvh_testkit::depth::rounds;
 
 type Integer = [i64; 3];
 
@@ -23,8 +23,8 @@ fn plus(p: Integer, q: Integer) -> Integer {
     [0, 1, 2].map(|k| p[k] + q[k])
 }
 
-/// A triangle in the half space z <= 0 and one in z >= 0 that have at least one point in common, all in z = 0;
-/// and a name. Corners are multiples of 8 where points between them are needed.
+/// Returns a name, a triangle in the half space z <= 0 and one in z >= 0. They have at least one point in common, and
+/// all common points are in z = 0. Corners are multiples of 8 where points between them are needed.
 fn touching_at_zero(random: &mut Random) -> (&'static str, [Integer; 3], [Integer; 3]) {
     let mut flat = |z: i64| {
         let mut number = || 8 * (random.below(33) as i64 - 16);
@@ -54,15 +54,15 @@ fn apply(turn: [[f64; 3]; 3], p: [f64; 3]) -> [f64; 3] {
     turn.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
 }
 
-/// The inverse: these turns are orthonormal to the bit.
+/// Applies the inverse rotation, which is exact because these rotations are orthonormal to the bit.
 fn apply_back(turn: [[f64; 3]; 3], p: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| turn[0][k] * p[0] + turn[1][k] * p[1] + turn[2][k] * p[2])
 }
 
-/// One contact in a place, at a scale: where the triangles are and where B is put.
+/// One contact at a place and a scale: the triangles, and the pose that brings B there.
 struct Construction {
     name: &'static str,
-    /// Multiplies all integers; 2^-30 of it is how far B is moved up or down.
+    /// Multiplies all integers. B is moved up or down by 2^-30 of it.
     unit: f64,
     placed: [Triangle; 2],
     stored_b: Triangle,
@@ -72,7 +72,7 @@ struct Construction {
 }
 
 impl Construction {
-    /// Both are turned as one. B is moved away in its file, and back by the pose.
+    /// Rotates both triangles as one. B is moved away in its file, and back by the pose.
     fn new(random: &mut Random, turns: &[[[f64; 3]; 3]]) -> Self {
         let (name, a, b) = touching_at_zero(random);
         let unit = 2f64.powi(random.below(220) as i32 - 130);
@@ -85,7 +85,8 @@ impl Construction {
         Self { name, unit, placed, stored_b, turn_b, back, up: apply(turn, [0.0, 0.0, 1.0]) }
     }
 
-    /// B where it touches A (0), off A (1) or into A (-1) by 2^-30 of a unit: 42 bits are enough for the sum.
+    /// Returns the pose in which B touches A (0), or is off A (1) or in A (-1) by 2^-30 of a unit. The sum takes 42
+    /// bits.
     fn pose(&self, side: f64) -> Pose {
         let off = side * self.unit * 2f64.powi(-30);
         Pose::new(self.turn_b, [0, 1, 2].map(|k| self.back[k] + off * self.up[k])).unwrap()
@@ -104,7 +105,8 @@ impl Construction {
             asked.all(&Truth::new(&surfaces[0], &surfaces[1], &pose), &pose, tally)?;
             if side >= 0.0 {
                 asked.collide(side == 0.0, &pose, tally)?;
-                // A is on one side of a plane, B on the other, and the point they shared is just opposite.
+                // A and B are on different sides of a plane, and the points that they shared are now exactly opposite
+                // each other.
                 let off = side * self.unit * 2f64.powi(-30);
                 let length = Length::between(&surfaces[0].corners[0], &placed);
                 assert!(length.compare(off).is_eq(), "{}", self.name);
@@ -125,7 +127,7 @@ fn corners_edges_and_faces_that_touch() {
     let (mut tally, mut queriers, mut random) = (Tally::default(), queriers(), Random::new(21));
     let turns = exact_turns();
     assert_eq!(turns.len(), 24);
-    for round in 0..rounds(2000) {
+    for round in 0..rounds(200) {
         let construction = Construction::new(&mut random, &turns);
         if let Err(error) = construction.check(&mut queriers, &mut tally) {
             tally.wrong(format!(

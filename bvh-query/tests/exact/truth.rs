@@ -1,4 +1,4 @@
-//! The right answers for two meshes in a pose, from the oracles over all pairs of triangles.
+//! Computes the right answers for two meshes in a pose, from the oracles over all pairs of triangles.
 
 use super::decide::{Boxed, Triangle, certainly_farther, intersect};
 use super::length::Length;
@@ -6,7 +6,7 @@ use super::tally::Tally;
 use crate::common::{Stored, placed, size};
 use bvh_query::{Contact, Distance, Pose};
 
-/// A mesh as a file holds it.
+/// A mesh as a file stores it.
 pub(crate) struct Surface {
     pub(crate) stored: Vec<Stored>,
     pub(crate) corners: Vec<Triangle>,
@@ -18,19 +18,19 @@ impl Surface {
         Self { stored, corners }
     }
 
-    /// The place in the list of the triangle that an answer names.
+    /// Returns the place in the list of the triangle that an answer names.
     fn find(&self, object: u32, id: u32) -> Option<usize> {
         self.stored.binary_search_by_key(&(object, id), |stored| (stored.object, stored.id)).ok()
     }
 }
 
-/// Two meshes in place.
+/// Two meshes, placed by a pose.
 pub(crate) struct Truth<'a> {
     a: &'a Surface,
     b: &'a Surface,
     boxed_a: Vec<Boxed>,
     boxed_b: Vec<Boxed>,
-    /// The diagonal of the box of both.
+    /// The diagonal of the box around both.
     pub(crate) size: f64,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Truth<'a> {
         Self { a, b, boxed_a: boxed(&a.corners), boxed_b: boxed(&corners_b), size }
     }
 
-    /// Whether the meshes meet; `hint` is a pair to try first, and is told the pair that does.
+    /// Returns whether the meshes meet. `hint` is a pair to try first, and is set to the pair that meets.
     pub(crate) fn collide(&self, hint: &mut (usize, usize), tally: &mut Tally) -> bool {
         if intersect(&self.boxed_a[hint.0], &self.boxed_b[hint.1], &mut tally.decided) {
             return true;
@@ -58,7 +58,7 @@ impl<'a> Truth<'a> {
         false
     }
 
-    /// All pairs in contact, ascending.
+    /// Returns all pairs in contact, in ascending order.
     pub(crate) fn contacts(&self, tally: &mut Tally) -> Vec<Contact> {
         let mut contacts = Vec::new();
         for (a, stored_a) in self.boxed_a.iter().zip(&self.a.stored) {
@@ -78,7 +78,8 @@ impl<'a> Truth<'a> {
         contacts
     }
 
-    /// The pair that an answer names: its exact distance, and its largest difference of two coordinates.
+    /// Returns the exact distance of the pair that an answer names, and the largest difference between two of its
+    /// coordinates.
     pub(crate) fn named(&self, answer: &Distance, tally: &mut Tally) -> Option<(Length, f64)> {
         let i = self.a.find(answer.object_a, answer.triangle_a)?;
         let j = self.b.find(answer.object_b, answer.triangle_b)?;
@@ -87,7 +88,7 @@ impl<'a> Truth<'a> {
         Some((Length::between(&a.corners, &b.corners), a.span(b)))
     }
 
-    /// The same for the closest pair, which is the named one or closer.
+    /// Returns the same for the closest pair, which is the named one or a closer one.
     pub(crate) fn distance(&self, named: (Length, f64), tally: &mut Tally) -> (Length, f64) {
         let limit = named.0.floor().next_up();
         let mut least = named;

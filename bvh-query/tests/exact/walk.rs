@@ -1,20 +1,20 @@
-//! Walks a pose to where the meshes start to touch, until two f64 that are neighbours give different answers.
+//! Moves a pose to where the meshes start to touch, until two neighbouring f64 numbers give different answers.
 
 use super::ask::Asked;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
 use bvh_query::Pose;
 
-/// Two meshes, and poses by one parameter.
+/// Two meshes, and poses that depend on one parameter.
 pub(crate) struct Walk<'a> {
     pub(crate) asked: Asked<'a>,
     pub(crate) surfaces: [&'a Surface; 2],
     pub(crate) pose: &'a dyn Fn(f64) -> Option<Pose>,
-    /// A pair of triangles that touched last.
+    /// The pair of triangles that touched last.
     pub(crate) hint: (usize, usize),
 }
 
-/// Bits in the order of the numbers.
+/// Returns an integer such that integers are in the order of the numbers.
 fn order(x: f64) -> i64 {
     let bits = x.to_bits() as i64;
     if bits < 0 { i64::MIN - bits } else { bits }
@@ -25,7 +25,7 @@ fn from_order(order: i64) -> f64 {
 }
 
 impl Walk<'_> {
-    /// Whether the meshes meet, by the oracle; the library must say so too.
+    /// Returns whether the meshes meet, by the oracle. The library must give the same answer.
     pub(crate) fn collide(&mut self, x: f64, tally: &mut Tally) -> Result<bool, String> {
         let pose = (self.pose)(x).ok_or("no such pose")?;
         let truth = Truth::new(self.surfaces[0], self.surfaces[1], &pose);
@@ -35,14 +35,15 @@ impl Walk<'_> {
         Ok(expected)
     }
 
-    /// Asks everything.
+    /// Asks every query.
     pub(crate) fn all(&mut self, x: f64, tally: &mut Tally) -> Result<(), String> {
         let Some(pose) = (self.pose)(x) else { return Ok(()) };
         let truth = Truth::new(self.surfaces[0], self.surfaces[1], &pose);
         self.asked.all(&truth, &pose, tally).map_err(|error| format!("{error}; {}", show(&pose)))
     }
 
-    /// From `one` to `other`, of which exactly one is a contact, to neighbours; asks everything around them.
+    /// Bisects from `one` to `other`, of which exactly one is a contact, down to neighbouring numbers. Asks every
+    /// query around them.
     pub(crate) fn find_boundary(&mut self, one: f64, other: f64, tally: &mut Tally) -> Result<f64, String> {
         let (mut one, mut other) = (order(one), order(other));
         let touching = self.collide(from_order(one), tally)?;
@@ -59,7 +60,7 @@ impl Walk<'_> {
     }
 }
 
-/// All bits of a pose.
+/// Shows all bits of a pose.
 fn show(pose: &Pose) -> String {
     format!("pose {:?} {:?}", pose.rotation(), pose.translation())
 }

@@ -1,13 +1,11 @@
-//! Shows on standard error how far a bake is, if that is a terminal.
+//! The progress line of a bake, on standard error if that is a terminal.
 
+use crate::console::spinner;
 use bvh_bake::{Progress, Stage, Step};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::{self, Display, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-
-/// How often the line is drawn anew.
-const TICK: Duration = Duration::from_millis(100);
 
 /// The line on the terminal.
 pub(crate) struct Screen {
@@ -15,17 +13,17 @@ pub(crate) struct Screen {
     step: Arc<Mutex<Option<Begun>>>,
 }
 
-/// The step at hand.
+/// The step that runs now.
 #[derive(Clone, Copy)]
 struct Begun {
     step: Step,
     since: Instant,
-    /// What the step had done before, for other objects.
+    /// The triangles that the step had done before, for other objects.
     triangles: u64,
 }
 
 impl Screen {
-    /// Shows a bake.
+    /// Shows the progress of a bake.
     pub(crate) fn new(progress: &Progress, quiet: bool) -> Self {
         let spinner = spinner(quiet);
         let step: Arc<Mutex<Option<Begun>>> = Arc::default();
@@ -33,7 +31,7 @@ impl Screen {
             let (progress, step, start) = (progress.clone(), step.clone(), Instant::now());
             let draw = move |_: &ProgressState, line: &mut dyn Write| {
                 if let Some(begun) = *lock(&step) {
-                    // Text in memory is written without fail.
+                    // Writing to text in memory cannot fail.
                     let _ = write!(line, "{}", Line::now(&progress, begun, start.elapsed()));
                 }
             };
@@ -44,21 +42,27 @@ impl Screen {
         Self { spinner, step }
     }
 
-    /// A step begins.
+    /// Notes that a step begins.
     pub(crate) fn begin(&self, step: Step, progress: &Progress) {
         if !self.spinner.is_hidden() {
             *lock(&self.step) =
                 Some(Begun { step, since: Instant::now(), triangles: progress.triangles(step) });
-            self.spinner.tick();
+            // Draws at once, so that even a step shorter than the spinner's interval is shown.
+            self.spinner.force_draw();
         }
     }
 
-    /// Takes the line away while something else is written.
+    /// Hides the line while something else is written.
     pub(crate) fn suspend(&self, write: impl FnOnce()) {
         self.spinner.suspend(write);
     }
 
-    /// Takes the line away for good.
+    /// Returns the line itself.
+    pub(crate) fn spinner(&self) -> &ProgressBar {
+        &self.spinner
+    }
+
+    /// Removes the line.
     pub(crate) fn clear(self) {
         self.spinner.finish_and_clear();
     }
@@ -68,24 +72,11 @@ fn lock(step: &Mutex<Option<Begun>>) -> MutexGuard<'_, Option<Begun>> {
     step.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line on standard error, with a message and the time, that is drawn anew ten times a second; none if that is no terminal.
-pub(crate) fn spinner(quiet: bool) -> ProgressBar {
-    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let spinner = ProgressBar::with_draw_target(None, target);
-    if !spinner.is_hidden() {
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-            spinner.set_style(style);
-        }
-        spinner.enable_steady_tick(TICK);
-    }
-    spinner
-}
-
 /// What the line says.
 struct Line {
     name: &'static str,
     share: Option<f64>,
-    triangles_a_second: f64,
+    triangles_per_second: f64,
     spilled: u64,
     elapsed: Duration,
     left: Option<Duration>,
@@ -98,7 +89,7 @@ impl Line {
         Self {
             name: step.name(),
             share: progress.share(step),
-            triangles_a_second: triangles as f64 / since.elapsed().as_secs_f64().max(1e-3),
+            triangles_per_second: triangles as f64 / since.elapsed().as_secs_f64().max(1e-3),
             spilled: progress.traffic().scratch_written,
             elapsed,
             left: left(elapsed, done(|step| progress.share(step))),
@@ -112,7 +103,7 @@ impl Display for Line {
         if let Some(share) = self.share {
             write!(f, " {:.0} %", (share * 100.0).floor())?;
         }
-        match self.triangles_a_second {
+        match self.triangles_per_second {
             rate @ 1e6.. => write!(f, ", {:.1} M triangles/s", rate / 1e6)?,
             rate @ 1e3.. => write!(f, ", {:.0} k triangles/s", rate / 1e3)?,
             rate @ 1.0.. => write!(f, ", {rate:.0} triangles/s")?,
@@ -131,14 +122,14 @@ impl Display for Line {
     }
 }
 
-/// Minutes and seconds.
+/// Returns a time in minutes and seconds.
 fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
     format!("{}:{:02}", seconds / 60, seconds % 60)
 }
 
-/// What the steps usually take of a bake's time, in hundredths: 2 million triangles as STL and PLY, in memory and
-/// within 200 MiB, on two cores of an Intel Xeon, family 6, model 167, 2026-11-21. Text takes longer to read.
+/// The usual share of each step in the time of a bake, in percent. Measured with 2 million triangles as STL and PLY, in
+/// memory and within 200 MiB, on two cores of an Intel Xeon, family 6, model 167, 2026-11-21. Reading text takes longer.
 const USUAL: [(Step, f64); Step::ALL.len()] = [
     (Step::Read, 23.0),
     (Step::Bake(Stage::Prepare), 10.0),
@@ -148,13 +139,13 @@ const USUAL: [(Step, f64); Step::ALL.len()] = [
     (Step::Write, 3.0),
 ];
 
-/// How much of all steps is done, from 0 to 1, judged by what they usually take.
+/// Estimates the share of all steps that is done, from 0 to 1, by their usual shares.
 fn done(share: impl Fn(Step) -> Option<f64>) -> f64 {
     let all: f64 = USUAL.iter().map(|(_, usual)| usual).sum();
     USUAL.iter().map(|&(step, usual)| usual * share(step).unwrap_or(0.0)).sum::<f64>() / all
 }
 
-/// The time left if all goes on as before; `None` where too little is done to tell.
+/// Estimates the time left at the speed so far. Returns `None` while too little is done to tell.
 fn left(elapsed: Duration, done: f64) -> Option<Duration> {
     (done >= 0.02).then(|| elapsed.mul_f64((1.0 - done).max(0.0) / done))
 }
@@ -164,12 +155,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_says_what_is_known() {
+    fn a_line_shows_what_is_known() {
         let seconds = Duration::from_secs;
         let mut line = Line {
             name: "building bricks",
             share: Some(0.439),
-            triangles_a_second: 1.24e6,
+            triangles_per_second: 1.24e6,
             spilled: 812 << 20,
             elapsed: seconds(72),
             left: Some(seconds(5)),
@@ -178,9 +169,9 @@ mod tests {
             line.to_string(),
             "building bricks 43 %, 1.2 M triangles/s, 812 MiB spilled, 1:12, about 0:05 left"
         );
-        (line.share, line.triangles_a_second, line.spilled, line.left) = (None, 0.0, 0, None);
+        (line.share, line.triangles_per_second, line.spilled, line.left) = (None, 0.0, 0, None);
         assert_eq!(line.to_string(), "building bricks, 1:12");
-        (line.triangles_a_second, line.spilled) = (45_600.0, 25 << 29);
+        (line.triangles_per_second, line.spilled) = (45_600.0, 25 << 29);
         assert_eq!(line.to_string(), "building bricks, 46 k triangles/s, 12.5 GiB spilled, 1:12");
     }
 

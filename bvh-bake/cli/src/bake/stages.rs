@@ -1,32 +1,32 @@
-//! What each stage of a bake took: time, triangles, bytes and memory.
+//! The time, triangles, bytes and memory of each stage of a bake.
 
-use crate::resident;
+use crate::process::resident;
 use bvh_bake::{Progress, Stage, Step, Traffic};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// What a stage took, as `--json` tells it. Seconds and bytes add up over the stages of a bake.
+/// One stage as `--json` prints it. Seconds and bytes add up over the stages of a bake.
 #[derive(Serialize, Debug, Clone, PartialEq)]
 pub(crate) struct StageLine {
     stage: &'static str,
     pub(crate) seconds: f64,
-    /// Of the input up to `prepare`; those stored from `build` on.
+    /// Triangles of the input up to `prepare`, and stored triangles from `build` on.
     triangles: u64,
     triangles_per_second: f64,
-    /// Of all files.
+    /// Bytes read from all files.
     bytes_read: u64,
-    /// To all files.
+    /// Bytes written to all files.
     bytes_written: u64,
-    /// Of those written the bytes that went to scratch files.
+    /// The part of `bytes_written` that went to scratch files.
     spilled_bytes: u64,
-    /// When the stage ended.
+    /// Resident memory when the stage ended.
     resident_bytes: Option<u64>,
-    /// Since the process began.
+    /// The largest resident memory since the process began.
     peak_rss_bytes: Option<u64>,
 }
 
-/// The name of a stage that scripts rely on.
+/// Returns the name of a stage, which scripts rely on.
 pub(crate) fn key(step: Step) -> &'static str {
     match step {
         Step::Read => "read",
@@ -38,13 +38,13 @@ pub(crate) fn key(step: Step) -> &'static str {
     }
 }
 
-/// Notes what the stages of a bake take. What they take for several objects adds up.
+/// Measures the stages of a bake. The figures of several objects add up.
 pub(crate) struct Stages {
     progress: Progress,
-    /// By number of the step.
+    /// Indexed by the number of the step.
     taken: [Taken; Step::ALL.len()],
     open: Option<(Step, Instant, Traffic)>,
-    /// How many stages have been told of.
+    /// The number of stages that have been reported.
     told: usize,
 }
 
@@ -63,7 +63,7 @@ impl Stages {
         Self { progress: progress.clone(), taken: Default::default(), open: None, told: 0 }
     }
 
-    /// A step begins. Tells of those that have ended, which are all before it but for objects that are still to come.
+    /// Notes that a step begins. Tells the stages that have ended for all objects.
     pub(crate) fn begin(&mut self, step: Step, tell: &mut dyn FnMut(&StageLine)) {
         self.close();
         self.open = Some((step, Instant::now(), self.progress.traffic()));
@@ -74,7 +74,7 @@ impl Stages {
         }
     }
 
-    /// All steps have ended. Tells of those that are still to be told of, and returns all.
+    /// Notes that all steps have ended. Tells the remaining stages and returns all of them.
     pub(crate) fn finish(mut self, tell: &mut dyn FnMut(&StageLine)) -> Vec<StageLine> {
         self.close();
         let lines: Vec<StageLine> = Step::ALL.iter().map(|&step| self.line(step)).collect();
@@ -114,12 +114,12 @@ fn number(step: Step) -> usize {
     Step::ALL.iter().position(|&other| other == step).unwrap_or(0)
 }
 
-/// Seconds by name of the stage.
+/// Returns the seconds of each stage by name.
 pub(crate) fn seconds(lines: &[StageLine]) -> BTreeMap<&'static str, f64> {
     lines.iter().map(|line| (line.stage, line.seconds)).collect()
 }
 
-/// Seconds for people, in order.
+/// Returns the seconds of each stage for people, in order.
 pub(crate) fn to_text(lines: &[StageLine]) -> String {
     let texts: Vec<String> = lines.iter().map(|line| format!("{} {:.2}", line.stage, line.seconds)).collect();
     texts.join(", ")

@@ -1,30 +1,33 @@
-//! The levels of an object's subtree roots: found from the first page to the last, and wanted again the other way.
+//! The levels of an object's subtree roots: found from the first page to the last, and read again from last to first.
 //!
-//! Links lead to later pages, so that the level of a root is known when its page comes. What has come is kept as one
-//! byte a root, some ten thousandth of the file.
+//! Links lead to later pages, so that the level of a root is known when its page is reached. Levels of pages behind are
+//! kept as one byte per root, which is about a ten thousandth of the file.
 
 use bvh_format::page::RootRef;
 use std::collections::BTreeMap;
 
+/// The levels of the roots of all pages up to the current one, and of known roots after it.
 #[derive(Default)]
 pub(super) struct RootLevels {
-    /// Those of roots in pages that have not come yet.
+    /// The levels of roots in later pages.
     ahead: BTreeMap<RootRef, usize>,
-    /// Those of roots in pages that have come, in their order; `DEEP` for those in `deep`.
-    come: Vec<u8>,
+    /// The levels of roots in earlier pages, in order; `DEEP` stands for the next level in `deep`.
+    passed: Vec<u8>,
     deep: Vec<usize>,
 }
 
+/// Marks a level that is too large for a byte.
 const DEEP: u8 = u8::MAX;
 
 impl RootLevels {
-    /// A link that leads to this root. Of several the last counts: there are several in damaged files only.
+    /// Notes the level of a root that a link leads to. The last link counts; only damaged files have several.
     pub(super) fn set(&mut self, to: RootRef, level: usize) {
         self.ahead.insert(to, level);
     }
 
-    /// The levels of the roots of the next page. A root that no link has led to counts as the tree's.
-    pub(super) fn come(&mut self, page: u32, roots: u8) -> Vec<usize> {
+    /// Advances to the next page and returns the levels of its roots. A root without a link counts as the root of the
+    /// tree.
+    pub(super) fn advance(&mut self, page: u32, roots: u8) -> Vec<usize> {
         let mut levels = vec![0; usize::from(roots)];
         while let Some(first) = self.ahead.first_entry().filter(|first| first.key().page() <= page) {
             let (to, level) = first.remove_entry();
@@ -34,7 +37,7 @@ impl RootLevels {
         }
         for &level in &levels {
             let small = u8::try_from(level).unwrap_or(DEEP);
-            self.come.push(small);
+            self.passed.push(small);
             if small == DEEP {
                 self.deep.push(level);
             }
@@ -42,9 +45,9 @@ impl RootLevels {
         levels
     }
 
-    /// The levels of the roots of the last page that has come and has not gone.
-    pub(super) fn go(&mut self, roots: u8) -> Vec<usize> {
-        let mut levels = self.come.split_off(self.come.len().saturating_sub(roots.into()));
+    /// Goes back by one page and returns the levels of its roots.
+    pub(super) fn retreat(&mut self, roots: u8) -> Vec<usize> {
+        let mut levels = self.passed.split_off(self.passed.len().saturating_sub(roots.into()));
         let of_root = |small: u8| match small {
             DEEP => self.deep.pop().unwrap_or(0),
             level => level.into(),
@@ -55,9 +58,9 @@ impl RootLevels {
         levels
     }
 
-    /// Bytes of memory of the pages that have come.
+    /// Returns the bytes of memory that the levels of earlier pages take.
     pub(super) fn bytes(&self) -> usize {
-        self.come.len() + self.deep.len() * size_of::<usize>()
+        self.passed.len() + self.deep.len() * size_of::<usize>()
     }
 }
 
@@ -66,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_go_as_they_came() {
+    fn levels_are_the_same_in_both_directions() {
         let mut levels = RootLevels::default();
         let mut all = Vec::new();
         for page in 0..100 {
@@ -74,16 +77,16 @@ mod tests {
                 levels.set(RootRef::new(page + 1 + u32::from(root) % 3, root), (page * page) as usize);
             }
             let roots = 1 + page as u8 % 4;
-            let come = levels.come(page, roots);
-            assert_eq!(come.len(), usize::from(roots));
-            all.push(come);
+            let passed = levels.advance(page, roots);
+            assert_eq!(passed.len(), usize::from(roots));
+            all.push(passed);
         }
         assert_eq!(all[0], [0]);
         // Page 2 led to roots 0 and 1 of pages 3 and 4.
         assert_eq!((all[3][0], all[4][0]), (4, 9));
         assert!(all.iter().flatten().any(|&level| level > 255));
-        for come in all.into_iter().rev() {
-            assert_eq!(levels.go(come.len() as u8), come);
+        for passed in all.into_iter().rev() {
+            assert_eq!(levels.retreat(passed.len() as u8), passed);
         }
         assert_eq!(levels.bytes(), 0);
     }

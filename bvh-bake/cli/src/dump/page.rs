@@ -1,7 +1,7 @@
-//! One page, decoded: its anchors, its links, its treelets. One treelet: its links and slabs.
+//! One decoded page, with its anchors, links and treelets; and one decoded treelet, with its links and slabs.
 
 use super::Contents;
-use crate::output::hex;
+use crate::console::hex;
 use bvh_bake::FileError;
 use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
@@ -12,7 +12,7 @@ use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Layout, Rule};
 use serde::Serialize;
 
-/// What `dump FILE --page N --json` prints.
+/// The object that `dump FILE --page N --json` prints.
 #[derive(Serialize)]
 pub(super) struct PageDump {
     page: u32,
@@ -29,7 +29,7 @@ pub(super) struct PageDump {
     first_packet: u32,
     packets: u16,
     treelet_line: u8,
-    /// Lines of 64 bytes in use, of 64.
+    /// The 64-byte lines in use, of 64.
     lines: usize,
     anchors: Vec<AnchorDump>,
     remotes: Vec<RootDump>,
@@ -40,13 +40,13 @@ pub(super) struct PageDump {
 #[derive(Serialize)]
 struct AnchorDump {
     slot: u8,
-    /// The page and remote link that lead here; none for the object's root.
+    /// The page and the remote link that lead here; `None` for the root of the object.
     parent_page: Option<u32>,
     parent_link: Option<u8>,
     slabs: Vec<[f32; 2]>,
 }
 
-/// Where a remote link leads.
+/// A remote link and its target.
 #[derive(Serialize)]
 struct RootDump {
     link: u8,
@@ -75,7 +75,7 @@ struct ChildDump {
     packet: Option<u16>,
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<u8>,
-    /// Only where slabs are asked for.
+    /// Empty unless slabs are asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     slabs: Vec<[f32; 2]>,
 }
@@ -139,7 +139,7 @@ impl PageDump {
         let bytes = contents.checked(object, number)?;
         let page = bytes.page(object);
         let header = page.header();
-        let slabs = object.profile.directions().slabs();
+        let slabs = object.profile().directions().slabs();
         let anchor = |slot| {
             let anchor = page.anchor(slot);
             let top = anchor.parent_page == NO_PARENT;
@@ -154,12 +154,12 @@ impl PageDump {
             let to = page.remote(link);
             RootDump { link, page: to.page(), root: to.root() }
         };
-        let treelet_lines = usize::from(header.treelets) * object.profile.treelet_bytes() / 64;
+        let treelet_lines = usize::from(header.treelets) * object.profile().treelet_bytes() / 64;
         Ok(Self {
             page: number,
             offset: at,
             object: index,
-            profile: object.profile.name(),
+            profile: object.profile().name(),
             checksum: hex(header.checksum.get()),
             leaf_checksum: hex(header.leaf_checksum.get()),
             id_checksum: hex(header.id_checksum.get()),
@@ -214,7 +214,7 @@ impl PageDump {
     }
 }
 
-/// What `dump FILE --treelet N --json` prints.
+/// The object that `dump FILE --treelet N --json` prints.
 #[derive(Serialize)]
 pub(super) struct TreeletDump {
     treelet: u64,
@@ -223,13 +223,13 @@ pub(super) struct TreeletDump {
     page: u32,
     slot: u8,
     offset: u64,
-    /// The treelet's own slabs, decoded from its anchor down.
+    /// The slabs of the treelet itself, decoded from its anchor down.
     slabs: Vec<[f32; 2]>,
     children: Vec<ChildDump>,
 }
 
 impl TreeletDump {
-    /// The treelet of this number in the file, `None` beyond the last.
+    /// Returns the treelet with this number in the file, or `None` after the last one.
     pub(super) fn find(contents: &Contents, number: u64) -> Result<Option<Self>, FileError> {
         let mut before = 0;
         for (index, object) in contents.layout.objects.iter().enumerate() {
@@ -249,20 +249,20 @@ impl TreeletDump {
 
     fn new(layout: &Layout, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
         let header = page.header();
-        let slabs = object.profile.directions().slabs();
+        let slabs = object.profile().directions().slabs();
         let own = decoded_slots(object, page)[usize::from(slot)];
         let mut children = children(page, slot);
         for (child, dump) in children.iter_mut().enumerate() {
-            let node = decode_child(object.profile, object.f16_scale, page.treelet(slot), child, &own);
+            let node = decode_child(object.profile(), object.f16_scale(), page.treelet(slot), child, &own);
             dump.slabs = slabs_of(&node.to_kdop(slabs), slabs);
         }
         let page_number = header.page_number.get();
         let within =
-            usize::from(header.treelet_line) * 64 + usize::from(slot) * object.profile.treelet_bytes();
+            usize::from(header.treelet_line) * 64 + usize::from(slot) * object.profile().treelet_bytes();
         Self {
             treelet: number,
             object: index,
-            profile: object.profile.name(),
+            profile: object.profile().name(),
             page: page_number,
             slot,
             offset: layout.page_offset(page_number) + within as u64,
@@ -290,7 +290,7 @@ impl TreeletDump {
     }
 }
 
-/// The decoded slabs of every slot of a page.
+/// Decodes the slabs of every slot of a page.
 fn decoded_slots(object: &Object, page: &Page) -> Vec<NodeSlabs> {
     let header = page.header();
     let mut decoded = vec![NodeSlabs::default(); usize::from(header.treelets)];
@@ -304,7 +304,7 @@ fn decoded_slots(object: &Object, page: &Page) -> Vec<NodeSlabs> {
             if let Child::Treelet(inner) = links.child(child) {
                 let parent = decoded[usize::from(slot)];
                 decoded[usize::from(inner)] =
-                    decode_child(object.profile, object.f16_scale, treelet, child, &parent);
+                    decode_child(object.profile(), object.f16_scale(), treelet, child, &parent);
             }
         }
     }

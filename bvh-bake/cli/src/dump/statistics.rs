@@ -1,8 +1,8 @@
-//! Counts of an object's tree by level, and how loose its slabs are there.
+//! Statistics of an object's tree by level: counts, and the width of decoded slabs relative to tight ones.
 //!
-//! Two passes over the pages, since links only lead to later pages: forwards for the levels, backwards for
-//! the tight bounds of what is below each subtree root. In memory are a page with its leaf block, the levels of the roots,
-//! and the bounds of those roots whose link has not come by: few, as in the proof of a bake.
+//! Links lead to later pages only, so that two passes are enough: forwards for the levels, and backwards for the tight
+//! bounds below each subtree root. Memory holds one page with its leaf block, the levels of the roots, and the bounds of
+//! the roots whose link has not been reached: few, as in the proof of a bake.
 
 use super::Contents;
 use super::levels::RootLevels;
@@ -15,7 +15,7 @@ use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
 use std::collections::HashMap;
 
-/// The treelets of one level; the root's is level 0.
+/// The treelets of one level. The root has level 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Level {
     pub(super) treelets: u64,
@@ -46,7 +46,7 @@ impl Level {
         mean(self.triangles as f64, self.packets)
     }
 
-    /// Decoded width by tight width; 1 where there is nothing to measure.
+    /// Returns the mean of decoded width over tight width, or 1 if there is nothing to measure.
     pub(super) fn mean_width(&self) -> f64 {
         self.inflation.mean_width()
     }
@@ -56,10 +56,10 @@ fn mean(sum: f64, count: u64) -> f64 {
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
-/// Counts of one object.
+/// The statistics of one object.
 pub(super) struct Statistics {
     pub(super) levels: Vec<Level>,
-    /// Lines of 64 bytes in use in all pages.
+    /// The 64-byte lines in use in all pages.
     pub(super) lines: u64,
     pub(super) roots: u64,
 }
@@ -74,10 +74,10 @@ impl Statistics {
             let page = bytes.page(object);
             let header = page.header();
             layout.check_leaf_block_of(&layout.read_leaf_block(file, header)?, &page, object)?;
-            let treelet_lines = usize::from(header.treelets) * object.profile.treelet_bytes() / 64;
+            let treelet_lines = usize::from(header.treelets) * object.profile().treelet_bytes() / 64;
             statistics.lines += u64::from(header.treelet_line) + treelet_lines as u64;
             statistics.roots += u64::from(header.roots);
-            let levels = slot_levels(&page, &root_levels.come(number, header.roots));
+            let levels = slot_levels(&page, &root_levels.advance(number, header.roots));
             for slot in 0..header.treelets {
                 let level = levels[usize::from(slot)];
                 let links = Links::read(page.treelet(slot));
@@ -90,13 +90,13 @@ impl Statistics {
             }
             file.require_memory(root_levels.bytes())?;
         }
-        let slabs = object.profile.directions().slabs();
-        // Of the roots whose link has not come by.
+        let slabs = object.profile().directions().slabs();
+        // The bounds of roots whose link has not been reached.
         let mut below: HashMap<RootRef, Kdop> = HashMap::new();
         for number in object.pages().rev() {
             let bytes = contents.checked(object, number)?;
             let page = bytes.page(object);
-            let levels = slot_levels(&page, &root_levels.go(page.header().roots));
+            let levels = slot_levels(&page, &root_levels.retreat(page.header().roots));
             let leaves = layout.read_leaf_block(file, page.header())?;
             let known = |to: RootRef| below.get(&to).copied().unwrap_or(Kdop::EMPTY);
             let tight = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
@@ -112,7 +112,7 @@ impl Statistics {
             below.extend((0..).map(|root| RootRef::new(number, root)).zip(tight));
         }
         if statistics.levels.is_empty() {
-            let at = layout.page_offset(object.record.first_page.get());
+            let at = layout.page_offset(object.record().first_page.get());
             return Err(FormatError::new(Rule::Counts, at, "a treelet", "none").into());
         }
         Ok(statistics)
@@ -138,7 +138,7 @@ impl Statistics {
     }
 }
 
-/// The level of each slot of a page from those of its roots.
+/// Returns the level of each slot of a page, given the levels of its roots.
 fn slot_levels(page: &Page, roots: &[usize]) -> Vec<usize> {
     let header = page.header();
     let mut levels = vec![0; usize::from(header.treelets)];

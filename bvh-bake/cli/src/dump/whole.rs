@@ -1,8 +1,8 @@
-//! A whole file: header, sections, objects and the statistics of their trees.
+//! A whole file: its header, sections and objects, and the statistics of their trees.
 
 use super::Contents;
 use super::statistics::{Level, Statistics};
-use crate::output::hex;
+use crate::console::{hex, length};
 use bvh_bake::FileError;
 use bvh_format::header::SectionKind;
 use bvh_format::object::Object;
@@ -10,7 +10,7 @@ use bvh_format::source::Source;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What `dump FILE --json` prints.
+/// The object that `dump FILE --json` prints.
 #[derive(Serialize)]
 pub(super) struct FileDump {
     file: String,
@@ -21,7 +21,7 @@ pub(super) struct FileDump {
     /// The lines of the provenance section.
     provenance: BTreeMap<String, String>,
     objects: Vec<ObjectDump>,
-    /// Bytes a stored triangle.
+    /// Bytes per stored triangle.
     bytes_per_tri: Split,
 }
 
@@ -35,7 +35,7 @@ struct SectionDump {
     xxh3: String,
 }
 
-/// Where the bytes go, a triangle.
+/// Bytes per stored triangle by purpose.
 #[derive(Serialize)]
 struct Split {
     total: f64,
@@ -66,11 +66,11 @@ struct ObjectDump {
     packets: u64,
     first_page: u32,
     pages: u32,
-    /// Treelets on the longest way from the root to a leaf packet.
+    /// The number of treelets on the longest path from the root to a leaf packet.
     depth: usize,
     mean_children: f64,
     mean_triangles_per_packet: f64,
-    /// Mean part of a page's lines that is in use.
+    /// The mean share of a page's lines that is in use.
     page_fill: f64,
     mean_roots_per_page: f64,
     width_inflation: f64,
@@ -84,7 +84,7 @@ struct LevelDump {
     mean_children: f64,
     packets: u64,
     mean_triangles_per_packet: f64,
-    /// Of the treelets' children.
+    /// Mean over the children of the level's treelets.
     width_inflation: f64,
 }
 
@@ -101,8 +101,8 @@ impl FileDump {
         let total = contents.file.length();
         let (nodes, leaves) = (bytes(&[SectionKind::Nodes]), bytes(&[SectionKind::Leaves]));
         let ids = bytes(&[SectionKind::Ids, SectionKind::Duplicates]);
-        let triangles: u64 = layout.objects.iter().map(|object| object.record.triangles.get()).sum();
-        let each = |bytes: u64| bytes as f64 / triangles as f64;
+        let triangles: u64 = layout.objects.iter().map(|object| object.triangles()).sum();
+        let per_triangle = |bytes: u64| bytes as f64 / triangles as f64;
         Ok(Self {
             file,
             format_version: format!("{}.{}", layout.version.0, layout.version.1),
@@ -123,11 +123,11 @@ impl FileDump {
             provenance: provenance(contents)?,
             objects: dumps,
             bytes_per_tri: Split {
-                total: each(total),
-                nodes: each(nodes),
-                leaves: each(leaves),
-                ids: each(ids),
-                other: each(total.saturating_sub(nodes + leaves + ids)),
+                total: per_triangle(total),
+                nodes: per_triangle(nodes),
+                leaves: per_triangle(leaves),
+                ids: per_triangle(ids),
+                other: per_triangle(total.saturating_sub(nodes + leaves + ids)),
             },
         })
     }
@@ -146,21 +146,21 @@ impl FileDump {
         }
         let Split { total, nodes, leaves, ids, other } = self.bytes_per_tri;
         text += &format!(
-            "\nbytes a triangle {total:.2}: nodes {nodes:.2}, leaves {leaves:.2}, ids {ids:.2}, other {other:.2}\n"
+            "\nbytes per triangle {total:.2}: nodes {nodes:.2}, leaves {leaves:.2}, ids {ids:.2}, other {other:.2}\n"
         );
         self.objects.iter().for_each(|object| text += &object.to_text());
         text
     }
 }
 
-/// The provenance lines; what is not of that form is left out.
+/// Returns the lines of the provenance section. Lines that have no `=` are left out.
 fn provenance(contents: &Contents) -> Result<BTreeMap<String, String>, FileError> {
     let mut sections = contents.layout.sections.iter();
     let section = sections.find(|section| section.kind == SectionKind::Provenance);
     let bytes = contents.file.read(section.map_or(0..0, |section| section.range.clone()))?;
     let text = String::from_utf8_lossy(&bytes);
     let lines = text.lines().filter_map(|line| line.split_once('='));
-    // Control characters would do things to a terminal.
+    // A terminal would obey control characters.
     let plain = |text: &str| text.chars().filter(|c| !c.is_control()).collect();
     Ok(lines.map(|(key, value)| (plain(key), plain(value))).collect())
 }
@@ -168,14 +168,14 @@ fn provenance(contents: &Contents) -> Result<BTreeMap<String, String>, FileError
 impl ObjectDump {
     fn new(contents: &Contents, number: usize, object: &Object) -> Result<Self, FileError> {
         let statistics = Statistics::gather(contents, object)?;
-        let record = &object.record;
+        let record = object.record();
         let whole = statistics.levels.iter().fold(Level::default(), |sum, level| sum.joined(level));
         let pages = f64::from(record.pages.get());
         Ok(Self {
             number,
-            name: object.name.clone(),
-            profile: object.profile.name(),
-            triangle_encoding: object.triangle_encoding.name(),
+            name: object.name().to_owned(),
+            profile: object.profile().name(),
+            triangle_encoding: object.triangle_encoding().name(),
             origin: record.origin.map(|value| value.get()),
             box_lo: record.box_lo.map(|value| value.get()),
             box_hi: record.box_hi.map(|value| value.get()),
@@ -229,11 +229,12 @@ impl ObjectDump {
         line("box", format!("{:?} to {:?}", self.box_lo, self.box_hi));
         line("sphere", format!("{:?}, radius {:?}", self.sphere_centre, self.sphere_radius));
         let (rounded, quantized) = (self.max_vertex_rounding, self.max_quantization_error);
-        line("moved", format!("by rounding at most {rounded:e}, by quantisation at most {quantized:e}"));
+        let (rounded, quantized) = (length(rounded), length(quantized));
+        line("moved", format!("at most {rounded} by rounding, at most {quantized} by quantisation"));
         line(
             "pages",
             format!(
-                "{} from {}, {:.1} % full, {:.2} roots each",
+                "{} from {}, {:.1} % full, {:.2} roots per page",
                 self.pages,
                 self.first_page,
                 100.0 * self.page_fill,
@@ -243,7 +244,7 @@ impl ObjectDump {
         line(
             "tree",
             format!(
-                "{} treelets, {} levels, {:.3} children each; {} packets of {:.3} triangles; slabs {:.4} times as wide \
+                "{} treelets, {} levels, {:.3} children per treelet; {} packets of {:.3} triangles; slabs {:.4} times as wide \
                  as tight ones",
                 self.treelets,
                 self.depth,

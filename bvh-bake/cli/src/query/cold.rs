@@ -1,16 +1,17 @@
-//! Asks about every pose files that are in memory nowhere.
+//! Times queries of files evicted from the page cache.
 
-use super::runner::{Answer, Run};
-use super::side::{How, Side};
-use super::{Question, Sides, add};
-use crate::error::Failure;
-use crate::from_disk::{self, FromDisk};
+use super::question::{Answer, Question};
+use super::runner::Run;
+use super::side::{How, Side, Sides};
+use crate::console::Failure;
+use crate::process::from_disk::{self, FromDisk};
 use bvh_query::{Backend, Pose, Querier, QueryStats};
+use cbvh_measure::rounds::add;
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 
-/// Means over the queries, for the JSON line.
+/// The means over all queries that the JSON line has in addition.
 #[derive(Serialize)]
 pub(crate) struct Means {
     cold: bool,
@@ -21,7 +22,8 @@ pub(crate) struct Means {
     touched_bytes_mean: Option<f64>,
 }
 
-/// Asks about the poses in order until `budget`, in seconds, is spent. Times are those of opening and the first answer.
+/// Asks about the poses in order until `budget`, in seconds, is spent. Each time covers opening the files and the first
+/// answer.
 pub(super) fn run(
     paths: [&Path; 2],
     how: &How<'_>,
@@ -40,7 +42,7 @@ pub(super) fn run(
             question.ask(&mut querier, &sides, pose).map_err(|error| sides.blame(error))
         };
         let Some(one) = from_disk::ask(paths, |path| Side::open(path, how), ask)? else {
-            let text = "--cold: this system cannot forget files or count page faults";
+            let text = "--cold: this system cannot evict files from the page cache or count page faults";
             return Err(Failure::System(text.into()));
         };
         add(&mut stats, querier.stats());

@@ -1,6 +1,6 @@
-//! Numbers as C's `%.17g` prints them: 17 significant digits, which tell every f64 from its neighbours.
+//! Formats numbers as C's `%.17g` does: 17 significant digits identify every f64.
 
-/// Formats a finite number; others come out as `inf`, `-inf` and `nan`.
+/// Formats a number. Infinities become `inf` and `-inf`, and NaN becomes `nan`.
 pub(crate) fn significant(value: f64) -> String {
     if value.is_nan() {
         return "nan".to_owned();
@@ -20,7 +20,7 @@ pub(crate) fn significant(value: f64) -> String {
     trimmed(&plain).to_owned()
 }
 
-/// Without zeros at the end of the fraction.
+/// Removes trailing zeros of a fraction.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_c_prints_them() {
+    fn numbers_are_formatted_as_in_c() {
         // From printf("%.17g").
         let cases = [
             (0.0, "0"),

@@ -1,10 +1,10 @@
-//! One pose, answered for a person; the witness of a distance as OBJ.
+//! Answers the question about one pose for a person, and writes the witness of a distance as OBJ.
 
-use super::{Question, Side, Sides};
-use crate::arguments::Mode;
-use crate::bake::plural;
-use crate::error::Failure;
-use crate::output;
+use super::arguments::Mode;
+use super::question::Question;
+use super::side::{Side, Sides};
+use super::write_file;
+use crate::console::{self, Failure, plural};
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
@@ -12,10 +12,10 @@ use bvh_format::validate::packets;
 use bvh_query::{Distance, Pose, Querier, QueryError};
 use std::path::Path;
 
-/// Contacts listed before the rest is only counted.
-const LISTED: usize = 10;
+/// The most contacts that are listed; the others are only counted.
+const MAX_LISTED: usize = 10;
 
-/// Asks about one pose and prints the answer.
+/// Asks the question and prints the answer.
 pub(crate) fn answer(
     sides: &Sides<'_>,
     pose: &Pose,
@@ -39,13 +39,13 @@ pub(crate) fn answer(
             let contacts = querier.contacts(a, b, pose).map_err(failed)?;
             let count = contacts.len() as u64;
             let mut text = format!("{count} {} of triangles in contact\n", plural(count, "pair"));
-            for contact in contacts.iter().take(LISTED) {
+            for contact in contacts.iter().take(MAX_LISTED) {
                 let a = name(sides.a, contact.object_a, contact.triangle_a);
                 let b = name(sides.b, contact.object_b, contact.triangle_b);
                 text.push_str(&format!("  A: {a}  B: {b}\n"));
             }
-            if contacts.len() > LISTED {
-                text.push_str(&format!("  and {} more\n", contacts.len() - LISTED));
+            if contacts.len() > MAX_LISTED {
+                text.push_str(&format!("  and {} more\n", contacts.len() - MAX_LISTED));
             }
             text
         }
@@ -53,13 +53,12 @@ pub(crate) fn answer(
             let distance = querier.distance_with(a, b, pose, &question.errors).map_err(failed)?;
             if let Some(path) = witness {
                 let obj = witness_obj(sides, pose, &distance)?;
-                bvh_bake::write_atomically(path, obj.as_bytes())
-                    .map_err(|error| Failure::System(error.to_string()))?;
+                write_file(path, &obj)?;
             }
             describe(sides, &distance)
         }
     };
-    output::text(&text)
+    console::text(&text)
 }
 
 fn describe(sides: &Sides<'_>, answer: &Distance) -> String {
@@ -79,18 +78,18 @@ fn point(point: [f64; 3]) -> String {
     format!("{x:?} {y:?} {z:?}")
 }
 
-/// A triangle for people; the object only where there are several.
+/// Names a triangle for people. The object is named only if there are several.
 fn name(side: &Side, object: u32, triangle: u32) -> String {
     match side.bvh.objects() {
         [_] => format!("triangle {triangle}"),
         objects => {
-            let name = objects.get(object as usize).map_or("", |object| object.name.as_str());
+            let name = objects.get(object as usize).map_or("", |object| object.name());
             format!("object {object} {name:?} triangle {triangle}")
         }
     }
 }
 
-/// Both triangles as faces and the segment between the closest points as a line, all in A's frame.
+/// Returns both triangles as faces, and the segment between the closest points as a line, all in the frame of A.
 fn witness_obj(sides: &Sides<'_>, pose: &Pose, answer: &Distance) -> Result<String, Failure> {
     let a = corners(sides.a, answer.object_a, answer.triangle_a)?;
     let b = corners(sides.b, answer.object_b, answer.triangle_b)?.map(|corner| pose.place(corner));
@@ -105,17 +104,17 @@ fn witness_obj(sides: &Sides<'_>, pose: &Pose, answer: &Distance) -> Result<Stri
     Ok(text)
 }
 
-/// The corners of a triangle by its number, in the file's own frame. Looks through the object's pages:
+/// Finds the corners of a triangle by its number, in the frame of its file. Searches all pages of the object, which is
 /// fast enough for one answer.
 fn corners(side: &Side, object: u32, triangle: u32) -> Result<[[f64; 3]; 3], Failure> {
     let (layout, bytes) = (side.bvh.layout(), side.bvh.bytes());
     let lost =
         || Failure::Invalid(format!("{}: expected triangle {triangle}, found none", side.path.display()));
     let object = side.bvh.objects().get(object as usize).ok_or_else(lost)?;
-    let first = object.record.first_page.get();
-    for number in first..first + object.record.pages.get() {
+    let first = object.record().first_page.get();
+    for number in first..first + object.record().pages.get() {
         let Some(page) = layout.page_bytes(bytes, number) else { continue };
-        let page = Page::new(page, object.profile);
+        let page = Page::new(page, object.profile());
         let header = page.header();
         let ids = layout.id_block(bytes, header);
         for (packet, count) in packets(&page) {
@@ -128,8 +127,8 @@ fn corners(side: &Side, object: u32, triangle: u32) -> Result<[[f64; 3]; 3], Fai
                 };
                 if id == triangle {
                     let block = layout.leaf_block(bytes, header);
-                    let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
-                    let place = |axis: usize, v: f32| object.record.origin[axis].get() + f64::from(v);
+                    let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
+                    let place = |axis: usize, v: f32| object.origin()[axis] + f64::from(v);
                     let corners = values.triangle(lane);
                     return Ok(corners.map(|v| [0, 1, 2].map(|axis| place(axis, v[axis]))));
                 }

@@ -1,18 +1,25 @@
-//! Poses: files of 12 numbers a line, and the one of the command line.
+//! Reads poses: files with 12 numbers per line, and the pose on the command line.
 
-use crate::error::Failure;
+use crate::console::Failure;
 use bvh_query::Pose;
 use std::path::Path;
 
-/// Reads a pose file. The first 12 numbers of a line are the rows of a 3x4 matrix; `#` starts a comment,
-/// blank lines are skipped.
+/// The numbers of a pose.
+const NUMBERS: usize = 12;
+/// The form of a pose, as messages state it.
+const EXPECTED: &str = "expected 12 numbers, the rows of the 3 by 4 matrix [R | t]";
+/// The message for a file without poses.
+pub(super) const NONE: &str =
+    "expected at least one line of 12 numbers, the rows of the 3 by 4 matrix [R | t], found no pose";
+/// Reads a pose file. Each line has the 12 numbers of a 3 by 4 matrix, row by row. `#` starts a comment, and blank lines
+/// are skipped.
 pub(crate) fn read(path: &Path) -> Result<Vec<Pose>, Failure> {
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let mut poses = Vec::new();
     for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
         let text = String::from_utf8_lossy(line);
         let text = text.split('#').next().unwrap_or("");
-        let pose = parse(text.split_whitespace());
+        let pose = parse(text);
         match pose.map_err(|text| Failure::invalid(path, format_args!("line {}: {text}", number + 1)))? {
             Some(pose) => poses.push(pose),
             None => continue,
@@ -21,36 +28,42 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Pose>, Failure> {
     Ok(poses)
 }
 
-/// The pose of `--pose`; commas may stand between the numbers.
+/// Parses the pose of `--pose`. Commas may separate the numbers.
 pub(crate) fn parse_one(text: &str) -> Result<Pose, Failure> {
-    let separated = text.replace(',', " ");
-    let count = separated.split_whitespace().count();
-    let pose = if count > 12 {
-        Err(format!("expected 12 numbers, found {count}"))
-    } else {
-        parse(separated.split_whitespace())
-    };
-    match pose {
+    match parse(&text.replace(',', " ")) {
         Ok(Some(pose)) => Ok(pose),
-        Ok(None) => Err(Failure::Usage("--pose: expected 12 numbers, found none".into())),
-        Err(text) => Err(Failure::Usage(format!("--pose: {text}"))),
+        Ok(None) => Err(Failure::Invalid(format!("--pose: {EXPECTED}, found none"))),
+        Err(text) => Err(Failure::Invalid(format!("--pose: {text}"))),
     }
 }
 
-/// `None` if there is no word at all.
-fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Option<Pose>, String> {
-    let mut numbers = [0.0; 12];
-    let mut count = 0;
-    for (number, word) in numbers.iter_mut().zip(words) {
+/// Parses a pose. Returns `None` if the text is blank.
+fn parse(text: &str) -> Result<Option<Pose>, String> {
+    let mut numbers = [0.0; NUMBERS];
+    let mut words = text.split_whitespace();
+    for (number, word) in numbers.iter_mut().zip(&mut words) {
         let shown = || word.chars().take(40).collect::<String>();
         *number = word.parse().map_err(|_| format!("expected a number, found {:?}", shown()))?;
-        count += 1;
     }
-    match count {
+    match text.split_whitespace().count() {
         0 => Ok(None),
-        12 => Pose::from_rows(&numbers).map(Some).map_err(|error| error.to_string()),
-        _ => Err(format!("expected 12 numbers, found {count}")),
+        NUMBERS => Pose::from_rows(&numbers).map(Some).map_err(|error| error.to_string()),
+        count => Err(wrong_count(count)),
     }
+}
+
+/// Guesses what a line with a wrong number of numbers means, and says what to write instead.
+fn wrong_count(count: usize) -> String {
+    let guess = match count {
+        7 => {
+            "; a quaternion and a translation? write the quaternion as a 3 by 3 matrix, and each number of the translation \
+              after a row of it"
+        }
+        9 => "; a rotation alone? write a 0 after each row of it",
+        16 => "; a 4 by 4 matrix? write its first three rows only, row by row",
+        _ => "",
+    };
+    format!("{EXPECTED}, found {count}{guess}")
 }
 
 #[cfg(test)]
@@ -62,7 +75,25 @@ mod tests {
         let pose = parse_one("1,0,0,2, 0,1,0,-3e1, 0 0 1 .5").unwrap();
         assert_eq!(pose.translation(), [2.0, -30.0, 0.5]);
         for wrong in ["", "1 2 3", "1 0 0 0 0 1 0 0 0 0 1 0 7", "1 0 0 0 0 1 0 0 0 0 2 0", "a"] {
-            assert!(matches!(parse_one(wrong), Err(Failure::Usage(_))), "{wrong}");
+            assert!(matches!(parse_one(wrong), Err(Failure::Invalid(_))), "{wrong}");
         }
+    }
+
+    #[test]
+    fn messages_say_what_to_write_instead() {
+        for (text, words) in [
+            ("0 0 0 1 1 2 3", "a quaternion"),
+            ("1 0 0 0 1 0 0 0 1", "a rotation alone"),
+            ("1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1", "a 4 by 4 matrix"),
+            ("2 0 0 5 0 2 0 0 0 0 2 0", "scaled by 2; bake the mesh at its size"),
+            ("0 -0.001 0 5 0.001 0 0 0 0 0 0.001 0", "scaled by 0.001;"),
+            ("1 0 0 5 0 2 0 0 0 0 1 0", "orthonormal"),
+            ("1 0 0 5 0 1 0 0 0 0 -1 0", "reflection"),
+            ("0 0 0 0 0 0 0 0 0 0 0 0", "orthonormal"),
+        ] {
+            let said = parse(text).unwrap_err();
+            assert!(said.starts_with("expected") && said.contains(words), "{text}: {said}");
+        }
+        assert_eq!(parse("  "), Ok(None));
     }
 }

@@ -1,18 +1,20 @@
-//! What a run comes to: the JSON line, the raw lines and the hash of the answers.
+//! The results of a run as data: the JSON line, the raw lines and the hash of the answers.
 
 use super::cold::Means;
 use super::number::significant;
-use super::runner::{Answer, Run, Timed};
-use super::{Question, Side, Sides};
-use crate::output::hex;
-use crate::resident;
+use super::question::{Answer, Question};
+use super::runner::{Run, Timed};
+use super::side::{Side, Sides};
+use crate::console::hex;
+use crate::process::resident;
 use bvh_format::checksum::Hasher;
 use bvh_query::Backend;
+use cbvh_measure::spread::quantile;
 use serde::Serialize;
 
-/// The JSON line of a pose file: the peers' fields and ours.
+/// The JSON line of a pose file: the fields that programs of this protocol share, and further ones.
 #[derive(Serialize)]
-pub(crate) struct Record {
+pub(super) struct Record {
     peer: &'static str,
     version: &'static str,
     mode: &'static str,
@@ -33,7 +35,7 @@ pub(crate) struct Record {
     positives: u64,
     sum: f64,
     peak_rss_mb: Option<f64>,
-    /// The peers measure it; here the file is all there is, and the next two fields tell it.
+    /// Not measured: a query needs the bytes of the files, which the next two fields give.
     rss_bytes_per_tri: f64,
     api_bytes_per_tri_a: f64,
     api_bytes_per_tri_b: f64,
@@ -51,7 +53,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    pub(crate) fn new(
+    pub(super) fn new(
         sides: &Sides<'_>,
         question: &Question,
         backend: Backend,
@@ -85,16 +87,16 @@ impl Record {
             ns_p10: quantile(&times, 0.1),
             ns_p90: quantile(&times, 0.9),
             ns_max: times.last().copied().unwrap_or(0),
-            positives: answers.iter().filter(|(answer, _)| answer.is_contact()).count() as u64,
+            positives: answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
             sum: answers.iter().map(|(answer, _)| answer.value()).sum(),
             peak_rss_mb: resident::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),
             rss_bytes_per_tri: -1.0,
             api_bytes_per_tri_a: bytes_a as f64 / stored_a as f64,
             api_bytes_per_tri_b: bytes_b as f64 / stored_b as f64,
             isa: backend.name(),
-            profile: both(sides, |side| side.shape().objects().first().map_or("", |o| o.profile.name())),
+            profile: both(sides, |side| side.shape().objects().first().map_or("", |o| o.profile().name())),
             triangle_encoding: both(sides, |side| {
-                side.shape().objects().first().map_or("", |object| object.triangle_encoding.name())
+                side.shape().objects().first().map_or("", |object| object.triangle_encoding().name())
             }),
             answers_xxh3: complete.then(|| hex(hash(answers))),
             node_tests: run.stats.node_tests,
@@ -108,45 +110,29 @@ impl Record {
 }
 
 impl Record {
-    /// The name of the pose file.
+    /// Returns the name of the pose file.
     pub(super) fn poses(&self) -> &str {
         &self.poses
     }
-}
 
-impl Answer {
-    /// True for contact, and for a yes to `within`.
-    fn is_contact(&self) -> bool {
-        match *self {
-            Self::Flag(flag) => flag,
-            Self::Count(count) => count > 0,
-            Self::Length(length) => length <= 0.0,
-        }
+    /// Returns the name of the backend.
+    pub(super) fn isa(&self) -> &'static str {
+        self.isa
     }
 
-    /// The answer as a number.
-    fn value(&self) -> f64 {
-        match *self {
-            Self::Flag(flag) => f64::from(u8::from(flag)),
-            Self::Count(count) => count as f64,
-            Self::Length(length) => length,
-        }
+    /// Returns the number of answers that are contact or yes.
+    pub(super) fn positives(&self) -> u64 {
+        self.positives
     }
 }
 
-/// A sorted time at a fraction of the way, counted as the peers do.
-pub(crate) fn quantile(sorted: &[u64], fraction: f64) -> u64 {
-    let index = (fraction * sorted.len() as f64) as usize;
-    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0)
-}
-
-/// What both sides have, or each side's.
+/// Returns the value of both sides, or the two values joined by a plus sign.
 fn both(sides: &Sides<'_>, of: impl Fn(&Side) -> &str) -> String {
     let (a, b) = (of(sides.a), of(sides.b));
     if a == b { a.to_owned() } else { format!("{a}+{b}") }
 }
 
-/// XXH3-64 of the answers without times: a byte for yes or no, a `u64` for a count, the bits of a distance.
+/// Returns XXH3-64 of the answers without their times: a byte for yes or no, a `u64` for a count, the bits of a distance.
 fn hash(answers: &[Timed]) -> u64 {
     let mut hasher = Hasher::default();
     for (answer, _) in answers {
@@ -159,8 +145,8 @@ fn hash(answers: &[Timed]) -> u64 {
     hasher.finish()
 }
 
-/// The raw lines: value, space, nanoseconds.
-pub(crate) fn raw(answers: &[Timed]) -> String {
+/// Returns the raw lines: value, space, nanoseconds.
+pub(super) fn raw(answers: &[Timed]) -> String {
     let mut text = String::with_capacity(answers.len() * 32);
     for (answer, nanoseconds) in answers {
         let value = match answer {
@@ -171,17 +157,4 @@ pub(crate) fn raw(answers: &[Timed]) -> String {
         text.push_str(&format!("{value} {nanoseconds}\n"));
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    pub(crate) fn quantiles_are_those_of_the_peers() {
-        let times: Vec<u64> = (0..10).collect();
-        let found = [0.1, 0.5, 0.9, 1.0].map(|fraction| quantile(&times, fraction));
-        assert_eq!(found, [1, 5, 9, 9]);
-        assert_eq!(quantile(&[], 0.5), 0);
-    }
 }

@@ -1,51 +1,41 @@
-//! Asks about every pose, each query timed alone, on one thread or several.
+//! Asks about every pose of a file on one thread or several, and times each query by itself.
 //!
-//! The order of events is that of the peers: `warm` untimed queries from the end of the file, then all
-//! poses in order until the budget is spent. Poses are independent, so threads take the next one each;
-//! the answers are put back in order, and those there are when the budget ends are always the first.
+//! First come `warm` untimed queries from the end of the file, then all poses in order until the budget is spent. Each
+//! thread takes the next pose. The answers are put back in order, so that a budget that ends early leaves the first ones.
 
-use super::{Question, Sides, add};
+use super::question::{Answer, Question};
+use super::side::Sides;
 use bvh_query::{Backend, Pose, Querier, QueryError, QueryStats};
+use cbvh_measure::rounds::add;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// What a query said.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Answer {
-    /// Yes or no.
-    Flag(bool),
-    /// Pairs of triangles.
-    Count(u64),
-    /// Mesh units.
-    Length(f64),
+/// An answer and its nanoseconds.
+pub(super) type Timed = (Answer, u64);
+
+/// The limits of a run.
+pub(super) struct Limits {
+    pub(super) jobs: usize,
+    pub(super) warm: usize,
+    /// The budget in seconds; `None` for no limit.
+    pub(super) budget: Option<f64>,
 }
 
-/// An answer and the nanoseconds that it took.
-pub(crate) type Timed = (Answer, u64);
-
-/// How to run.
-pub(crate) struct Limits {
-    pub(crate) jobs: usize,
-    pub(crate) warm: usize,
-    /// Seconds; `None` for no limit.
-    pub(crate) budget: Option<f64>,
-}
-
-/// All answers to the poses of a file.
-pub(crate) struct Run {
-    /// In the order of the poses; fewer than those if the budget ended.
-    pub(crate) answers: Vec<Timed>,
-    pub(crate) requested: usize,
-    /// Threads used.
-    pub(crate) jobs: usize,
-    /// Seconds from the first query to the last.
-    pub(crate) total_seconds: f64,
-    pub(crate) stats: QueryStats,
+/// The results of a run.
+pub(super) struct Run {
+    /// The answers in the order of the poses. There are fewer than poses if the budget ended.
+    pub(super) answers: Vec<Timed>,
+    pub(super) requested: usize,
+    /// The number of threads used.
+    pub(super) jobs: usize,
+    /// The seconds from the first query to the last.
+    pub(super) total_seconds: f64,
+    pub(super) stats: QueryStats,
 }
 
 /// Asks about all poses.
-pub(crate) fn run(
+pub(super) fn run(
     sides: &Sides<'_>,
     poses: &[Pose],
     question: &Question,
@@ -72,7 +62,7 @@ pub(crate) fn run(
         total_seconds = total_seconds.max(share.seconds);
         share.answers.into_iter().for_each(|(index, timed)| answers[index] = Some(timed));
     }
-    // Poses are taken in order and each that is taken is answered: no gaps.
+    // Poses are taken in order, and each one that is taken is answered, so that there are no gaps.
     let answers = answers.into_iter().map_while(|answer| answer).collect();
     Ok(Run { answers, requested: poses.len(), jobs, total_seconds, stats })
 }
@@ -89,7 +79,7 @@ fn work_together(worker: &Worker<'_>, jobs: usize) -> Vec<Result<Share, QueryErr
     })
 }
 
-/// What all threads share.
+/// The work that all threads share.
 struct Worker<'a> {
     sides: &'a Sides<'a>,
     poses: &'a [Pose],
@@ -100,7 +90,7 @@ struct Worker<'a> {
     ready: Barrier,
 }
 
-/// What one thread has done.
+/// The results of one thread.
 struct Share {
     answers: Vec<(usize, Timed)>,
     stats: QueryStats,
@@ -116,7 +106,7 @@ impl Worker<'_> {
             if start.elapsed().as_secs_f64() >= budget / 4.0 {
                 break;
             }
-            // What is wrong is met again in the timed part. Here it would keep others waiting.
+            // The timed part meets the same error again. Returning it here would leave the other threads at the barrier.
             let _ = self.question.ask(&mut querier, self.sides, pose);
         }
         let mut share = Share {

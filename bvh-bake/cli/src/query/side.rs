@@ -1,42 +1,41 @@
-//! One side of a query: an opened file, or a mesh baked in memory.
+//! The two sides of a query. Each is an opened file, or a mesh baked in memory.
 
-use crate::arguments::LayoutArguments;
-use crate::bake::options;
-use crate::error::Failure;
-use bvh_bake::{BakeError, Options, io, to_bytes};
+use crate::console::Failure;
+use crate::options::LayoutArguments;
+use bvh_bake::{BakeError, Options, input, to_bytes};
 use bvh_format::header::MAGIC;
-use bvh_query::{Bvh, ReadAhead, Shape};
+use bvh_query::{Bvh, QueryError, ReadAhead, Shape};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// How sides are made ready.
+/// The options for preparing the sides.
 #[derive(Clone, Copy)]
 pub(crate) struct How<'a> {
-    /// For meshes that are baked.
+    /// The layout of meshes that are baked in memory.
     pub(crate) layout: &'a LayoutArguments,
-    /// The object to ask about.
+    /// The object to query.
     pub(crate) object: Option<&'a str>,
     pub(crate) read_ahead: ReadAhead,
 }
 
-/// A side, ready to be asked about.
+/// A side that is ready to be queried.
 pub(crate) struct Side {
     pub(crate) path: PathBuf,
     pub(crate) bvh: Bvh,
     /// The object that `--object` names, if this side has it.
     pub(crate) object: Option<usize>,
-    /// Seconds of baking, or of opening the file.
+    /// The seconds of baking the mesh, or of opening the file.
     pub(crate) build_seconds: f64,
 }
 
 impl Side {
-    /// Opens a `.cbvh` file or bakes a mesh. The mesh's objects are one tree, unless `object` names one.
+    /// Opens a `.cbvh` file or bakes a mesh. All objects of a mesh become one tree, unless `--object` names one of them.
     pub(crate) fn load(path: &Path, how: &How) -> Result<Self, Failure> {
         if is_baked(path)? {
             return Self::open(path, how);
         }
-        let (bvh, build_seconds) = bake(path, &options(how.layout), how.object)?;
+        let (bvh, build_seconds) = bake(path, &how.layout.to_options(), how.object)?;
         Ok(Self::new(path, bvh, how, build_seconds))
     }
 
@@ -52,8 +51,8 @@ impl Side {
         Self { path: path.to_owned(), bvh, object, build_seconds }
     }
 
-    /// Checks all pages before queries are timed, as a part of building: no query pays for a first
-    /// touch that the next one would have for nothing.
+    /// Checks all pages before queries are timed, and counts that as building: otherwise the first query that touches a
+    /// page would pay for its check.
     pub(crate) fn check(&mut self) -> Result<(), Failure> {
         let start = Instant::now();
         self.bvh.check_all().map_err(|error| Failure::invalid(&self.path, error))?;
@@ -61,26 +60,57 @@ impl Side {
         Ok(())
     }
 
-    /// What is queried.
+    /// Returns what is queried.
     pub(crate) fn shape(&self) -> Shape<'_> {
         self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all())
     }
 
-    /// Triangles of the mesh, exact duplicates too.
+    /// Returns the number of triangles of the mesh, including exact duplicates.
     pub(crate) fn triangles(&self) -> u64 {
-        let records = self.shape().objects().iter().map(|object| &object.record);
-        // As stated: the numbers of a forged file may have no sum.
+        let records = self.shape().objects().iter().map(|object| object.record());
+        // The counts are as the file states them, and those of a forged file may overflow.
         let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
         counts.fold(0, u64::saturating_add)
     }
 
-    /// Bytes of the file, and triangles stored in it.
+    /// Returns the bytes of the file, and the number of triangles stored in it.
     pub(crate) fn bytes_and_stored(&self) -> (u64, u64) {
         (self.bvh.bytes().len() as u64, self.bvh.all().triangles())
     }
 }
 
-/// True for `.cbvh` files, by content or, so that a damaged one is called so, by name.
+/// Both sides of a query.
+#[derive(Clone, Copy)]
+pub(crate) struct Sides<'a> {
+    pub(crate) a: &'a Side,
+    pub(crate) b: &'a Side,
+}
+
+impl<'a> Sides<'a> {
+    /// Returns what is queried on each side.
+    pub(super) fn shapes(&self) -> (Shape<'a>, Shape<'a>) {
+        (self.a.shape(), self.b.shape())
+    }
+
+    /// Turns an error of a query into one of the file that caused it.
+    pub(super) fn blame(&self, error: QueryError) -> Failure {
+        match error {
+            QueryError::Backend(error) => error.into(),
+            QueryError::Budget { .. } => Failure::Limit(error.to_string()),
+            QueryError::Damaged(breach) => {
+                // The error does not say which file is damaged, so that both are checked.
+                let damaged = |bvh: &Bvh| bvh_format::validate::validate(bvh.bytes()).is_err();
+                let side = if damaged(&self.a.bvh) { self.a } else { self.b };
+                Failure::invalid(&side.path, breach)
+            }
+            // A number that the command line has let through.
+            error => Failure::Usage(error.to_string()),
+        }
+    }
+}
+
+/// Returns whether a file is a `.cbvh` file by its content or by its name. The name counts too, so that a damaged file is
+/// reported as such.
 pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
     let failed = |error| Failure::from_input(path, &error);
     let mut file = std::fs::File::open(path).map_err(failed)?;
@@ -92,14 +122,14 @@ pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
 
 fn bake(path: &Path, options: &Options, object: Option<&str>) -> Result<(Bvh, f64), Failure> {
     let failed = |error: &BakeError| Failure::from_bake(&path.display().to_string(), error);
-    let mut mesh = io::read(path).map_err(|error| failed(&error.into()))?;
-    // A file that lacks the object is one thing to query, and one tree is faster to query than many.
+    let mut mesh = input::read(path).map_err(|error| failed(&error.into()))?;
+    // One tree is faster to query than several, unless the object is to be queried alone.
     let has = object.is_some_and(|name| mesh.objects.iter().any(|object| object.name == name));
     if !has {
         mesh = mesh.merged();
     }
     let start = Instant::now();
-    let options = Options { split_objects: has, ..options.clone() };
+    let options = options.clone().split_objects(has);
     let (bytes, _) = to_bytes(&mesh, &options).map_err(|error| failed(&error))?;
     let bvh = Bvh::from_bytes(bytes).map_err(|error| failed(&BakeError::Unproved(error)))?;
     Ok((bvh, start.elapsed().as_secs_f64()))

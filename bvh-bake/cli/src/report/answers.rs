@@ -1,37 +1,37 @@
-//! Holds answers against those of the reference: the profile of plain floats, with the same triangles.
+//! Compares answers with those of the reference: the profile of plain floats, with the same triangles.
 //!
-//! Contact and exact distances have one right answer for given triangles, bit for bit; with an allowed error the
-//! answer is from the least distance to that much more. Triangles that were moved have answers of their own:
-//! those are held against the reference with the same moved triangles, and how far they are from the answers
-//! for the mesh itself is an error that is reported.
+//! Contact and exact distances have one right answer for given triangles, bit for bit. With an allowed error the answer
+//! lies between the least distance and that much more. Quantised triangles have moved and have answers of their own:
+//! these are compared with the reference for the same moved triangles, and their difference from the answers for the
+//! mesh itself is an error that is reported.
 
-use super::measure::{Asked, Baked, Question};
+use super::measured::Baked;
 use super::row::Errors;
-use super::spread::median;
+use super::{EXACT_DISTANCE, QUESTIONS};
 use bvh_format::leaf::TriangleEncoding;
+use cbvh_measure::rounds::{Asked, Question};
+use cbvh_measure::spread::median;
 
-/// Roundings allowed to the product of a distance and 1 + an allowed error: two of 2^-53 each, with room.
+/// The rounding allowed to the product of a distance and 1 + an allowed error: two of 2^-53 each, with room.
 const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
 
-/// What is wrong with the answers, one line each, and the errors of each variant's answers, by question.
+/// Returns the wrong answers, one line each, and the errors of each layout's answers, by question.
 pub(super) fn judge(pair: &str, bakes: &[Baked], asked: &[Vec<Asked>]) -> (Vec<String>, Vec<Vec<Errors>>) {
     let reference = |triangles: TriangleEncoding| {
-        let place = bakes.iter().position(|bake| bake.variant.is_reference(triangles));
+        let place = bakes.iter().position(|bake| bake.layout.is_reference(triangles));
         &asked[place.unwrap_or(0)]
     };
-    let distance = Question::ALL.iter().position(|&q| q == Question::Distance(0.0)).unwrap_or(0);
-    let exact = &reference(TriangleEncoding::F32)[distance].answers;
+    let exact = &reference(TriangleEncoding::F32)[EXACT_DISTANCE].answers;
     let mut wrong = Vec::new();
     let mut errors = Vec::new();
     for (bake, found) in bakes.iter().zip(asked) {
-        let variant = &bake.variant;
-        let right = reference(variant.triangles);
-        let name = format!("{pair}, {} {}", variant.group.name(), variant.name);
+        let right = reference(bake.layout.triangles);
+        let name = format!("{pair}, {}", bake.layout.name());
         let mut errors_of = Vec::new();
-        for (number, question) in Question::ALL.into_iter().enumerate() {
+        for (number, question) in QUESTIONS.into_iter().enumerate() {
             let expected = match question {
                 Question::Collide => &right[number].answers,
-                Question::Distance(_) => &right[distance].answers,
+                Question::Distance(_) => &right[EXACT_DISTANCE].answers,
             };
             for (pose, (&found, &expected)) in found[number].answers.iter().zip(expected).enumerate() {
                 if !is_right(question, found, expected) {
@@ -77,6 +77,7 @@ fn errors_against(exact: &[f64], found: &[f64]) -> Errors {
 
 #[cfg(test)]
 mod tests {
+    use super::super::layout::Layout;
     use super::*;
 
     #[test]
@@ -98,38 +99,28 @@ mod tests {
         assert_eq!((touching.median, touching.max, touching.max_length), (None, None, Some(0.0)));
     }
 
-    /// All variants of two triangles, and answers as they should be.
-    fn asked() -> (Vec<Baked>, Vec<Vec<Asked>>) {
+    #[test]
+    fn one_wrong_answer_is_named() {
         let mesh = bvh_bake::mesh::Mesh::from_triangles(
             vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             vec![[0, 1, 2]],
         );
-        let bakes: Vec<Baked> = super::super::variant::all()
-            .into_iter()
-            .map(|variant| {
-                let (bytes, _) = bvh_bake::to_bytes(&mesh, &variant.options()).unwrap();
-                let a = std::sync::Arc::new(bvh_query::Bvh::from_bytes(bytes).unwrap());
-                Baked { variant, b: a.clone(), a }
-            })
-            .collect();
-        let poses = [0.0, 2.0]
-            .map(|z| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [0.0, 0.0, z]).unwrap());
-        let asked = super::super::measure::rounds(&bakes, &poses, bvh_query::Backend::Scalar, 1).unwrap();
-        (bakes, asked)
-    }
-
-    #[test]
-    fn one_wrong_answer_is_named() {
-        let (bakes, mut found) = asked();
+        let (bytes, _) = bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default()).unwrap();
+        let a = std::sync::Arc::new(bvh_query::Bvh::from_bytes(bytes).unwrap());
+        let baked = |layout| Baked { layout, b: a.clone(), a: a.clone(), size: Default::default() };
+        let bakes: Vec<Baked> = Layout::all().map(baked).collect();
+        // The answers in two poses, of which the second is 2 apart.
+        let asked = |question: Question| {
+            let answers = if question == Question::Collide { vec![1.0, 0.0] } else { vec![0.0, 2.0] };
+            Asked { answers, ..Asked::default() }
+        };
+        let mut found = vec![QUESTIONS.map(asked).to_vec(); bakes.len()];
         assert!(judge("pair", &bakes, &found).0.is_empty());
-        let variant = bakes.iter().position(|bake| bake.variant.name == "dop6-u8 packed").unwrap();
-        found[variant][0].answers[1] = 1.0;
-        let (wrong, _) = judge("pair", &bakes, &found);
+        let layout = bakes.iter().position(|bake| bake.layout.name() == "dop6-u8 packed").unwrap();
+        found[layout][0].answers[1] = 1.0;
         assert_eq!(
-            wrong,
-            [
-                "pair, layout dop6-u8 packed, collide with an allowed error of 0, pose 2: expected 0.0, found 1.0"
-            ]
+            judge("pair", &bakes, &found).0,
+            ["pair, dop6-u8 packed, collide with an allowed error of 0, pose 2: expected 0.0, found 1.0"]
         );
     }
 }

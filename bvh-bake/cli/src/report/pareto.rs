@@ -1,6 +1,6 @@
-//! The Pareto front: what nothing else beats in both of two figures, less being better in each.
+//! The Pareto front: the points that no other point beats in both of two figures, of which less is better.
 
-/// For each point, whether no other is at least as good in both and better in one.
+/// Returns for each point whether no other is at least as good in both figures and better in one.
 pub(super) fn front(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 <= b.1 && (a.0 < b.0 || a.1 < b.1);
     points.iter().map(|point| !points.iter().any(|other| beats(other, point))).collect()

@@ -1,42 +1,42 @@
 //! The mesh to bake: read from a mesh file, or taken out of a `.cbvh` file.
 
-use crate::error::Failure;
-use crate::opened;
+use crate::console::Failure;
 use crate::query::side::is_baked;
-use bvh_bake::io;
+use bvh_bake::input;
 use bvh_bake::mesh::Mesh;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
 use bvh_format::validate::{packets, validate};
+use bvh_query::Bvh;
 use std::path::Path;
 
-/// The mesh of a file, all its objects as one.
+/// Returns the mesh of a file, all its objects as one.
 pub(super) fn mesh(path: &Path) -> Result<Mesh, Failure> {
     if is_baked(path)? {
         return unbaked(path);
     }
     let read =
-        io::read(path).map_err(|error| Failure::from_bake(&path.display().to_string(), &error.into()))?;
+        input::read(path).map_err(|error| Failure::from_bake(&path.display().to_string(), &error.into()))?;
     Ok(read.merged())
 }
 
-/// The triangles of a `.cbvh` file in the order of their ids, or of the file if it has none. Exact duplicates,
-/// of which the file holds only one, stay away.
+/// Returns the triangles of a `.cbvh` file in the order of their ids, or in the order of the file if it has no ids. The
+/// file stores only one of several exact duplicates, so the others are missing.
 fn unbaked(path: &Path) -> Result<Mesh, Failure> {
-    let bvh = opened::open(path)?;
+    let bvh = Bvh::open(path)?;
     validate(bvh.bytes()).map_err(|error| Failure::invalid(path, error))?;
     let (layout, bytes) = (bvh.layout(), bvh.bytes());
     let mut triangles = Vec::new();
     for object in bvh.objects() {
-        let origin = object.record.origin.map(|o| o.get());
+        let origin = object.origin();
         for number in object.pages() {
             let Some(page) = layout.page_bytes(bytes, number) else { continue };
-            let page = Page::new(page, object.profile);
+            let page = Page::new(page, object.profile());
             let header = page.header();
             let (block, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
             for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
+                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                 for lane in 0..count {
                     let place = triangles.len() as u32;
                     let id = if layout.has_ids() { decode_id(ids, usize::from(packet), lane) } else { place };

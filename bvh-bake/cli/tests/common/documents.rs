@@ -1,9 +1,9 @@
-//! What reports are written in: tables, JSON and documents after XML's rules.
+//! Parses the files of a report: tables, and documents that follow the rules of XML.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Lines of comma-separated values, each as a map by name. No field here has a comma.
+/// Returns the lines of comma-separated values, each as a map from names to values. No field here contains a comma.
 pub(crate) fn rows_of(csv: &str) -> Vec<BTreeMap<String, String>> {
     let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let header = lines.next().unwrap();
@@ -18,7 +18,7 @@ pub(crate) fn rows_of(csv: &str) -> Vec<BTreeMap<String, String>> {
 /// An element: its name and attributes.
 pub(crate) type Element = (String, BTreeMap<String, String>);
 
-/// The elements of a document, all of which must be closed as XML wants it.
+/// Returns the elements of a document, all of which must be closed as XML requires.
 pub(crate) fn elements(document: &str) -> Vec<Element> {
     let (mut all, mut open) = (Vec::new(), Vec::new());
     let mut rest = document;
@@ -55,7 +55,7 @@ pub(crate) fn number(value: &Value, field: &str) -> Option<f64> {
     value[field].as_f64()
 }
 
-/// The table has the rows, with the same figures under the same names.
+/// Asserts that a table has the given rows, with the same figures under the same names.
 #[track_caller]
 pub(crate) fn same_figures(csv: &str, rows: &[Value]) {
     let table = rows_of(csv);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How a run of the command ended.
+/// The outcome of a run of the command.
 #[derive(Debug)]
 pub(crate) struct Ended {
     pub(crate) code: i32,
@@ -17,7 +17,7 @@ pub(crate) struct Ended {
     pub(crate) err: String,
 }
 
-/// No command on these files takes longer, not even on a machine that is busy with others.
+/// The longest time that a command may take on these files, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(100);
 
 /// Runs the command in a directory.
@@ -34,7 +34,7 @@ pub(crate) fn cbvh_with_isa(directory: &Path, isa: &str, arguments: &[&str]) -> 
 }
 
 fn run(command: &mut Command) -> Ended {
-    // Into files: a full pipe would stop the command.
+    // Output goes to files, because a full pipe would stop the command.
     let directory = tempfile::tempdir().unwrap();
     let paths = ["out", "err"].map(|name| directory.path().join(name));
     let [out, err] = paths.each_ref().map(|path| std::fs::File::create(path).unwrap());
@@ -55,14 +55,14 @@ fn run(command: &mut Command) -> Ended {
 }
 
 impl Ended {
-    /// The command succeeded and said nothing on standard error.
+    /// Asserts that the command succeeded and printed nothing on standard error.
     #[track_caller]
     pub(crate) fn done(self) -> Self {
         assert_eq!((self.code, self.err.as_str()), (0, ""), "{self:?}");
         self
     }
 
-    /// The command failed with this code and one line that has all these words.
+    /// Asserts that the command failed with this exit code and one line that contains all of `words`.
     #[track_caller]
     pub(crate) fn failed(self, code: i32, words: &[&str]) -> Self {
         assert_eq!(self.code, code, "{self:?}");
@@ -72,13 +72,13 @@ impl Ended {
         self
     }
 
-    /// Standard output as JSON objects, one a line.
+    /// Returns standard output as JSON objects, one per line.
     #[track_caller]
     pub(crate) fn json_lines(&self) -> Vec<Value> {
         self.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
-    /// Standard output as one JSON object.
+    /// Returns standard output as one JSON object.
     #[track_caller]
     pub(crate) fn json(&self) -> Value {
         let lines = self.json_lines();
@@ -87,7 +87,7 @@ impl Ended {
     }
 }
 
-/// Names of all files in a directory, sorted.
+/// Returns the names of all files in a directory, sorted.
 pub(crate) fn names(directory: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(directory).unwrap();
     let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -95,7 +95,7 @@ pub(crate) fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The cube of side 2 around the origin.
+/// Returns the cube of side 2 around the origin.
 pub(crate) fn cube() -> String {
     let mut text = String::from("o cube\n");
     for corner in 0..8 {
@@ -105,7 +105,7 @@ pub(crate) fn cube() -> String {
     text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// A torus around z of 2 * n * m triangles: radii 2 and 0.5, with dents.
+/// Returns a torus around z of 2 * n * m triangles, with radii 2 and 0.5 and with dents.
 pub(crate) fn torus(n: usize, m: usize) -> String {
     let mut text = String::from("o torus\n");
     for i in 0..n {
@@ -127,7 +127,7 @@ pub(crate) fn torus(n: usize, m: usize) -> String {
     text
 }
 
-/// Poses that turn about z by 0.1 rad a line and move along x.
+/// Returns poses, each turned about z by 0.1 rad more than the one before, and moved along x.
 pub(crate) fn poses(count: usize, from: f64, to: f64) -> String {
     let mut text = String::from("# x y z turned\n\n");
     for i in 0..count {
@@ -138,19 +138,19 @@ pub(crate) fn poses(count: usize, from: f64, to: f64) -> String {
     text
 }
 
-/// A folder of test material beside the repository, if it is there.
+/// Returns a folder of test material beside the repository, if it exists.
 pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
     folder.is_dir().then_some(folder)
 }
 
-/// Tells that a test has been left out.
+/// Says that a test was skipped.
 #[allow(clippy::print_stderr, reason = "a test that does nothing must say so")]
 pub(crate) fn skip(why: &str) {
     eprintln!("skipped: {why}");
 }
 
-/// Backends that this CPU has.
+/// Returns the backends that this CPU has.
 pub(crate) fn backends(directory: &Path) -> Vec<&'static str> {
     std::fs::write(directory.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let there = |isa: &&str| {

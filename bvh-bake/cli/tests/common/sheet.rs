@@ -1,10 +1,10 @@
-//! Writes meshes of any size: bumpy sheets, in each format that is read piece by piece.
+//! Writes bumpy sheets of any size, in each format that is read piece by piece.
 
 use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// A bumpy sheet of `side` by `side` squares: vertices that are `f32` numbers, and triangles.
+/// Returns a bumpy sheet of `side` by `side` squares: vertices that are `f32` numbers, and triangles.
 fn sheet(side: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let height = |x: u32, y: u32| (x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b)) >> 24;
     let at = |i: u32| {
@@ -19,7 +19,7 @@ fn sheet(side: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     ((0..(side + 1).pow(2)).map(at).collect(), (0..side * side).flat_map(square).collect())
 }
 
-/// Writes a sheet in the format that the name ends in.
+/// Writes a sheet in the format of the name's extension.
 pub(crate) fn write_sheet(path: &Path, side: u32) {
     let (vertices, triangles) = sheet(side);
     let mut file = BufWriter::new(fs::File::create(path).unwrap());

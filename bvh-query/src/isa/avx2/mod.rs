@@ -293,10 +293,8 @@ impl Isa for Avx2 {
         with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
     }
     #[inline(always)]
-    fn prefetch(self, bytes: &[u8]) {
-        for line in bytes.chunks(64) {
-            with_features!(_mm_prefetch::<_MM_HINT_T0>(line.as_ptr().cast()));
-        }
+    fn prefetch_line(self, byte: &u8) {
+        with_features!(_mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()));
     }
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.

@@ -174,7 +174,7 @@ impl Isa for Scalar {
         *to = value.0;
     }
     #[inline(always)]
-    fn prefetch(self, _bytes: &[u8]) {
+    fn prefetch_line(self, _byte: &u8) {
         // Portable code has no way to ask.
     }
     fn run<T: Task>(self, task: T) -> T::Output {

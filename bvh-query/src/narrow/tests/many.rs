@@ -1,10 +1,10 @@
 //! `triangles_intersect` on many pairs that f64 can hardly tell from touching, against the oracles of
 //! `tests/exact`, which are independent of it; the interval of `triangle_distance` on some of them.
 //!
-//! `CBVH_TEST_PAIRS` multiplies the amount.
+//! `CBVH_TEST_DEPTH` multiplies the amount.
 
+use super::depth::rounds;
 use super::exact::decide::{Boxed, Decided, intersect};
-use super::exact::effort::rounds;
 use super::exact::length::Length;
 use super::generate::{KINDS, Random, pair};
 use crate::narrow::{Point, Triangle, subtract, triangle_distance, triangles_intersect};
@@ -48,7 +48,7 @@ fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Trian
 #[allow(clippy::print_stderr, reason = "counts are what a longer search is run for")]
 fn pairs_that_almost_touch_agree_with_the_exact_oracle() {
     let (mut random, mut decided, mut touching, mut lengths) = (Random(23), Decided::default(), 0_u64, 0_u64);
-    let count = rounds(400_000);
+    let count = rounds(40_000);
     for round in 0..count {
         let (name, a, b) = close_pair(round, &mut random);
         let expected = intersect(&Boxed::new(a), &Boxed::new(b), &mut decided);

@@ -1,5 +1,6 @@
 //! The narrow phase against exact integer arithmetic.
 
+mod depth;
 mod distance;
 mod generate;
 mod intersect;
@@ -13,7 +14,6 @@ mod exact {
     pub(super) mod ball;
     pub(super) mod decide;
     pub(super) mod dyadic;
-    pub(super) mod effort;
     pub(super) mod features;
     pub(super) mod length;
     pub(super) mod meet;

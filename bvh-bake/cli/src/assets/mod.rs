@@ -1,0 +1,222 @@
+//! `cbvh bake` of many assets: baked in parallel within one budget, with one line of results per asset.
+//!
+//! Each thread takes the next asset in turn, waits for its share of the memory, and bakes it on the thread pool that all
+//! share. If an asset fails, the failure is told and noted, and the next asset follows.
+
+mod asset;
+mod folder;
+mod journal;
+mod list;
+mod shares;
+mod summary;
+
+use crate::bake::{self, BakeArguments, FileOptions, Report};
+use crate::console::{self, Failure, spinner};
+use crate::process::signals;
+use asset::Asset;
+use bvh_bake::{BakeError, Progress};
+use indicatif::ProgressBar;
+use journal::Journal;
+use serde::Serialize;
+use shares::Shares;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+use summary::Summary;
+
+/// The most bytes of memory per asset for what is known of it: its paths, and its line of results until the end.
+const BYTES_PER_ASSET: u64 = 4096;
+
+/// Returns whether the command line is about many assets: a manifest, or one folder.
+pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
+    arguments.manifest.is_some() || matches!(&arguments.inputs[..], [input] if input.is_dir())
+}
+
+/// Bakes all assets of a manifest or a folder.
+pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
+    let (options, file_options) = bake::prepare(arguments)?;
+    let start = Instant::now();
+    let mut assets = match (&arguments.manifest, &arguments.inputs[..], &arguments.output) {
+        (Some(manifest), ..) => list::read(manifest, &options)?,
+        (None, [folder], Some(output)) => folder::read(folder, output, &options)?,
+        _ => return Err(Failure::Usage("expected a manifest or one folder (see --help)".into())),
+    };
+    let results = arguments.out_manifest.as_deref();
+    asset::refuse_shared_outputs(&assets, arguments.manifest.as_deref(), results)?;
+    let known = BYTES_PER_ASSET * assets.len() as u64;
+    if let Some(shard) = arguments.shard {
+        let mut number = 0..;
+        assets.retain(|_| number.next().is_some_and(|number| shard.has(number)));
+    }
+    let jobs = rayon::current_num_threads();
+    let shares = file_options.max_memory.map(|budget| Shares::new(budget.saturating_sub(known), jobs));
+    let spinner = spinner(arguments.quiet);
+    signals::remove_unfinished_files(&spinner)?;
+    let done = Done {
+        journal: results.map(Journal::open).transpose()?,
+        summary: Summary::new(arguments.shard, assets.len()),
+        stopped: None,
+    };
+    let queue = Queue {
+        turn: Mutex::new(assets.iter().enumerate()),
+        done: Mutex::new(done),
+        spinner,
+        shares,
+        file_options: &file_options,
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..jobs.min(assets.len()) {
+            scope.spawn(|| queue.work());
+        }
+        queue.work();
+    });
+    queue.spinner.finish_and_clear();
+    let mut done = queue.done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(failure) = done.stopped {
+        return Err(failure);
+    }
+    if let Some(journal) = done.journal {
+        journal.close()?;
+    }
+    done.summary.close(start.elapsed().as_secs_f64());
+    if arguments.json {
+        console::json(&done.summary)?;
+    } else if !arguments.quiet {
+        console::text(&done.summary.to_text())?;
+    }
+    done.summary.failure(results).map_or(Ok(()), Err)
+}
+
+/// The assets to bake and all that the threads share.
+struct Queue<'a, T> {
+    /// The assets that remain. A thread holds the lock until it has both an asset and its memory, so that others cannot
+    /// overtake a large asset for ever.
+    turn: Mutex<T>,
+    done: Mutex<Done>,
+    spinner: ProgressBar,
+    /// The memory; `None` without a budget.
+    shares: Option<Shares>,
+    file_options: &'a FileOptions,
+}
+
+/// The results so far.
+struct Done {
+    journal: Option<Journal>,
+    summary: Summary,
+    /// Why no more assets are started.
+    stopped: Option<Failure>,
+}
+
+/// The line of results of an asset that was baked.
+#[derive(Serialize)]
+struct DoneLine<'a> {
+    line: u64,
+    exit_code: u8,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+/// The line of results of an asset that failed.
+#[derive(Serialize)]
+struct FailedLine<'a> {
+    line: u64,
+    exit_code: u8,
+    input: &'a str,
+    output: &'a str,
+    error: &'a str,
+}
+
+impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
+    /// Bakes assets until none remain.
+    fn work(&self) {
+        loop {
+            let mut turn = lock(&self.turn);
+            if lock(&self.done).stopped.is_some() {
+                return;
+            }
+            let Some((number, asset)) = turn.next() else { return };
+            let share = self.shares.as_ref().map(|shares| shares.take(shares.of(&asset.input)));
+            drop(turn);
+            let mut baked = self.bake(asset, share.as_ref().map(|share| share.bytes));
+            drop(share);
+            if let (Some(shares), Err(BakeError::Memory { .. })) = (&self.shares, &baked) {
+                // The file has more triangles than its length suggests: bake it again, with the whole budget.
+                let turn = lock(&self.turn);
+                let share = shares.take(shares.budget());
+                drop(turn);
+                baked = self.bake(asset, Some(share.bytes));
+            }
+            if let Err(failure) = self.note(number, asset, baked) {
+                lock(&self.done).stopped.get_or_insert(failure);
+            }
+        }
+    }
+
+    fn bake(&self, asset: &Asset, max_memory: Option<u64>) -> Result<Report, BakeError> {
+        if let Some(folder) = asset.output.parent() {
+            std::fs::create_dir_all(folder).map_err(|source| BakeError::Write {
+                path: folder.to_owned(),
+                action: "create the folder",
+                source,
+            })?;
+        }
+        let file_options = FileOptions { max_memory, ..self.file_options.clone() };
+        let inputs = std::slice::from_ref(&asset.input);
+        let progress = Progress::default();
+        bake::bake(inputs, &asset.output, &asset.options, &file_options, &progress, &mut |_| ())
+    }
+
+    /// Counts an asset, writes its line of results, and tells what is wrong with it.
+    fn note(&self, number: usize, asset: &Asset, baked: Result<Report, BakeError>) -> Result<(), Failure> {
+        let (input, output) = (asset.named_input.clone(), asset.named_output.clone());
+        let baked = match baked {
+            Ok(mut report) => {
+                (report.input, report.output) = (input, output);
+                Ok(report)
+            }
+            Err(error) => {
+                let failure = Failure::from_bake(&asset.input.display().to_string(), &error);
+                Err(failure.line().unwrap_or_else(|| (2, error.to_string())))
+            }
+        };
+        let text = match &baked {
+            Ok(report) => serde_json::to_string(&DoneLine { line: asset.line, exit_code: 0, report }),
+            Err((code, error)) => serde_json::to_string(&FailedLine {
+                line: asset.line,
+                exit_code: *code,
+                input: &asset.named_input,
+                output: &asset.named_output,
+                error,
+            }),
+        };
+        let text = text.map_err(|error| Failure::System(format!("JSON: {error}")))?;
+        let mut done = lock(&self.done);
+        match &baked {
+            Ok(report) => {
+                done.summary.add(report);
+                if let Some(warning) = &report.warning {
+                    self.spinner.suspend(|| console::tell_line(&format!("warning: {warning}")));
+                }
+            }
+            Err((code, error)) => {
+                done.summary.add_failed(*code);
+                self.spinner.suspend(|| console::tell_line(error));
+            }
+        }
+        self.spinner.set_message(done.summary.progress());
+        match &mut done.journal {
+            Some(journal) => journal.add(number, text),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Locks a mutex. Poison is ignored: a thread that panics leaves nothing half-changed behind the lock.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns a path as messages show it.
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}

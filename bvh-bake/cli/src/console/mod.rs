@@ -1,0 +1,11 @@
+//! What every command prints, and how it ends: standard output, standard error, exit codes.
+
+mod failure;
+mod output;
+mod spinner;
+mod words;
+
+pub(crate) use failure::{Failure, tell_json, tell_line};
+pub(crate) use output::{hex, json, text};
+pub(crate) use spinner::spinner;
+pub(crate) use words::{length, names, plural};

@@ -1,0 +1,173 @@
+//! Asks questions of several subjects in rounds and times each query alone.
+//!
+//! Within a round the subjects take turns at each question, and the next round starts with another subject, so that
+//! drift (clock, temperature, neighbours) affects all of them alike. A turn is a few untimed queries and then all poses
+//! in their order. Caches hold what the previous queries left there, which is called warm.
+
+use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, QueryError, QueryStats};
+use std::time::Instant;
+
+/// Untimed queries before each turn.
+const WARM_UP_QUERIES: usize = 3;
+/// The number of subjects by which the start moves on from round to round. It shares no factor with usual numbers of
+/// subjects, so that the order of turns differs from round to round.
+const STRIDE: usize = 17;
+
+/// A question about two meshes in a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Question {
+    /// Whether they touch.
+    Collide,
+    /// How far apart they are, with an allowed relative error.
+    Distance(f64),
+}
+
+impl Question {
+    /// The questions without an allowed error.
+    pub const EXACT: [Self; 2] = [Self::Collide, Self::Distance(0.0)];
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Collide => "collide",
+            Self::Distance(_) => "distance",
+        }
+    }
+
+    /// The allowed relative error of a distance.
+    pub fn rel_err(self) -> Option<f64> {
+        match self {
+            Self::Collide => None,
+            Self::Distance(rel_err) => Some(rel_err),
+        }
+    }
+
+    /// Returns the answer as a number: 1 for contact, or the distance in mesh units.
+    ///
+    /// # Errors
+    /// Returns the error of the query.
+    #[inline]
+    pub fn ask(self, querier: &mut Querier, a: &Bvh, b: &Bvh, pose: &Pose) -> Result<f64, QueryError> {
+        Ok(match self {
+            Self::Collide => f64::from(u8::from(querier.collide(a, b, pose)?)),
+            Self::Distance(rel_err) => {
+                let options = DistanceOptions::new().rel_err(rel_err);
+                querier.distance_with(a, b, pose, &options)?.distance
+            }
+        })
+    }
+
+    /// Returns how many of its answers say that the meshes touch.
+    pub fn touching(self, answers: &[f64]) -> u64 {
+        let touching = if self == Self::Collide { 1.0 } else { 0.0 };
+        answers.iter().filter(|&&answer| answer == touching).count() as u64
+    }
+}
+
+/// Two baked meshes and the poses to ask about.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    /// The first mesh.
+    pub a: &'a Bvh,
+    /// The mesh that the poses place.
+    pub b: &'a Bvh,
+    /// The poses, in the order in which they are asked about.
+    pub poses: &'a [Pose],
+}
+
+/// The answers and times of one question to one subject.
+#[derive(Debug, Default, Clone)]
+pub struct Asked {
+    /// The answer in each pose.
+    pub answers: Vec<f64>,
+    /// Nanoseconds by round and pose.
+    pub rounds: Vec<Vec<u64>>,
+    /// The work of one round, summed over the poses.
+    pub stats: QueryStats,
+}
+
+impl Asked {
+    /// Mean work per query.
+    pub fn work(&self) -> Work {
+        Work::mean(self.stats, self.answers.len())
+    }
+}
+
+/// Mean work per query.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Work {
+    /// Tests of up to 16 pairs of nodes.
+    pub node_tests: Option<f64>,
+    /// Tests of up to 16 pairs of triangles.
+    pub packet_tests: Option<f64>,
+    /// Pairs of triangles that were decided exactly.
+    pub exact_tests: Option<f64>,
+}
+
+impl Work {
+    /// The mean of a sum over so many queries.
+    pub fn mean(sum: QueryStats, queries: usize) -> Self {
+        let mean = |count: u64| Some(count as f64 / queries as f64);
+        Self {
+            node_tests: mean(sum.node_tests),
+            packet_tests: mean(sum.packet_tests),
+            exact_tests: mean(sum.exact_tests),
+        }
+    }
+}
+
+/// Adds the work of one query to a sum.
+pub fn add(sum: &mut QueryStats, stats: QueryStats) {
+    sum.node_tests += stats.node_tests;
+    sum.packet_tests += stats.packet_tests;
+    sum.exact_tests += stats.exact_tests;
+}
+
+/// Asks all subjects all questions in `rounds` rounds. The result is indexed by subject, then by question.
+///
+/// # Errors
+/// Returns the first error of a query.
+pub fn rounds(
+    subjects: &[Subject<'_>],
+    questions: &[Question],
+    backend: Backend,
+    rounds: usize,
+) -> Result<Vec<Vec<Asked>>, QueryError> {
+    let mut all = vec![vec![Asked::default(); questions.len()]; subjects.len()];
+    let mut queriers: Vec<Querier> = subjects.iter().map(|_| Querier::with_backend(backend)).collect();
+    for round in 0..rounds {
+        for (number, &question) in questions.iter().enumerate() {
+            for turn in 0..subjects.len() {
+                let subject = (turn + STRIDE * round) % subjects.len();
+                take_turn(question, &mut queriers[subject], &subjects[subject], &mut all[subject][number])?;
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Asks in all poses, after a few queries that are not timed.
+fn take_turn(
+    question: Question,
+    querier: &mut Querier,
+    subject: &Subject<'_>,
+    asked: &mut Asked,
+) -> Result<(), QueryError> {
+    let &Subject { a, b, poses } = subject;
+    for pose in poses.iter().rev().take(WARM_UP_QUERIES) {
+        question.ask(querier, a, b, pose)?;
+    }
+    let is_first = asked.rounds.is_empty();
+    let mut times = Vec::with_capacity(poses.len());
+    for pose in poses {
+        let before = Instant::now();
+        let answer = question.ask(querier, a, b, pose)?;
+        times.push(before.elapsed().as_nanos() as u64);
+        if is_first {
+            asked.answers.push(answer);
+            add(&mut asked.stats, querier.stats());
+        }
+    }
+    asked.rounds.push(times);
+    Ok(())
+}

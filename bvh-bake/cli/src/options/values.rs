@@ -1,0 +1,81 @@
+//! Parses the values of options: lengths, counts, threads and sizes in bytes.
+
+/// The most threads that `--jobs` may ask for.
+const MAX_THREADS: u16 = 1024;
+
+/// Parses a finite number above 0.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| "expected a finite number above 0".to_owned())
+}
+
+/// Parses a finite number of at least 0.
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| "expected a finite number of at least 0".to_owned())
+}
+
+/// Parses a whole number of at least 0.
+pub(crate) fn whole<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    let bits = 8 * size_of::<T>();
+    text.parse().map_err(|_| format!("expected a whole number from 0 to 2^{bits} - 1"))
+}
+
+/// Parses a number of threads.
+pub(crate) fn threads(text: &str) -> Result<u16, String> {
+    let value = text.parse().ok().filter(|threads| (1..=MAX_THREADS).contains(threads));
+    value.ok_or_else(|| format!("expected a number of threads from 1 to {MAX_THREADS}"))
+}
+
+/// Parses a number of bytes with an optional unit: powers of 1000 are `kB`, `MB`, `GB`, `TB`, and powers of 1024 are
+/// `KiB`, `MiB`, `GiB`, `TiB`.
+pub(crate) fn size(text: &str) -> Result<u64, String> {
+    let expected = || "expected a size such as 512MiB, 2GB or 100000000".to_owned();
+    let text = text.trim();
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "k" | "kib" => 1024.0,
+        "m" | "mib" => 1048576.0,
+        "g" | "gib" => 1073741824.0,
+        "t" | "tib" => 1099511627776.0,
+        _ => return Err(expected()),
+    };
+    let bytes = number.parse::<f64>().map_err(|_| expected())? * factor;
+    // Above 2^53 not every number of bytes is an f64, and no machine has so much memory.
+    if bytes < 9007199254740992.0 { Ok(bytes as u64) } else { Err(expected()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(size("512MiB"), Ok(512 << 20));
+        assert_eq!(size("1.5 GiB"), Ok(3 << 29));
+        assert_eq!(size("2GB"), Ok(2_000_000_000));
+        assert_eq!(size("7"), Ok(7));
+        for wrong in ["", "MiB", "-1", "1XB", "1e3", "1.2.3", "99999999999999999999"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_refused() {
+        for wrong in ["nan", "inf", "-inf", "1e400", "-1", "", "one"] {
+            assert!(positive(wrong).is_err() && not_negative(wrong).is_err(), "{wrong}");
+            assert!(whole::<u32>(wrong).is_err() && threads(wrong).is_err(), "{wrong}");
+        }
+        assert!(positive("0").is_err() && threads("0").is_err() && threads("1025").is_err());
+        assert_eq!(
+            (not_negative("0"), whole("4294967295"), threads("1024")),
+            (Ok(0.0), Ok(u32::MAX), Ok(1024))
+        );
+    }
+}

@@ -1,0 +1,138 @@
+//! The arguments of `cbvh query`.
+
+use crate::options::{LayoutArguments, not_negative, threads, whole};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+const HELP: &str = "\
+Examples:
+  cbvh query a.cbvh b.cbvh poses.txt --mode collide
+  cbvh query a.obj b.obj near.txt,far.txt --mode distance --out raw_%s.txt
+  cbvh query a.cbvh b.cbvh --mode distance --pose \"1 0 0 2  0 1 0 0  0 0 1 0\" --witness w.obj
+
+Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that places B in the frame of A. The first three \
+numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
+
+On a terminal, the answers are printed one per line, and the timing after them. Otherwise, and with --json, one JSON \
+object is printed per pose file. --out writes one line per query: 0 or 1, a count, or a distance, then nanoseconds; %s \
+stands for the name of the pose file. answers_xxh3 is the same for every --isa and --jobs. It is null if --budget cut \
+the run short, or if --rel-err or --abs-err leave a choice of answers.
+
+With --cold, the object also has the means over the queries of open_ns_mean, the time of opening both files; \
+disk_faults_mean, the page faults that waited for the disk; read_bytes_mean, the bytes read from the disk; \
+resident_bytes_mean, the bytes of both files in memory after the answer, in whole pages; and touched_bytes_mean, the \
+bytes that the same query touches when it is asked again, in whole pages. A figure that the system does not provide is \
+null.";
+
+/// What `query` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct QueryArguments {
+    /// The first mesh: a .cbvh file, or a mesh file that is baked in memory first
+    pub(super) a: PathBuf,
+    /// The second mesh, which the poses place
+    pub(super) b: PathBuf,
+    /// Pose files, separated by commas
+    #[arg(value_name = "POSES[,POSES...]", required_unless_present = "pose", conflicts_with = "pose")]
+    pub(super) poses: Option<String>,
+    /// The question
+    #[arg(long, value_enum, default_value = "collide")]
+    pub(super) mode: Mode,
+    /// With --mode within: the distance to compare with, in mesh units
+    #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(super) within: Option<f64>,
+    /// With --mode distance: the answer may exceed the least distance by this fraction of it
+    #[arg(long, value_name = "R", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(super) rel_err: Option<f64>,
+    /// With --mode distance: the answer may exceed the least distance by this length, in mesh units
+    #[arg(long, value_name = "E", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(super) abs_err: Option<f64>,
+    /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    pub(super) isa: String,
+    /// The number of threads that share the poses
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true,
+          conflicts_with = "pose")]
+    pub(super) jobs: u16,
+    #[command(flatten)]
+    pub(super) layout: LayoutArguments,
+    /// Query only the object of this name, in each mesh that has one
+    #[arg(long, value_name = "NAME")]
+    pub(super) object: Option<String>,
+    /// Write raw answers and times to this file; %s stands for the name of the pose file
+    #[arg(long, value_name = "raw_%s.txt", conflicts_with = "pose")]
+    pub(super) out: Option<String>,
+    /// Stop each pose file after this many seconds
+    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "pose")]
+    pub(super) budget: Option<f64>,
+    /// Untimed queries before the timed ones, taken from the end of the pose file
+    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true,
+          conflicts_with = "pose")]
+    pub(super) warm: usize,
+    /// Ask only the first N poses of each file; 0 asks all
+    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true,
+          conflicts_with = "pose")]
+    pub(super) limit: usize,
+    /// Time queries of files evicted from the page cache: the system is asked to evict both files before each query, and
+    /// the time includes opening them
+    #[arg(long, conflicts_with_all = ["pose", "jobs", "warm"])]
+    pub(super) cold: bool,
+    /// How the system reads .cbvh files from the disk
+    #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
+    pub(super) read_ahead: ReadAhead,
+    /// Print one JSON object per pose file, as always when standard output is not a terminal
+    #[arg(long, conflicts_with = "pose")]
+    pub(super) json: bool,
+    /// Ask about one pose, given as 12 numbers, and print the answer for a person
+    #[arg(long, value_name = "12 NUMBERS", allow_hyphen_values = true)]
+    pub(super) pose: Option<String>,
+    /// With --pose and --mode distance: write both closest triangles and the segment between them as OBJ
+    #[arg(long, value_name = "OBJ")]
+    pub(super) witness: Option<PathBuf>,
+}
+
+/// How the system reads a file from the disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ReadAhead {
+    /// As the system chooses: some pages around each page that is touched
+    Usual,
+    /// Only the pages that queries touch
+    Sparse,
+    /// The whole file, in the background
+    Whole,
+}
+
+impl From<ReadAhead> for bvh_query::ReadAhead {
+    fn from(how: ReadAhead) -> Self {
+        match how {
+            ReadAhead::Usual => Self::Usual,
+            ReadAhead::Sparse => Self::Sparse,
+            ReadAhead::Whole => Self::Whole,
+        }
+    }
+}
+
+/// A question about two meshes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Mode {
+    /// Do they touch?
+    Collide,
+    /// How many pairs of triangles touch?
+    Contacts,
+    /// How far apart are they?
+    Distance,
+    /// Are they at most --within apart?
+    Within,
+}
+
+impl Mode {
+    /// Returns the name on the command line.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Collide => "collide",
+            Self::Contacts => "contacts",
+            Self::Distance => "distance",
+            Self::Within => "within",
+        }
+    }
+}

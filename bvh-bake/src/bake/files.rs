@@ -1,0 +1,323 @@
+//! Bakes mesh files to a `.cbvh` file, which is written completely or not at all, and skips outputs that are up to
+//! date.
+//!
+//! An output is up to date if a bake would give the same content: the output is undamaged, and it was made by this
+//! version of the format and the baker, with the same options and from inputs with the same bytes. The provenance
+//! section of the output records all of this, so that no other file is needed.
+
+use super::provenance::{self, Provenance};
+use super::report::BakeReport;
+use super::summary::FileSummary;
+use crate::bake;
+use crate::error::BakeError;
+use crate::input::gather::Gatherer;
+use crate::input::{Checksums, GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
+use crate::options::Options;
+use crate::progress::{Progress, Step};
+use crate::storage::output::Output;
+use crate::storage::resources::Resources;
+use crate::storage::{self, atomic, disk_space};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The outcome of [`FileBake::run`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The output has been written.
+    Baked(Box<BakeReport>),
+    /// The output was up to date and was left alone. The summary is that of the existing file.
+    UpToDate(FileSummary),
+}
+
+/// Returns the least bytes of memory with which a mesh of `triangles` triangles can be baked. The rest goes to scratch
+/// files.
+pub fn least_memory(triangles: u64) -> u64 {
+    Resources::least(triangles)
+}
+
+/// A bake of mesh files into one `.cbvh` file: its inputs, its output and its options.
+///
+/// Several inputs are baked as if they were one: their objects follow each other, and the triangle ids continue from
+/// each file to the next. The output is written completely or not at all: it is written under a temporary name beside
+/// its own, synchronised and renamed. Until then, the old file stays in place.
+///
+/// The bytes of the output depend neither on the memory budget nor on the number of threads.
+///
+/// Cost: that of [`crate::to_bytes`], plus reading all inputs once, or twice if an existing output may be up to date. A
+/// malformed file may be read again to find the place of the error. With a memory budget, up to 200 bytes of scratch
+/// files per triangle are written and read two to three times. If the output is up to date, only the inputs and the
+/// output are read.
+///
+/// ```no_run
+/// use bvh_bake::{FileBake, Options, Outcome};
+///
+/// # fn main() -> Result<(), bvh_bake::BakeError> {
+/// let bake = FileBake::new(["rock.obj"], "rock.cbvh").options(Options::default().ids(false)).max_memory(512 << 20);
+/// match bake.run()? {
+///     Outcome::Baked(report) => println!("{} triangles", report.file.triangles),
+///     Outcome::UpToDate(_) => println!("rock.cbvh is up to date"),
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[must_use = "nothing is baked until it is run"]
+pub struct FileBake<'a> {
+    inputs: Vec<PathBuf>,
+    output: PathBuf,
+    options: Options,
+    force: bool,
+    max_memory: Option<u64>,
+    scratch: Option<PathBuf>,
+    progress: Progress,
+    on_step: Box<dyn FnMut(Step) + 'a>,
+}
+
+impl<'a> FileBake<'a> {
+    /// Makes a bake of the given inputs to the given output, with default options and no memory limit.
+    pub fn new(inputs: impl IntoIterator<Item = impl Into<PathBuf>>, output: impl Into<PathBuf>) -> Self {
+        Self {
+            inputs: inputs.into_iter().map(Into::into).collect(),
+            output: output.into(),
+            options: Options::default(),
+            force: false,
+            max_memory: None,
+            scratch: None,
+            progress: Progress::default(),
+            on_step: Box::new(|_| ()),
+        }
+    }
+
+    /// Sets the options of the bake.
+    pub fn options(self, options: Options) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Sets whether to bake even if the output is up to date.
+    pub fn force(self, force: bool) -> Self {
+        Self { force, ..self }
+    }
+
+    /// Sets the most memory that the whole process may have resident, in bytes; `None` for no limit. What does not fit
+    /// goes to scratch files. glTF files, and files that are not regular such as pipes, are read into memory as a
+    /// whole, other inputs piece by piece. Some allocators keep much of the freed memory, such as that of the GNU C
+    /// library. Such an allocator must be told not to: see its `mallopt`.
+    pub fn max_memory(self, bytes: impl Into<Option<u64>>) -> Self {
+        Self { max_memory: bytes.into(), ..self }
+    }
+
+    /// Sets the directory for scratch files; `None` for the directory of the output. Scratch files have no names there,
+    /// so that nothing is left however the process ends.
+    pub fn scratch(self, directory: impl Into<Option<PathBuf>>) -> Self {
+        Self { scratch: directory.into(), ..self }
+    }
+
+    /// Sets the progress that the bake updates. Any thread may read it at any time.
+    pub fn progress(self, progress: &Progress) -> Self {
+        Self { progress: progress.clone(), ..self }
+    }
+
+    /// Sets a function that is called when a step begins. The progress then contains the work of the previous step.
+    pub fn on_step(self, on_step: impl FnMut(Step) + 'a) -> Self {
+        Self { on_step: Box::new(on_step), ..self }
+    }
+
+    /// Runs the bake.
+    ///
+    /// # Errors
+    /// [`BakeError::Read`] if an input cannot be read or is malformed; [`BakeError::OutputIsInput`] if the output is
+    /// one of the inputs; [`BakeError::Memory`] if the memory budget is too small; [`BakeError::Room`] if there is too
+    /// little room for scratch files and the output; [`BakeError::Scratch`] if the system refuses scratch files;
+    /// [`BakeError::Write`] if it refuses the output; and the errors of [`crate::to_bytes`]. After any of them, the
+    /// output is unchanged, and no other file is left.
+    pub fn run(mut self) -> Result<Outcome, BakeError> {
+        (self.on_step)(Step::Read);
+        refuse_output(&self.inputs, &self.output)?;
+        self.progress.expect_bytes(file_lengths(&self.inputs));
+        storage::remove_stale(self.scratch_directory());
+        // If the budget is too small for any mesh, the inputs are not even read.
+        self.require_memory(0, Resources::least(0))?;
+        let inputs = self.find_inputs()?;
+        // Reading the inputs gives their checksums. They are needed before that only if an existing output may be up to
+        // date.
+        if !self.force && self.output.exists() {
+            let checksums = inputs.iter().map(|input| Checksums::of(input, &self.progress));
+            let provenance = self.provenance(&checksums.collect::<Result<Vec<_>, _>>()?);
+            if let Some(summary) = provenance::up_to_date(&self.output, &provenance, &self.progress) {
+                return Ok(Outcome::UpToDate(summary));
+            }
+        }
+        // If the output cannot be written, the bake fails here, before the work.
+        drop(Output::beside(&self.output, &self.progress)?);
+        let resources = match self.max_memory {
+            Some(budget) => {
+                disk_space::check(&[(self.scratch_directory(), file_lengths(&self.inputs))])?;
+                Resources::within(budget, self.scratch_directory(), &self.progress)
+            }
+            None => Resources::unlimited(&self.progress),
+        };
+        let mut start = Instant::now();
+        let mut gatherer = Gatherer::new(&resources, self.options.split_objects);
+        let checksums = inputs.iter().map(|input| gatherer.read(input)).collect::<Result<Vec<_>, _>>()?;
+        drop(inputs);
+        if self.max_memory.is_some() {
+            self.require_resources(gatherer.triangles())?;
+        } else {
+            start = Instant::now();
+        }
+        let provenance = self.provenance(&checksums).to_text();
+        // Without a memory budget, the output stays in memory until it is proved, while a thread writes it.
+        let new_output = if self.max_memory.is_some() { Output::beside } else { Output::kept_beside };
+        let mut output = new_output(&self.output, &self.progress)?;
+        let on_step = &mut self.on_step;
+        let mut on_stage = |stage| on_step(Step::Bake(stage));
+        let mut report = bake::bake(gatherer, &self.options, &provenance, &mut output, &mut on_stage)?;
+        on_step(Step::Write);
+        output.rename()?;
+        self.progress.reach(Step::Write, report.file.triangles);
+        report.seconds = start.elapsed().as_secs_f64();
+        Ok(Outcome::Baked(Box::new(report)))
+    }
+
+    fn find_inputs(&self) -> Result<Vec<InputFile<'_>>, BakeError> {
+        let mut inputs = Vec::new();
+        for path in &self.inputs {
+            let input = InputFile::find(path, &self.progress)?;
+            if input.format() == MeshFormat::Gltf {
+                let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
+                self.require_memory(0, Resources::least(0).saturating_add(bytes))?;
+            }
+            inputs.push(input);
+        }
+        Ok(inputs)
+    }
+
+    fn provenance(&self, checksums: &[Checksums]) -> Provenance {
+        Provenance::new(&self.inputs, &self.options, checksums)
+    }
+
+    /// Returns the directory for scratch files.
+    fn scratch_directory(&self) -> &Path {
+        self.scratch.as_deref().unwrap_or_else(|| atomic::directory_of(&self.output))
+    }
+
+    /// Refuses a mesh of `triangles` triangles that needs more memory or more room on disk than there is.
+    fn require_resources(&self, triangles: u64) -> Result<(), BakeError> {
+        self.require_memory(triangles, Resources::least(triangles))?;
+        let bytes = |each: u64| triangles.saturating_mul(each);
+        disk_space::check(&[
+            (self.scratch_directory(), bytes(disk_space::SCRATCH_BYTES_PER_TRIANGLE)),
+            (atomic::directory_of(&self.output), bytes(disk_space::OUTPUT_BYTES_PER_TRIANGLE)),
+        ])
+    }
+
+    fn require_memory(&self, triangles: u64, needed: u64) -> Result<(), BakeError> {
+        match self.max_memory {
+            Some(budget) if needed > budget => {
+                let input = self.inputs.first().cloned().unwrap_or_default();
+                Err(BakeError::Memory { input, triangles, needed, budget })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Returns the bytes of all inputs. Missing inputs are reported when they are read.
+fn file_lengths(inputs: &[PathBuf]) -> u64 {
+    inputs.iter().filter_map(|input| std::fs::metadata(input).ok()).map(|metadata| metadata.len()).sum()
+}
+
+/// Refuses outputs that a rename would destroy: an input, a directory or a device.
+fn refuse_output(inputs: &[PathBuf], output: &Path) -> Result<(), BakeError> {
+    let Ok(existing) = std::fs::canonicalize(output) else { return Ok(()) };
+    for input in inputs {
+        if std::fs::canonicalize(input).is_ok_and(|input| input == existing) {
+            return Err(BakeError::OutputIsInput { path: output.to_owned() });
+        }
+    }
+    atomic::refuse_special(output)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    fn bake(inputs: &[PathBuf], output: &Path, options: &Options) -> Result<Outcome, BakeError> {
+        FileBake::new(inputs, output).options(options.clone()).run()
+    }
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_is_up_to_date_is_left_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let input = directory.path().join("in.obj");
+        let output = directory.path().join("out.cbvh");
+        fs::write(&input, TRIANGLE).unwrap();
+        let inputs = [input.clone()];
+        let options = Options::default();
+        let skipped = |options: &Options| match bake(&inputs, &output, options).unwrap() {
+            Outcome::UpToDate(_) => true,
+            Outcome::Baked(_) => false,
+        };
+        assert!(!skipped(&options));
+        assert!(skipped(&options));
+        let other = Options::default().ids(false);
+        assert!(!skipped(&other));
+        assert!(skipped(&other));
+        fs::write(&input, format!("{TRIANGLE}v 5 5 5\n")).unwrap();
+        assert!(!skipped(&other));
+        let mut damaged = fs::read(&output).unwrap();
+        let last = damaged.len() - 1;
+        damaged[last / 2] ^= 1;
+        fs::write(&output, &damaged).unwrap();
+        assert!(!skipped(&other), "a damaged output is no output");
+        assert_eq!(names(directory.path()), ["in.obj", "out.cbvh"]);
+    }
+
+    #[test]
+    fn ids_run_on_over_files() {
+        let directory = tempfile::tempdir().unwrap();
+        let inputs = ["a.obj", "b.obj"].map(|name| directory.path().join(name));
+        inputs.iter().for_each(|input| fs::write(input, TRIANGLE).unwrap());
+        let mesh = crate::read_meshes(&inputs).unwrap();
+        assert_eq!(mesh.objects.len(), 2);
+        assert_eq!(mesh.objects[1].triangle_ids, [1]);
+        assert_eq!(mesh.check(), Ok(()));
+    }
+
+    #[test]
+    fn an_input_is_never_the_output() {
+        let directory = tempfile::tempdir().unwrap();
+        let input = directory.path().join("in.obj");
+        fs::write(&input, TRIANGLE).unwrap();
+        let output = directory.path().join(".").join("in.obj");
+        let refused = bake(std::slice::from_ref(&input), &output, &Options::default());
+        assert!(matches!(refused, Err(BakeError::OutputIsInput { .. })), "{refused:?}");
+        let refused = bake(std::slice::from_ref(&input), directory.path(), &Options::default());
+        assert!(matches!(refused, Err(BakeError::Write { .. })), "{refused:?}");
+        assert_eq!(fs::read_to_string(&input).unwrap(), TRIANGLE);
+        assert_eq!(names(directory.path()), ["in.obj"]);
+    }
+
+    #[test]
+    fn a_small_budget_is_refused_before_the_work() {
+        let directory = tempfile::tempdir().unwrap();
+        let input = directory.path().join("in.obj");
+        fs::write(&input, TRIANGLE).unwrap();
+        let output = directory.path().join("out.cbvh");
+        for budget in [0, 10, least_memory(1) - 1] {
+            let refused = FileBake::new([&input], &output).max_memory(budget).run();
+            assert!(matches!(refused, Err(BakeError::Memory { .. })), "{refused:?}");
+        }
+        assert_eq!(names(directory.path()), ["in.obj"]);
+    }
+}

@@ -1,0 +1,175 @@
+//! Checks the pages of a file from the last to the first, a run of pages at a time.
+//!
+//! Links lead to later pages. Of each page that has been checked, only the subtree roots are kept, each with its tight
+//! k-DOP and the link that it names, until the walk reaches that link. Only few roots wait at any time, since bricks
+//! follow one after the other: the memory for them hardly grows with the file.
+
+use super::InParallel;
+use crate::progress::{Progress, Stage, Step, WHOLE};
+use bvh_format::bounds::{Inflation, check_bounds};
+use bvh_format::kdop::Kdop;
+use bvh_format::object::Object;
+use bvh_format::page::{NO_PARENT, Page, RootRef};
+use bvh_format::source::{Block, PageBytes, Source};
+use bvh_format::validate::{CountsFromEnd, Workers, check_sections, validate_page};
+use bvh_format::{FormatError, Layout, Rule};
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// Pages that are read, checked and then walked through together.
+const PAGES_PER_WINDOW: u32 = 128;
+
+/// Validates a whole file and checks its bounds. Returns how much wider the bounds are than the tight ones.
+pub(crate) fn prove<S: Source>(source: &S, progress: &Progress) -> Result<(Layout, Inflation), S::Error> {
+    let layout = Layout::read_from(source)?;
+    let pages = || {
+        let mut inflation = Inflation::default();
+        for object in &layout.objects {
+            inflation.join(&prove_object(&layout, source, object, true, progress)?);
+        }
+        Ok(inflation)
+    };
+    let ((), inflation) = InParallel.both(|| check_sections(&layout, source), pages)?;
+    Ok((layout, inflation))
+}
+
+/// A subtree root whose link the walk has not reached yet.
+struct Root {
+    kdop: Kdop,
+    parent: (u32, u8),
+}
+
+/// Pages that follow each other, with their leaf blocks.
+struct Window<'a> {
+    first: u32,
+    pages: Vec<(PageBytes<'a>, Block<'a>)>,
+}
+
+impl Window<'_> {
+    fn page(&self, number: u32, object: &Object) -> (Page<'_>, &[u8]) {
+        let (bytes, leaves) = &self.pages[(number - self.first) as usize];
+        (bytes.page(object), leaves.bytes())
+    }
+}
+
+/// Checks the bounds of an object and, unless the caller has done so, everything else about its pages.
+pub(super) fn prove_object<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    object: &Object,
+    structure: bool,
+    progress: &Progress,
+) -> Result<Inflation, S::Error> {
+    let pages = object.pages();
+    let mut walk = Walk { layout, object, roots: HashMap::new(), inflation: Inflation::default() };
+    let (triangles, count) = (object.triangles(), (pages.end - pages.start).into());
+    let tally = progress.tally(Step::Bake(Stage::Prove), WHOLE, triangles, count);
+    let mut counts = CountsFromEnd::default();
+    let mut end = pages.end;
+    while end > pages.start {
+        let start = end.saturating_sub(PAGES_PER_WINDOW).max(pages.start);
+        let window = if structure {
+            let checked =
+                InParallel.each(start..end, |number| validate_page(layout, source, object, number))?;
+            for (number, page) in (start..end).zip(&checked).rev() {
+                counts.add(layout, number, &page.counts)?;
+            }
+            checked.into_iter().map(|page| (page.bytes, page.leaves)).collect()
+        } else {
+            InParallel.each(start..end, |number| {
+                let bytes = layout.read_page(source, number)?;
+                let leaves = layout.read_leaf_block(source, bytes.page(object).header())?;
+                Ok::<_, S::Error>((bytes, leaves))
+            })?
+        };
+        walk.go_through(&Window { first: start, pages: window }, start..end)?;
+        tally.add((end - start).into());
+        end = start;
+    }
+    if structure {
+        counts.finish(layout, object)?;
+    }
+    Ok(walk.finish()?)
+}
+
+struct Walk<'a> {
+    layout: &'a Layout,
+    object: &'a Object,
+    /// Roots of the pages that have been checked, until their links are reached.
+    roots: HashMap<RootRef, Root>,
+    inflation: Inflation,
+}
+
+impl Walk<'_> {
+    fn go_through(&mut self, window: &Window, pages: Range<u32>) -> Result<(), FormatError> {
+        // Runs of pages from the end are independent if all their remote links lead to pages after the run.
+        let mut stop = pages.end;
+        while stop > pages.start {
+            let mut start = stop;
+            while start > pages.start {
+                let (page, _) = window.page(start - 1, self.object);
+                if (0..page.header().remotes).any(|link| page.remote(link).page() < stop) {
+                    break;
+                }
+                start -= 1;
+            }
+            // The structural checks refuse a link to an earlier page. Where they were skipped, a forged one is refused
+            // here.
+            if start == stop {
+                let at = self.layout.page_offset(stop - 1);
+                return Err(FormatError::new(Rule::RemoteLinks, at, "links to later pages", "another"));
+            }
+            let below = |root: RootRef| self.roots.get(&root).map_or(Kdop::EMPTY, |root| root.kdop);
+            let check = |number: u32| {
+                let (page, leaves) = window.page(number, self.object);
+                check_bounds(self.layout, self.object, &page, leaves, below)
+            };
+            let results = InParallel.each(start..stop, check)?;
+            for (number, (tight, sums)) in (start..stop).zip(results).rev() {
+                self.inflation.join(&sums);
+                let (page, _) = window.page(number, self.object);
+                self.follow_links(&page, number)?;
+                for (root, kdop) in (0..).zip(tight) {
+                    let parent = page.anchor_parent(root);
+                    self.roots.insert(RootRef::new(number, root), Root { kdop, parent });
+                }
+            }
+            stop = start;
+        }
+        Ok(())
+    }
+
+    /// Checks that each root to which a link of the page leads names that link, and forgets the root.
+    fn follow_links(&mut self, page: &Page, number: u32) -> Result<(), FormatError> {
+        for link in 0..page.header().remotes {
+            let to = page.remote(link);
+            let found = self.roots.remove(&to).map(|root| root.parent);
+            if found != Some((number, link)) {
+                let at = self.layout.page_offset(to.page());
+                let expected = format!("root {} with parent {number}, link {link}", to.root());
+                return Err(FormatError::new(Rule::AnchorParent, at, expected, format!("{found:?}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that one root is left, the object's, and that the object's box contains it.
+    fn finish(self) -> Result<Inflation, FormatError> {
+        let record = self.object.record();
+        let first = record.first_page.get();
+        let at = self.layout.page_offset(first);
+        let root = self.roots.get(&RootRef::new(first, 0)).filter(|root| root.parent == (NO_PARENT, 0));
+        let Some(root) = root.filter(|_| self.roots.len() == 1) else {
+            let found = format!("{} roots without a link", self.roots.len());
+            return Err(FormatError::new(Rule::AnchorParent, at, "the object's root and no other", found));
+        };
+        let kdop = &root.kdop;
+        let inside =
+            (0..3).all(|a| record.box_lo[a].get() <= kdop.lo[a] && kdop.hi[a] <= record.box_hi[a].get());
+        if !inside {
+            let expected = "the object's box to contain its triangles";
+            return Err(FormatError::new(Rule::BoundContains, at, expected, format!("{record:?}")));
+        }
+        Ok(self.inflation)
+    }
+}

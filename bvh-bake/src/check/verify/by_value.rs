@@ -1,0 +1,264 @@
+//! Compares the triangles of a mesh and a file as multisets of rounded corners, for files without ids.
+//!
+//! The triangles of both are sorted by object and corners and then compared in that order.
+
+use super::input::{Input, InputCorners};
+use super::{VerifyError, distance, each_triangle, place, source_of, tolerance};
+use crate::storage::external_sort::{Merge, Sorter};
+use crate::storage::resources::Resources;
+use bvh_format::Layout;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::object::Object;
+use bvh_format::source::Source;
+use bytemuck::{Pod, Zeroable};
+
+/// The bits of the corners in ascending order: equal triangles have the same key, whatever the order of their
+/// corners.
+type Key = [[u32; 3]; 3];
+
+/// A triangle with the number of its object in the file.
+#[derive(Clone, Copy, Pod, Zeroable, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(C)]
+struct Keyed {
+    object: u32,
+    key: Key,
+}
+
+impl Keyed {
+    fn new(object: u32, corners: &[[f32; 3]; 3]) -> Self {
+        let mut key = corners.map(|corner| corner.map(f32::to_bits));
+        key.sort_unstable();
+        Self { object, key }
+    }
+}
+
+/// Checks each object of the file against the mesh objects from which it was made. Returns the largest distance
+/// between a corner and the place where it is stored, and the number of duplicates.
+pub(super) fn compare<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    input: &impl Input,
+    resources: &Resources,
+) -> Result<(f64, u64), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    let spill = resources.scratch.spill();
+    let run = resources.sorted_at_once::<Keyed>(u64::MAX);
+    let mut stored = Sorter::of_runs(run);
+    let mut roundings: Vec<Rounding> = layout.objects.iter().map(Rounding::new).collect();
+    for (number, object) in (0..).zip(&layout.objects) {
+        each_triangle(layout, source, object, |triangle| {
+            let keyed = Keyed::new(number, &triangle.corners);
+            roundings[number as usize].add_stored(&keyed.key);
+            Ok(stored.extend(&[keyed], &spill)?)
+        })?;
+    }
+    if roundings.iter().any(|rounding| rounding.origin != [0.0; 3]) {
+        input.visit(&mut |mesh, _, corners| {
+            roundings[source_of(layout, mesh)].add_expected(corners);
+            Ok(())
+        })?;
+    }
+    roundings.iter_mut().for_each(Rounding::settle);
+    let mut expected = Sorter::of_runs(run);
+    let mut max_move = 0.0f64;
+    // The first difference in the order of the file's objects, then of the mesh's objects.
+    let mut first: Option<((usize, u32, u32), VerifyError)> = None;
+    input.visit(&mut |mesh, id, corners| {
+        let number = source_of(layout, mesh);
+        let (object, rounding) = (&layout.objects[number], &roundings[number]);
+        let rounded = corners.map(|corner| rounding.round(corner));
+        match check_moves(object, id, corners, &rounded) {
+            Ok(moved) => max_move = max_move.max(moved),
+            Err(error) if first.as_ref().is_none_or(|(at, _)| (number, mesh, id) < *at) => {
+                first = Some(((number, mesh, id), error));
+            }
+            Err(_) => {}
+        }
+        Ok(expected.extend(&[Keyed::new(number as u32, &rounded)], &spill)?)
+    })?;
+    let (stored, expected) = (stored.finish(), expected.finish());
+    let (mut stored, mut expected) = (Keys::new(stored.merge())?, Keys::new(expected.merge())?);
+    let mut duplicates = 0;
+    for (number, object) in layout.objects.iter().enumerate() {
+        if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
+            return Err(error);
+        }
+        duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored)?;
+    }
+    Ok((max_move, duplicates))
+}
+
+/// Returns the largest distance by which rounding moves a corner of a triangle of the mesh.
+fn check_moves(
+    object: &Object,
+    id: u32,
+    corners: &InputCorners,
+    rounded: &[[f32; 3]; 3],
+) -> Result<f64, VerifyError> {
+    let mut max_move = 0.0f64;
+    for corner in 0..3 {
+        let moved = distance(corners[corner], place(object, rounded[corner]));
+        let limit = tolerance(object);
+        if moved.is_nan() || moved > limit {
+            let what = format!("triangle {id}, corner {corner}");
+            return Err(VerifyError::differs(
+                what,
+                format!("a move of at most {limit:e}"),
+                format!("{moved:e}"),
+            ));
+        }
+        max_move = max_move.max(moved);
+    }
+    Ok(max_move)
+}
+
+/// Triangles in ascending order, with a look at the first one.
+struct Keys<'a> {
+    merge: Merge<'a, Keyed>,
+    first: Option<Keyed>,
+}
+
+impl<'a> Keys<'a> {
+    fn new(mut merge: Merge<'a, Keyed>) -> Result<Self, VerifyError> {
+        let first = merge.next()?;
+        Ok(Self { merge, first })
+    }
+
+    /// Returns the next triangle of an object.
+    fn next_of(&mut self, object: u32) -> Result<Option<Key>, VerifyError> {
+        let Some(now) = self.first.filter(|first| first.object == object) else { return Ok(None) };
+        self.first = self.merge.next()?;
+        Ok(Some(now.key))
+    }
+
+    /// Returns the next triangle of an object and skips all that are equal to it. Returns also how many it skipped.
+    fn next_distinct_of(&mut self, object: u32) -> Result<(Option<Key>, u64), VerifyError> {
+        let (now, mut others) = (self.next_of(object)?, 0);
+        while now.is_some_and(|key| self.first == Some(Keyed { object, key })) {
+            self.next_of(object)?;
+            others += 1;
+        }
+        Ok((now, others))
+    }
+}
+
+/// Compares the triangles of an object, and returns the number of duplicates.
+fn compare_sorted(
+    object: &Object,
+    number: u32,
+    expected: &mut Keys,
+    stored: &mut Keys,
+) -> Result<u64, VerifyError> {
+    let place = |key: Option<Key>| match key {
+        Some(key) => format!("{:?}", key.map(|corner| place(object, corner.map(f32::from_bits)))),
+        None => "no more".to_owned(),
+    };
+    let mut duplicates = 0;
+    for index in 0u64.. {
+        let (wanted, others) = expected.next_distinct_of(number)?;
+        let found = stored.next_of(number)?;
+        duplicates += others;
+        if wanted != found {
+            let what = format!("the triangles in order of their corners, number {index}");
+            return Err(VerifyError::differs(what, place(wanted), place(found)));
+        }
+        if wanted.is_none() {
+            break;
+        }
+    }
+    Ok(duplicates)
+}
+
+/// The rounding that the baker applied to coordinates, reconstructed from the file.
+struct Rounding {
+    origin: [f64; 3],
+    /// Whether the baker may have put vertices on a grid.
+    quantized: bool,
+    /// The lowest bit set in any stored coordinate, per axis.
+    lowest: [Option<i32>; 3],
+    /// The largest magnitude of the mesh's coordinates, per axis.
+    largest: [f64; 3],
+    /// The grid of the origin per axis; 0 if the origin is 0.
+    origin_grid: [f64; 3],
+    /// The grid of quantisation per axis; 0 for no grid, and infinite if every coordinate became 0.
+    grid: [f64; 3],
+}
+
+impl Rounding {
+    fn new(object: &Object) -> Self {
+        Self {
+            origin: object.origin(),
+            quantized: object.triangle_encoding() == TriangleEncoding::Quantized,
+            lowest: [None; 3],
+            largest: [0.0; 3],
+            origin_grid: [0.0; 3],
+            grid: [0.0; 3],
+        }
+    }
+
+    /// Adds a stored triangle.
+    fn add_stored(&mut self, key: &Key) {
+        if !self.quantized {
+            return;
+        }
+        for corner in key {
+            for axis in 0..3 {
+                let bit = lowest_bit(corner[axis]);
+                self.lowest[axis] = [self.lowest[axis], bit].into_iter().flatten().min();
+            }
+        }
+    }
+
+    /// Adds a triangle of the mesh.
+    fn add_expected(&mut self, corners: &InputCorners) {
+        for corner in corners {
+            for axis in 0..3 {
+                self.largest[axis] = self.largest[axis].max(corner[axis].abs());
+            }
+        }
+    }
+
+    /// Derives the grids, after all triangles of the file and the mesh have been added.
+    ///
+    /// The grid of quantisation is the coarsest power of two of which all stored coordinates of an axis are
+    /// multiples. The baker's own grid may be finer, but rounding to either gives the same result: a value that the
+    /// finer grid puts on the coarser one is within half a fine step of it.
+    fn settle(&mut self) {
+        for axis in 0..3 {
+            if self.origin[axis] != 0.0 {
+                // The sum of origin and vertex stays below twice the largest coordinate, where this is the spacing of
+                // `f64`.
+                let largest = 2.0 * self.largest[axis];
+                self.origin_grid[axis] = largest.next_up() - largest;
+            }
+            if self.quantized {
+                self.grid[axis] = self.lowest[axis].map_or(f64::INFINITY, |exponent| 2f64.powi(exponent));
+            }
+        }
+    }
+
+    fn round(&self, position: [f64; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|axis| {
+            let mut offset = position[axis] - self.origin[axis];
+            let snap = |value: f64, grid: f64| match grid {
+                0.0 => value,
+                f64::INFINITY => 0.0,
+                _ => (value / grid).round() * grid,
+            };
+            offset = snap(offset, self.origin_grid[axis]);
+            let rounded = f64::from(offset as f32);
+            // Adding 0.0 turns -0.0 into 0.0, so that equal values have equal bits.
+            snap(rounded, self.grid[axis]) as f32 + 0.0
+        })
+    }
+}
+
+/// Returns the exponent of the lowest set bit of a float, or `None` for 0.
+fn lowest_bit(bits: u32) -> Option<i32> {
+    let (exponent, fraction) = ((bits >> 23 & 255) as i32, bits & 0x7f_ffff);
+    let (mantissa, scale) =
+        if exponent == 0 { (fraction, -149) } else { (fraction | 1 << 23, exponent - 150) };
+    (mantissa != 0).then(|| scale + mantissa.trailing_zeros() as i32)
+}

@@ -1,0 +1,357 @@
+//! Verifies a file against the mesh it was baked from: the same triangles, and bounds that contain them.
+//!
+//! The comparison shares no code with the way from mesh to bytes, so that neither can hide a mistake of the other. It
+//! shares what surrounds that way: the mesh readers, which return corners as the file states them; scratch files and
+//! the sorter; and the checks of finished bytes, which use the reference decoder of bvh-format.
+//!
+//! With ids, every triangle is matched by its number, and its corners are compared in order. Without ids, the stored
+//! triangles and the rounded triangles of the mesh are compared as multisets. In both cases the two sides are sorted
+//! and then read in step, so that neither must be in memory.
+
+mod by_id;
+mod by_value;
+mod input;
+mod second_reading;
+
+use crate::check::prove::{prove_bounds, validate_in_parallel};
+use crate::error::BakeError;
+use crate::input::gather::Gatherer;
+use crate::input::mesh::{InputError, Mesh};
+use crate::input::{GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
+use crate::progress::Progress;
+use crate::storage::resources::Resources;
+use crate::storage::stored_file::{FileError, StoredFile};
+use bvh_format::FormatError;
+use bvh_format::Layout;
+use bvh_format::bounds::Inflation;
+use bvh_format::ids::decode_id;
+use bvh_format::leaf::decode_packet;
+use bvh_format::object::Object;
+use bvh_format::source::Source;
+use bvh_format::validate::packets;
+use input::{InMemory, Input};
+use second_reading::SecondReading;
+use std::path::{Path, PathBuf};
+
+/// The figures of a successful verification.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VerifyReport {
+    /// The number of stored triangles, each of which equals one of the mesh.
+    pub triangles: u64,
+    /// The number of triangles of the mesh that are exact duplicates of stored ones.
+    pub duplicates: u64,
+    /// The number of objects in the file.
+    pub objects: u64,
+    /// Whether triangles were matched by their ids (true) or compared as multisets (false).
+    pub by_id: bool,
+    /// The largest distance between a corner of the mesh and the place where it is stored, in mesh units.
+    pub max_move: f64,
+    /// How much wider decoded bounds are than the tight ones.
+    pub inflation: Inflation,
+}
+
+/// The reason why a file is not a faithful bake of a mesh.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerifyError {
+    /// The file itself breaks a rule of the format.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// The mesh breaks the input contract, so that no file can be a bake of it.
+    #[error("the mesh: {0}")]
+    Mesh(#[from] InputError),
+    /// A mesh cannot be read, or the triangles that were read cannot be kept.
+    #[error(transparent)]
+    Input(#[from] BakeError),
+    /// The file cannot be read, or it needs more memory than allowed.
+    #[error(transparent)]
+    File(FileError),
+    /// The file is valid, but it is not a bake of this mesh.
+    #[error("{what}: expected {expected}, found {found}")]
+    Differs {
+        /// The triangle or number that differs.
+        what: String,
+        /// The value that the mesh requires.
+        expected: String,
+        /// The value in the file.
+        found: String,
+    },
+}
+
+impl From<FileError> for VerifyError {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Format(error) => Self::Format(error),
+            other => Self::File(other),
+        }
+    }
+}
+
+impl VerifyError {
+    #[cold]
+    fn differs(what: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
+        Self::Differs { what: what.to_string(), expected: expected.to_string(), found: found.to_string() }
+    }
+}
+
+/// Verifies that a file is a faithful bake of a mesh: the file is valid; every bound contains what is below it; the
+/// triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones; and no corner has
+/// moved farther than the file states.
+///
+/// Cost: about that of reading the mesh. Memory: 8 bytes per triangle of the mesh; in addition, 60 bytes per stored
+/// triangle with ids, or 40 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
+///
+/// # Errors
+/// Returns the first difference or broken rule that was found.
+pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
+    mesh.check()?;
+    let layout = Layout::read(bytes)?;
+    compare(&layout, bytes, || InMemory::new(mesh), &Resources::unlimited(&Progress::default()))
+}
+
+/// Options of [`verify_files`].
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct VerifyOptions {
+    /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. What does not fit goes
+    /// to scratch files. glTF files are read into memory, other meshes piece by piece. If the allocator keeps much of
+    /// the freed memory, tell it not to; see [`FileBake::max_memory`](crate::FileBake::max_memory).
+    pub max_memory: Option<u64>,
+    /// The directory for scratch files; `None` for the system's directory for temporary files. Scratch files have no
+    /// names there, so that nothing is left however the process ends.
+    pub scratch: Option<PathBuf>,
+}
+
+impl VerifyOptions {
+    /// Sets the most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB.
+    #[must_use]
+    pub fn max_memory(self, bytes: impl Into<Option<u64>>) -> Self {
+        Self { max_memory: bytes.into(), ..self }
+    }
+
+    /// Sets the directory for scratch files; `None` for the system's directory for temporary files.
+    #[must_use]
+    pub fn scratch(self, directory: impl Into<Option<PathBuf>>) -> Self {
+        Self { scratch: directory.into(), ..self }
+    }
+}
+
+/// The value of `VerifyOptions::max_memory` if the caller gives none.
+const USUAL_MEMORY: u64 = 3 << 29;
+
+/// Verifies a file of any size like [`verify`]. The file and the meshes are read piece by piece.
+///
+/// OBJ files of up to a 32nd of the memory are read a second time, with the parser of the crate `tobj`, and both readings
+/// have to agree: the first is that of the bake, whose mistakes it would share. Files that `tobj` is known to read
+/// differently are read once.
+///
+/// Cost: reading the meshes once and the file five times, and up to 240 bytes of scratch per triangle, which are
+/// written and read once or twice.
+///
+/// # Errors
+/// The errors of [`verify`]; [`VerifyError::Input`] if a mesh or scratch file cannot be read or written; and
+/// [`VerifyError::File`] if the file cannot be read or the memory limit is too low.
+pub fn verify_files(
+    path: &Path,
+    meshes: &[PathBuf],
+    options: &VerifyOptions,
+) -> Result<VerifyReport, VerifyError> {
+    let budget = options.max_memory.unwrap_or(USUAL_MEMORY);
+    let enough = |path: &Path, needed: u64| {
+        let path = path.to_owned();
+        if needed <= budget { Ok(()) } else { Err(FileError::Memory { path, needed, budget }) }
+    };
+    enough(path, Resources::least_of_check())?;
+    let file = StoredFile::open(path, options.max_memory)?;
+    let layout = Layout::read_from(&file)?;
+    let scratch = options.scratch.clone().unwrap_or_else(std::env::temp_dir);
+    let resources = Resources::of_check(budget, &scratch);
+    let mut gatherer = Gatherer::in_input_order(&resources);
+    let mut inputs = Vec::new();
+    for mesh in meshes {
+        let input = InputFile::find(mesh, &resources.progress).map_err(BakeError::from)?;
+        if input.format() == MeshFormat::Gltf && options.max_memory.is_some() {
+            let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
+            enough(mesh, bytes.saturating_add(Resources::least_of_check()))?;
+        }
+        gatherer.read(&input)?;
+        inputs.push(input);
+    }
+    let triangles = gatherer.into_input_order()?;
+    if let Some(second) = SecondReading::of(&inputs, budget / 4) {
+        second.compare(&triangles)?;
+    }
+    drop(inputs);
+    compare(&layout, &file, || Ok(triangles), &resources)
+}
+
+/// Checks a file, and compares it with a mesh that has been checked.
+fn compare<S: Source + ?Sized, I: Input>(
+    layout: &Layout,
+    source: &S,
+    input: impl FnOnce() -> Result<I, VerifyError>,
+    resources: &Resources,
+) -> Result<VerifyReport, VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    validate_in_parallel(source)?;
+    let inflation = prove_bounds(layout, source)?;
+    let input = input()?;
+    match_objects(layout, input.counts())?;
+    let all = input.counts().iter().sum();
+    for (number, object) in layout.objects.iter().enumerate() {
+        let own = if layout.objects.len() == 1 { all } else { input.counts()[number] };
+        check_counts(object, own, all)?;
+        check_hull(layout, source, object)?;
+    }
+    let (max_move, duplicates) = if layout.has_ids() {
+        by_id::compare(layout, source, &input, resources)?
+    } else {
+        by_value::compare(layout, source, &input, resources)?
+    };
+    Ok(VerifyReport {
+        triangles: layout.objects.iter().map(|object| object.triangles()).sum(),
+        duplicates,
+        objects: layout.objects.len() as u64,
+        by_id: layout.has_ids(),
+        max_move,
+        inflation,
+    })
+}
+
+/// Checks that a file has one object for the whole mesh, or one for each object of the mesh that has triangles.
+fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
+    match layout.objects.len() {
+        1 => Ok(()),
+        count if count == full.len() => Ok(()),
+        count => Err(VerifyError::differs("objects", format!("1 or {}", full.len()), count)),
+    }
+}
+
+/// Returns the number of the file's object for an object of the mesh, counted among those with triangles.
+fn source_of(layout: &Layout, number: u32) -> usize {
+    if layout.objects.len() == 1 { 0 } else { number as usize }
+}
+
+/// Checks an object's counts. `own` is the number of triangles that the mesh has for this object, and `all` the number
+/// for all objects.
+fn check_counts(object: &Object, own: u64, all: u64) -> Result<(), VerifyError> {
+    let record = object.record();
+    let counts = [
+        ("triangles of the input", all, record.input_triangles.get()),
+        (
+            "triangles stored and duplicates left out",
+            own,
+            record.triangles.get().saturating_add(record.duplicates.get()),
+        ),
+    ];
+    for (what, expected, found) in counts {
+        if expected != found {
+            return Err(VerifyError::differs(what, expected, found));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the record's box and sphere contain all corners stored.
+fn check_hull<S: Source + ?Sized>(layout: &Layout, source: &S, object: &Object) -> Result<(), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    let record = object.record();
+    let axes = [0, 1, 2];
+    let (lo, hi) = (axes.map(|a| record.box_lo[a].get()), axes.map(|a| record.box_hi[a].get()));
+    let centre = axes.map(|a| f64::from(record.sphere_centre[a].get()));
+    let radius = f64::from(record.sphere_radius.get());
+    each_triangle(layout, source, object, |triangle| {
+        for (corner, v) in triangle.corners.iter().enumerate() {
+            let what = || format!("{}, corner {corner}", triangle.name());
+            if axes.iter().any(|&a| v[a] < lo[a] || v[a] > hi[a]) {
+                return Err(VerifyError::differs(
+                    what(),
+                    format!("within {lo:?} to {hi:?}"),
+                    format!("{v:?}"),
+                ));
+            }
+            let distance = axes.map(|a| (f64::from(v[a]) - centre[a]).powi(2)).iter().sum::<f64>().sqrt();
+            if distance > radius {
+                let expected = format!("within {radius:e} of {centre:?}");
+                return Err(VerifyError::differs(what(), expected, format!("{v:?}, at {distance:e}")));
+            }
+        }
+        Ok(())
+    })
+}
+
+/// A stored triangle.
+struct Stored {
+    page: u32,
+    packet: u16,
+    lane: usize,
+    /// Its number in the input, if the file has ids.
+    id: Option<u32>,
+    /// The corners relative to the object's origin.
+    corners: [[f32; 3]; 3],
+}
+
+impl Stored {
+    fn name(&self) -> String {
+        match self.id {
+            Some(id) => format!("triangle {id}"),
+            None => format!("page {}, packet {}, lane {}", self.page, self.packet, self.lane),
+        }
+    }
+}
+
+/// Calls `visit` for every triangle of an object of a validated file, in the order of the leaves.
+fn each_triangle<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    object: &Object,
+    mut visit: impl FnMut(&Stored) -> Result<(), VerifyError>,
+) -> Result<(), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    for number in object.pages() {
+        let bytes = layout.read_page(source, number)?;
+        let page = bytes.page(object);
+        let leaves = layout.read_leaf_block(source, page.header())?;
+        let ids = layout.read_id_block(source, page.header())?;
+        let (block, ids) = (leaves.bytes(), ids.bytes());
+        for (packet, count) in packets(&page) {
+            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
+            for lane in 0..count {
+                let id = layout.has_ids().then(|| decode_id(ids, usize::from(packet), lane));
+                visit(&Stored { page: number, packet, lane, id, corners: values.triangle(lane) })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns a stored vertex in mesh coordinates, which is exact by rule 37.
+fn place(object: &Object, v: [f32; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| object.origin()[axis] + f64::from(v[axis]))
+}
+
+/// Returns the largest distance that a corner of the mesh may have from its stored place: both stated errors, plus room
+/// for the few roundings in their sum and in lengths.
+fn tolerance(object: &Object) -> f64 {
+    let stated = object.record().max_vertex_rounding.get() + object.record().max_quantization_error.get();
+    stated * (1.0 + 2f64.powi(-40))
+}
+
+/// The distance of two points, safe from overflow and underflow of squares.
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let difference = [0, 1, 2].map(|axis| a[axis] - b[axis]);
+    let largest = difference.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    largest * difference.iter().map(|value| (value / largest).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests;

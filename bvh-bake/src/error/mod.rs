@@ -1,0 +1,109 @@
+//! The errors of a bake, by cause: the input, the system, a limit, or the baker.
+
+mod mesh;
+mod read;
+
+pub use mesh::InputError;
+pub(crate) use read::{Fault, Halt, excerpt};
+pub use read::{Place, ReadError};
+
+use bvh_format::FormatError;
+use std::path::PathBuf;
+
+/// The reason why a bake failed. The output's name still has its old content, if it had any.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The input file could not be read or is not a valid mesh.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The mesh breaks the input contract.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The operating system refused to write the output.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Write {
+        /// The output.
+        path: PathBuf,
+        /// The operation that failed.
+        action: &'static str,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
+    /// The operating system refused to create, write or read scratch files.
+    #[error(
+        "{}: cannot {action}: {source}; free room there, or name another directory for scratch files",
+        directory.display()
+    )]
+    Scratch {
+        /// The directory.
+        directory: PathBuf,
+        /// The operation that failed.
+        action: &'static str,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
+    /// The output is one of the inputs, and baking would destroy it.
+    #[error("{}: expected an output other than the inputs, found an input", path.display())]
+    OutputIsInput {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The bake needs more memory than it may use, even with scratch files.
+    #[error(
+        "{}: expected a mesh that bakes in at most {budget} bytes of memory, found {} that takes at least \
+         {needed}", input.display(), counted(*triangles)
+    )]
+    Memory {
+        /// The first input.
+        input: PathBuf,
+        /// The number of triangles of all inputs, or 0 if none has been read.
+        triangles: u64,
+        /// The bytes that the bake needs.
+        needed: u64,
+        /// The bytes that it may use.
+        budget: u64,
+    },
+    /// The allowed error of quantisation is too large for an object: most of its triangles would collapse.
+    #[error(
+        "{object}expected a max error of at most {limit:.2e}, a hundredth of the diagonal {diagonal:.2e} of the object's box, \
+         found {allowed:e}, which would collapse most triangles"
+    )]
+    MaxError {
+        /// The object's name as the message shows it; empty if the object has no name.
+        object: String,
+        /// The allowed error, in mesh units.
+        allowed: f64,
+        /// The largest error for this object, in mesh units.
+        limit: f64,
+        /// The diagonal of the object's box, in mesh units.
+        diagonal: f64,
+    },
+    /// There is too little room for scratch files and the output.
+    #[error("{}: expected room for {needed} bytes of scratch files and output, found {found}", directory.display())]
+    Room {
+        /// The directory.
+        directory: PathBuf,
+        /// The bytes that the files take.
+        needed: u64,
+        /// The bytes that are free.
+        found: u64,
+    },
+    /// The function for build scripts was called outside a build script.
+    #[error("expected the environment variable OUT_DIR of a build script, found none")]
+    NoOutDir,
+    /// The mesh exceeds a limit of the format or a given limit.
+    #[error("the mesh needs more than {0}")]
+    Limit(String),
+    /// The output failed its own proof. This is a defect of the baker, never of the input.
+    #[error("the baked bytes fail their proof, please report this: {0}")]
+    Unproved(#[from] FormatError),
+}
+
+fn counted(triangles: u64) -> String {
+    match triangles {
+        0 => "a file".to_owned(),
+        1 => "1 triangle".to_owned(),
+        _ => format!("{triangles} triangles"),
+    }
+}

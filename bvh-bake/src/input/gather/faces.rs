@@ -1,0 +1,130 @@
+//! Gathers the faces of a file after all have been read: looks up their corners and cuts polygons into triangles.
+
+use super::Gatherer;
+use super::vertex_counter::Counter;
+use crate::error::Halt;
+use crate::input::indexed::{FaceRun, IndexedFaces, LookedUp};
+use crate::input::names::Names;
+use crate::input::polygon::Cutter;
+use crate::progress::Tally;
+use rayon::prelude::*;
+
+/// The number of faces that one thread cuts at a time.
+const FACES_PER_TASK: usize = 1 << 12;
+
+impl Gatherer<'_> {
+    /// Adds faces that have been checked to the objects of `names`. `tally` counts the corners.
+    pub(super) fn add_faces(
+        &mut self,
+        faces: &IndexedFaces,
+        names: &Names,
+        tally: &Tally,
+    ) -> Result<(), Halt> {
+        let first = self.names.len();
+        for name in names.all() {
+            self.object(name.clone());
+        }
+        let mut counter = Counter::default();
+        let mut last: Option<(usize, u32)> = None;
+        faces.each_window(|runs, corners| {
+            let positions = faces.look_up(corners)?;
+            let mut start = 0;
+            for runs in runs.chunk_by(|a, b| names.of(a) == names.of(b)) {
+                let of = names.of(&runs[0]);
+                if let Some((object, _)) = last.filter(|last| *last != of) {
+                    self.add_vertices(first + object, counter.end_run());
+                }
+                last = Some(of);
+                let triangles = Triangles::of(runs, start, &positions);
+                start += runs.iter().map(|run| run.faces as usize * run.corners as usize).sum::<usize>();
+                let counts = self.counts_vertices();
+                let mut gather = || {
+                    let corners_of = |number| triangles.corners(number).map(|place| positions.at(place));
+                    self.add_triangles(first + of.0, triangles.count(), corners_of)
+                };
+                let mut count = || {
+                    if counts {
+                        // Cutting may leave out corners that add nothing.
+                        (0..triangles.count()).for_each(|number| {
+                            let vertices = triangles.corners(number).map(|place| corners[place]);
+                            vertices.into_iter().for_each(|vertex| counter.add(vertex, faces.vertex_count()));
+                        });
+                    }
+                };
+                if triangles.count() < FACES_PER_TASK {
+                    gather()?;
+                    count();
+                } else {
+                    rayon::join(gather, count).0?;
+                }
+            }
+            tally.add(corners.len() as u64);
+            Ok::<_, Halt>(())
+        })?;
+        if let Some((object, _)) = last {
+            self.add_vertices(first + object, counter.end_run());
+        }
+        Ok(())
+    }
+}
+
+/// The triangles of consecutive faces, as places in a window.
+enum Triangles {
+    /// All faces are triangles. The first one starts at `start`.
+    Faces {
+        start: usize,
+        count: usize,
+    },
+    Cut(Vec<[u32; 3]>),
+}
+
+impl Triangles {
+    /// Returns the triangles of runs of faces. The first run starts at the place `start` of a window.
+    fn of(runs: &[FaceRun], start: usize, positions: &LookedUp) -> Self {
+        if runs.iter().all(|run| run.corners == 3) {
+            return Self::Faces { start, count: runs.iter().map(|run| run.faces as usize).sum() };
+        }
+        let mut faces = Vec::new();
+        let mut at = start;
+        for run in runs {
+            for _ in 0..run.faces {
+                faces.push((at, run.corners as usize));
+                at += run.corners as usize;
+            }
+        }
+        let cut = |faces: &[(usize, usize)]| {
+            let (mut cutter, mut triangles, mut polygon) = (Cutter::default(), Vec::new(), Vec::new());
+            for &(start, corners) in faces {
+                polygon.clear();
+                polygon.extend((start..start + corners).map(|place| positions.at(place)));
+                let keep = |triangle: [usize; 3]| {
+                    triangles.push(triangle.map(|corner| (start + corner) as u32));
+                    Ok::<_, std::convert::Infallible>(())
+                };
+                let Ok(()) = cutter.cut_polygon(&polygon, keep);
+            }
+            triangles
+        };
+        if faces.len() < FACES_PER_TASK {
+            return Self::Cut(cut(&faces));
+        }
+        let cut: Vec<Vec<[u32; 3]>> = faces.par_chunks(FACES_PER_TASK).map(cut).collect();
+        Self::Cut(cut.concat())
+    }
+
+    fn count(&self) -> usize {
+        match self {
+            Self::Faces { count, .. } => *count,
+            Self::Cut(triangles) => triangles.len(),
+        }
+    }
+
+    /// Returns the places of a triangle's corners.
+    #[inline]
+    fn corners(&self, number: usize) -> [usize; 3] {
+        match self {
+            Self::Faces { start, .. } => [0, 1, 2].map(|corner| start + 3 * number + corner),
+            Self::Cut(triangles) => triangles[number].map(|place| place as usize),
+        }
+    }
+}

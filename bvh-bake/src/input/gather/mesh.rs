@@ -1,0 +1,61 @@
+//! Gathers a mesh in memory.
+
+use super::Gatherer;
+use crate::error::Halt;
+use crate::input::mesh::{Mesh, Object};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+
+impl Gatherer<'_> {
+    /// Adds the objects of a mesh that has been checked. Their ids follow the present ones.
+    pub(crate) fn add_mesh(&mut self, mesh: &Mesh) -> Result<(), Halt> {
+        let (first, first_id) = (self.names.len(), self.id_end);
+        for object in &mesh.objects {
+            let number = self.object(object.name.clone());
+            // Objects that are joined lose their names, even if one of them has no triangles.
+            self.names[number].1 |= !self.split;
+            self.add_vertices(number, used_vertices(object));
+        }
+        for (number, places) in self.runs_of(mesh) {
+            let object = &mesh.objects[number];
+            let (triangles, ids) = (&object.triangles[places.clone()], &object.triangle_ids[places]);
+            let corners_of = |place: usize| triangles[place].map(|vertex| object.positions[vertex as usize]);
+            let id_of = |place: usize| (first_id + u64::from(ids[place])) as u32;
+            self.add_numbered(first + number, triangles.len(), corners_of, id_of)?;
+            let end = ids.last().map_or(0, |&id| first_id + u64::from(id) + 1);
+            self.id_end = self.id_end.max(end);
+        }
+        Ok(())
+    }
+
+    /// Returns the triangles of a mesh as ranges of objects, in an order in which ids ascend within each body.
+    fn runs_of(&self, mesh: &Mesh) -> Vec<(usize, Range<usize>)> {
+        let objects = || mesh.objects.iter().enumerate().filter(|(_, object)| !object.triangles.is_empty());
+        let ends = objects()
+            .filter_map(|(_, object)| Some((*object.triangle_ids.first()?, *object.triangle_ids.last()?)));
+        let ends: Vec<(u32, u32)> = ends.collect();
+        if self.split || ends.windows(2).all(|pair| pair[0].1 < pair[1].0) {
+            return objects().map(|(number, object)| (number, 0..object.triangles.len())).collect();
+        }
+        // The object with the smallest next id continues until the next id of another object is smaller.
+        let mut next: BinaryHeap<Reverse<(u32, usize, usize)>> =
+            objects().map(|(number, object)| Reverse((object.triangle_ids[0], number, 0))).collect();
+        let mut runs = Vec::new();
+        while let Some(Reverse((_, number, start))) = next.pop() {
+            let ids = &mesh.objects[number].triangle_ids;
+            let limit = next.peek().map_or(u32::MAX, |Reverse((id, ..))| *id);
+            let end = start + 1 + ids[start + 1..].partition_point(|&id| id < limit);
+            runs.push((number, start..end));
+            next.extend(ids.get(end).map(|&id| Reverse((id, number, end))));
+        }
+        runs
+    }
+}
+
+/// Returns the number of vertices that triangles use.
+fn used_vertices(object: &Object) -> u64 {
+    let mut used = vec![false; object.positions.len()];
+    object.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+    used.iter().filter(|&&used| used).count() as u64
+}

@@ -1,0 +1,353 @@
+//! Gathers the triangles of meshes for a bake: from files of any size, piece by piece, and from meshes in memory.
+//!
+//! Triangles are stored in parts, in memory or in scratch files. Parts are filled in parallel, because a reader passes
+//! on many triangles at a time, as a count and a function that returns the corners of each.
+
+mod faces;
+mod input_order;
+mod mesh;
+mod solids;
+mod vertex_counter;
+
+pub(crate) use input_order::InputOrder;
+
+use super::indexed::IndexedFaces;
+use super::input_file::Opener;
+use super::names::Names;
+use super::{Checksums, InputFile, MeshFormat, obj, ply, stl};
+use crate::error::BakeError;
+use crate::error::InputError;
+use crate::error::{Fault, Halt, Place, ReadError};
+use crate::limits::MAX_TRIANGLES;
+use crate::progress::{Step, WHOLE};
+use crate::storage::resources::Resources;
+use crate::storage::{Piece, Spill};
+use crate::triangles::placement::{Extent, Placement};
+use crate::triangles::{Gathered, Part, TRIANGLES_PER_PART, Triangle, TriangleStream, WideTriangle};
+use input_order::ObjectRuns;
+use rayon::prelude::*;
+use solids::SolidsForBake;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::thread;
+
+/// The share of OBJ text and of PLY bytes in the step of reading. The rest of the step is spent on their corners.
+const OBJ_TEXT: u64 = 10;
+const PLY_BYTES: u64 = 10;
+
+/// Bytes of memory to fill a part.
+const BYTES_PER_OPEN_PART: usize = TRIANGLES_PER_PART * (size_of::<WideTriangle>() + size_of::<Triangle>());
+
+/// Gathers triangles.
+pub(crate) struct Gatherer<'a> {
+    resources: &'a Resources,
+    /// Whether objects stay separate.
+    split: bool,
+    spill: Spill,
+    /// The names of the objects of all inputs, and whether each object counts as having triangles.
+    names: Vec<(String, bool)>,
+    /// The bodies to bake: one per object, or one for all objects.
+    bodies: Vec<Body>,
+    /// The body of the last triangle. Its open triangles are in memory; those of other bodies are stored.
+    current: usize,
+    triangles: u64,
+    /// One more than the largest id.
+    id_end: u64,
+    /// The object that each triangle belongs to, if the caller needs it.
+    runs: Option<ObjectRuns>,
+}
+
+/// The triangles of one future tree.
+struct Body {
+    parts: Vec<Part>,
+    /// The triangles that do not fill a part yet.
+    open: Vec<WideTriangle>,
+    /// The same triangles, stored while the body is not the current one.
+    parked: Option<Piece<WideTriangle>>,
+    extent: Extent,
+    count: u64,
+    /// The number of distinct vertices.
+    vertices: u64,
+}
+
+impl Body {
+    fn new() -> Self {
+        let (parts, open) = (Vec::new(), Vec::new());
+        Self { parts, open, parked: None, extent: Extent::EMPTY, count: 0, vertices: 0 }
+    }
+}
+
+impl<'a> Gatherer<'a> {
+    pub(crate) fn new(resources: &'a Resources, split: bool) -> Self {
+        Self {
+            resources,
+            split,
+            spill: resources.scratch.spill(),
+            names: Vec::new(),
+            bodies: Vec::new(),
+            current: 0,
+            triangles: 0,
+            id_end: 0,
+            runs: None,
+        }
+    }
+
+    /// Makes a gatherer that joins all objects into one and records which triangles belong to which object.
+    pub(crate) fn in_input_order(resources: &'a Resources) -> Self {
+        Self { runs: Some(ObjectRuns::new()), ..Self::new(resources, false) }
+    }
+
+    pub(crate) fn resources(&self) -> &'a Resources {
+        self.resources
+    }
+
+    /// Returns whether the number of distinct vertices is needed.
+    fn counts_vertices(&self) -> bool {
+        self.runs.is_none()
+    }
+
+    /// Returns the number of triangles so far.
+    pub(crate) fn triangles(&self) -> u64 {
+        self.triangles
+    }
+
+    /// Returns one more than the largest id so far.
+    pub(crate) fn id_end(&self) -> u64 {
+        self.id_end
+    }
+
+    /// Reads a file: glTF as a whole, other formats piece by piece.
+    pub(crate) fn read(&mut self, input: &InputFile) -> Result<Checksums, BakeError> {
+        let (before, first_object) = (self.triangles, self.names.len());
+        let checksums = if input.format() == MeshFormat::Gltf {
+            let (mesh, checksums) = super::read_gltf(input, &self.resources.progress, WHOLE)?;
+            self.add_mesh(&mesh).map_err(|halt| halt.in_file(input.path()))?;
+            checksums
+        } else {
+            let (progress, checksum) = (&self.resources.progress, OnceLock::new());
+            let read = thread::scope(|scope| {
+                self.read_stream(&Opener { input, progress, checksum: &checksum, scope })
+            });
+            read.map_err(|halt| halt.in_file(input.path()))?;
+            // A reader that succeeds goes to the end of the file, where the checksum is known.
+            let file = checksum.into_inner();
+            let file = file.ok_or_else(|| input.failed(std::io::ErrorKind::UnexpectedEof.into()))?;
+            Checksums { file, mesh: None }
+        };
+        self.name_after(input.path(), first_object);
+        if self.triangles == before {
+            return Err(ReadError::Mesh { path: input.path().to_owned(), source: InputError::Empty }.into());
+        }
+        Ok(checksums)
+    }
+
+    fn read_stream(&mut self, opener: &Opener) -> Result<(), Halt> {
+        let open = |weight| move |is_first| opener.open(if is_first { weight } else { 0 });
+        let mut faces = IndexedFaces::new(self.resources);
+        let (names, left) = match opener.input.format() {
+            MeshFormat::Stl => return stl::read(opener.open(WHOLE)?, &mut SolidsForBake::new(self)),
+            MeshFormat::Ply => {
+                ply::read(open(PLY_BYTES), &mut faces)?;
+                (Names::unnamed(), WHOLE - PLY_BYTES)
+            }
+            MeshFormat::Obj => (obj::read(open(OBJ_TEXT), &mut faces, self.resources)?, WHOLE - OBJ_TEXT),
+            MeshFormat::Gltf => return Ok(()),
+        };
+        let length = opener.input.length();
+        let tally = self.resources.progress.tally(Step::Read, left, length, faces.corner_count());
+        self.add_faces(&faces, &names, &tally)
+    }
+
+    /// Names the objects from the number `first` on after their file, if objects stay separate and have no name.
+    fn name_after(&mut self, path: &Path, first: usize) {
+        if self.split {
+            let unnamed = self.names[first..].iter_mut().filter(|(name, _)| name.is_empty());
+            unnamed.for_each(|(name, _)| *name = super::stem(path));
+        }
+    }
+
+    /// Begins an object and returns its number.
+    fn object(&mut self, name: String) -> usize {
+        self.names.push((name, false));
+        if self.split || self.bodies.is_empty() {
+            self.bodies.push(Body::new());
+        }
+        self.names.len() - 1
+    }
+
+    /// Returns the number of the body of an object.
+    fn body_of(&self, object: usize) -> usize {
+        if self.split { object } else { 0 }
+    }
+
+    /// Adds to the number of distinct vertices of an object.
+    fn add_vertices(&mut self, object: usize, count: u64) {
+        let body = self.body_of(object);
+        self.bodies[body].vertices += count;
+    }
+
+    /// Adds triangles to an object. Their ids follow the present ones.
+    fn add_triangles(
+        &mut self,
+        object: usize,
+        count: usize,
+        corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
+    ) -> Result<(), Halt> {
+        let first = self.id_end;
+        self.add_numbered(object, count, corners_of, |place| (first + place as u64) as u32)?;
+        self.id_end += count as u64;
+        Ok(())
+    }
+
+    /// Adds triangles to an object. -0.0 becomes 0.0. Ids must ascend within a body.
+    fn add_numbered(
+        &mut self,
+        object: usize,
+        count: usize,
+        corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
+        id_of: impl Fn(usize) -> u32 + Sync,
+    ) -> Result<(), Halt> {
+        if count == 0 {
+            return Ok(());
+        }
+        if self.triangles + count as u64 > MAX_TRIANGLES {
+            return Err(Fault::Limit { place: Place::File, most: MAX_TRIANGLES, what: "triangles" }.into());
+        }
+        let number = self.body_of(object);
+        self.go_to(number)?;
+        self.triangles += count as u64;
+        self.names[object].1 = true;
+        self.resources.progress.find(count as u64);
+        if let Some(runs) = &mut self.runs {
+            runs.add(object, count as u64, &self.spill)?;
+        }
+        let (body, spill) = (&mut self.bodies[number], &self.spill);
+        body.count += count as u64;
+        let triangle = |place: usize| WideTriangle {
+            corners: corners_of(place).map(|corner| corner.map(|value| value + 0.0)),
+            id: id_of(place),
+            spare: 0,
+        };
+        let fill_open = |body: &mut Body, places: Range<usize>| {
+            for place in places {
+                let triangle = triangle(place);
+                triangle.corners.iter().for_each(|&corner| body.extent.add(corner));
+                body.open.push(triangle);
+            }
+        };
+        let mut done = 0;
+        if !body.open.is_empty() || count < TRIANGLES_PER_PART {
+            done = count.min(TRIANGLES_PER_PART - body.open.len());
+            fill_open(body, 0..done);
+            if body.open.len() == TRIANGLES_PER_PART {
+                let open = std::mem::take(&mut body.open);
+                body.parts.push(part(open, spill)?);
+            }
+        }
+        let full =
+            (done..count).step_by(TRIANGLES_PER_PART).take_while(|start| count - start >= TRIANGLES_PER_PART);
+        let full: Vec<usize> = full.collect();
+        for batch in full.chunks(self.resources.reading_tasks(BYTES_PER_OPEN_PART)) {
+            let filled = batch.par_iter().map(|&start| {
+                let mut extent = Extent::EMPTY;
+                let triangles = (start..start + TRIANGLES_PER_PART).map(|place| {
+                    let triangle = triangle(place);
+                    triangle.corners.iter().for_each(|&corner| extent.add(corner));
+                    triangle
+                });
+                let triangles = triangles.collect();
+                Ok::<_, BakeError>((part(triangles, spill)?, extent))
+            });
+            for (part, extent) in filled.collect::<Result<Vec<_>, _>>()? {
+                body.parts.push(part);
+                body.extent = body.extent.joined(extent);
+            }
+        }
+        done += full.len() * TRIANGLES_PER_PART;
+        fill_open(body, done..count);
+        Ok(())
+    }
+
+    /// Makes a body the current one.
+    fn go_to(&mut self, body: usize) -> Result<(), Halt> {
+        if body == self.current {
+            return Ok(());
+        }
+        if let Some(last) = self.bodies.get_mut(self.current).filter(|last| !last.open.is_empty()) {
+            last.parked = Some(self.spill.put(std::mem::take(&mut last.open))?);
+        }
+        if let Some(parked) = self.bodies[body].parked.take() {
+            self.bodies[body].open = parked.take()?;
+        }
+        self.current = body;
+        Ok(())
+    }
+
+    /// Returns all triangles as they were read, in the order of their ids. The gatherer must have been made by
+    /// [`in_input_order`](Self::in_input_order).
+    pub(crate) fn into_input_order(self) -> Result<InputOrder, BakeError> {
+        let Self { names, mut bodies, spill, runs, .. } = self;
+        let mut parts = Vec::new();
+        for body in &mut bodies {
+            if !body.open.is_empty() {
+                body.parts.push(part(std::mem::take(&mut body.open), &spill)?);
+            }
+            parts.append(&mut body.parts);
+        }
+        InputOrder::new(parts, runs.unwrap_or_else(ObjectRuns::new), names.len(), &spill)
+    }
+
+    /// Returns all objects with triangles, ready to be baked. `grid_error` returns the largest move that quantisation
+    /// may make, given the name of the object and the diagonal of its box; `None` leaves vertices as they are.
+    pub(crate) fn finish(
+        self,
+        grid_error: impl Fn(&str, f64) -> Result<Option<f64>, BakeError>,
+    ) -> Result<Vec<Gathered>, BakeError> {
+        let Self { names, bodies, spill, split, .. } = self;
+        let mut names = names.into_iter().filter(|(_, counts)| *counts).map(|(name, _)| name);
+        let mut gathered = Vec::new();
+        for mut body in bodies.into_iter().filter(|body| body.count > 0) {
+            if let Some(parked) = body.parked.take() {
+                body.open = parked.take()?;
+            }
+            if !body.open.is_empty() {
+                body.parts.push(part(body.open, &spill)?);
+            }
+            let name = names.next().unwrap_or_default();
+            // A single object keeps its name; several objects that are joined have no name.
+            let name = if split || names.next().is_none() { name } else { String::new() };
+            let placement = Placement::new(&body.extent, grid_error(&name, body.extent.diagonal())?);
+            let stream = TriangleStream {
+                parts: body.parts,
+                count: body.count,
+                placement: Some(placement).filter(|placement| !placement.keeps_f32()),
+            };
+            let (stream, moved) = stream.placed_in_memory(&spill)?;
+            gathered.push(Gathered {
+                name,
+                origin: placement.origin(),
+                stream,
+                moved,
+                vertices: body.vertices,
+            });
+        }
+        Ok(gathered)
+    }
+}
+
+/// Stores triangles, as `f32` numbers if these represent them exactly.
+fn part(triangles: Vec<WideTriangle>, spill: &Spill) -> Result<Part, BakeError> {
+    let fits = |triangle: &WideTriangle| {
+        triangle.corners.as_flattened().iter().all(|&value| f64::from(value as f32) == value)
+    };
+    let narrow = |triangle: &WideTriangle| Triangle {
+        corners: triangle.corners.map(|corner| corner.map(|value| value as f32)),
+        id: triangle.id,
+    };
+    Ok(if triangles.iter().all(fits) {
+        Part::Narrow(spill.put(triangles.iter().map(narrow).collect())?)
+    } else {
+        Part::Wide(spill.put(triangles)?)
+    })
+}

@@ -1,0 +1,216 @@
+//! Opens input files, which can be read from the beginning any number of times, and counts their bytes as they are
+//! read.
+
+use super::MeshFormat;
+use super::byte_reader::ByteReader;
+use super::read_ahead::ReadAhead;
+use crate::error::{Halt, ReadError};
+use crate::progress::{Progress, Step, Tally};
+use bvh_format::checksum::Hasher;
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+use std::sync::OnceLock;
+use std::thread::Scope;
+
+/// The number of bytes that are read at a time if a file is read as a whole.
+const READ_BYTES: u64 = 4 << 20;
+/// The number of bytes from which the format is recognised.
+const HEAD_BYTES: u64 = 4096;
+
+/// An input with a known format.
+pub(crate) struct InputFile<'a> {
+    path: Cow<'a, Path>,
+    format: MeshFormat,
+    length: u64,
+    /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
+    bytes: Option<Cow<'a, [u8]>>,
+}
+
+impl<'a> InputFile<'a> {
+    /// Makes an input of the bytes of a file. `path` names it in errors.
+    pub(crate) fn of_bytes(bytes: &'a [u8], format: MeshFormat, path: &'a Path) -> Self {
+        let length = bytes.len() as u64;
+        Self { path: Cow::Borrowed(path), format, length, bytes: Some(Cow::Borrowed(bytes)) }
+    }
+
+    /// Finds a file. The format is that of its extension or, if the extension is unknown or missing, the one that its
+    /// content suggests. A pipe or another file without a length is read as a whole.
+    pub(crate) fn find(path: &'a Path, progress: &Progress) -> Result<Self, ReadError> {
+        let failed = |source| ReadError::Io { path: path.to_owned(), source };
+        let mut reader = InputReader::open(path, progress, 0).map_err(failed)?;
+        let is_regular = reader.is_regular().map_err(failed)?;
+        let bytes = if is_regular { None } else { Some(reader.read_up_to(u64::MAX).map_err(failed)?) };
+        let length = bytes.as_ref().map_or(reader.length, |bytes| bytes.len() as u64);
+        let format = match (MeshFormat::from_extension(path), &bytes) {
+            (Some(format), _) => Some(format),
+            (None, Some(bytes)) => MeshFormat::from_content(bytes),
+            (None, None) => MeshFormat::from_head(&reader.read_up_to(HEAD_BYTES).map_err(failed)?, length),
+        };
+        let format = format.ok_or_else(|| super::unknown_format(path))?;
+        Ok(Self { path: Cow::Borrowed(path), format, length, bytes: bytes.map(Cow::Owned) })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn format(&self) -> MeshFormat {
+        self.format
+    }
+
+    /// Returns the number of bytes.
+    pub(crate) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Starts to read the bytes. Reading them is a pass of the given weight.
+    fn reader<'r>(&'r self, progress: &'r Progress, weight: u64) -> io::Result<InputReader<'r>> {
+        match &self.bytes {
+            None => InputReader::open(&self.path, progress, weight),
+            Some(bytes) => {
+                let tally = progress.tally(Step::Read, weight, self.length, self.length);
+                let source = Source::Memory(bytes);
+                Ok(InputReader { source, length: self.length, progress, tally, checksum: None })
+            }
+        }
+    }
+
+    /// Returns all bytes. Reading them is a pass of the given weight.
+    pub(crate) fn read_all(&self, progress: &Progress, weight: u64) -> Result<Cow<'_, [u8]>, ReadError> {
+        if let Some(bytes) = &self.bytes {
+            return Ok(Cow::Borrowed(bytes));
+        }
+        let bytes = self.reader(progress, weight).and_then(|mut reader| reader.read_up_to(u64::MAX));
+        bytes.map(Cow::Owned).map_err(|source| self.failed(source))
+    }
+
+    /// Returns the checksum of all bytes. Reading them does not count as progress.
+    pub(crate) fn checksum(&self, progress: &Progress) -> Result<u64, ReadError> {
+        let mut hasher = Hasher::default();
+        let mut block = vec![0; READ_BYTES as usize];
+        let mut reader = self.reader(progress, 0).map_err(|source| self.failed(source))?;
+        loop {
+            match reader.read(&mut block) {
+                Ok(0) => return Ok(hasher.finish()),
+                Ok(count) => hasher.update(&block[..count]),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.failed(error)),
+            }
+        }
+    }
+
+    /// Returns the error for an input that the system refused to read.
+    pub(crate) fn failed(&self, source: io::Error) -> ReadError {
+        ReadError::Io { path: self.path.clone().into_owned(), source }
+    }
+}
+
+/// Opens an input at its beginning, any number of times. A thread of its own reads ahead.
+pub(crate) struct Opener<'scope, 'env> {
+    pub(crate) input: &'env InputFile<'env>,
+    pub(crate) progress: &'env Progress,
+    /// The checksum of all bytes, once a reader has come to the end.
+    pub(crate) checksum: &'env OnceLock<u64>,
+    pub(crate) scope: &'scope Scope<'scope, 'env>,
+}
+
+impl Opener<'_, '_> {
+    /// Opens the input. Reading it is a pass of the given weight.
+    pub(crate) fn open(&self, weight: u64) -> Result<ByteReader<ReadAhead>, Halt> {
+        let mut reader = self.input.reader(self.progress, weight).map_err(Halt::Io)?;
+        reader.checksum = Some((Hasher::default(), self.checksum));
+        let length = reader.length;
+        Ok(ByteReader::new(ReadAhead::start(self.scope, reader), length))
+    }
+}
+
+/// Reads an input once, from its beginning.
+pub(crate) struct InputReader<'a> {
+    source: Source<'a>,
+    length: u64,
+    progress: &'a Progress,
+    tally: Tally<'a>,
+    /// The hasher, and where the checksum goes when all bytes have been read in order; `None` if nobody needs it.
+    checksum: Option<(Hasher, &'a OnceLock<u64>)>,
+}
+
+enum Source<'a> {
+    File(File),
+    /// The bytes that have not been read yet.
+    Memory(&'a [u8]),
+}
+
+impl<'a> InputReader<'a> {
+    /// Opens a file. Reading it is a pass of the given weight.
+    pub(crate) fn open(path: &Path, progress: &'a Progress, weight: u64) -> io::Result<Self> {
+        let file = File::open(path)?;
+        let length = file.metadata()?.len();
+        let tally = progress.tally(Step::Read, weight, length, length);
+        Ok(Self { source: Source::File(file), length, progress, tally, checksum: None })
+    }
+
+    /// Returns whether this is a regular file, which has an end.
+    pub(crate) fn is_regular(&self) -> io::Result<bool> {
+        match &self.source {
+            Source::File(file) => Ok(file.metadata()?.is_file()),
+            Source::Memory(_) => Ok(true),
+        }
+    }
+
+    /// Returns the remaining bytes, at most `most` of them.
+    pub(crate) fn read_up_to(&mut self, most: u64) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(self.length.min(most) as usize)?;
+        loop {
+            let block = READ_BYTES.min(most - bytes.len() as u64);
+            let count = self.by_ref().take(block).read_to_end(&mut bytes)?;
+            if count == 0 {
+                return Ok(bytes);
+            }
+        }
+    }
+}
+
+impl Read for InputReader<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = match &mut self.source {
+            Source::File(file) => {
+                let count = file.read(buffer)?;
+                self.progress.add_input_read(count as u64);
+                count
+            }
+            Source::Memory(rest) => rest.read(buffer)?,
+        };
+        self.tally.add(count as u64);
+        if let Some((hasher, checksum)) = &mut self.checksum {
+            if count > 0 {
+                hasher.update(&buffer[..count]);
+            } else if !buffer.is_empty() {
+                // Another read at the end does not change the checksum.
+                checksum.get_or_init(|| hasher.finish());
+            }
+        }
+        Ok(count)
+    }
+}
+
+/// The checksums that show whether an input has changed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Checksums {
+    /// The checksum of the file's bytes.
+    pub(crate) file: u64,
+    /// The checksum of the mesh, if the bytes of the file do not suffice: a glTF file may name other files.
+    pub(crate) mesh: Option<u64>,
+}
+
+impl Checksums {
+    /// Reads an input only for its checksums.
+    pub(crate) fn of(input: &InputFile, progress: &Progress) -> Result<Self, ReadError> {
+        if input.format() == MeshFormat::Gltf {
+            return Ok(super::read_gltf(input, progress, 0)?.1);
+        }
+        Ok(Self { file: input.checksum(progress)?, mesh: None })
+    }
+}

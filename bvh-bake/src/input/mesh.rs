@@ -1,0 +1,213 @@
+//! Defines meshes in memory and the contract that every input keeps.
+//!
+//! Lengths are in mesh units, whatever these are. A triangle consists of three vertex numbers. Its id is its place in
+//! the input, counted over all objects after polygons have been triangulated.
+
+pub use crate::error::InputError;
+use crate::error::excerpt;
+use crate::limits::coordinate_fits;
+pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
+use bvh_format::checksum::Hasher;
+use rayon::prelude::*;
+
+/// The content of a mesh file: one object or several.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// The objects, in the order of the file.
+    pub objects: Vec<Object>,
+}
+
+/// A named set of triangles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Object {
+    /// The name, which may be empty.
+    pub name: String,
+    /// The vertices, in mesh units. Vertices that no triangle uses may have any value, including NaN.
+    pub positions: Vec<[f64; 3]>,
+    /// The triangles, as indices into `positions`. They may be degenerate.
+    pub triangles: Vec<[u32; 3]>,
+    /// The id of each triangle, in ascending order. No other triangle of the mesh has the same id.
+    pub triangle_ids: Vec<u32>,
+}
+
+impl Mesh {
+    /// Makes a mesh of one unnamed object whose triangles are numbered in the given order. -0.0 becomes 0.0.
+    ///
+    /// The function checks nothing: see [`Mesh::check`]. Ids beyond 32 bits wrap, which `check` refuses.
+    pub fn from_triangles(positions: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Mesh {
+        let triangle_ids = (0..triangles.len()).into_par_iter().map(|id| id as u32).collect();
+        let mut mesh =
+            Mesh { objects: vec![Object { name: String::new(), positions, triangles, triangle_ids }] };
+        mesh.drop_negative_zeros();
+        mesh
+    }
+
+    /// Returns the number of triangles of all objects.
+    pub fn triangle_count(&self) -> u64 {
+        self.objects.iter().map(|object| object.triangles.len() as u64).sum()
+    }
+
+    /// Returns the number of vertices of all objects, whether used or not.
+    pub fn vertex_count(&self) -> u64 {
+        self.objects.iter().map(|object| object.positions.len() as u64).sum()
+    }
+
+    /// Replaces every -0.0 by 0.0, so that meshes that compare equal bake to equal bytes.
+    pub fn drop_negative_zeros(&mut self) {
+        for object in &mut self.objects {
+            // -0.0 + 0.0 is 0.0; every other number stays as it is.
+            object.positions.par_iter_mut().for_each(|position| *position = position.map(|c| c + 0.0));
+        }
+    }
+
+    /// Returns a checksum of everything that a bake takes from the mesh.
+    pub(crate) fn checksum(&self) -> u64 {
+        let mut hasher = Hasher::default();
+        for object in &self.objects {
+            let lengths = [object.name.len(), object.positions.len(), object.triangles.len()];
+            lengths.iter().for_each(|&length| hasher.update(&(length as u64).to_le_bytes()));
+            hasher.update(object.name.as_bytes());
+            object.positions.iter().flatten().for_each(|value| hasher.update(&value.to_le_bytes()));
+            object.triangles.iter().flatten().for_each(|index| hasher.update(&index.to_le_bytes()));
+        }
+        hasher.finish()
+    }
+
+    /// Checks the contract: between 1 and 2^32 - 2 triangles, at most 2^32 - 1 vertices, ascending ids, vertex numbers
+    /// in range, and every coordinate that a triangle uses finite and of at most 2^120 in magnitude. The function does
+    /// not check that ids differ between objects.
+    ///
+    /// Cost: one parallel pass over vertices and triangles.
+    ///
+    /// # Errors
+    /// Returns the first breach, by object and triangle.
+    pub fn check(&self) -> Result<(), InputError> {
+        match self.triangle_count() {
+            0 => return Err(InputError::Empty),
+            count if count > MAX_TRIANGLES => return Err(InputError::TooManyTriangles(count)),
+            _ => {}
+        }
+        let vertices = self.vertex_count();
+        if vertices > MAX_VERTICES {
+            return Err(InputError::TooManyVertices(vertices));
+        }
+        self.objects.iter().try_for_each(Object::check)
+    }
+
+    /// Joins all objects into one unnamed object, with the triangles in the order of their ids. A single object keeps
+    /// its name. The vertices of the objects are appended one after the other; equal vertices are not joined.
+    pub fn merged(self) -> Mesh {
+        if self.objects.len() <= 1 {
+            return self;
+        }
+        let mut whole = Object::default();
+        whole.positions.reserve_exact(self.vertex_count() as usize);
+        whole.triangles.reserve_exact(self.triangle_count() as usize);
+        whole.triangle_ids.reserve_exact(self.triangle_count() as usize);
+        for object in self.objects {
+            // A mesh that passed `check` has no vertex beyond 32 bits. In any other mesh, the number stays out of
+            // range.
+            let first = u32::try_from(whole.positions.len()).unwrap_or(u32::MAX);
+            let moved = object.triangles.iter().map(|corners| corners.map(|v| v.saturating_add(first)));
+            whole.triangles.extend(moved);
+            whole.positions.extend(object.positions);
+            whole.triangle_ids.extend(object.triangle_ids);
+        }
+        if whole.triangles.len() == whole.triangle_ids.len() && !whole.triangle_ids.is_sorted() {
+            let mut pairs: Vec<_> = whole.triangle_ids.into_iter().zip(whole.triangles).collect();
+            pairs.par_sort_by_key(|&(id, _)| id);
+            (whole.triangle_ids, whole.triangles) = pairs.into_iter().unzip();
+        }
+        Mesh { objects: vec![whole] }
+    }
+}
+
+impl Object {
+    fn check(&self) -> Result<(), InputError> {
+        let object = || excerpt(self.name.as_bytes());
+        let ids =
+            |found: String| InputError::Ids { object: object(), triangles: self.triangles.len(), found };
+        if self.triangle_ids.len() != self.triangles.len() {
+            return Err(ids(format!("{} ids", self.triangle_ids.len())));
+        }
+        if let Some(place) = self.triangle_ids.par_windows(2).position_first(|pair| pair[0] >= pair[1]) {
+            return Err(ids(format!("{} before {}", self.triangle_ids[place], self.triangle_ids[place + 1])));
+        }
+        let vertices = self.positions.len();
+        let out_of_range = |corner: u32| corner as usize >= vertices;
+        if let Some(place) = self.triangles.par_iter().position_first(|t| t.iter().copied().any(out_of_range))
+        {
+            let found = self.triangles[place].into_iter().find(|&corner| out_of_range(corner));
+            return Err(InputError::Index {
+                object: object(),
+                triangle: self.triangle_ids[place],
+                vertices,
+                found: found.unwrap_or_default(),
+            });
+        }
+        // All coordinates almost always fit, and then the triangles need no check.
+        if self.positions.par_iter().all(|position| position.iter().all(|&c| coordinate_fits(c))) {
+            return Ok(());
+        }
+        let misfit = |corner: u32| self.positions[corner as usize].into_iter().find(|&c| !coordinate_fits(c));
+        let Some(place) =
+            self.triangles.par_iter().position_first(|t| t.iter().any(|&corner| misfit(corner).is_some()))
+        else {
+            return Ok(());
+        };
+        let first = self.triangles[place].into_iter().find_map(|corner| Some((corner, misfit(corner)?)));
+        let (vertex, found) = first.unwrap_or_default();
+        Err(InputError::Coordinate { object: object(), triangle: self.triangle_ids[place], vertex, found })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one() -> Mesh {
+        Mesh::from_triangles(vec![[0.0; 3], [1.0, -0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])
+    }
+
+    #[test]
+    fn negative_zero_is_zero() {
+        assert_eq!(one().objects[0].positions[1][1].to_bits(), 0);
+    }
+
+    #[test]
+    fn the_contract_is_checked() {
+        assert_eq!(one().check(), Ok(()));
+        assert_eq!(Mesh::default().check(), Err(InputError::Empty));
+        let mut mesh = one();
+        mesh.objects[0].positions.push([f64::NAN; 3]);
+        assert_eq!(mesh.check(), Ok(()), "no triangle uses the NaN");
+        mesh.objects[0].triangles[0][1] = 3;
+        let said = mesh.check().unwrap_err().to_string();
+        assert!(said.contains("triangle 0, vertex 3") && said.ends_with("found NaN"), "{said}");
+        mesh.objects[0].triangles[0][1] = 4;
+        assert!(matches!(mesh.check(), Err(InputError::Index { found: 4, .. })));
+        mesh.objects[0].triangle_ids.clear();
+        assert!(matches!(mesh.check(), Err(InputError::Ids { .. })));
+    }
+
+    #[test]
+    fn the_largest_coordinate_is_two_to_the_120() {
+        let mut mesh = one();
+        mesh.objects[0].positions[0][0] = -(2f64.powi(120));
+        assert_eq!(mesh.check(), Ok(()));
+        mesh.objects[0].positions[0][0] = mesh.objects[0].positions[0][0].next_down();
+        assert!(matches!(mesh.check(), Err(InputError::Coordinate { vertex: 0, .. })));
+    }
+
+    #[test]
+    fn merging_keeps_ids_and_sorts_by_them() {
+        let (mut a, b) = (one(), one());
+        a.objects.extend(b.objects);
+        a.objects[0].triangle_ids = vec![7];
+        let merged = a.merged();
+        assert_eq!(merged.objects.len(), 1);
+        assert_eq!(merged.objects[0].triangle_ids, [0, 7]);
+        assert_eq!(merged.objects[0].triangles, [[3, 4, 5], [0, 1, 2]]);
+        assert_eq!(merged.check(), Ok(()));
+    }
+}

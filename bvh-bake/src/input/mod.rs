@@ -1,0 +1,229 @@
+//! Reads meshes from files: OBJ, STL, PLY and glTF.
+//!
+//! There is one reader per format. It reads a file piece by piece and passes what it finds either to a bake (module
+//! `gather`), which keeps to its memory budget, or into a [`Mesh`] that keeps the contract of [`Mesh::check`]
+//! ([`read`]). If a file is malformed, one line states what is wrong and where. No reader panics, and no reader
+//! allocates from a count that the file declares before checking that the file is long enough for it. glTF files, whose
+//! parts may be in any order, are read as a whole.
+//!
+//! Polygons are triangulated (module `polygon`), objects without triangles are left out, degenerate triangles are kept,
+//! and -0.0 is read as 0.0.
+
+mod byte_reader;
+mod collect;
+pub(crate) mod gather;
+mod gltf;
+mod indexed;
+mod input_file;
+pub mod mesh;
+mod names;
+mod obj;
+mod ply;
+pub(crate) mod polygon;
+mod read_ahead;
+mod stl;
+mod text;
+
+use crate::error::BakeError;
+use crate::error::{Fault, Halt, excerpt};
+pub use crate::error::{Place, ReadError};
+use crate::progress::{Progress, WHOLE};
+use crate::storage::resources::Resources;
+use bvh_format::checksum::checksum;
+use collect::mesh_of_faces;
+use indexed::IndexedFaces;
+use input_file::Opener;
+pub(crate) use input_file::{Checksums, InputFile};
+use mesh::Mesh;
+use names::Names;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::thread;
+
+/// A format of mesh files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum MeshFormat {
+    /// Wavefront OBJ, text.
+    Obj,
+    /// STL, text or binary.
+    Stl,
+    /// PLY, text or binary of either byte order.
+    Ply,
+    /// glTF 2.0, as JSON or as one binary file (GLB).
+    Gltf,
+}
+
+const KNOWN: &str = "a mesh in a file named .obj, .stl, .ply, .gltf or .glb";
+
+impl MeshFormat {
+    /// Returns the format that the extension of a file's name stands for, in upper or lower case.
+    pub fn from_extension(path: &Path) -> Option<MeshFormat> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "obj" => Some(MeshFormat::Obj),
+            "stl" => Some(MeshFormat::Stl),
+            "ply" => Some(MeshFormat::Ply),
+            "gltf" | "glb" => Some(MeshFormat::Gltf),
+            _ => None,
+        }
+    }
+
+    /// Recognises the format from the beginning of a file.
+    pub fn from_content(bytes: &[u8]) -> Option<MeshFormat> {
+        Self::from_head(bytes, bytes.len() as u64)
+    }
+
+    /// Recognises the format from the first bytes of a file of `length` bytes. 4096 bytes are enough.
+    pub(crate) fn from_head(bytes: &[u8], length: u64) -> Option<MeshFormat> {
+        let head = &bytes[..bytes.len().min(4096)];
+        let trimmed = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+        let is_statement = |line: &[u8]| {
+            matches!(text::words(line).next(), Some(b"v" | b"vn" | b"vt" | b"o" | b"g" | b"mtllib"))
+        };
+        if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
+            Some(MeshFormat::Ply)
+        } else if head.starts_with(b"glTF") || trimmed.starts_with(b"{") {
+            Some(MeshFormat::Gltf)
+        } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes, length) {
+            Some(MeshFormat::Stl)
+        } else if !head.contains(&0) && text::Lines::new(head).any(is_statement) {
+            Some(MeshFormat::Obj)
+        } else {
+            None
+        }
+    }
+}
+
+/// Returns the name of a file without its folders and its extension. Objects without a name get this name.
+pub(crate) fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// Reads a mesh file into memory. The format is that of the file's extension or, if the extension is unknown or
+/// missing, the one that the content suggests.
+///
+/// # Errors
+/// [`ReadError`]: the error of the system, or the first defect of the file.
+pub fn read(path: &Path) -> Result<Mesh, ReadError> {
+    let progress = Progress::default();
+    Ok(collect(&InputFile::find(path, &progress)?, &progress, WHOLE)?.0)
+}
+
+/// Reads a mesh from the bytes of a file. `source` names the file in errors. Other files that a glTF file names are
+/// looked up in the folder of `source`.
+///
+/// # Errors
+/// The errors of [`read`].
+pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
+    Ok(collect(&InputFile::of_bytes(bytes, format, source), &Progress::default(), WHOLE)?.0)
+}
+
+/// Reads a glTF file, which is a pass of the given weight. Also returns the checksums that show whether the file has
+/// changed.
+pub(crate) fn read_gltf(
+    input: &InputFile,
+    progress: &Progress,
+    weight: u64,
+) -> Result<(Mesh, Checksums), ReadError> {
+    let (mesh, file) = collect(input, progress, weight)?;
+    let checksums = Checksums { file, mesh: Some(mesh.checksum()) };
+    Ok((mesh, checksums))
+}
+
+/// Reads an input into a mesh that keeps the contract. Reading is a pass of the given weight. Also returns the checksum
+/// of the input's bytes.
+fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh, u64), ReadError> {
+    let (mesh, checksum) = if input.format() == MeshFormat::Gltf {
+        let bytes = input.read_all(progress, weight)?;
+        (gltf::read(&bytes, input.path(), progress).map_err(Halt::from), checksum(&bytes))
+    } else {
+        let file = OnceLock::new();
+        let mesh = thread::scope(|scope| {
+            let opener = Opener { input, progress, checksum: &file, scope };
+            let open = |is_first| opener.open(if is_first { weight } else { 0 });
+            // Nothing goes to scratch files.
+            let resources = Resources::unlimited(progress);
+            let mut faces = IndexedFaces::new(&resources);
+            match input.format() {
+                MeshFormat::Stl => stl::read_mesh(open(true)?),
+                MeshFormat::Ply => {
+                    ply::read(open, &mut faces)?;
+                    mesh_of_faces(&faces, &Names::unnamed())
+                }
+                _ => {
+                    let names = obj::read(open, &mut faces, &resources)?;
+                    mesh_of_faces(&faces, &names)
+                }
+            }
+        });
+        (mesh, file.into_inner().unwrap_or_default())
+    };
+    let mut mesh = mesh.map_err(|halt| match halt.in_file(input.path()) {
+        BakeError::Read(error) => error,
+        // This reader stores nothing outside memory.
+        other => input.failed(std::io::Error::other(other.to_string())),
+    })?;
+    mesh.objects.retain(|object| !object.triangles.is_empty());
+    mesh.drop_negative_zeros();
+    mesh.check().map_err(|error| ReadError::Mesh { path: input.path().to_owned(), source: error })?;
+    Ok((mesh, checksum))
+}
+
+/// Returns the error for a file of no known format.
+pub(crate) fn unknown_format(path: &Path) -> ReadError {
+    let found = match path.extension() {
+        Some(extension) => format!("an unsupported format, .{}", excerpt(extension.as_encoded_bytes())),
+        None => "content of no known format".to_owned(),
+    };
+    Fault::new(Place::File, KNOWN, found).in_file(path)
+}
+
+/// The least bytes of memory per byte of a glTF file.
+pub(crate) const GLTF_BYTES_PER_BYTE: u64 = 8;
+
+/// Reads mesh files as [`crate::FileBake`] does: the objects of one file follow those of the previous one, and the ids
+/// are consecutive.
+///
+/// # Errors
+/// The errors of [`read`], and an error if the files together have more triangles than there are ids.
+pub fn read_meshes(inputs: &[PathBuf]) -> Result<Mesh, BakeError> {
+    let mut joined = Mesh::default();
+    for input in inputs {
+        append(&mut joined, read(input)?)?;
+    }
+    Ok(joined)
+}
+
+/// Appends the objects of a mesh. Their ids follow the present ones.
+fn append(joined: &mut Mesh, mut mesh: Mesh) -> Result<(), BakeError> {
+    let first = joined.triangle_count();
+    let all = first + mesh.triangle_count();
+    if all > mesh::MAX_TRIANGLES {
+        return Err(mesh::InputError::TooManyTriangles(all).into());
+    }
+    let ids = mesh.objects.iter_mut().flat_map(|object| &mut object.triangle_ids);
+    ids.for_each(|id| *id = id.saturating_add(first as u32));
+    joined.objects.append(&mut mesh.objects);
+    Ok(())
+}
+
+/// Returns the ids of the next `count` triangles.
+fn next_ids(next: &mut u32, count: usize) -> Result<Vec<u32>, Fault> {
+    let most = mesh::MAX_TRIANGLES;
+    let end = u64::from(*next) + count as u64;
+    if end > most {
+        return Err(Fault::Limit { place: Place::File, most, what: "triangles" });
+    }
+    let ids = (*next..end as u32).collect();
+    *next = end as u32;
+    Ok(ids)
+}
+
+/// The requirement for a coordinate, as messages state it.
+pub(crate) const COORDINATE: &str = "a finite coordinate of at most 2^120 in magnitude";
+
+/// Returns the fault of a file that was malformed at the first reading but not at the second.
+fn changed_meanwhile() -> Fault {
+    Fault::new(Place::File, "the file as it was at the first reading", "a changed file")
+}

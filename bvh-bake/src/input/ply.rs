@@ -1,0 +1,418 @@
+//! Reads PLY: text, or binary of either byte order, with any elements and properties in any order.
+//!
+//! The reader needs `x`, `y` and `z` of the element `vertex` and the list `vertex_indices` (or `vertex_index`) of the
+//! element `face`. It reads and drops the rest. All numbers are read as f64, which represents numbers of every type
+//! exactly. Text is read word by word, wherever its lines end. Bytes after the last element are ignored.
+
+use super::byte_reader::{ByteReader, Words};
+use super::indexed::IndexedFaces;
+use super::polygon::MAX_CORNERS;
+use super::text::words;
+use super::{COORDINATE, changed_meanwhile};
+use crate::error::{Fault, Halt, Place, excerpt};
+use crate::limits::{MAX_TRIANGLES, MAX_VERTICES, coordinate_fits};
+use std::io::Read;
+
+/// Takes the vertices and faces of a file in order. Either kind may come first.
+pub(crate) trait Faces {
+    /// Returns the number of vertices taken.
+    fn vertices(&self) -> u64;
+    /// Takes the next vertex.
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt>;
+    /// Takes the next vertex, which has a coordinate that the format cannot hold. `place` is where that coordinate is.
+    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt>;
+    /// Takes the next face. Its vertices may come later.
+    fn face(&mut self, corners: &[u32]) -> Result<(), Halt>;
+}
+
+/// Reads a file into `faces`. After a success, all their corners are vertices that the format can hold. `open` opens
+/// the file at its beginning; its argument states whether this is the first time.
+pub(crate) fn read<R: Read>(
+    open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
+    faces: &mut IndexedFaces,
+) -> Result<(), Halt> {
+    stream(open(true)?, faces)?;
+    faces.finish()?;
+    if let Some((_, corner)) = faces.first_out_of_range()? {
+        let expected = format!("vertex numbers below {}", faces.vertex_count());
+        return Err(Fault::new(Place::File, expected, corner.to_string()).into());
+    }
+    match faces.first_misfit(None)? {
+        None => Ok(()),
+        Some(vertex) => {
+            // The second reading meets the misfit again and reports its place.
+            stream(open(false)?, &mut MisfitFinder { vertex, vertices: 0 })?;
+            Err(changed_meanwhile().into())
+        }
+    }
+}
+
+/// Reads a file from its beginning to its end.
+fn stream<R: Read>(reader: ByteReader<R>, faces: &mut impl Faces) -> Result<(), Halt> {
+    let mut words = Words::new(reader);
+    let header = match Header::read(&mut words) {
+        Ok(header) => header,
+        Err(fault) => return words.reader.finish(Err(fault.into())),
+    };
+    let format = header.format;
+    let mut body = Body { words, format };
+    let mut reader = Reader { faces, corners: Vec::new(), triangles: 0 };
+    let result = header.elements.iter().try_for_each(|element| {
+        body.expect_room(element)?;
+        reader.read_element(element, &mut body)
+    });
+    body.words.reader.finish(result)
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn parse(word: &[u8]) -> Option<Kind> {
+        Some(match word {
+            b"char" | b"int8" => Kind::I8,
+            b"uchar" | b"uint8" => Kind::U8,
+            b"short" | b"int16" => Kind::I16,
+            b"ushort" | b"uint16" => Kind::U16,
+            b"int" | b"int32" => Kind::I32,
+            b"uint" | b"uint32" => Kind::U32,
+            b"float" | b"float32" => Kind::F32,
+            b"double" | b"float64" => Kind::F64,
+            _ => return None,
+        })
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Kind::I8 | Kind::U8 => 1,
+            Kind::I16 | Kind::U16 => 2,
+            Kind::I32 | Kind::U32 | Kind::F32 => 4,
+            Kind::F64 => 8,
+        }
+    }
+}
+
+/// The meaning of a property for a mesh.
+#[derive(Clone, Copy, PartialEq)]
+enum Role {
+    Coordinate(usize),
+    Corners,
+    Other,
+}
+
+struct Property {
+    /// The type of the count if this is a list.
+    count: Option<Kind>,
+    kind: Kind,
+    role: Role,
+}
+
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<Property>,
+}
+
+struct Header {
+    elements: Vec<Element>,
+    format: Format,
+}
+
+impl Header {
+    fn read<R: Read>(words_of_file: &mut Words<R>) -> Result<Header, Fault> {
+        let lines = words_of_file;
+        let head = lines.reader.peek(16).to_vec();
+        if lines.line().is_none_or(|(line, _)| line != b"ply") {
+            return Err(Fault::new(Place::Line(1), "ply", excerpt(&head)));
+        }
+        let only_returns = head.get(3..5).is_some_and(|ending| ending[0] == b'\r' && ending[1] != b'\n');
+        let mut elements: Vec<Element> = Vec::new();
+        let mut format = None;
+        let ended_by_both = loop {
+            let Some((line, both)) = lines.line() else {
+                return Err(Fault::new(lines.place(), "end_header", "the end of the file"));
+            };
+            let (line, place) = (&line[..], lines.place());
+            let invalid = |expected: &'static str| Fault::new(place, expected, excerpt(line));
+            // No statement has more words; a list has five.
+            let mut parts: [&[u8]; 6] = [b""; 6];
+            parts.iter_mut().zip(words(line)).for_each(|(part, word)| *part = word);
+            match parts {
+                [b"comment" | b"obj_info", ..] | [b"", ..] => {}
+                [b"format", name, b"1.0", ..] => {
+                    format = Some(match name {
+                        b"ascii" => Format::Ascii,
+                        b"binary_little_endian" => Format::LittleEndian,
+                        b"binary_big_endian" => Format::BigEndian,
+                        _ => return Err(invalid("format ascii, binary_little_endian or binary_big_endian")),
+                    });
+                }
+                [b"element", name, count, ..] => {
+                    let count = std::str::from_utf8(count).ok().and_then(|count| count.parse().ok());
+                    let count = count.ok_or_else(|| invalid("element NAME COUNT"))?;
+                    let name = String::from_utf8_lossy(name).into_owned();
+                    elements.push(Element { name, count, properties: Vec::new() });
+                }
+                [b"property", ref kinds @ ..] => {
+                    let element =
+                        elements.last_mut().ok_or_else(|| invalid("an element before its properties"))?;
+                    let property = read_property(&element.name, kinds);
+                    element
+                        .properties
+                        .push(property.ok_or_else(|| invalid("property [list COUNT] TYPE NAME"))?);
+                }
+                [b"end_header", ..] => break both,
+                _ => return Err(invalid("format 1.0, comment, element, property or end_header")),
+            }
+        };
+        let format = format.ok_or_else(|| Fault::new(lines.place(), "a format above end_header", "none"))?;
+        for (name, roles) in [
+            ("vertex", &[Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)][..]),
+            ("face", &[Role::Corners]),
+        ] {
+            let element = elements.iter().find(|element| element.name == name);
+            let has = |role: &Role| element.is_some_and(|e| e.properties.iter().any(|p| p.role == *role));
+            if !roles.iter().all(has) {
+                let expected =
+                    "an element vertex with x, y and z, and an element face with a list vertex_indices";
+                return Err(Fault::new(lines.place(), expected, format!("no such {name}")));
+            }
+        }
+        // If lines end in CR alone, an LF after the last CR belongs to the body.
+        if format != Format::Ascii && only_returns && ended_by_both {
+            lines.reader.step_back();
+        }
+        Ok(Header { elements, format })
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Format {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+fn read_property(element: &str, words: &[&[u8]; 5]) -> Option<Property> {
+    let (count, kind, name) = match *words {
+        [b"list", count, kind, name, _] => {
+            let count = Kind::parse(count).filter(|kind| !matches!(kind, Kind::F32 | Kind::F64));
+            (Some(count?), kind, name)
+        }
+        [kind, name, ..] => (None, kind, name),
+    };
+    let role = match (element, name, count) {
+        ("vertex", b"x", None) => Role::Coordinate(0),
+        ("vertex", b"y", None) => Role::Coordinate(1),
+        ("vertex", b"z", None) => Role::Coordinate(2),
+        ("face", b"vertex_indices" | b"vertex_index", Some(_)) => Role::Corners,
+        _ => Role::Other,
+    };
+    Some(Property { count, kind: Kind::parse(kind)?, role }).filter(|_| !name.is_empty())
+}
+
+/// The part of the file after the header.
+struct Body<R> {
+    words: Words<R>,
+    format: Format,
+}
+
+impl<R: Read> Body<R> {
+    /// Returns the place of the next number; in text, the line of the last word.
+    fn place(&self) -> Place {
+        match self.format {
+            Format::Ascii => self.words.place(),
+            _ => Place::Byte(self.words.reader.position()),
+        }
+    }
+
+    /// Refuses an element that declares more rows than the file can hold.
+    fn expect_room(&self, element: &Element) -> Result<(), Fault> {
+        let least: u64 = match self.format {
+            // Each number takes a character and a blank; only the last blank may be missing.
+            Format::Ascii => 2 * element.properties.len() as u64,
+            _ => element
+                .properties
+                .iter()
+                .map(|property| property.count.unwrap_or(property.kind).bytes() as u64)
+                .sum(),
+        };
+        let left = self.words.reader.bytes_left() + 1;
+        if element.count.saturating_mul(least) > left {
+            let expected = format!(
+                "at most {} rows of element {}, which is what fits the file",
+                left / least,
+                excerpt(element.name.as_bytes())
+            );
+            return Err(Fault::new(self.place(), expected, element.count.to_string()));
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn number(&mut self, kind: Kind) -> Result<f64, Fault> {
+        if self.format == Format::Ascii {
+            return self.words.number();
+        }
+        let number = match kind {
+            Kind::I8 => self.take().map(|b| f64::from(i8::from_le_bytes(b))),
+            Kind::U8 => self.take().map(|b| f64::from(u8::from_le_bytes(b))),
+            Kind::I16 => self.take().map(|b| f64::from(i16::from_le_bytes(b))),
+            Kind::U16 => self.take().map(|b| f64::from(u16::from_le_bytes(b))),
+            Kind::I32 => self.take().map(|b| f64::from(i32::from_le_bytes(b))),
+            Kind::U32 => self.take().map(|b| f64::from(u32::from_le_bytes(b))),
+            Kind::F32 => self.take().map(|b| f64::from(f32::from_le_bytes(b))),
+            Kind::F64 => self.take().map(f64::from_le_bytes),
+        };
+        number.ok_or_else(|| Fault::new(self.place(), "a number", "the end of the file"))
+    }
+
+    /// Takes the next `N` bytes, in little-endian order.
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let mut taken: [u8; N] = self.words.reader.take()?;
+        if self.format == Format::BigEndian {
+            taken.reverse();
+        }
+        Some(taken)
+    }
+
+    /// Returns a whole number from 0 to `most`.
+    fn whole(&mut self, kind: Kind, most: u64, what: &'static str) -> Result<u32, Fault> {
+        let before = self.place();
+        let number = self.number(kind)?;
+        if number >= 0.0 && number <= most as f64 && number.fract() == 0.0 {
+            return Ok(number as u32);
+        }
+        let place = if self.format == Format::Ascii { self.place() } else { before };
+        Err(Fault::new(place, format!("{what} from 0 to {most}"), number.to_string()))
+    }
+}
+
+/// Reads the elements of a body.
+struct Reader<'a, F> {
+    faces: &'a mut F,
+    /// The corners of the current face.
+    corners: Vec<u32>,
+    triangles: u64,
+}
+
+impl<F: Faces> Reader<'_, F> {
+    fn read_element<R: Read>(&mut self, element: &Element, body: &mut Body<R>) -> Result<(), Halt> {
+        if element.properties.is_empty() {
+            return Ok(());
+        }
+        let is_vertex = element.name == "vertex";
+        for _ in 0..element.count {
+            let mut position = [0.0; 3];
+            for property in &element.properties {
+                let place = body.place();
+                match (property.count, property.role) {
+                    (Some(count), Role::Corners) => self.read_face(count, property.kind, body)?,
+                    (Some(count), _) => {
+                        for _ in 0..body.whole(count, u64::from(u32::MAX), "a length of a list")? {
+                            body.number(property.kind)?;
+                        }
+                    }
+                    (None, Role::Coordinate(axis)) => {
+                        position[axis] = body.number(property.kind)?;
+                        if !coordinate_fits(position[axis]) {
+                            let place = if body.format == Format::Ascii { body.place() } else { place };
+                            self.faces.misfit(place, position[axis])?;
+                        }
+                    }
+                    (None, _) => {
+                        body.number(property.kind)?;
+                    }
+                }
+            }
+            if is_vertex {
+                if self.faces.vertices() == MAX_VERTICES {
+                    let (place, most) = (body.place(), MAX_VERTICES);
+                    return Err(Fault::Limit { place, most, what: "vertices" }.into());
+                }
+                self.faces.vertex(position)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_face<R: Read>(&mut self, count: Kind, kind: Kind, body: &mut Body<R>) -> Result<(), Halt> {
+        let place = body.place();
+        let arity = body.whole(count, u64::from(u32::MAX), "a number of corners")?;
+        if arity < 3 {
+            return Err(Fault::new(place, "a face of at least three vertices", arity.to_string()).into());
+        }
+        if arity as usize > MAX_CORNERS {
+            return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" }.into());
+        }
+        self.triangles += u64::from(arity) - 2;
+        if self.triangles > MAX_TRIANGLES {
+            return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" }.into());
+        }
+        // If the vertices come first, a wrong number is reported at its place.
+        let vertices = self.faces.vertices();
+        let last = if vertices > 0 { vertices - 1 } else { MAX_VERTICES - 1 };
+        self.corners.clear();
+        for _ in 0..arity {
+            self.corners.push(body.whole(kind, last, "a vertex number")?);
+        }
+        self.faces.face(&self.corners)
+    }
+}
+
+impl Faces for IndexedFaces {
+    fn vertices(&self) -> u64 {
+        self.vertex_count()
+    }
+
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt> {
+        Ok(self.add_vertices(&[position])?)
+    }
+
+    fn misfit(&mut self, _: Place, _: f64) -> Result<(), Halt> {
+        // A misfit is an error only if a face uses it.
+        Ok(())
+    }
+
+    fn face(&mut self, corners: &[u32]) -> Result<(), Halt> {
+        Ok(self.add_run(corners.len() as u32, 1, 0, 0, corners)?)
+    }
+}
+
+/// Finds the place of a vertex that a face uses and that the format cannot hold.
+struct MisfitFinder {
+    vertex: u64,
+    vertices: u64,
+}
+
+impl Faces for MisfitFinder {
+    fn vertices(&self) -> u64 {
+        self.vertices
+    }
+
+    fn vertex(&mut self, _: [f64; 3]) -> Result<(), Halt> {
+        self.vertices += 1;
+        Ok(())
+    }
+
+    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt> {
+        if self.vertices == self.vertex {
+            return Err(Fault::new(place, COORDINATE, found.to_string()).into());
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, _: &[u32]) -> Result<(), Halt> {
+        Ok(())
+    }
+}

@@ -1,0 +1,319 @@
+//! Cuts 3D polygons into triangles that cover them and nothing else.
+//!
+//! A polygon is projected along the dominant axis of its Newell normal (Sutherland, Sproull and Schumacker 1974;
+//! Tampieri, Graphics Gems III). The projection drops a coordinate, so that nothing is rounded. Triangles need no cut.
+//! A quad is cut along the diagonal that lies inside it. Larger polygons are cut by ear clipping (`earcut`), because a
+//! fan would cover area outside a concave polygon. Ear clipping leaves out vertices that lie on an edge in projection.
+//! If such a vertex lies off that edge in space, the triangle between the two is added.
+//!
+//! A polygon without area (its Newell normal is zero or not finite, or nothing is left to clip) becomes a fan, which
+//! keeps the points and segments of the polygon. A long polygon that crosses itself also becomes a fan: definitions of
+//! its inside differ, a fan covers every point that the polygon winds around, and clipping such polygons takes cubic
+//! time. The same input always gives the same triangles.
+
+use earcut::Earcut;
+
+/// The most corners of a polygon, because clipping takes up to quadratic time.
+pub(crate) const MAX_CORNERS: usize = 1 << 16;
+/// Polygons with more corners than this are clipped only if they do not cross themselves.
+const MAX_TANGLED: usize = 256;
+/// The most visits of a long polygon to one point. A hole that is connected by a bridge takes two visits.
+const MAX_VISITS: usize = 8;
+
+/// Scratch memory for cutting one polygon after another.
+#[derive(Default)]
+pub(crate) struct Cutter {
+    earcut: Earcut<f64>,
+    flat: Vec<[f64; 2]>,
+    ears: Vec<u32>,
+    kept: Vec<bool>,
+}
+
+impl Cutter {
+    /// Cuts a polygon, given by the positions of its corners. Passes the triangles on one after the other, as places
+    /// among the corners.
+    pub(crate) fn cut_polygon<E>(
+        &mut self,
+        corners: &[[f64; 3]],
+        mut give: impl FnMut([usize; 3]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        if corners.len() == 3 {
+            return give([0, 1, 2]);
+        }
+        let polygon: Vec<u32> = (0..corners.len() as u32).collect();
+        let mut triangles = Vec::new();
+        self.cut(corners, &polygon, &mut triangles);
+        triangles.into_iter().try_for_each(|triangle| give(triangle.map(|corner| corner as usize)))
+    }
+
+    fn cut(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+        match *polygon {
+            [] | [_] | [_, _] => {}
+            [a, b, c] => triangles.push([a, b, c]),
+            _ if !self.flatten(positions, polygon) => fan(polygon, triangles),
+            [a, b, c, d] => {
+                let [fa, fb, fc, fd] = [self.flat[0], self.flat[1], self.flat[2], self.flat[3]];
+                let along_ac = doubled_area(fa, fb, fc) > 0.0 && doubled_area(fc, fd, fa) > 0.0;
+                let along_bd = doubled_area(fb, fc, fd) > 0.0 && doubled_area(fd, fa, fb) > 0.0;
+                if along_bd && !along_ac {
+                    triangles.extend([[b, c, d], [d, a, b]]);
+                } else {
+                    triangles.extend([[a, b, c], [a, c, d]]);
+                }
+            }
+            _ if polygon.len() > MAX_TANGLED && is_tangled(&self.flat) => fan(polygon, triangles),
+            _ => self.clip(positions, polygon, triangles),
+        }
+    }
+
+    fn clip(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+        self.earcut.earcut_slice::<u32>(&self.flat, &[], &mut self.ears);
+        let ears = self.ears.as_chunks::<3>().0;
+        // Ear clipping has a winding of its own. The polygon's winding is positive here, and the triangles must keep
+        // it.
+        let area = |ear: &[u32; 3]| {
+            let [a, b, c] = ear.map(|corner| self.flat[corner as usize]);
+            doubled_area(a, b, c)
+        };
+        let flip = ears.iter().map(area).sum::<f64>() < 0.0;
+        triangles.extend(ears.iter().map(|&[a, b, c]| {
+            let [a, b, c] = [a, b, c].map(|corner| polygon[corner as usize]);
+            if flip { [a, c, b] } else { [a, b, c] }
+        }));
+
+        self.kept.clear();
+        self.kept.resize(polygon.len(), false);
+        self.ears.iter().for_each(|&corner| self.kept[corner as usize] = true);
+        let Some(start) = self.kept.iter().position(|&kept| kept) else {
+            return fan(polygon, triangles);
+        };
+        let ring = |step: usize| (start + step) % polygon.len();
+        let mut last = polygon[start];
+        for step in 1..polygon.len() {
+            let (here, next) = (polygon[ring(step)], polygon[ring(step + 1)]);
+            if self.kept[ring(step)] {
+                last = here;
+            } else if has_area([last, here, next].map(|corner| positions[corner as usize])) {
+                triangles.push([last, here, next]);
+            }
+        }
+    }
+
+    /// Projects the polygon into `self.flat`, counter-clockwise. Returns false if the polygon has no area.
+    fn flatten(&mut self, positions: &[[f64; 3]], polygon: &[u32]) -> bool {
+        let at = |corner: u32| positions[corner as usize];
+        let origin = at(polygon[0]);
+        let relative =
+            |corner: u32| -> [f64; 3] { std::array::from_fn(|axis| at(corner)[axis] - origin[axis]) };
+        let mut normal = [0.0; 3];
+        let mut previous = relative(polygon[polygon.len() - 1]);
+        for &corner in polygon {
+            let current = relative(corner);
+            for axis in 0..3 {
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                normal[axis] += (previous[u] - current[u]) * (previous[v] + current[v]);
+            }
+            previous = current;
+        }
+        let mut dominant = 0;
+        for axis in 1..3 {
+            if normal[axis].abs() > normal[dominant].abs() {
+                dominant = axis;
+            }
+        }
+        if !normal.iter().all(|n| n.is_finite()) || normal[dominant] == 0.0 {
+            return false;
+        }
+        let (mut u, mut v) = ((dominant + 1) % 3, (dominant + 2) % 3);
+        if normal[dominant] < 0.0 {
+            (u, v) = (v, u);
+        }
+        self.flat.clear();
+        self.flat.extend(polygon.iter().map(|&corner| [at(corner)[u], at(corner)[v]]));
+        true
+    }
+}
+
+fn fan(polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    triangles.extend(polygon[1..].windows(2).map(|pair| [polygon[0], pair[0], pair[1]]));
+}
+
+/// Returns whether a triangle's normal differs from zero as far as f64 can represent it.
+fn has_area([a, b, c]: [[f64; 3]; 3]) -> bool {
+    let edge = |to: [f64; 3]| -> [f64; 3] { std::array::from_fn(|axis| to[axis] - a[axis]) };
+    let (u, v) = (edge(b), edge(c));
+    (0..3).any(|axis| {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        u[i] * v[j] != u[j] * v[i]
+    })
+}
+
+/// Returns whether two edges cross in their interiors, or whether more edges meet in one point than in any sensible
+/// polygon. Sweeps over the edges sorted by x, which usually takes n log n steps, and at worst one test per pair.
+fn is_tangled(flat: &[[f64; 2]]) -> bool {
+    let mut points: Vec<[u64; 2]> = flat.iter().map(|point| point.map(|c| (c + 0.0).to_bits())).collect();
+    points.sort_unstable();
+    if points.windows(MAX_VISITS + 1).any(|visits| visits[0] == visits[MAX_VISITS]) {
+        return true;
+    }
+    let mut edges: Vec<[[f64; 2]; 2]> = flat
+        .iter()
+        .zip(flat.iter().cycle().skip(1))
+        .map(|(&p, &q)| if p[0] <= q[0] { [p, q] } else { [q, p] })
+        .collect();
+    edges.sort_unstable_by(|a, b| a[0][0].total_cmp(&b[0][0]));
+    edges.iter().enumerate().any(|(place, &[a, b])| {
+        edges[place + 1..].iter().take_while(|other| other[0][0] < b[0]).any(|&[c, d]| {
+            a[1].min(b[1]) < c[1].max(d[1])
+                && c[1].min(d[1]) < a[1].max(b[1])
+                && doubled_area(a, b, c) * doubled_area(a, b, d) < 0.0
+                && doubled_area(c, d, a) * doubled_area(c, d, b) < 0.0
+        })
+    })
+}
+
+/// Returns twice the signed area of a flat triangle, which is positive if the triangle is counter-clockwise.
+fn doubled_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cuts polygons that are given as one list of corners and the number of corners of each polygon.
+    fn triangulate(positions: &[[f64; 3]], corners: &[u32], arities: &[usize]) -> Vec<[u32; 3]> {
+        let (mut cutter, mut triangles, mut rest) = (Cutter::default(), Vec::new(), corners);
+        for &arity in arities {
+            let (polygon, after) = rest.split_at(arity.min(rest.len()));
+            cutter.cut(positions, polygon, &mut triangles);
+            rest = after;
+        }
+        triangles
+    }
+
+    fn cut(points: &[[f64; 2]], lift: impl Fn([f64; 2]) -> [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+        let positions: Vec<_> = points.iter().map(|&point| lift(point)).collect();
+        let corners: Vec<u32> = (0..points.len() as u32).collect();
+        let triangles = triangulate(&positions, &corners, &[points.len()]);
+        (positions, triangles)
+    }
+
+    /// Returns the sum of the signed areas and the sum of their magnitudes, in the plane of x and y.
+    fn areas(points: &[[f64; 2]], triangles: &[[u32; 3]]) -> (f64, f64) {
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|corner| points[corner as usize]);
+            doubled_area(a, b, c) / 2.0
+        };
+        (triangles.iter().map(area).sum(), triangles.iter().map(|t| area(t).abs()).sum())
+    }
+
+    fn shoelace(points: &[[f64; 2]]) -> f64 {
+        let next = points.iter().cycle().skip(1);
+        points.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>() / 2.0
+    }
+
+    /// Returns a star, a comb, and a dart that starts at each of its corners. All coordinates are whole, so that every
+    /// area is exact.
+    fn concave() -> Vec<Vec<[f64; 2]>> {
+        let dart = [[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]];
+        let mut all: Vec<Vec<_>> =
+            (0..4).map(|turn| (0..4).map(|i| dart[(i + turn) % 4]).collect()).collect();
+        let mut comb = vec![[0.0, -1.0], [40.0, -1.0]];
+        for tooth in (0..20).rev() {
+            comb.extend([[2.0 * f64::from(tooth) + 2.0, 0.0], [2.0 * f64::from(tooth) + 1.0, 9.0]]);
+        }
+        comb.push([0.0, 0.0]);
+        all.push(comb);
+        all.push(
+            (0..24)
+                .map(|i| {
+                    let angle = std::f64::consts::TAU * f64::from(i) / 24.0;
+                    let radius = if i % 2 == 0 { 1000.0 } else { 300.0 };
+                    [(radius * angle.cos()).round(), (radius * angle.sin()).round()]
+                })
+                .collect(),
+        );
+        all
+    }
+
+    #[test]
+    fn concave_polygons_keep_their_area() {
+        for mut points in concave() {
+            for _ in 0..2 {
+                let lifts: [fn([f64; 2]) -> [f64; 3]; 3] =
+                    [|[x, y]| [x, y, x + y], |[x, y]| [2.0 * y - x, x, y], |[x, y]| [y, 7.0, x]];
+                for lift in lifts {
+                    let (_, triangles) = cut(&points, lift);
+                    let (signed, unsigned) = areas(&points, &triangles);
+                    assert_eq!(signed, shoelace(&points), "{points:?}");
+                    assert_eq!(unsigned, signed.abs(), "no triangle lies outside, and the winding is kept");
+                }
+                points.reverse();
+            }
+        }
+    }
+
+    #[test]
+    fn a_convex_quad_is_cut_as_a_fan() {
+        let (_, triangles) = cut(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], |[x, y]| [x, y, 0.0]);
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_quad_with_a_corner_on_an_edge_gets_no_triangle_without_area() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 2.0]];
+        let (_, triangles) = cut(&points, |[x, y]| [x, y, 0.0]);
+        assert_eq!(areas(&points, &triangles), (2.0, 2.0));
+        assert_eq!(triangles, [[1, 2, 3], [3, 0, 1]]);
+    }
+
+    #[test]
+    fn polygons_without_area_become_fans() {
+        let (_, triangles) =
+            cut(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [5.0, 0.0]], |[x, _]| [x; 3]);
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        let (_, triangles) = cut(&[[f64::NAN, 0.0]; 5], |[x, y]| [x, y, 0.0]);
+        assert_eq!(triangles.len(), 3);
+    }
+
+    #[test]
+    fn a_corner_on_an_edge_in_projection_only_stays() {
+        let positions =
+            [[-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0], [-5.0, 0.0, -5.0], [0.0, 5.0, -5.0]];
+        let triangles = triangulate(&positions, &[0, 1, 2, 3, 4], &[5]);
+        assert_eq!(triangles.len(), 3);
+        assert!(triangles.iter().flatten().any(|&corner| corner == 4), "{triangles:?}");
+        // The vertex is on the edge in space as well, so that no triangle is added.
+        let positions = positions.map(|[x, _, z]| [x, 0.0, z]);
+        assert_eq!(triangulate(&positions, &[0, 1, 2, 3, 4], &[5]).len(), 2);
+    }
+
+    #[test]
+    fn long_polygons_that_cross_themselves_become_fans() {
+        let corner = |i: usize| [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]][i % 4];
+        let (_, triangles) = cut(&(0..2000).map(corner).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
+        assert_eq!(triangles.len(), 1998);
+        let golden = |i: usize| [(2.4 * i as f64).cos(), (2.4 * i as f64).sin()];
+        let (_, triangles) = cut(&(0..2000).map(golden).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
+        assert_eq!(triangles[1997], [0, 1998, 1999]);
+    }
+
+    #[test]
+    fn long_simple_polygons_are_clipped() {
+        let spiral = |i: usize| {
+            let (turn, radius) = if i < 500 { (i, 1.0) } else { (999 - i, 1.1) };
+            let angle = 0.05 * turn as f64;
+            [(radius + angle) * angle.cos(), (radius + angle) * angle.sin()]
+        };
+        let points: Vec<_> = (0..1000).map(spiral).collect();
+        let (_, triangles) = cut(&points, |[x, y]| [x, y, 0.0]);
+        let (signed, unsigned) = areas(&points, &triangles);
+        assert!((unsigned - shoelace(&points).abs()).abs() <= 1e-12 * unsigned, "{signed} {unsigned}");
+    }
+
+    #[test]
+    fn short_runs_and_tiny_polygons_are_no_panic() {
+        assert_eq!(triangulate(&[[0.0; 3]], &[0, 0], &[1, 9]), Vec::<[u32; 3]>::new());
+    }
+}

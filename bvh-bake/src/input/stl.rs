@@ -1,0 +1,313 @@
+//! Reads STL: text with any number of solids, or binary.
+//!
+//! STL has no vertex numbers, so the reader joins vertices with equal coordinates and numbers them in the order in
+//! which they first appear. A file whose length is exactly what its binary count requires is binary even if it starts
+//! with `solid`, and so is a file with a zero byte near its start. Bytes after the last binary triangle are ignored,
+//! because some exporters write them. A file that is shorter than its count requires, or text that ends inside a solid,
+//! is refused. Normals are ignored.
+
+use super::byte_reader::{ByteReader, Words};
+use super::text::Lines;
+use super::{COORDINATE, next_ids, text};
+use crate::error::{Fault, Halt, Place, excerpt};
+use crate::input::mesh::{Mesh, Object};
+use crate::limits::{MAX_VERTICES, coordinate_fits};
+use crate::triangles::TRIANGLES_PER_PART;
+use rayon::prelude::*;
+use std::hash::BuildHasher;
+use std::io::Read;
+
+/// Bytes of a binary file before its first triangle: 80 for the header and 4 for the count.
+const HEAD: usize = 84;
+/// Bytes of a binary triangle: the normal, three vertices, and two bytes of attributes.
+const TRIANGLE: usize = 50;
+/// The number of bytes that decide between text and binary.
+const TELLING: usize = 1024;
+
+/// The number of triangles that are passed on at a time: several parts of a stream for each thread.
+const BATCH_TRIANGLES: usize = 8 * TRIANGLES_PER_PART;
+
+/// Takes the solids of a file in order.
+pub(super) trait Solids {
+    /// Begins a solid of about `expected` triangles.
+    fn begin(&mut self, name: String, expected: usize) -> Result<(), Halt>;
+    /// Takes the next triangles of the solid. `corners_of` returns their corners.
+    fn triangles(
+        &mut self,
+        count: usize,
+        corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
+    ) -> Result<(), Halt>;
+    /// Ends the solid.
+    fn end(&mut self) -> Result<(), Halt>;
+}
+
+/// Reads a file into a mesh in which equal vertices are joined.
+pub(super) fn read_mesh<R: Read>(reader: ByteReader<R>) -> Result<Mesh, Halt> {
+    let mut joined = Joined::default();
+    read(reader, &mut joined)?;
+    Ok(joined.mesh)
+}
+
+/// Reads a file from its beginning to its end.
+pub(super) fn read<R: Read>(mut reader: ByteReader<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+    let length = reader.length();
+    let head = reader.peek(TELLING);
+    if is_ascii(head) && !is_exact_binary(head, length) {
+        let mut words = Words::new(reader);
+        let result = read_ascii(&mut words, solids);
+        words.reader.finish(result)
+    } else {
+        let result = read_binary(&mut reader, solids);
+        reader.finish(result)
+    }
+}
+
+/// Returns whether a file of `length` bytes that starts with `head` has the exact length of a binary STL with its
+/// count.
+pub(super) fn is_exact_binary(head: &[u8], length: u64) -> bool {
+    binary_count(head).is_some_and(|count| HEAD as u64 + u64::from(count) * TRIANGLE as u64 == length)
+}
+
+/// Returns whether the file starts like STL text.
+pub(super) fn is_ascii(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(TELLING)];
+    let first = Lines::new(head).find_map(|line| text::words(line).next());
+    !head.contains(&0) && first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
+fn binary_count(bytes: &[u8]) -> Option<u32> {
+    let count = bytes.get(HEAD - 4..HEAD)?;
+    Some(u32::from_le_bytes(count.try_into().ok()?))
+}
+
+fn read_binary<R: Read>(reader: &mut ByteReader<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+    let Some(count) = binary_count(reader.peek(HEAD)) else {
+        let found = format!("{} bytes", reader.length());
+        return Err(Fault::new(Place::File, "STL text, or at least 84 bytes of binary STL", found).into());
+    };
+    let room = (reader.length() - HEAD as u64) / TRIANGLE as u64;
+    if u64::from(count) > room {
+        let expected = format!("a count of at most {room} triangles, which is what fits the file");
+        return Err(Fault::new(Place::Byte(HEAD as u64 - 4), expected, count.to_string()).into());
+    }
+    reader.skip(HEAD);
+    solids.begin(String::new(), count as usize)?;
+    let mut before = 0;
+    while before < count as usize {
+        let now = (count as usize - before).min(BATCH_TRIANGLES);
+        let triangles = reader.peek(now * TRIANGLE).as_chunks::<TRIANGLE>().0;
+        let at = |place: usize| HEAD as u64 + (before + place) as u64 * TRIANGLE as u64;
+        let misfit = triangles.par_iter().position_first(|triangle| first_misfit(triangle).is_some());
+        if let Some(place) = misfit {
+            let (corner, value) = first_misfit(&triangles[place]).unwrap_or_default();
+            let byte = at(place) + 12 + 4 * corner as u64;
+            return Err(Fault::new(Place::Byte(byte), COORDINATE, value.to_string()).into());
+        }
+        if triangles.len() < now {
+            let place = Place::Byte(at(triangles.len()));
+            return Err(Fault::new(place, "a triangle", "the end of the file").into());
+        }
+        solids.triangles(now, |place| coordinates(&triangles[place]).map(|corner| corner.map(f64::from)))?;
+        reader.skip(now * TRIANGLE);
+        before += now;
+    }
+    solids.end()
+}
+
+/// Returns the corners of a binary triangle.
+#[inline]
+fn coordinates(triangle: &[u8; TRIANGLE]) -> [[f32; 3]; 3] {
+    let values = triangle[12..48].as_chunks::<4>().0;
+    let value = |place: usize| f32::from_le_bytes(values[place]);
+    [0, 3, 6].map(|corner| [corner, corner + 1, corner + 2].map(value))
+}
+
+/// Returns the first coordinate of a triangle that the format cannot hold, and its place among the nine.
+fn first_misfit(triangle: &[u8; TRIANGLE]) -> Option<(usize, f32)> {
+    let corners = coordinates(triangle);
+    let mut values = corners.as_flattened().iter().copied().enumerate();
+    values.find(|&(_, value)| !coordinate_fits(value.into()))
+}
+
+fn read_ascii<R: Read>(words: &mut Words<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+    const SOLID: &str = "facet or endsolid";
+    while let Some(word) = words.next() {
+        let word = words.text(word);
+        if !word.eq_ignore_ascii_case(b"solid") {
+            return Err(Fault::new(words.place(), "solid", excerpt(word)).into());
+        }
+        let name = words.rest_of_line();
+        let name = name.map(|name| String::from_utf8_lossy(words.text(name).trim_ascii()).into_owned());
+        solids.begin(name.unwrap_or_default(), 0)?;
+        let mut batch = Vec::new();
+        loop {
+            let word = words.expect(SOLID)?;
+            let word = words.text(word);
+            if word.eq_ignore_ascii_case(b"endsolid") {
+                words.rest_of_line();
+                break;
+            } else if !word.eq_ignore_ascii_case(b"facet") {
+                return Err(Fault::new(words.place(), SOLID, excerpt(word)).into());
+            }
+            batch.push(read_facet(words)?);
+            if batch.len() == BATCH_TRIANGLES {
+                solids.triangles(batch.len(), |place| batch[place])?;
+                batch.clear();
+            }
+        }
+        solids.triangles(batch.len(), |place| batch[place])?;
+        solids.end()?;
+    }
+    Ok(())
+}
+
+/// Reads from after `facet` up to and including `endfacet`.
+fn read_facet<R: Read>(words: &mut Words<R>) -> Result<[[f64; 3]; 3], Fault> {
+    keyword(words, "normal")?;
+    // The words of the normal are skipped, whether they are three numbers or not.
+    let mut skipped = 0;
+    loop {
+        let word = words.expect("outer loop")?;
+        let word = words.text(word);
+        if word.eq_ignore_ascii_case(b"outer") {
+            break;
+        }
+        skipped += 1;
+        if skipped > 3 {
+            return Err(Fault::new(words.place(), "outer loop", excerpt(word)));
+        }
+    }
+    keyword(words, "loop")?;
+    let mut corners = [[0.0; 3]; 3];
+    for coordinates in &mut corners {
+        keyword(words, "vertex")?;
+        for coordinate in coordinates {
+            *coordinate = words.number()?;
+            if !coordinate_fits(*coordinate) {
+                return Err(Fault::new(words.place(), COORDINATE, coordinate.to_string()));
+            }
+        }
+    }
+    keyword(words, "endloop")?;
+    keyword(words, "endfacet")?;
+    Ok(corners)
+}
+
+fn keyword<R: Read>(words: &mut Words<R>, expected: &'static str) -> Result<(), Fault> {
+    let word = words.expect(expected)?;
+    let word = words.text(word);
+    if word.eq_ignore_ascii_case(expected.as_bytes()) {
+        Ok(())
+    } else {
+        Err(Fault::new(words.place(), expected, excerpt(word)))
+    }
+}
+
+/// Collects a mesh in which equal vertices are joined.
+#[derive(Default)]
+struct Joined {
+    mesh: Mesh,
+    solid: Option<Solid>,
+    next_id: u32,
+}
+
+impl Solids for Joined {
+    fn begin(&mut self, name: String, expected: usize) -> Result<(), Halt> {
+        self.solid = Some(Solid::new(name, expected));
+        Ok(())
+    }
+
+    fn triangles(
+        &mut self,
+        count: usize,
+        corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
+    ) -> Result<(), Halt> {
+        let Some(solid) = &mut self.solid else { return Ok(()) };
+        (0..count).try_for_each(|place| Ok(solid.push(corners_of(place))?))
+    }
+
+    fn end(&mut self) -> Result<(), Halt> {
+        if let Some(solid) = self.solid.take() {
+            self.mesh.objects.push(solid.finish(&mut self.next_id)?);
+        }
+        Ok(())
+    }
+}
+
+/// An object that grows by triangles and joins equal vertices.
+struct Solid {
+    object: Object,
+    /// An open-addressed hash table of vertex numbers. Its length is a power of two.
+    table: Vec<u32>,
+    /// A random number, so that nobody can make a file whose vertices all collide. The vertex numbers do not depend on
+    /// it.
+    seed: u64,
+}
+
+const FREE: u32 = u32::MAX;
+
+impl Solid {
+    /// Makes an empty solid for `expected` triangles. The file is long enough to hold that many.
+    fn new(name: String, expected: usize) -> Self {
+        let mut object = Object { name, ..Object::default() };
+        object.triangles.reserve_exact(expected);
+        // A closed surface has half as many vertices as triangles, so that the table becomes half full.
+        let table = vec![FREE; expected.next_power_of_two().max(64)];
+        Solid { object, table, seed: std::hash::RandomState::new().hash_one(0) }
+    }
+
+    fn push(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Fault> {
+        let mut triangle = [0; 3];
+        for (corner, position) in triangle.iter_mut().zip(corners) {
+            *corner = self.number(position)?;
+        }
+        self.object.triangles.push(triangle);
+        Ok(())
+    }
+
+    /// Returns the number of the vertex with this position, and adds the vertex if there is none.
+    fn number(&mut self, position: [f64; 3]) -> Result<u32, Fault> {
+        // -0.0 and 0.0 are the same position.
+        let position = position.map(|coordinate| coordinate + 0.0);
+        let slot = self.slot(position);
+        if self.table[slot] != FREE {
+            return Ok(self.table[slot]);
+        }
+        let number = self.object.positions.len() as u32;
+        if u64::from(number) == MAX_VERTICES {
+            return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" });
+        }
+        self.table[slot] = number;
+        self.object.positions.push(position);
+        if self.object.positions.len() * 3 > self.table.len() * 2 {
+            self.grow();
+        }
+        Ok(number)
+    }
+
+    /// Returns the slot of this position, or the free slot where it belongs.
+    fn slot(&self, position: [f64; 3]) -> usize {
+        let hash = xxhash_rust::xxh3::xxh3_64_with_seed(bytemuck::bytes_of(&position), self.seed);
+        let mut slot = hash as usize & (self.table.len() - 1);
+        loop {
+            match self.table[slot] {
+                FREE => return slot,
+                number if self.object.positions[number as usize] == position => return slot,
+                _ => slot = (slot + 1) & (self.table.len() - 1),
+            }
+        }
+    }
+
+    fn grow(&mut self) {
+        self.table = vec![FREE; self.table.len() * 4];
+        for number in 0..self.object.positions.len() {
+            let slot = self.slot(self.object.positions[number]);
+            self.table[slot] = number as u32;
+        }
+    }
+
+    fn finish(mut self, next_id: &mut u32) -> Result<Object, Fault> {
+        self.object.triangle_ids = next_ids(next_id, self.object.triangles.len())?;
+        Ok(self.object)
+    }
+}

@@ -1,0 +1,184 @@
+//! Puts the parts of a file together, section by section from the first to the last.
+
+use crate::error::BakeError;
+use crate::pages::unnumbered::{Numbering, ObjectPages, UnnumberedPages};
+use crate::progress::{Progress, Stage, Step, Tally, WHOLE};
+use crate::storage::external_sort::Sorter;
+use crate::storage::output::Output;
+use crate::storage::{Piece, Spill};
+use bvh_format::checksum::Hasher;
+use bvh_format::header::{Section, SectionKind, write_header};
+use bvh_format::layout::ContentHasher;
+use bvh_format::object::{ObjectRecord, write_objects};
+use bvh_format::page::{PAGE, PagePlace};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The most bytes of a section that are in memory at a time under a memory budget, unless a single brick has more.
+const MAX_BATCH_BYTES: usize = 8 << 20;
+
+/// The parts of a file.
+pub(crate) struct Contents {
+    pub(crate) records: Vec<(String, ObjectRecord)>,
+    /// The pages of each object.
+    pub(crate) objects: Vec<ObjectPages>,
+    /// The pairs (kept id, id of an equal triangle that is left out).
+    pub(crate) duplicates: Sorter<[u32; 2]>,
+    /// The place for records that the sorter does not hold in memory.
+    pub(crate) spill: Spill,
+}
+
+impl Contents {
+    /// The number of pages of all objects so far.
+    pub(crate) fn page_count(&self) -> usize {
+        self.objects.iter().map(ObjectPages::page_count).sum()
+    }
+}
+
+/// Writes the sections page by page, and then the header.
+pub(crate) fn assemble(
+    contents: Contents,
+    with_ids: bool,
+    provenance: &str,
+    output: &mut Output,
+    progress: &Progress,
+) -> Result<(), BakeError> {
+    let Contents { records, objects, duplicates, .. } = contents;
+    let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
+    let table = write_objects(&records);
+    let lengths = [
+        table.len(),
+        sum(|object| object.page_count() * PAGE),
+        sum(ObjectPages::leaf_bytes),
+        sum(ObjectPages::id_bytes),
+    ];
+    let rest = duplicates.count() as usize * 8 + provenance.len() + 7 * PAGE;
+    let expected = (lengths.iter().sum::<usize>() + rest) as u64;
+    output.expect(expected);
+    output.append(Arc::new(vec![0; PAGE]))?;
+    let triangles = records.iter().map(|(_, record)| record.triangles.get()).sum();
+    let tally = progress.tally(Step::Bake(Stage::Encode), WHOLE, triangles, expected);
+    let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default(), tally };
+    file.section(SectionKind::Objects, lengths[0], |section| section.write(table))?;
+    let (mut leaves, mut ids) = (Vec::new(), Vec::new());
+    file.section(SectionKind::Nodes, lengths[1], |section| {
+        let mut place = PagePlace::default();
+        for ObjectPages { profile, parts, parents } in objects {
+            let numbering = Numbering { profile, parents, first: place.page };
+            place = place.of_next_object();
+            let mut pages = Vec::new();
+            for UnnumberedPages { pages: own, leaves: own_leaves, ids: own_ids } in parts {
+                pages.push(own);
+                leaves.push(own_leaves);
+                ids.push(own_ids);
+            }
+            in_batches(pages, |mut batch| {
+                numbering.number(&mut batch, &mut place);
+                batch.into_iter().try_for_each(|pages| section.write(pages))
+            })?;
+        }
+        Ok(())
+    })?;
+    let blocks = |section: &mut OpenSection, pieces: Vec<Piece<u8>>| {
+        in_batches(pieces, |batch| batch.into_iter().try_for_each(|blocks| section.write(blocks)))
+    };
+    file.section(SectionKind::Leaves, lengths[2], |section| blocks(section, leaves))?;
+    if with_ids {
+        file.section(SectionKind::Ids, lengths[3], |section| blocks(section, ids))?;
+    }
+    if with_ids && duplicates.count() > 0 {
+        file.section(SectionKind::Duplicates, duplicates.count() as usize * 8, |section| {
+            let mut bytes = Vec::new();
+            duplicates.visit(|pair| {
+                pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
+                if bytes.len() >= 1 << 20 {
+                    section.write(std::mem::take(&mut bytes))?;
+                }
+                Ok(())
+            })?;
+            section.write(bytes)
+        })?;
+    }
+    if !provenance.is_empty() {
+        let text = provenance.as_bytes();
+        file.section(SectionKind::Provenance, text.len(), |section| section.write(text.to_vec()))?;
+    }
+    let Sections { table, content, .. } = file;
+    let header = write_header(output.length(), content.finish(), &table);
+    output.replace_first(header)
+}
+
+/// Takes pieces out of their storage, a batch at a time, and visits the batches in order.
+fn in_batches(
+    pieces: Vec<Piece<u8>>,
+    mut visit: impl FnMut(Vec<Vec<u8>>) -> Result<(), BakeError>,
+) -> Result<(), BakeError> {
+    let mut pieces = pieces.into_iter().peekable();
+    while pieces.peek().is_some() {
+        let (mut batch, mut bytes) = (Vec::new(), 0);
+        // Pieces in memory need no further memory.
+        while let Some(piece) = pieces.next_if(|piece| {
+            batch.is_empty() || piece.in_memory().is_some() || bytes + piece.len() <= MAX_BATCH_BYTES
+        }) {
+            bytes += if piece.in_memory().is_some() { 0 } else { piece.len() };
+            batch.push(piece);
+        }
+        visit(batch.into_par_iter().map(Piece::take).collect::<Result<_, _>>()?)?;
+    }
+    Ok(())
+}
+
+/// The sections of a file in ascending order.
+struct Sections<'a> {
+    output: &'a mut Output,
+    table: Vec<Section>,
+    content: ContentHasher,
+    /// The hasher over the bytes of all sections.
+    tally: Tally<'a>,
+}
+
+impl Sections<'_> {
+    /// Adds a section of `length` bytes, which `write` writes, and pads its last page.
+    fn section(
+        &mut self,
+        kind: SectionKind,
+        length: usize,
+        write: impl FnOnce(&mut OpenSection) -> Result<(), BakeError>,
+    ) -> Result<(), BakeError> {
+        let start = self.output.length() as usize;
+        if kind.is_content() {
+            self.content.begin(kind, length as u64);
+        }
+        let content = kind.is_content().then_some(&mut self.content);
+        let (output, tally) = (&mut *self.output, &self.tally);
+        let mut section = OpenSection { output, checksum: Hasher::default(), content, tally };
+        write(&mut section)?;
+        let checksum = section.checksum.finish();
+        self.table.push(Section { kind, range: start..start + length, checksum });
+        let end = self.output.length() as usize;
+        self.output.append(Arc::new(vec![0; end.next_multiple_of(PAGE) - end]))
+    }
+}
+
+/// The section that is being written.
+struct OpenSection<'a> {
+    output: &'a mut Output,
+    checksum: Hasher,
+    content: Option<&'a mut ContentHasher>,
+    tally: &'a Tally<'a>,
+}
+
+impl OpenSection<'_> {
+    fn write(&mut self, bytes: Vec<u8>) -> Result<(), BakeError> {
+        let Self { output, checksum, content, tally } = self;
+        tally.add(bytes.len() as u64);
+        let bytes = Arc::new(bytes);
+        let hash_content = || {
+            if let Some(content) = content {
+                content.update(&bytes);
+            }
+        };
+        let hash = || rayon::join(|| checksum.update(&bytes), hash_content);
+        rayon::join(|| output.append(bytes.clone()), hash).0
+    }
+}

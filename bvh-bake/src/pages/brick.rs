@@ -1,0 +1,122 @@
+//! Turns the tree of a brick into pages: the tree is cut, planned and encoded, except for a rest of at most half a
+//! page, which goes to the pages above the bricks.
+
+use crate::error::BakeError;
+use crate::pages::encode::{Encoder, Style};
+use crate::pages::plan::{self, Place};
+use crate::pages::unnumbered::{ObjectPages, UnnumberedPages};
+use crate::storage::Spill;
+use crate::storage::resources::Resources;
+use crate::tree::arena::Arena;
+use crate::tree::treelets::{cut_brick, cut_top};
+use crate::tree::{Bricks, PacketTriangles, Tree};
+use crate::triangles::Triangle;
+use bvh_format::kdop::Kdop;
+use std::collections::HashMap;
+
+/// A brick that has been encoded.
+struct EncodedBrick {
+    pages: UnnumberedPages,
+    packets: u64,
+    /// The number of treelets in the pages.
+    treelets: u64,
+    /// The k-DOP of the whole brick.
+    kdop: Kdop,
+    /// The treelets that are in no page yet, with those directly below them that are in one.
+    rest: Arena,
+    /// The triangles of the rest.
+    triangles: Vec<Triangle>,
+    /// The treelets of the rest that are in a page, counted from the brick's first page, and their places.
+    placed: Vec<(u32, Place)>,
+    /// The number of children of all treelets.
+    children: u64,
+}
+
+/// The pages of an object and what they hold.
+pub(crate) struct EncodedObject {
+    pub(crate) pages: ObjectPages,
+    pub(crate) packets: u64,
+    pub(crate) treelets: u64,
+    /// The number of children of all treelets.
+    pub(crate) children: u64,
+}
+
+/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them.
+pub(crate) fn encode_object(
+    bricks: Bricks,
+    style: Style,
+    resources: &Resources,
+) -> Result<EncodedObject, BakeError> {
+    let spill = resources.scratch.spill();
+    let (bricks, top) =
+        bricks.build(resources, |tree, triangles| encode_brick(tree, triangles, style, &spill))?;
+    let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
+    let mut top = if top.is_leaf() {
+        Arena::empty()
+    } else {
+        cut_top(&top, |brick| bricks[brick as usize].kdop, width, slabs)
+    };
+    let sum = |of: fn(&EncodedBrick) -> u64| bricks.iter().map(of).sum::<u64>();
+    let children = top.child_count() + sum(|brick| brick.children);
+    let (packets, treelets) = (sum(|brick| brick.packets), sum(|brick| brick.treelets));
+    let mut triangles = Vec::new();
+    let (mut rests, mut parts, mut placed) = (Vec::new(), Vec::new(), Vec::new());
+    for mut brick in bricks {
+        brick.rest.renumber_triangles(triangles.len() as u32);
+        triangles.append(&mut brick.triangles);
+        rests.push(brick.rest);
+        parts.push(brick.pages);
+        placed.push(brick.placed);
+    }
+    let ranges;
+    (top, ranges) = Arena::join(top, rests);
+    let mut taken = vec![false; top.len()];
+    for (range, placed) in ranges.iter().zip(&placed) {
+        placed.iter().for_each(|(treelet, _)| taken[range.start + *treelet as usize] = true);
+    }
+    let pages = plan::plan_rest(&top, style.profile, taken);
+    let mut places = plan::places(&pages, top.len());
+    let mut base = pages.len() as u32;
+    for ((range, placed), part) in ranges.iter().zip(placed).zip(&parts) {
+        for (treelet, place) in placed {
+            places[range.start + treelet as usize] = Place { page: base + place.page, ..place };
+        }
+        base += part.page_count() as u32;
+    }
+    let mut parents = HashMap::new();
+    for (number, page) in (0..).zip(&pages) {
+        for (link, &target) in (0..).zip(&page.remotes) {
+            let Place { page, slot } = places[target as usize];
+            parents.insert((page, slot), (number, link));
+        }
+    }
+    let encoder = Encoder { arena: &top, pages: &pages, places: &places, triangles: &triangles, style };
+    let encoded = encoder.encode();
+    let (packets, treelets) = (packets + encoded.packets, treelets + encoded.treelets);
+    parts.insert(0, UnnumberedPages::new(encoded, &spill)?);
+    let pages = ObjectPages { profile: style.profile, parts, parents };
+    Ok(EncodedObject { pages, packets, treelets, children })
+}
+
+fn encode_brick(
+    tree: Tree<PacketTriangles>,
+    triangles: &[Triangle],
+    style: Style,
+    spill: &Spill,
+) -> Result<EncodedBrick, BakeError> {
+    let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
+    let arena = cut_brick(&tree, triangles, width, slabs);
+    drop(tree);
+    let kdop = arena.kdop(0, slabs);
+    let plan = plan::plan_brick(&arena, style.profile);
+    let places = plan::places(&plan.pages, arena.len());
+    let encoder = Encoder { arena: &arena, pages: &plan.pages, places: &places, triangles, style };
+    let encoded = encoder.encode();
+    let (packets, treelets, children) = (encoded.packets, encoded.treelets, arena.child_count());
+    let (mut own, mut placed) = (Vec::new(), Vec::new());
+    let rest = arena.rest(&plan.taken, triangles, &mut own, |there, here| {
+        placed.push((here, places[there as usize]));
+    });
+    let pages = UnnumberedPages::new(encoded, spill)?;
+    Ok(EncodedBrick { pages, packets, treelets, kdop, rest, triangles: own, placed, children })
+}

@@ -1,0 +1,9 @@
+//! Turns a tree of treelets into the pages of a file.
+
+pub(crate) mod assemble;
+pub(crate) mod brick;
+mod encode;
+mod plan;
+pub(crate) mod unnumbered;
+
+pub(crate) use encode::Style;

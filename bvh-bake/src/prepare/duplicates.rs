@@ -1,0 +1,237 @@
+//! Finds exact duplicates: triangles whose corners are the same points in any order. Of equal triangles, the first is
+//! kept.
+//!
+//! The hashes of all triangles are sorted. Triangles that share their hash with another are then sorted by their
+//! corners, so that equal ones become neighbours. Different triangles may have the same hash, even many of them by
+//! intent. This costs the second sort, but such triangles are never taken for duplicates.
+//!
+//! If all hashes are in memory, a bitmap first drops most hashes that occur once, because sorting all of them takes ten
+//! times as long.
+
+use crate::error::BakeError;
+use crate::progress::Tally;
+use crate::storage::Spill;
+use crate::storage::external_sort::Sorter;
+use crate::triangles::{Corners, TRIANGLES_PER_PART, TriangleStream, Triangles};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// The hash of a triangle, upper half first, and the triangle's place in the stream.
+#[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Hashed([u32; 3]);
+
+impl Hashed {
+    fn hash(self) -> u64 {
+        u64::from(self.0[0]) << 32 | u64::from(self.0[1])
+    }
+
+    fn place(self) -> u32 {
+        self.0[2]
+    }
+}
+
+/// Compares by hash, then by place.
+impl Ord for Hashed {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.hash().cmp(&other.hash()).then(self.place().cmp(&other.place()))
+    }
+}
+
+impl PartialOrd for Hashed {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The bits per hash of the bitmap that finds hashes which occur once; an eighth of these share their bit with another
+/// hash.
+const BITS_PER_HASH: usize = 8;
+
+/// A triangle's corners in a fixed order, then its place in the stream and its id.
+pub(crate) type DuplicateCandidate = [u32; 11];
+/// The words of the corners in a [`DuplicateCandidate`], and the positions of its place and its id.
+const CORNERS: std::ops::Range<usize> = 0..9;
+const PLACE: usize = 9;
+const ID: usize = 10;
+
+/// Returns the hash of the triangle at a place.
+pub(crate) fn hashed(corners: &Corners, place: u64) -> Hashed {
+    let hash = xxh3_64(bytemuck::bytes_of(&canonical(corners)));
+    Hashed([(hash >> 32) as u32, hash as u32, place as u32])
+}
+
+/// Returns the bits of the corners in a fixed order.
+fn canonical(triangle: &Corners) -> [[u32; 3]; 3] {
+    // Each corner becomes one number: that takes three comparisons, where a sort takes many more instructions.
+    let [mut a, mut b, mut c] = triangle.map(|corner| {
+        let [x, y, z] = corner.map(|value| u128::from(value.to_bits()));
+        x << 64 | y << 32 | z
+    });
+    (a, b) = (a.min(b), a.max(b));
+    (b, c) = (b.min(c), b.max(c));
+    (a, b) = (a.min(b), a.max(b));
+    [a, b, c].map(|corner| [(corner >> 64) as u32, (corner >> 32) as u32, corner as u32])
+}
+
+/// Drops most of the hashes that occur once, namely those that are alone in their bit of the bitmap.
+fn drop_single(hashes: &mut Vec<Hashed>) {
+    let bits = (hashes.len() * BITS_PER_HASH).next_power_of_two().max(64);
+    let bitmap = || (0..bits / 64).map(|_| AtomicU64::new(0)).collect::<Vec<_>>();
+    let (once, twice) = (bitmap(), bitmap());
+    let place = |hashed: &Hashed| {
+        let bit = hashed.hash() as usize & (bits - 1);
+        (bit / 64, 1 << (bit % 64))
+    };
+    hashes.par_iter().with_min_len(TRIANGLES_PER_PART).for_each(|hashed| {
+        let (word, bit) = place(hashed);
+        if once[word].fetch_or(bit, Relaxed) & bit != 0 {
+            twice[word].fetch_or(bit, Relaxed);
+        }
+    });
+    hashes.retain(|hashed| {
+        let (word, bit) = place(hashed);
+        twice[word].load(Relaxed) & bit != 0
+    });
+}
+
+/// Finds the places of duplicates from the hashes of all triangles, as one bit per triangle, or no bits at all if there
+/// are no duplicates. Passes the pairs (kept id, id of an equal triangle) to `found`. Sorts `run` records at a time.
+/// `tally` counts the triangles.
+pub(crate) fn find(
+    stream: &TriangleStream,
+    mut hashes: Sorter<Hashed>,
+    run: usize,
+    spill: &Spill,
+    tally: &Tally,
+    mut found: impl FnMut([u32; 2]) -> Result<(), BakeError>,
+) -> Result<Vec<u64>, BakeError> {
+    let words = stream.count.div_ceil(64) as usize;
+    let mut shared: Vec<u64> = Vec::new();
+    let mut last: Option<Hashed> = None;
+    let mut visited = 0;
+    if let Some(hashes) = hashes.in_memory() {
+        drop_single(hashes);
+        tally.add(stream.count);
+    }
+    hashes.visit(|hashed| {
+        visited += 1;
+        if visited % TRIANGLES_PER_PART == 0 {
+            tally.add(TRIANGLES_PER_PART as u64);
+        }
+        if let Some(last) = last.filter(|last| last.hash() == hashed.hash()) {
+            shared.resize(words, 0);
+            [last.place(), hashed.place()].into_iter().for_each(|place| set(&mut shared, place));
+        }
+        last = Some(*hashed);
+        Ok(())
+    })?;
+    if shared.is_empty() {
+        return Ok(shared);
+    }
+    let mut candidates = Sorter::of_runs(run);
+    let batch = 4 * rayon::current_num_threads();
+    for start in (0..stream.parts()).step_by(batch) {
+        let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
+        let parts: Vec<Vec<DuplicateCandidate>> =
+            parts.map(|part| of_part(stream, part, &shared)).collect::<Result<_, _>>()?;
+        parts.iter().try_for_each(|part| candidates.extend(part, spill))?;
+    }
+    let mut dropped = shared;
+    dropped.fill(0);
+    let mut any = false;
+    // Of equal triangles, this is the one with the first place.
+    let mut first: Option<DuplicateCandidate> = None;
+    candidates.visit(|candidate| {
+        match first.filter(|first| first[CORNERS] == candidate[CORNERS]) {
+            Some(first) => {
+                any = true;
+                set(&mut dropped, candidate[PLACE]);
+                found([first[ID], candidate[ID]])?;
+            }
+            None => first = Some(*candidate),
+        }
+        Ok(())
+    })?;
+    Ok(if any { dropped } else { Vec::new() })
+}
+
+/// Returns the triangles of a part whose bit in `shared` is set.
+fn of_part(
+    stream: &TriangleStream,
+    part: usize,
+    shared: &[u64],
+) -> Result<Vec<DuplicateCandidate>, BakeError> {
+    let first = part * TRIANGLES_PER_PART;
+    let words = &shared[first / 64..shared.len().min((first + TRIANGLES_PER_PART) / 64)];
+    if words.iter().all(|&word| word == 0) {
+        return Ok(Vec::new());
+    }
+    let triangles = stream.part(part)?;
+    let candidate = |(place, triangle): (usize, &crate::triangles::Triangle)| {
+        if words[place / 64] >> (place % 64) & 1 == 0 {
+            return None;
+        }
+        let mut candidate = [0; 11];
+        candidate[CORNERS].copy_from_slice(canonical(&triangle.corners).as_flattened());
+        candidate[PLACE] = (first + place) as u32;
+        candidate[ID] = triangle.id;
+        Some(candidate)
+    };
+    Ok(triangles.iter().enumerate().filter_map(candidate).collect())
+}
+
+fn set(bits: &mut [u64], place: u32) {
+    bits[place as usize / 64] |= 1 << (place % 64);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::{Progress, Stage, Step};
+    use crate::storage::Scratch;
+    use crate::triangles::{Part, Triangle};
+
+    /// A mesh forged such that all hashes are equal. Comparing each triangle with each other one would take minutes.
+    #[test]
+    fn equal_hashes_are_no_duplicates_and_take_no_quadratic_time() {
+        let progress = Progress::default();
+        let spill = Scratch::in_memory(&progress).spill();
+        let count = 300_000u32;
+        // Every tenth triangle equals the one before it, with its corners in another order.
+        let corners = |number: u32| {
+            let at = |corner: u32| [number as f32, corner as f32, 0.0];
+            [at(0), at(1), at(2)]
+        };
+        let triangle = |id: u32| {
+            let [a, b, c] = corners(if id % 10 == 9 { id - 1 } else { id });
+            Triangle { corners: if id % 10 == 9 { [c, a, b] } else { [a, b, c] }, id }
+        };
+        let all: Vec<Triangle> = (0..count).map(triangle).collect();
+        let parts = all
+            .chunks(TRIANGLES_PER_PART)
+            .map(|part| Part::Narrow(spill.put(part.to_vec()).unwrap()))
+            .collect();
+        let stream = TriangleStream { parts, count: count.into(), placement: None };
+        let mut hashes = Sorter::of_runs(count as usize);
+        (0..count).for_each(|place| hashes.extend(&[Hashed([7, 7, place])], &spill).unwrap());
+        let tally = progress.tally(Step::Bake(Stage::Prepare), 1, count.into(), count.into());
+        let mut pairs = Vec::new();
+        let dropped = find(&stream, hashes, count as usize, &spill, &tally, |pair| {
+            pairs.push(pair);
+            Ok(())
+        });
+        pairs.sort_unstable();
+        let expected: Vec<[u32; 2]> = (9..count).step_by(10).map(|id| [id - 1, id]).collect();
+        assert!(pairs == expected);
+        let dropped = dropped.unwrap();
+        assert!(
+            (0..count)
+                .all(|place| (dropped[place as usize / 64] >> (place % 64) & 1 == 1) == (place % 10 == 9))
+        );
+    }
+}

@@ -1,0 +1,172 @@
+//! Gathers the facts about all triangles of an object that are needed before its tree is built.
+//!
+//! There are two passes. The first measures and hashes, and its hashes give the duplicates. The second looks at the
+//! triangles that are kept.
+
+pub(crate) mod duplicates;
+pub(crate) mod layout_choice;
+pub(crate) mod quantization;
+
+use crate::error::BakeError;
+use crate::progress::{Stage, Step};
+use crate::storage::external_sort::Sorter;
+use crate::storage::resources::Resources;
+use crate::tree::{Aabb, Grid, is_one_brick};
+use crate::triangles::placement::Moved;
+use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
+use duplicates::{DuplicateCandidate, Hashed};
+use layout_choice::Trial;
+use rayon::prelude::*;
+
+/// The shares of the passes in the stage's work: measuring, finding duplicates, and surveying.
+const MEASURE_WEIGHT: u64 = 8;
+const DUPLICATES_WEIGHT: u64 = 4;
+const SURVEY_WEIGHT: u64 = 4;
+
+/// The results of the first pass.
+pub(crate) struct Measured {
+    pub(crate) moved: Moved,
+    /// The box of all corners.
+    pub(crate) bounds: Aabb,
+    /// The box of the centres of all triangles' boxes, each centre times two.
+    centres: Aabb,
+    /// One bit per triangle, set for duplicates; empty if there are none.
+    pub(crate) dropped: Vec<u64>,
+}
+
+/// Runs the first pass. Passes the pairs of ids of duplicates to `found`.
+pub(crate) fn measure(
+    stream: &TriangleStream,
+    resources: &Resources,
+    found: impl FnMut([u32; 2]) -> Result<(), BakeError>,
+) -> Result<Measured, BakeError> {
+    let spill = resources.scratch.spill();
+    let mut hashes = Sorter::of_runs(resources.sorted_at_once::<Hashed>(stream.count));
+    let mut moved = Moved::default();
+    let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
+    let tally =
+        |weight| resources.progress.tally(Step::Bake(Stage::Prepare), weight, stream.count, stream.count);
+    let measuring = tally(MEASURE_WEIGHT);
+    let batch = 4 * rayon::current_num_threads();
+    for start in (0..stream.parts()).step_by(batch) {
+        let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
+        let of_part = |part: usize| {
+            let (triangles, moved) = stream.measured_part(part)?;
+            let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
+            let mut hashes = Vec::with_capacity(triangles.len());
+            for (triangle, place) in triangles.iter().zip((part * TRIANGLES_PER_PART) as u64..) {
+                let own = Aabb::of_triangle(&triangle.corners);
+                bounds.join(&own);
+                centres.join(&Aabb::of_point(own.centre()));
+                hashes.push(duplicates::hashed(&triangle.corners, place));
+            }
+            measuring.add(triangles.len() as u64);
+            Ok((moved, bounds, centres, hashes))
+        };
+        let parts: Vec<_> = parts.map(of_part).collect::<Result<_, BakeError>>()?;
+        for (part_moved, part_bounds, part_centres, part_hashes) in parts {
+            moved = moved.joined(part_moved);
+            bounds.join(&part_bounds);
+            centres.join(&part_centres);
+            hashes.extend(&part_hashes, &spill)?;
+        }
+    }
+    let run = resources.sorted_at_once::<DuplicateCandidate>(stream.count);
+    let dropped = duplicates::find(stream, hashes, run, &spill, &tally(DUPLICATES_WEIGHT), found)?;
+    Ok(Measured { moved, bounds, centres, dropped })
+}
+
+/// The results of the second pass.
+pub(crate) struct Surveyed {
+    pub(crate) centre: [f32; 3],
+    pub(crate) radius: f32,
+    /// The number of triangles without area.
+    pub(crate) degenerate: u64,
+    /// Counts and boxes for the division into bricks, if there is more than one.
+    pub(crate) grid: Option<Grid>,
+    /// The patches that the trials use, in the order of `layout_choice::patches`.
+    pub(crate) patches: Vec<Vec<Corners>>,
+}
+
+/// Runs the second pass. `trials` are the trials for choosing a profile, or empty if the choice is not open.
+pub(crate) fn survey(
+    kept: &Kept,
+    measured: &Measured,
+    trials: &[Trial],
+    resources: &Resources,
+) -> Result<Surveyed, BakeError> {
+    let tally =
+        resources.progress.tally(Step::Bake(Stage::Prepare), SURVEY_WEIGHT, kept.count(), kept.count());
+    let bounds = &measured.bounds;
+    let centre = [0, 1, 2].map(|a| ((f64::from(bounds.lo(a)) + f64::from(bounds.hi(a))) / 2.0) as f32);
+    let wanted = layout_choice::patches(trials);
+    struct Sum {
+        squared: f64,
+        degenerate: u64,
+        grid: Option<Grid>,
+        /// The number of a patch, and some of its corners.
+        patches: Vec<(usize, Vec<Corners>)>,
+    }
+    let new = || Sum {
+        squared: 0.0,
+        degenerate: 0,
+        grid: (!is_one_brick(kept.count())).then(|| Grid::empty(&measured.centres)),
+        patches: Vec::new(),
+    };
+    let add = |sum: &mut Sum, part: usize| {
+        let triangles = kept.part(part)?;
+        for triangle in triangles.iter() {
+            for corner in &triangle.corners {
+                let squared =
+                    (0..3).map(|a| (f64::from(corner[a]) - f64::from(centre[a])).powi(2)).sum::<f64>();
+                sum.squared = sum.squared.max(squared);
+            }
+            sum.degenerate += u64::from(is_degenerate(&triangle.corners));
+            if let Some(grid) = &mut sum.grid {
+                grid.add(&Aabb::of_triangle(&triangle.corners));
+            }
+        }
+        let first = kept.first(part);
+        let end = first + triangles.len() as u64;
+        // The patches are in the order of their starts, and none is longer than the longest.
+        let near = wanted.partition_point(|(start, _)| *start + layout_choice::MAX_PATCH_TRIANGLES <= first);
+        for (number, (start, length)) in wanted.iter().enumerate().skip(near) {
+            if *start >= end {
+                break;
+            }
+            let (from, to) = ((*start).max(first), (start + length).min(end));
+            if from < to {
+                let some = &triangles[(from - first) as usize..(to - first) as usize];
+                sum.patches.push((number, some.iter().map(|triangle| triangle.corners).collect()));
+            }
+        }
+        tally.add(triangles.len() as u64);
+        Ok(())
+    };
+    let mut all = Surveyed { centre, radius: 0.0, degenerate: 0, grid: None, patches: Vec::new() };
+    all.patches.resize(wanted.len(), Vec::new());
+    let mut squared = 0f64;
+    for sum in fold(kept.parts(), new, add)? {
+        squared = squared.max(sum.squared);
+        all.degenerate += sum.degenerate;
+        all.grid = match (all.grid, sum.grid) {
+            (Some(a), Some(b)) => Some(a.merged(&b)),
+            (a, b) => a.or(b),
+        };
+        sum.patches.into_iter().for_each(|(number, corners)| all.patches[number].extend(corners));
+    }
+    // Differences of f32 in f64, three squares, two sums and a root each round by at most 2^-53 relative. The factor 1
+    // + 2^-40 covers these, and the next f32 covers the last rounding.
+    all.radius = ((squared.sqrt() * (1.0 + 2f64.powi(-40))) as f32).next_up();
+    Ok(all)
+}
+
+/// Returns true if the three corners lie on a line. This is decided exactly: each component of the cross product of two
+/// edges is a sum of products of f32 differences, which is a 2-by-2 orientation.
+fn is_degenerate(triangle: &Corners) -> bool {
+    let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
+    [(0, 1), (1, 2), (2, 0)].into_iter().all(|(x, y)| {
+        let point = |p: [f64; 3]| robust::Coord { x: p[x], y: p[y] };
+        robust::orient2d(point(a), point(b), point(c)) == 0.0
+    })
+}

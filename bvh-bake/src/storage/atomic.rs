@@ -1,0 +1,226 @@
+//! Writes a file completely or not at all: under a temporary name beside its own, synchronised, then renamed. Last, the
+//! directory is synchronised.
+//!
+//! A temporary file stays locked while a process writes it. One that is not locked was left by a process that was
+//! killed, and the next process that writes the same output removes it.
+
+use crate::error::BakeError;
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Replaces a file by `bytes` such that its name always refers either to the old content or to all of `bytes`. What is
+/// mapped or open under the old name keeps its content.
+///
+/// # Errors
+/// [`BakeError::Write`] if the system refuses, or if something other than a regular file has the name.
+/// Nothing is left behind then.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), BakeError> {
+    refuse_special(path)?;
+    let mut temporary = Temporary::beside(path)?;
+    temporary.file.write_all(bytes).map_err(failed(path, "write"))?;
+    temporary.rename(path)
+}
+
+/// Removes the temporary files of this process and prevents new ones and renames: any thread that tries waits for ever.
+/// Call this from a thread that is about to end the process, such as one that handles a signal.
+pub fn discard_unfinished() {
+    let live = live();
+    live.iter().for_each(|path| drop(fs::remove_file(path)));
+    std::mem::forget(live);
+}
+
+/// Refuses a device or a directory, because a rename would replace it or fail late.
+pub(crate) fn refuse_special(path: &Path) -> Result<(), BakeError> {
+    match fs::metadata(path) {
+        Ok(metadata) if !metadata.is_file() => {
+            let found = if metadata.is_dir() { "a directory" } else { "a special file" };
+            let source = io::Error::other(format!("expected a regular file or none, found {found}"));
+            Err(BakeError::Write { path: path.to_owned(), action: "replace", source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Removes the temporary files for `name` that killed processes left in a directory.
+pub(crate) fn remove_stale_of(directory: &Path, name: &OsStr) {
+    let Ok(entries) = fs::read_dir(directory) else { return };
+    for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name(), name)) {
+        let path = entry.path();
+        // Another process's file is opened only for this check, and a file that cannot be opened is left alone.
+        if let Ok(file) = File::options().read(true).write(true).open(&path)
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(&path);
+        }
+    }
+}
+
+/// Returns whether a name is that of a temporary file for `name`.
+fn is_temporary(file: &OsStr, name: &OsStr) -> bool {
+    let (file, name) = (file.as_encoded_bytes(), name.as_encoded_bytes());
+    let rest = file.strip_prefix(b".").and_then(|rest| rest.strip_prefix(name));
+    let number = rest.and_then(|rest| rest.strip_prefix(b".")?.strip_suffix(b".tmp"));
+    number.is_some_and(|number| number.iter().all(|byte| byte.is_ascii_digit() || *byte == b'-'))
+}
+
+/// The temporary files of this process that exist now.
+fn live() -> MutexGuard<'static, Vec<PathBuf>> {
+    static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn failed(path: &Path, action: &'static str) -> impl Fn(io::Error) -> BakeError {
+    move |source| BakeError::Write { path: path.to_owned(), action, source }
+}
+
+/// A new, locked file in the directory of the output. It is removed when dropped.
+pub(crate) struct Temporary {
+    path: PathBuf,
+    file: File,
+    /// Whether the file still has its temporary name.
+    named: bool,
+}
+
+impl Temporary {
+    /// Creates an empty file beside `output`, hidden and named after it.
+    pub(crate) fn beside(output: &Path) -> Result<Self, BakeError> {
+        let nameless = || io::Error::new(io::ErrorKind::InvalidInput, "the path names no file");
+        let name = output.file_name().ok_or_else(nameless).map_err(failed(output, "create"))?;
+        Self::named(directory_of(output), name).map_err(failed(output, "create"))
+    }
+
+    /// Creates an empty file in a directory, hidden and named after `name`.
+    pub(crate) fn named(directory: &Path, name: &OsStr) -> io::Result<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        remove_stale_of(directory, name);
+        loop {
+            let number = COUNT.fetch_add(1, Ordering::Relaxed);
+            let mut hidden = OsString::from(".");
+            hidden.push(name);
+            hidden.push(format!(".{}-{number}.tmp", std::process::id()));
+            let path = directory.join(hidden);
+            let mut live = live();
+            match File::options().read(true).write(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    live.push(path.clone());
+                    drop(live);
+                    let temporary = Self { path, file, named: true };
+                    // Before the file was locked, another process may have taken it for a stale one. Where files cannot
+                    // be locked, no file is taken for stale.
+                    match temporary.file.try_lock() {
+                        Err(fs::TryLockError::WouldBlock) => continue,
+                        _ if !temporary.path.exists() => continue,
+                        _ => return Ok(temporary),
+                    }
+                }
+                // The name is in use by a process with the same number in another container.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Unlinks the file, which stays open. If the system does not allow that, `drop` does it.
+    pub(crate) fn forget_name(&mut self) {
+        let mut live = live();
+        if fs::remove_file(&self.path).is_ok() {
+            live.retain(|path| *path != self.path);
+            self.named = false;
+        }
+    }
+
+    /// Renames the synchronised file to `path` and replaces what had that name.
+    pub(crate) fn rename(mut self, path: &Path) -> Result<(), BakeError> {
+        // Without this, a crash soon after the rename could leave an empty file under the name.
+        self.file.sync_all().map_err(failed(path, "write"))?;
+        let mut live = live();
+        fs::rename(&self.path, path).map_err(failed(path, "create"))?;
+        live.retain(|path| *path != self.path);
+        self.named = false;
+        drop(live);
+        sync_directory(directory_of(path));
+        Ok(())
+    }
+}
+
+/// Synchronises a directory in which a file was renamed, so that the name outlasts a crash.
+///
+/// Failures are ignored. The file is complete and has its name in any case; without this, a crash within the next
+/// seconds may bring back the old file, which is complete as well. Some file systems cannot synchronise directories at
+/// all.
+fn sync_directory(directory: &Path) {
+    // Other systems do not open directories.
+    if cfg!(unix)
+        && let Ok(directory) = File::open(directory)
+    {
+        let _ = directory.sync_all();
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if self.named {
+            let mut live = live();
+            // Only the error that led here is reported.
+            let _ = fs::remove_file(&self.path);
+            live.retain(|path| *path != self.path);
+        }
+    }
+}
+
+/// Returns the directory of a file.
+pub(crate) fn directory_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_what_is_in_use_is_not() {
+        let directory = tempfile::tempdir().unwrap();
+        let output = directory.path().join("out.cbvh");
+        let write = |name: &str| fs::write(directory.path().join(name), "x").unwrap();
+        let stale = ".out.cbvh.123-4.tmp";
+        let others = [".out.cbvh.backup.tmp", ".other.cbvh.123-4.tmp", "out.cbvh.123-4.tmp"];
+        write(stale);
+        others.iter().for_each(|name| write(name));
+        let used = Temporary::beside(&output).unwrap();
+        let second = Temporary::beside(&output).unwrap();
+        assert!(!directory.path().join(stale).exists() && used.path.exists() && second.path.exists());
+        assert!(others.iter().all(|name| directory.path().join(name).exists()));
+        drop((used, second));
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), others.len());
+        write_atomically(&output, b"whole").unwrap();
+        assert_eq!(fs::read(&output).unwrap(), b"whole");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), others.len() + 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_synchronised_gets_no_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let output = directory.path().join("out.cbvh");
+        fs::write(&output, "old").unwrap();
+        let mut unfinished = Temporary::beside(&output).unwrap();
+        // A pipe cannot be synchronised, and the system says so.
+        let (_reader, writer) = io::pipe().unwrap();
+        unfinished.file = std::os::fd::OwnedFd::from(writer).into();
+        let refused = unfinished.rename(&output).unwrap_err();
+        assert!(matches!(refused, BakeError::Write { action: "write", .. }), "{refused}");
+        assert_eq!(fs::read(&output).unwrap(), b"old");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+}

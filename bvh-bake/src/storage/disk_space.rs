@@ -1,0 +1,47 @@
+//! Finds out before the work whether the directories have room for what will be written to them.
+
+use crate::error::BakeError;
+use std::path::Path;
+
+/// Bytes of scratch files per triangle once a mesh has been read: the triangles in bricks, and the pages with their
+/// blocks, which take up to 80 in the largest profile.
+pub(crate) const SCRATCH_BYTES_PER_TRIANGLE: u64 = 120;
+/// Bytes of the output per triangle.
+pub(crate) const OUTPUT_BYTES_PER_TRIANGLE: u64 = 80;
+
+/// Refuses a directory that has less room than the bytes given. Where directories share a file system, their bytes
+/// add up.
+pub(crate) fn check(needs: &[(&Path, u64)]) -> Result<(), BakeError> {
+    for (number, (directory, needed)) in needs.iter().enumerate() {
+        let others = needs.iter().enumerate().filter(|(other, _)| *other != number);
+        let shared = others.filter(|(_, (other, _))| same_system(directory, other));
+        let needed = shared.fold(*needed, |sum, (_, (_, bytes))| sum.saturating_add(*bytes));
+        if let Some(found) = free_bytes(directory).filter(|&found| found < needed) {
+            return Err(BakeError::Room { directory: directory.to_path_buf(), needed, found });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the bytes that may still be written in a directory, or `None` if the system does not say.
+#[cfg(unix)]
+fn free_bytes(directory: &Path) -> Option<u64> {
+    let found = rustix::fs::statvfs(directory).ok()?;
+    Some(found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
+
+#[cfg(unix)]
+fn same_system(a: &Path, b: &Path) -> bool {
+    let device = |path: &Path| rustix::fs::stat(path).ok().map(|stat| stat.st_dev);
+    device(a) == device(b)
+}
+
+#[cfg(not(unix))]
+fn same_system(_: &Path, _: &Path) -> bool {
+    false
+}

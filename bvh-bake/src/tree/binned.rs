@@ -1,0 +1,193 @@
+//! Splits a brick top-down by planes between bins until each part has at most a few dozen triangles.
+
+use super::binary::{Content, NONE, NodeIndex, Tree};
+use super::boxes::{Aabb, Binning, Cost, Reference};
+use super::swept;
+use super::{Builder, PACKET, PacketTriangles};
+
+const BINS_PER_AXIS: usize = 16;
+/// A node of more triangles is split by several threads. With fewer, threads cost more time than they save.
+const MAX_SEQUENTIAL_TRIANGLES: usize = 8192;
+/// Beyond this depth only medians are used, which bounds the depth of any tree.
+const MAX_COSTED_DEPTH: usize = 64;
+
+impl Builder {
+    /// Builds the tree of a brick. `scratch` is as long as `references`, and its contents do not matter.
+    pub(super) fn brick(
+        &self,
+        references: &mut [Reference],
+        scratch: &mut [Reference],
+    ) -> Tree<PacketTriangles> {
+        let mut centres = Aabb::EMPTY;
+        references.iter().for_each(|reference| centres.join(&Aabb::of_point(reference.aabb().centre())));
+        let mut tree = Tree::with_capacity(expected_nodes(references.len()));
+        self.node(&mut tree, references, scratch, &centres, 0);
+        tree
+    }
+
+    /// Adds the subtree of some references to `tree` and returns the index of its root. `centres` is the box of the
+    /// references' centres.
+    fn node(
+        &self,
+        tree: &mut Tree<PacketTriangles>,
+        references: &mut [Reference],
+        scratch: &mut [Reference],
+        centres: &Aabb,
+        depth: usize,
+    ) -> NodeIndex {
+        let count = references.len();
+        if count <= self.sweep {
+            return swept::add(self, tree, references);
+        }
+        let Split { middle, bounds, centres } = self.split(references, scratch, centres, depth);
+        let (left, right) = references.split_at_mut(middle);
+        let (left_scratch, right_scratch) = scratch.split_at_mut(middle);
+        let index = tree.add(bounds, Content::Inner([NONE; 2]));
+        let mut add_left = |tree: &mut Tree<_>| self.node(tree, left, left_scratch, &centres[0], depth + 1);
+        let mut add_right =
+            |tree: &mut Tree<_>| self.node(tree, right, right_scratch, &centres[1], depth + 1);
+        let children = if count > MAX_SEQUENTIAL_TRIANGLES {
+            let right_tree = || {
+                let mut tree = Tree::with_capacity(expected_nodes(count - middle));
+                add_right(&mut tree);
+                tree
+            };
+            let (left, right) = rayon::join(|| add_left(tree), right_tree);
+            [left, tree.append(right)]
+        } else {
+            [add_left(tree), add_right(tree)]
+        };
+        tree.link(index, children);
+        index
+    }
+
+    /// Orders the references so that those of the first side come before those of the second.
+    fn split(
+        &self,
+        references: &mut [Reference],
+        scratch: &mut [Reference],
+        centres: &Aabb,
+        depth: usize,
+    ) -> Split {
+        let binning = Binning::<BINS_PER_AXIS>::new(centres);
+        let bins = fill_bins(references, &binning);
+        let mut bounds = Aabb::EMPTY;
+        bins[0].iter().for_each(|(_, bin)| bounds.join(bin));
+        let mut best: Option<(f32, usize, usize)> = None;
+        if depth < MAX_COSTED_DEPTH {
+            let cost = Cost::within(&bounds);
+            for axis in 0..3 {
+                if let Some((cost, plane)) = Self::best_of(&bins[axis], cost)
+                    && best.is_none_or(|(least, ..)| cost < least)
+                {
+                    best = Some((cost, axis, plane));
+                }
+            }
+        }
+        if let Some((_, axis, plane)) = best {
+            let is_left = |centre| binning.bins(centre)[axis] < plane;
+            let (middle, centres) = partition(references, scratch, is_left);
+            return Split { middle, bounds, centres };
+        }
+        // All centres are nearly equal, or the tree is deep: split into halves of whole treelets.
+        let axis = centres.longest();
+        let centre = |reference: &Reference| reference.aabb().centre();
+        references.sort_unstable_by(|a, b| {
+            centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.triangle.cmp(&b.triangle))
+        });
+        let middle = (references.len() / 2).next_multiple_of(self.treelet);
+        let centres = [&references[..middle], &references[middle..]].map(|side| {
+            let mut centres = Aabb::EMPTY;
+            side.iter().for_each(|reference| centres.join(&Aabb::of_point(centre(reference))));
+            centres
+        });
+        Split { middle, bounds, centres }
+    }
+
+    /// Returns the cost and the number of the best plane, or `None` if every plane leaves all triangles on one side.
+    /// There is a plane before each bin but the first.
+    pub(super) fn best_of<const N: usize>(bins: &[(usize, Aabb); N], cost: Cost) -> Option<(f32, usize)> {
+        let mut right_cost = [0.0; N];
+        let (mut bounds, mut right) = (Aabb::EMPTY, 0);
+        for plane in (1..N).rev() {
+            right += bins[plane].0;
+            bounds.join(&bins[plane].1);
+            right_cost[plane] = if right > 0 { cost.of(&bounds, weight(right)) } else { f32::INFINITY };
+        }
+        let mut best: Option<(f32, usize)> = None;
+        let (mut bounds, mut left) = (Aabb::EMPTY, 0);
+        for plane in 1..N {
+            left += bins[plane - 1].0;
+            bounds.join(&bins[plane - 1].1);
+            if left == 0 || right_cost[plane] == f32::INFINITY {
+                continue;
+            }
+            let cost = cost.of(&bounds, weight(left)) + right_cost[plane];
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, plane));
+            }
+        }
+        best
+    }
+}
+
+/// Estimates the nodes of a tree of `triangles` triangles. Packets hold more than three triangles on average.
+fn expected_nodes(triangles: usize) -> usize {
+    triangles * 5 / 8 + 1
+}
+
+/// Returns the weight of `count` triangles, which counts whole packets. This fills the packets; without it, a fifth
+/// of their places stay empty.
+#[inline(always)]
+pub(super) fn weight(count: usize) -> f32 {
+    count.next_multiple_of(PACKET) as f32
+}
+
+struct Split {
+    /// The length of the first side.
+    middle: usize,
+    /// The box of both sides.
+    bounds: Aabb,
+    /// The boxes of the centres of each side.
+    centres: [Aabb; 2],
+}
+
+/// By axis and bin, the number of triangles whose centre is in the bin, and their box.
+type Bins = [[(usize, Aabb); BINS_PER_AXIS]; 3];
+
+fn fill_bins(references: &[Reference], binning: &Binning<BINS_PER_AXIS>) -> Bins {
+    let mut bins = [[(0, Aabb::EMPTY); BINS_PER_AXIS]; 3];
+    for reference in references {
+        let bounds = reference.aabb();
+        let at = binning.bins(bounds.centre());
+        for axis in 0..3 {
+            let (count, bin) = &mut bins[axis][at[axis]];
+            *count += 1;
+            bin.join(&bounds);
+        }
+    }
+    bins
+}
+
+/// Moves one side to the front; both sides keep their order. Returns the length of the first side and the boxes of
+/// the centres of each side.
+fn partition(
+    references: &mut [Reference],
+    scratch: &mut [Reference],
+    is_left: impl Fn([f32; 4]) -> bool,
+) -> (usize, [Aabb; 2]) {
+    let mut ends = [0; 2];
+    let mut centres = [Aabb::EMPTY; 2];
+    for index in 0..references.len() {
+        let reference = references[index];
+        let centre = reference.aabb().centre();
+        let side = usize::from(!is_left(centre));
+        // The reference is written to both sides and counted on one, so that there is no branch to mispredict.
+        references[ends[0]] = reference;
+        scratch[ends[1]] = reference;
+        ends[side] += 1;
+        centres[side].join(&Aabb::of_point(centre));
+    }
+    references[ends[0]..].copy_from_slice(&scratch[..ends[1]]);
+    (ends[0], centres)
+}

@@ -1,0 +1,199 @@
+//! Builds binary trees over triangle boxes: one in each brick, and one above the bricks.
+//!
+//! Planes between the cells of a grid divide the triangles into bricks. Within a brick, bins find the splits down to a
+//! few dozen triangles; below that, all positions along all three axes are tried. All three use one cost
+//! (`boxes::Cost`). Last, subtrees of a brick move to where they enlarge the tree least (`reinsert`).
+//!
+//! The result does not depend on the order in which threads run: counts and boxes are merged by sums of integers
+//! and by minima, partitions are stable, and ties go to the lower axis and position.
+
+pub(crate) mod arena;
+mod binary;
+mod binned;
+mod boxes;
+mod bricks;
+mod reinsert;
+mod swept;
+pub(crate) mod treelets;
+
+use crate::error::BakeError;
+use crate::options::Effort;
+use crate::progress::{Stage, Step, Tally, WHOLE};
+use crate::storage::Stream;
+use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
+use crate::triangles::{Kept, Triangle};
+pub(crate) use binary::Tree;
+pub(crate) use boxes::Aabb;
+use boxes::Reference;
+use bricks::Division;
+pub(crate) use bricks::{BrickIndex, Grid};
+use reinsert::Pass;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The number of triangles in a full leaf packet.
+const PACKET: usize = bvh_format::leaf::PACKET;
+
+/// The shares of two passes over the triangles in the stage's work: dividing them into bricks, and building the bricks'
+/// trees. The rest is the encoding.
+const DIVIDE_WEIGHT: u64 = 2;
+const TREES_WEIGHT: u64 = 9;
+
+/// Returns true if `triangles` triangles make a single brick.
+pub(crate) fn is_one_brick(triangles: u64) -> bool {
+    triangles <= MAX_BRICK_TRIANGLES as u64
+}
+
+/// The most children of a treelet in any profile.
+pub(crate) const MAX_CHILDREN: usize = 8;
+
+/// The triangles of a leaf packet, by number, ascending.
+#[derive(Clone, Copy)]
+pub(crate) struct PacketTriangles {
+    numbers: [u32; PACKET],
+    count: u8,
+}
+
+impl PacketTriangles {
+    /// Takes the first numbers, as many as a packet holds.
+    pub(crate) fn new(numbers: impl Iterator<Item = u32>) -> Self {
+        let mut packet = Self { numbers: [0; PACKET], count: 0 };
+        for (slot, number) in packet.numbers.iter_mut().zip(numbers) {
+            *slot = number;
+            packet.count += 1;
+        }
+        packet.numbers[..usize::from(packet.count)].sort_unstable();
+        packet
+    }
+
+    pub(crate) fn numbers(&self) -> &[u32] {
+        &self.numbers[..usize::from(self.count)]
+    }
+}
+
+/// The bricks of an object and the tree above them.
+pub(crate) struct Bricks {
+    bricks: Vec<Stream<Triangle>>,
+    top: Tree<BrickIndex>,
+    builder: Builder,
+}
+
+impl Bricks {
+    /// Divides triangles into bricks, for treelets of `width` children. `grid` counts all of them, if they are more than
+    /// a brick holds.
+    pub(crate) fn divide(
+        triangles: &Kept,
+        grid: Option<Grid>,
+        width: usize,
+        effort: Effort,
+        resources: &Resources,
+    ) -> Result<Self, BakeError> {
+        let builder = Builder::new(width, effort);
+        let spill = resources.scratch.spill();
+        let tally = tally(resources, DIVIDE_WEIGHT, triangles.count());
+        let mut division =
+            Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks: Vec::new() };
+        let top = division.divide(triangles, triangles.count(), grid)?;
+        let bricks = division.bricks;
+        Ok(Self { bricks, top, builder })
+    }
+
+    /// Builds the tree of each brick and passes it to `make`, several bricks at a time. Returns the results of `make`
+    /// by brick, and the tree above the bricks. Packets number the triangles of their brick.
+    pub(crate) fn build<T: Send>(
+        self,
+        resources: &Resources,
+        make: impl Fn(Tree<PacketTriangles>, &[Triangle]) -> Result<T, BakeError> + Sync,
+    ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
+        let Self { bricks, top, builder } = self;
+        let count = bricks.len();
+        let triangles = bricks.iter().map(Stream::count).sum();
+        let (trees, rest) = (
+            tally(resources, TREES_WEIGHT, triangles),
+            tally(resources, WHOLE - DIVIDE_WEIGHT - TREES_WEIGHT, triangles),
+        );
+        // The largest bricks come first, so that few threads wait for the last one.
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by_key(|&number| std::cmp::Reverse(bricks[number].count()));
+        let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
+        let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
+        let lock = |mutex: &Mutex<Option<Stream<Triangle>>>| match mutex.lock() {
+            Ok(mut brick) => brick.take(),
+            Err(_) => None,
+        };
+        let next = AtomicUsize::new(0);
+        let work = || {
+            while let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let Some(brick) = lock(&bricks[number]) else { break };
+                let result = brick.take().and_then(|triangles| {
+                    let tree = builder.tree(&triangles);
+                    trees.add(triangles.len() as u64);
+                    let made = make(tree, &triangles)?;
+                    rest.add(triangles.len() as u64);
+                    Ok(made)
+                });
+                if result.is_err() {
+                    // The other loops end after their current brick.
+                    next.fetch_add(count, Ordering::Relaxed);
+                }
+                if let Ok(mut made) = made[number].lock() {
+                    *made = Some(result);
+                }
+            }
+        };
+        // One loop per brick that may be in memory. A thread that waits for another may run a second loop, but only loops
+        // start bricks.
+        rayon::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
+        let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
+        Ok((results.collect::<Result<_, _>>()?, top))
+    }
+}
+
+/// Starts a tally of a pass over `triangles` triangles.
+fn tally(resources: &Resources, weight: u64, triangles: u64) -> Tally<'_> {
+    resources.progress.tally(Step::Bake(Stage::Build), weight, triangles, triangles)
+}
+
+struct Builder {
+    /// The number of triangles in a full treelet of leaves.
+    treelet: usize,
+    /// The most triangles of a brick.
+    brick: usize,
+    /// Nodes of at most this many triangles are swept (`swept`).
+    sweep: usize,
+    /// The passes that move subtrees once a brick's tree is built.
+    passes: &'static [Pass],
+}
+
+impl Builder {
+    fn new(width: usize, effort: Effort) -> Self {
+        let (sweep, passes): (_, &[_]) = match effort {
+            Effort::Fast => (16, &[]),
+            Effort::Default => (swept::MAX_SWEPT, &[Pass { one_in: 10 }]),
+            Effort::High => (swept::MAX_SWEPT, &[Pass { one_in: 1 }; 3]),
+        };
+        Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, passes }
+    }
+
+    /// Builds the tree of a brick.
+    fn tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
+        let mut passes = self.passes;
+        loop {
+            let mut tree = self.split_tree(triangles);
+            match reinsert::optimise(&mut tree, passes) {
+                Ok(()) => return tree,
+                // A copy of the tree before each pass would cost every bake time, and hardly any bake needs it.
+                Err(reinsert::TooDeep { pass }) => passes = &passes[..pass],
+            }
+        }
+    }
+
+    /// Builds the tree by splits, before any subtree is moved.
+    fn split_tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
+        let references =
+            triangles.iter().zip(0..).map(|(triangle, number)| Reference::new(number, &triangle.corners));
+        let mut references: Vec<Reference> = references.collect();
+        let mut scratch = vec![Reference::default(); references.len()];
+        self.brick(&mut references, &mut scratch)
+    }
+}

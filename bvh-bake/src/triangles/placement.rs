@@ -1,0 +1,163 @@
+//! Places vertices: turns the coordinates of the input into those of a file, by origin, rounding and the grid of
+//! quantised triangles.
+//!
+//! Coordinates become `f32` numbers relative to an `f64` origin, such that `origin + v` is exact in `f64`. The
+//! distance by which a vertex moves is measured, not estimated.
+
+/// The range of the coordinates of an object.
+#[derive(Clone, Copy)]
+pub(crate) struct Extent {
+    pub(crate) lo: [f64; 3],
+    pub(crate) hi: [f64; 3],
+    /// Per axis, whether all coordinates are `f32` numbers.
+    pub(crate) all_f32: [bool; 3],
+}
+
+impl Extent {
+    pub(crate) const EMPTY: Self =
+        Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3], all_f32: [true; 3] };
+
+    #[inline]
+    pub(crate) fn add(&mut self, position: [f64; 3]) {
+        for axis in 0..3 {
+            let value = position[axis];
+            self.lo[axis] = self.lo[axis].min(value);
+            self.hi[axis] = self.hi[axis].max(value);
+            self.all_f32[axis] &= f64::from(value as f32) == value;
+        }
+    }
+
+    pub(crate) fn joined(self, other: Self) -> Self {
+        Self {
+            lo: [0, 1, 2].map(|axis| self.lo[axis].min(other.lo[axis])),
+            hi: [0, 1, 2].map(|axis| self.hi[axis].max(other.hi[axis])),
+            all_f32: [0, 1, 2].map(|axis| self.all_f32[axis] && other.all_f32[axis]),
+        }
+    }
+
+    /// Returns the diagonal of the box, in mesh units.
+    pub(crate) fn diagonal(&self) -> f64 {
+        (0..3).map(|a| (self.hi[a] - self.lo[a]).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// One axis of the origin, and the grid on which `origin + v` is exact.
+#[derive(Clone, Copy, Default)]
+struct AxisOrigin {
+    origin: f64,
+    /// Vertices are multiples of this number; 0 stands for no grid.
+    grid: f64,
+}
+
+/// The largest distances by which vertices moved, in mesh units.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Moved {
+    pub(crate) rounding: f64,
+    pub(crate) quantization: f64,
+}
+
+impl Moved {
+    pub(crate) fn joined(self, other: Self) -> Self {
+        Self {
+            rounding: self.rounding.max(other.rounding),
+            quantization: self.quantization.max(other.quantization),
+        }
+    }
+
+    /// Returns upper bounds of the true distances, if `norm` computed these.
+    pub(crate) fn rounded_up(self) -> Self {
+        Self { rounding: rounded_up(self.rounding), quantization: rounded_up(self.quantization) }
+    }
+}
+
+/// The way the vertices of an object are placed.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Placement {
+    axes: [AxisOrigin; 3],
+    /// The step of the grid of quantised triangles.
+    step: Option<f64>,
+}
+
+impl Placement {
+    /// Chooses the origin. Along an axis it is 0 if every coordinate is an `f32`, or if moving it would gain less
+    /// than two bits. Otherwise it is the middle of the axis, rounded to the spacing of `f64` numbers there.
+    /// `grid_error` is the largest distance by which quantisation may move a vertex, or `None` for no quantisation.
+    pub(crate) fn new(extent: &Extent, grid_error: Option<f64>) -> Self {
+        let axes = [0, 1, 2].map(|axis| {
+            let (lo, hi) = (extent.lo[axis], extent.hi[axis]);
+            let largest = lo.abs().max(hi.abs());
+            let half = (hi - lo) / 2.0;
+            if largest <= 4.0 * half || extent.all_f32[axis] {
+                return AxisOrigin::default();
+            }
+            // `origin + v` stays below twice the largest coordinate, where this is the spacing of `f64` numbers.
+            // Origins are multiples of the smallest `f32`, as all vertices are.
+            let grid = spacing(2.0 * largest).max(f64::from(f32::from_bits(1)));
+            let middle = lo + half;
+            AxisOrigin { origin: (middle / grid).round() * grid, grid }
+        });
+        Self { axes, step: grid_error.map(grid_step) }
+    }
+
+    pub(crate) fn origin(&self) -> [f64; 3] {
+        self.axes.map(|axis| axis.origin)
+    }
+
+    /// Returns whether `f32` coordinates other than -0.0 stay as they are.
+    pub(crate) fn keeps_f32(&self) -> bool {
+        self.step.is_none() && self.axes.iter().all(|axis| axis.origin == 0.0 && axis.grid == 0.0)
+    }
+
+    /// Returns the vertex of the file for a vertex of the input, and records in `moved` how far it moved.
+    #[inline]
+    pub(crate) fn place(&self, position: [f64; 3], moved: &mut Moved) -> [f32; 3] {
+        let mut vertex = [0.0; 3];
+        let (mut rounding, mut quantization) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let AxisOrigin { origin, grid } = self.axes[axis];
+            let mut offset = position[axis] - origin;
+            if grid > 0.0 {
+                offset = (offset / grid).round() * grid;
+            }
+            let rounded = offset as f32;
+            rounding[axis] = position[axis] - (origin + f64::from(rounded));
+            // If the step is smaller than the spacing of `f32` at the vertex, the vertex is on the grid already. That
+            // includes a step so small that the quotient overflows.
+            let snapped = self.step.map(|step| ((f64::from(rounded) / step).round() * step) as f32);
+            let snapped = snapped.filter(|snapped| snapped.is_finite()).unwrap_or(rounded);
+            quantization[axis] = f64::from(snapped) - f64::from(rounded);
+            // Equal values must have equal bits.
+            vertex[axis] = if snapped == 0.0 { 0.0 } else { snapped };
+        }
+        moved.rounding = moved.rounding.max(norm(rounding));
+        moved.quantization = moved.quantization.max(norm(quantization));
+        vertex
+    }
+}
+
+/// Returns the distance from `value` to the next larger `f64`, a power of two.
+fn spacing(value: f64) -> f64 {
+    value.next_up() - value
+}
+
+/// Returns the length of a vector, scaled such that squares neither overflow nor vanish.
+fn norm(v: [f64; 3]) -> f64 {
+    let largest = v.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    largest * v.iter().map(|c| (c / largest).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Returns an upper bound of a true length that `norm` computed with at most five rounding errors of 2^-53.
+fn rounded_up(length: f64) -> f64 {
+    if length == 0.0 { 0.0 } else { (length * (1.0 + 2f64.powi(-49))).next_up() }
+}
+
+/// Returns the largest power of two whose grid moves no vertex by more than `error`: half a step along each of three
+/// axes is sqrt(3) / 2 steps.
+fn grid_step(error: f64) -> f64 {
+    let limit = error * 2.0 / 3f64.sqrt();
+    // Keeps the leading bit only. A logarithm could differ between the libraries of two platforms.
+    f64::from_bits(limit.to_bits() & 0x7ff << 52).max(f64::MIN_POSITIVE)
+}

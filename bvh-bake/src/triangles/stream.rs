@@ -1,0 +1,143 @@
+//! Streams the triangles of an object in the order of their ids, part by part and as often as needed.
+//!
+//! Each thread can hold a few parts in memory.
+
+use super::placement::{Moved, Placement};
+use super::{TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
+use crate::error::BakeError;
+use crate::storage::{Piece, Spill};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// A part of the input as it was read.
+pub(crate) enum Part {
+    Narrow(Piece<Triangle>),
+    Wide(Piece<WideTriangle>),
+}
+
+/// All triangles of an object, duplicates included. All parts but the last are full.
+pub(crate) struct TriangleStream {
+    pub(crate) parts: Vec<Part>,
+    pub(crate) count: u64,
+    /// The placement of each corner when it is read; `None` if the corners are placed already.
+    pub(crate) placement: Option<Placement>,
+}
+
+impl TriangleStream {
+    /// Returns the triangles of a part, and how far their corners were moved.
+    pub(crate) fn measured_part(&self, number: usize) -> Result<(Cow<'_, [Triangle]>, Moved), BakeError> {
+        self.parts[number].measured(self.placement.as_ref())
+    }
+}
+
+impl Part {
+    /// Returns the triangles, placed if there is a placement, and how far their corners were moved.
+    fn measured(&self, placement: Option<&Placement>) -> Result<(Cow<'_, [Triangle]>, Moved), BakeError> {
+        let mut moved = Moved::default();
+        let placed = match (self, placement) {
+            (Part::Narrow(piece), None) => piece.all()?,
+            (Part::Narrow(piece), Some(placement)) => {
+                let place = |triangle: &Triangle| Triangle {
+                    corners: triangle.corners.map(|c| placement.place(c.map(f64::from), &mut moved)),
+                    id: triangle.id,
+                };
+                Cow::Owned(piece.all()?.iter().map(place).collect())
+            }
+            (Part::Wide(piece), placement) => {
+                let placement = placement.copied().unwrap_or_default();
+                let place = |triangle: &WideTriangle| Triangle {
+                    corners: triangle.corners.map(|corner| placement.place(corner, &mut moved)),
+                    id: triangle.id,
+                };
+                Cow::Owned(piece.all()?.iter().map(place).collect())
+            }
+        };
+        Ok((placed, moved))
+    }
+}
+
+impl TriangleStream {
+    /// Places all corners at once if all triangles are in memory, because otherwise every pass would place them again.
+    /// Returns the stream and how far the corners moved if it placed them.
+    pub(crate) fn placed_in_memory(self, spill: &Spill) -> Result<(Self, Moved), BakeError> {
+        let Self { parts, count, placement } = self;
+        let is_placed = |part: &Part| placement.is_none() && matches!(part, Part::Narrow(_));
+        let is_in_memory = |part: &Part| match part {
+            Part::Narrow(piece) => piece.in_memory().is_some(),
+            Part::Wide(piece) => piece.in_memory().is_some(),
+        };
+        if parts.iter().all(is_placed) || !parts.iter().all(is_in_memory) {
+            return Ok((Self { parts, count, placement }, Moved::default()));
+        }
+        let place = |part: Part| {
+            let (triangles, moved) = part.measured(placement.as_ref())?;
+            let triangles = triangles.into_owned();
+            drop(part);
+            Ok((Part::Narrow(spill.put(triangles)?), moved))
+        };
+        let placed = parts.into_par_iter().map(place).collect::<Result<Vec<_>, BakeError>>()?;
+        let moved = placed.iter().fold(Moved::default(), |all, (_, moved)| all.joined(*moved));
+        let parts = placed.into_iter().map(|(part, _)| part).collect();
+        Ok((Self { parts, count, placement: None }, moved))
+    }
+}
+
+impl Triangles for TriangleStream {
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
+        Ok(self.measured_part(number)?.0)
+    }
+}
+
+/// A stream without its duplicates.
+pub(crate) struct Kept<'a> {
+    pub(crate) stream: &'a TriangleStream,
+    /// One bit per triangle, set for those that are left out; empty if none is.
+    dropped: &'a [u64],
+    /// For each part, the number of triangles kept in all parts before it; then the number in all parts.
+    firsts: Vec<u64>,
+}
+
+impl<'a> Kept<'a> {
+    pub(crate) fn new(stream: &'a TriangleStream, dropped: &'a [u64]) -> Self {
+        let mut firsts = vec![0];
+        let mut first = 0;
+        for part in 0..stream.parts.len() {
+            let size = (stream.count - (part * TRIANGLES_PER_PART) as u64).min(TRIANGLES_PER_PART as u64);
+            let words = dropped.get(part * TRIANGLES_PER_PART / 64..).unwrap_or(&[]);
+            let missing: u32 = words.iter().take(TRIANGLES_PER_PART / 64).map(|word| word.count_ones()).sum();
+            first += size - u64::from(missing);
+            firsts.push(first);
+        }
+        Self { stream, dropped, firsts }
+    }
+
+    /// Returns the number of triangles kept.
+    pub(crate) fn count(&self) -> u64 {
+        self.firsts[self.stream.parts.len()]
+    }
+
+    /// Returns the number of triangles kept before a part.
+    pub(crate) fn first(&self, part: usize) -> u64 {
+        self.firsts[part]
+    }
+}
+
+impl Triangles for Kept<'_> {
+    fn parts(&self) -> usize {
+        self.stream.parts.len()
+    }
+
+    fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
+        let all = self.stream.part(number)?;
+        if self.firsts[number + 1] - self.firsts[number] == all.len() as u64 {
+            return Ok(all);
+        }
+        let first = number * TRIANGLES_PER_PART;
+        let is_kept = |place: &usize| self.dropped[(first + place) / 64] >> ((first + place) % 64) & 1 == 0;
+        Ok(Cow::Owned((0..all.len()).filter(is_kept).map(|place| all[place]).collect()))
+    }
+}

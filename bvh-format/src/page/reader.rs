@@ -1,0 +1,119 @@
+//! Reads a page: its header, anchors, remote links and treelets, without copying any.
+
+use super::{
+    Anchor, LINK_BYTES, PAGE, PAGE_HEADER_BYTES, PARENT_BYTES, PageHeader, RootRef, anchor_at, link_at,
+};
+use crate::leaf::LINE;
+use crate::profile::Profile;
+use crate::slabs::{NodeSlabs, row};
+use crate::treelet::Links;
+
+/// A view of a page that has passed [`check_page`](super::check_page), or is being checked.
+///
+/// Over bytes that have not been checked, the accessors may return nonsense, but they never panic.
+#[derive(Clone, Copy)]
+pub struct Page<'a> {
+    bytes: &'a [u8; PAGE],
+    profile: Profile,
+}
+
+impl<'a> Page<'a> {
+    /// Views the bytes of a page as one of an object of this profile.
+    #[inline]
+    pub fn new(bytes: &'a [u8; PAGE], profile: Profile) -> Self {
+        Self { bytes, profile }
+    }
+
+    /// The header: the first line.
+    #[inline]
+    pub fn header(&self) -> &'a PageHeader {
+        let head: &[u8; PAGE_HEADER_BYTES] = self.bytes.first_chunk().unwrap_or(&[0; PAGE_HEADER_BYTES]);
+        zerocopy::transmute_ref!(head)
+    }
+
+    /// All bytes of the page.
+    pub fn bytes(&self) -> &'a [u8; PAGE] {
+        self.bytes
+    }
+
+    /// The profile with which the treelets are read.
+    #[inline]
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// The treelet in a slot. A slot that lies beyond the page reads the page's first bytes.
+    #[inline]
+    pub fn treelet(&self, slot: u8) -> &'a [u8] {
+        let size = self.profile.treelet_bytes();
+        let start = self.treelet_at(slot);
+        self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size])
+    }
+
+    /// The byte of the page at which the treelet in a slot starts.
+    #[inline]
+    pub(super) fn treelet_at(&self, slot: u8) -> usize {
+        usize::from(self.header().treelet_line) * LINE + usize::from(slot) * self.profile.treelet_bytes()
+    }
+
+    /// The bytes of a treelet's child treelets in this page, which are contiguous.
+    #[inline]
+    pub fn treelets_ahead(&self, links: &Links) -> &'a [u8] {
+        let start = self.treelet_at(links.first_treelet);
+        let end = start + links.treelets().count_ones() as usize * self.profile.treelet_bytes();
+        self.bytes.get(start..end).unwrap_or(&[])
+    }
+
+    /// The anchor of a root.
+    #[inline]
+    pub fn anchor(&self, root: u8) -> Anchor {
+        let (parent_page, parent_link) = self.anchor_parent(root);
+        Anchor { slabs: self.anchor_slabs(root), parent_page, parent_link }
+    }
+
+    /// The slabs of a root.
+    #[inline]
+    pub fn anchor_slabs(&self, root: u8) -> NodeSlabs {
+        let bytes = self.anchor_bytes(root);
+        let slabs = self.profile.directions().slabs();
+        let mut node = NodeSlabs::default();
+        let (lo, hi) = (bytes.as_chunks::<4>().0, bytes[4 * slabs..].as_chunks::<4>().0);
+        // Slabs up to 6 stand in their own rows, the others one row further.
+        for row in 0..slabs.min(7) {
+            node.lo[row] = f32::from_le_bytes(lo[row]);
+            node.hi[row] = f32::from_le_bytes(hi[row]);
+        }
+        for slab in 7..slabs {
+            node.lo[row(slab)] = f32::from_le_bytes(lo[slab]);
+            node.hi[row(slab)] = f32::from_le_bytes(hi[slab]);
+        }
+        node
+    }
+
+    /// The page and the remote link that lead to a root.
+    #[inline]
+    pub fn anchor_parent(&self, root: u8) -> (u32, u8) {
+        let bytes = self.anchor_bytes(root);
+        let at = bytes.len() - PARENT_BYTES;
+        let page = [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
+        (u32::from_le_bytes(page), bytes[at + 4])
+    }
+
+    #[inline]
+    fn anchor_bytes(&self, root: u8) -> &'a [u8] {
+        let size = self.profile.anchor_bytes();
+        let start = anchor_at(self.profile, root.into());
+        self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size])
+    }
+
+    /// A remote link: a reference to a subtree root in a later page.
+    #[inline]
+    pub fn remote(&self, link: u8) -> RootRef {
+        let start = link_at(self.profile, self.header().roots, link);
+        let mut word = [0; LINK_BYTES];
+        if let Some(bytes) = self.bytes.get(start..start + LINK_BYTES) {
+            word.copy_from_slice(bytes);
+        }
+        RootRef(u32::from_le_bytes(word))
+    }
+}

@@ -1,0 +1,368 @@
+//! Writes a page from the plan of a baker: roots first, then treelet after treelet with their children.
+//!
+//! The writer numbers children as the format demands, encodes their slabs under the *decoded* slabs of their parents,
+//! collects the packets of the leaf block, and fills in the header. The caller decides which treelet goes into which
+//! slot, and visits the treelets in that order.
+
+use super::{
+    LINK_BYTES, NO_PARENT, PAGE, PAGE_HEADER_BYTES, PARENT_BYTES, PageHeader, PageShape, RootRef, anchor_at,
+    link_at,
+};
+use crate::checksum::checksum;
+use crate::decode::decode_child;
+use crate::ids::{WORD, encode_ids};
+use crate::kdop::Kdop;
+use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, encode_block};
+use crate::profile::Profile;
+use crate::slabs::NodeSlabs;
+use crate::treelet::{ChildKind, Links, SlabEncoder};
+use zerocopy::IntoBytes;
+
+/// A page and its blocks. Its numbers count from itself until a [`PagePatcher`](super::PagePatcher) changes them: it is
+/// page 0, its blocks start their sections, and its checksum is missing.
+pub struct WrittenPage {
+    /// The bytes of the page.
+    pub bytes: Box<[u8; PAGE]>,
+    /// The leaf block in whole lines; empty without packets.
+    pub leaf_block: Vec<u8>,
+    /// The id block in whole words; empty without packets or ids.
+    pub id_block: Vec<u8>,
+}
+
+/// Writes one page.
+///
+/// Call [`root`](Self::root) for each root; then, for each slot in turn, [`begin_treelet`](Self::begin_treelet) and one
+/// of [`treelet`](Self::treelet), [`remote`](Self::remote) and [`leaf`](Self::leaf) for each child; at last
+/// [`finish`](Self::finish). Children that are treelets of this page take the next free slots, and remote links and
+/// leaf packets the next free numbers, in the order of the calls.
+///
+/// # Panics
+/// The methods panic if more is written than the shape has room for, or than the profile allows for a treelet.
+pub struct PageWriter {
+    bytes: Box<[u8; PAGE]>,
+    profile: Profile,
+    f16_scale: f32,
+    shape: PageShape,
+    /// The decoded slabs of the slots that have been given to a root or a child so far.
+    decoded: Vec<NodeSlabs>,
+    /// Treelets begun so far.
+    begun: usize,
+    /// Remote links written so far.
+    remotes: usize,
+    packets: Vec<Packet>,
+    ids: Vec<LaneIds>,
+    open: OpenTreelet,
+}
+
+/// The treelet that is being written.
+struct OpenTreelet {
+    /// The byte of the page at which it starts.
+    at: usize,
+    children: usize,
+    links: Links,
+    slabs: SlabEncoder,
+}
+
+/// The ids of a packet's triangles.
+struct LaneIds {
+    ids: [u32; PACKET],
+    count: usize,
+}
+
+impl AsRef<[u32]> for LaneIds {
+    fn as_ref(&self) -> &[u32] {
+        &self.ids[..self.count]
+    }
+}
+
+impl PageWriter {
+    /// Starts a page of this shape. `f16_scale` is the object's unit of f16 residuals, a power of two.
+    pub fn new(profile: Profile, f16_scale: f32, shape: PageShape) -> Self {
+        debug_assert!(shape.fits(profile));
+        let none = NodeSlabs::default();
+        Self {
+            bytes: Box::new([0; PAGE]),
+            profile,
+            f16_scale,
+            shape,
+            decoded: Vec::with_capacity(shape.treelets),
+            begun: 0,
+            remotes: 0,
+            packets: Vec::new(),
+            ids: Vec::new(),
+            open: OpenTreelet {
+                at: 0,
+                children: 0,
+                links: Links::default(),
+                slabs: SlabEncoder::new(profile, f16_scale, &none),
+            },
+        }
+    }
+
+    /// Writes the anchor of the next root: its slabs, and the page and remote link that lead to it. Without a parent
+    /// it is the object's root, or its parent is patched in later.
+    pub fn root(&mut self, slabs: &Kdop, parent: Option<(u32, u8)>) {
+        let (root, count) = (self.decoded.len(), self.profile.directions().slabs());
+        let ends = slabs.lo[..count].iter().chain(&slabs.hi[..count]);
+        let anchor = &mut self.bytes[anchor_at(self.profile, root)..];
+        for (place, end) in anchor.as_chunks_mut().0.iter_mut().zip(ends) {
+            *place = end.to_le_bytes();
+        }
+        write_parent(&mut self.bytes, self.profile, root, parent.unwrap_or((NO_PARENT, 0)));
+        self.decoded.push(NodeSlabs::from_kdop(slabs, count));
+    }
+
+    /// Starts the treelet in the next slot.
+    pub fn begin_treelet(&mut self) {
+        let slot = self.begun;
+        self.begun += 1;
+        self.open = OpenTreelet {
+            at: self.shape.treelet_line(self.profile) * LINE + slot * self.profile.treelet_bytes(),
+            children: 0,
+            links: Links {
+                kinds: 0,
+                first_treelet: self.decoded.len() as u8,
+                first_remote: self.remotes as u8,
+                first_leaf: self.packets.len() as u16,
+            },
+            slabs: SlabEncoder::new(self.profile, self.f16_scale, &self.decoded[slot]),
+        };
+    }
+
+    /// Adds a child that is a treelet of this page: the one in the next free slot.
+    pub fn treelet(&mut self, slabs: &Kdop) {
+        let child = self.child(slabs, ChildKind::Treelet);
+        let treelet = &self.bytes[self.open.at..][..self.profile.treelet_bytes()];
+        let parent = &self.open.slabs.parent;
+        self.decoded.push(decode_child(self.profile, self.f16_scale, treelet, child, parent));
+    }
+
+    /// Adds a child that is a subtree root of another page.
+    pub fn remote(&mut self, slabs: &Kdop, to: RootRef) {
+        self.child(slabs, ChildKind::Remote);
+        write_remote(&mut self.bytes, self.profile, self.shape.roots as u8, self.remotes as u8, to);
+        self.remotes += 1;
+    }
+
+    /// Adds a child that is a leaf packet of one to four triangles: their corners, around the object's origin, and ids.
+    pub fn leaf(&mut self, slabs: &Kdop, triangles: impl Iterator<Item = ([[f32; 3]; 3], u32)>) {
+        let (mut corners, mut ids) = ([[[0.0; 3]; 3]; PACKET], LaneIds { ids: [0; PACKET], count: 0 });
+        for (lane, triangle) in triangles.enumerate() {
+            (corners[lane], ids.ids[lane]) = triangle;
+            ids.count += 1;
+        }
+        self.child(slabs, ChildKind::Leaf { triangles: ids.count });
+        self.packets.push(Packet::new(&corners[..ids.count]));
+        self.ids.push(ids);
+    }
+
+    /// Writes the slabs and the kind of the next child of the treelet; returns its number.
+    fn child(&mut self, slabs: &Kdop, kind: ChildKind) -> usize {
+        let open = &mut self.open;
+        let child = open.children;
+        open.children += 1;
+        open.links.set_kind(child, kind);
+        let treelet = &mut self.bytes[open.at..][..self.profile.treelet_bytes()];
+        open.slabs.encode(child, slabs, treelet);
+        open.links.write(treelet);
+        child
+    }
+
+    /// Encodes the blocks and writes the header.
+    pub fn finish(mut self, encoding: TriangleEncoding, with_ids: bool) -> WrittenPage {
+        let written =
+            PageShape { roots: self.shape.roots, remotes: self.remotes, treelets: self.decoded.len() };
+        debug_assert!(written == self.shape && self.begun == self.shape.treelets);
+        let none = self.packets.is_empty();
+        let leaf_block = if none { Vec::new() } else { encode_block(encoding, &self.packets) };
+        let id_block = if none || !with_ids { Vec::new() } else { encode_ids(&self.ids) };
+        let header = PageHeader {
+            checksum: 0.into(),
+            leaf_checksum: checksum(&leaf_block).into(),
+            id_checksum: if id_block.is_empty() { 0 } else { checksum(&id_block) }.into(),
+            leaf_line: 0.into(),
+            id_word: 0.into(),
+            first_packet: 0.into(),
+            page_number: 0.into(),
+            leaf_lines: ((leaf_block.len() / LINE) as u32).into(),
+            id_words: ((id_block.len() / WORD) as u32).into(),
+            packets: (self.packets.len() as u16).into(),
+            roots: self.shape.roots as u8,
+            treelets: self.shape.treelets as u8,
+            remotes: self.shape.remotes as u8,
+            treelet_line: self.shape.treelet_line(self.profile) as u8,
+            profile: self.profile.number(),
+            reserved: 0,
+        };
+        write_header(&mut self.bytes, &header);
+        WrittenPage { bytes: self.bytes, leaf_block, id_block }
+    }
+}
+
+/// Writes the header of a page.
+pub(super) fn write_header(bytes: &mut [u8; PAGE], header: &PageHeader) {
+    bytes[..PAGE_HEADER_BYTES].copy_from_slice(header.as_bytes());
+}
+
+/// Writes into the anchor of a root which remote link of which page leads to it.
+pub(super) fn write_parent(bytes: &mut [u8; PAGE], profile: Profile, root: usize, (page, link): (u32, u8)) {
+    let at = anchor_at(profile, root + 1) - PARENT_BYTES;
+    bytes[at..at + 4].copy_from_slice(&page.to_le_bytes());
+    bytes[at + 4] = link;
+}
+
+/// Writes a remote link of a page of `roots` roots.
+pub(super) fn write_remote(bytes: &mut [u8; PAGE], profile: Profile, roots: u8, link: u8, to: RootRef) {
+    let at = link_at(profile, roots, link);
+    bytes[at..at + LINK_BYTES].copy_from_slice(&to.0.to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Page, PagePatcher, PagePlace, check_page};
+    use super::*;
+    use crate::ids::decode_id;
+    use crate::leaf::decode_packet;
+    use crate::object::{Object, ObjectRecord};
+    use crate::treelet::Child;
+    use std::ops::Range;
+    use zerocopy::FromZeros;
+
+    const ENCODING: TriangleEncoding = TriangleEncoding::Packed;
+    /// Root 1 of page 7 is that of page 5, link 3.
+    const PARENT: (u32, u8) = (5, 3);
+    const REMOTE: RootRef = RootRef(9 << 6 | 2);
+    const PLACE: PagePlace = PagePlace { page: 7, leaf_line: 1000, id_word: 2000, first_packet: 3000 };
+
+    /// The corners and the id of the triangle of a number.
+    fn triangle(number: u32) -> ([[f32; 3]; 3], u32) {
+        let at = number as f32;
+        ([[at, 0.25, 0.0], [at + 0.5, 0.0, -0.125], [at, 0.75, 0.5]], 100 + 3 * number)
+    }
+
+    fn bound(numbers: Range<u32>) -> Kdop {
+        Kdop::of_points(numbers.flat_map(|number| triangle(number).0))
+    }
+
+    /// A page of two roots. The first has a packet of four triangles, a treelet and, if the profile has room for a
+    /// third child, a remote link. That treelet has a packet of one triangle, and so has the second root.
+    fn write(profile: Profile, with_ids: bool) -> WrittenPage {
+        let remotes = usize::from(profile.width() > 2);
+        let mut writer =
+            PageWriter::new(profile, 2f32.powi(-12), PageShape { roots: 2, remotes, treelets: 3 });
+        writer.root(&bound(0..8), None);
+        writer.root(&bound(8..9), Some(PARENT));
+        writer.begin_treelet();
+        writer.leaf(&bound(0..4), (0..4).map(triangle));
+        writer.treelet(&bound(4..5));
+        if remotes == 1 {
+            writer.remote(&bound(5..8), REMOTE);
+        }
+        writer.begin_treelet();
+        writer.leaf(&bound(8..9), (8..9).map(triangle));
+        writer.begin_treelet();
+        writer.leaf(&bound(4..5), (4..5).map(triangle));
+        writer.finish(ENCODING, with_ids)
+    }
+
+    /// An object to which page 7 may belong.
+    fn object(profile: Profile) -> Object {
+        let mut record = ObjectRecord::new_zeroed();
+        record.first_page = 2.into();
+        record.pages = 20.into();
+        Object {
+            name: String::new(),
+            profile,
+            triangle_encoding: ENCODING,
+            f16_scale: 2f32.powi(-12),
+            record,
+        }
+    }
+
+    #[test]
+    fn a_written_page_keeps_the_rules_and_reads_back() {
+        for profile in Profile::ALL {
+            let slabs = profile.directions().slabs();
+            let mut written = write(profile, true);
+            let mut patcher = PagePatcher::new(&mut written.bytes, profile);
+            patcher.set_place(&PLACE);
+            patcher.set_parent(0, 4, 1);
+            patcher.seal();
+            check_page(&written.bytes, 7, &object(profile), 0).unwrap();
+
+            let page = Page::new(&written.bytes, profile);
+            assert_eq!([page.anchor_parent(0), page.anchor_parent(1)], [(4, 1), PARENT]);
+            assert_eq!(
+                page.anchor_slabs(1).to_kdop(slabs),
+                NodeSlabs::from_kdop(&bound(8..9), slabs).to_kdop(slabs)
+            );
+            let header = page.header();
+            assert_eq!(header.leaf_bytes(), 64_000..64_000 + written.leaf_block.len());
+            assert_eq!(header.id_bytes(), 16_000..16_000 + written.id_block.len());
+            assert_eq!(PLACE.behind(header).first_packet, 3003);
+            let first = Links::read(page.treelet(0));
+            let leaf = |packet, triangles| Child::Leaf { packet, triangles };
+            assert_eq!([first.child(0), first.child(1)], [leaf(0, 4), Child::Treelet(2)]);
+            if profile.width() > 2 {
+                assert_eq!((first.child(2), page.remote(0)), (Child::Remote(0), REMOTE));
+            }
+            assert_eq!(Links::read(page.treelet(1)).child(0), leaf(1, 1));
+            assert_eq!(Links::read(page.treelet(2)).child(0), leaf(2, 1));
+
+            let decode = |slot, child, parent: &NodeSlabs| {
+                decode_child(profile, 2f32.powi(-12), page.treelet(slot), child, parent)
+            };
+            let root = page.anchor_slabs(0);
+            let inner = decode(0, 1, &root);
+            for (decoded, held) in [
+                (root, bound(0..8)),
+                (decode(0, 0, &root), bound(0..4)),
+                (inner, bound(4..5)),
+                (decode(2, 0, &inner), bound(4..5)),
+                (decode(1, 0, &page.anchor_slabs(1)), bound(8..9)),
+            ] {
+                assert!(decoded.to_kdop(slabs).contains(&held, slabs), "{}", profile.name());
+            }
+            for (packet, lane, number) in [(0, 0, 0), (0, 3, 3), (1, 0, 8), (2, 0, 4)] {
+                let corners = decode_packet(ENCODING, &written.leaf_block, packet).triangle(lane);
+                assert_eq!((corners, decode_id(&written.id_block, packet, lane)), triangle(number));
+            }
+        }
+    }
+
+    #[test]
+    fn patches_change_the_numbers_and_nothing_else() {
+        let profile = Profile::Dop26U8Wide;
+        let (untouched, mut patched) = (write(profile, false), write(profile, false));
+        let mut patcher = PagePatcher::new(&mut patched.bytes, profile);
+        patcher.set_place(&PLACE);
+        patcher.set_parent(1, 6, 200);
+        patcher.set_remote(0, RootRef::new(12, 61));
+        patcher.seal();
+        let page = Page::new(&patched.bytes, profile);
+        assert_eq!((page.anchor_parent(1), page.remote(0)), ((6, 200), RootRef::new(12, 61)));
+        let header = page.header();
+        assert_eq!((header.page_number.get(), header.leaf_line.get()), (7, 1000));
+        // Without ids the page has no place in the id section.
+        assert_eq!((header.id_word.get(), header.first_packet.get()), (0, 3000));
+        let anchors = anchor_at(profile, 2);
+        let numbers =
+            [0..8, 24..48, anchors - PARENT_BYTES..anchors - PARENT_BYTES + 5, anchors..anchors + LINK_BYTES];
+        for at in 0..PAGE {
+            if !numbers.iter().any(|range| range.contains(&at)) {
+                assert_eq!(page.bytes()[at], untouched.bytes[at], "byte {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_page_without_packets_has_no_blocks() {
+        let shape = PageShape { roots: 1, remotes: 1, treelets: 1 };
+        let mut writer = PageWriter::new(Profile::Dop14U8, 1.0, shape);
+        writer.root(&bound(0..3), None);
+        writer.begin_treelet();
+        writer.remote(&bound(0..3), REMOTE);
+        let page = writer.finish(ENCODING, true);
+        assert!(page.leaf_block.is_empty() && page.id_block.is_empty());
+    }
+}

@@ -1,0 +1,88 @@
+//! Makes small meshes of dyadic coordinates, and changes them exactly.
+
+use crate::Triangle;
+
+/// Returns a power of two.
+pub(super) fn two(exponent: i32) -> f64 {
+    2f64.powi(exponent)
+}
+
+/// Returns the surface of a box, which has 12 triangles.
+pub(super) fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
+    let corner = |bits: usize| [0, 1, 2].map(|k| if bits >> k & 1 == 1 { high[k] } else { low[k] });
+    let face = |[p, q, r, s]: [usize; 4]| [[p, q, r].map(corner), [r, q, s].map(corner)];
+    [[0, 2, 1, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 4, 2, 6], [1, 3, 5, 7]]
+        .into_iter()
+        .flat_map(face)
+        .collect()
+}
+
+/// Returns the box from -1 to 1.
+pub(super) fn cube() -> Vec<Triangle> {
+    cuboid([-1.0; 3], [1.0; 3])
+}
+
+/// Returns the box from 0 to 1.
+pub(super) fn unit_cube() -> Vec<Triangle> {
+    cuboid([0.0; 3], [1.0; 3])
+}
+
+/// Returns n x n squares of two triangles each, in the plane z = 0 from 0 to n.
+pub(super) fn plate(n: usize) -> Vec<Triangle> {
+    terrain(n, |_, _| 0.0)
+}
+
+/// Returns the same squares with a height at each corner.
+pub(super) fn terrain(n: usize, height: impl Fn(usize, usize) -> f64) -> Vec<Triangle> {
+    let at = |x: usize, y: usize| [x as f64, y as f64, height(x, y)];
+    let square = |k: usize| {
+        let (x, y) = (k % n, k / n);
+        let [p, q, r, s] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+        [[p, q, r], [r, q, s]]
+    };
+    (0..n * n).flat_map(square).collect()
+}
+
+/// Returns the octahedron of 8 triangles whose corners are on the axes, at the distance `reach` from the origin.
+pub(super) fn octahedron(reach: f64) -> Vec<Triangle> {
+    let sign = |bits: usize, k: usize| if bits >> k & 1 == 1 { -reach } else { reach };
+    (0..8)
+        .map(|bits| [[sign(bits, 0), 0.0, 0.0], [0.0, sign(bits, 1), 0.0], [0.0, 0.0, sign(bits, 2)]])
+        .collect()
+}
+
+/// Returns a needle from `tail` to `tip`: four triangles around a square tail in the plane z = `tail[2]`.
+pub(super) fn needle(tail: [f64; 3], tip: [f64; 3], half: f64) -> Vec<Triangle> {
+    let corner = |x: f64, y: f64| [tail[0] + x * half, tail[1] + y * half, tail[2]];
+    let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    (0..4).map(|k| [ring[k], ring[(k + 1) % 4], tip]).collect()
+}
+
+/// Scales a mesh by a power of two.
+pub(super) fn scaled(mesh: &[Triangle], power: f64) -> Vec<Triangle> {
+    mesh.iter().map(|t| t.map(|p| p.map(|x| x * power))).collect()
+}
+
+/// Moves a mesh, exactly if the sums are f64 numbers.
+pub(super) fn moved(mesh: &[Triangle], by: [f64; 3]) -> Vec<Triangle> {
+    mesh.iter().map(|t| t.map(|p| [0, 1, 2].map(|k| p[k] + by[k]))).collect()
+}
+
+/// Reorders the axes: x becomes the coordinate number `order[0]`, and so on.
+pub(super) fn axes(mesh: &[Triangle], order: [usize; 3]) -> Vec<Triangle> {
+    mesh.iter().map(|t| t.map(|p| order.map(|k| p[k]))).collect()
+}
+
+/// Returns both meshes as one.
+pub(super) fn joined(one: Vec<Triangle>, other: Vec<Triangle>) -> Vec<Triangle> {
+    [one, other].concat()
+}
+
+/// Returns forty triangles of size 1 on a grid in the plane z = `z`, so that the tree has several levels.
+pub(super) fn crowd(z: f64) -> Vec<Triangle> {
+    let one = |k: usize| {
+        let (x, y) = ((k % 8) as f64 * 2.0 - 8.0, (k / 8) as f64 * 2.0 - 5.0);
+        [[x, y, z], [x + 1.0, y, z], [x, y + 1.0, z]]
+    };
+    (0..40).map(one).collect()
+}

@@ -1,0 +1,32 @@
+//! The laboratory: measures cbvh itself, for those who develop it. What users ask is in `cbvh report`.
+//!
+//! Each experiment is a module with a function `run` that writes its files and returns a summary. `README.md` says what
+//! each measures and how long it takes.
+
+mod arguments;
+mod hard;
+mod layouts;
+mod output;
+mod scaling;
+
+use arguments::{Arguments, Experiment};
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Why an experiment failed, as one line.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+fn main() -> ExitCode {
+    let result = match &Arguments::parse().experiment {
+        Experiment::Hard(arguments) => hard::run(arguments),
+        Experiment::Scaling(arguments) => scaling::run(arguments),
+        Experiment::Layouts(arguments) => layouts::run(arguments),
+    };
+    match result.and_then(|summary| output::print(&summary)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::tell(&format!("error: {failure}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! An opened `.cbvh` file: its bytes, its objects, and which of its pages have been checked.
+
+use crate::error::{OpenError, QueryError};
+use crate::file::mapped::{self, ReadAhead};
+use crate::file::packet_cache::PacketCache;
+use crate::file::place::{LeafPacket, TrianglePlace};
+use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
+use bvh_format::object::Object;
+use bvh_format::page::{PAGE, Page, check_page};
+use bvh_format::treelet::Links;
+use bvh_format::{FormatError, Layout, Rule, ids};
+use bytes::Bytes;
+use memmap2::Mmap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+
+/// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`: share it between threads.
+///
+/// Opening a file reads its header page and its object table, whatever the size of the file. A page is checked when a
+/// query first touches it. The memory needed is one byte per page, twice the bytes of the object table, and some KiB,
+/// whatever numbers the file holds.
+pub struct Bvh {
+    bytes: Bytes,
+    /// The map that the bytes are, if the system is to be told which blocks are needed next.
+    advised: Option<Arc<Mmap>>,
+    layout: Layout,
+    /// What has been checked of each page.
+    checked: Box<[AtomicU8]>,
+    duplicates_checked: AtomicBool,
+    /// A number that no other `Bvh` of this process has or had.
+    identity: u64,
+}
+
+/// From this size on, a file does not fit into the caches near a processor.
+const MIN_LARGE_FILE_BYTES: usize = 8 << 20;
+
+/// Set once the bytes of the page itself have been checked.
+const PAGE_CHECKED: u8 = 1;
+/// Set once the leaf block of the page has been checked.
+const LEAVES_CHECKED: u8 = 2;
+/// Set once the id block of the page has been checked.
+const IDS_CHECKED: u8 = 4;
+
+/// Keeps a map alive behind `Bytes`.
+struct MapOwner(Arc<Mmap>);
+
+impl AsRef<[u8]> for MapOwner {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl Bvh {
+    /// Maps a file into memory and opens it.
+    ///
+    /// Cost: microseconds, whatever the size of the file; for memory see [`Bvh`].
+    ///
+    /// **The bytes of the file must not change while it is open.** Replace a file by renaming another one over it, as
+    /// `cbvh bake` does; then an open file keeps its old content. A file that another process truncates ends this
+    /// process with SIGBUS, and one that is written into gives undefined answers. [`ReadAhead`] documents this promise
+    /// in full, and why this function is safe nevertheless. [`Bvh::read`] asks for no such promise: use it where others
+    /// may write to the file.
+    ///
+    /// # Errors
+    /// [`OpenError::Io`] if the system refuses the file, [`OpenError::Format`] if the header or the object table
+    /// break a rule of the format.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        Self::open_with(path, ReadAhead::Usual)
+    }
+
+    /// Maps a file as [`Bvh::open`] does, and tells the system how to read it. Answers do not depend on that.
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::open`].
+    pub fn open_with(path: impl AsRef<Path>, read_ahead: ReadAhead) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        let map = mapped::map(path, read_ahead).map_err(|source| OpenError::io(path, source))?;
+        let map = Arc::new(map);
+        let advised = (read_ahead == ReadAhead::Sparse).then(|| map.clone());
+        let opened = Self::new(Bytes::from_owner(MapOwner(map)));
+        Ok(Self { advised, ..opened.map_err(|source| OpenError::format(path, source))? })
+    }
+
+    /// Reads a whole file into memory and opens the copy. What becomes of the file afterwards does not matter.
+    ///
+    /// Cost: that of reading the file, and its size in memory.
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::open`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        let bytes = mapped::read(path).map_err(|source| OpenError::io(path, source))?;
+        Self::new(Bytes::from_owner(bytes)).map_err(|source| OpenError::format(path, source))
+    }
+
+    /// Opens the bytes of a file in memory, such as those that `bvh_bake::to_bytes` returns.
+    ///
+    /// The bytes may have any owner: a `Vec<u8>`, an `Arc<[u8]>` that others share, a `&'static [u8]`. They are used
+    /// where they are, at any alignment; packets of plain `f32` triangles that are not aligned to 4 bytes are copied
+    /// when they are tested. Only from 8 MiB on the bytes are moved to large memory pages, where the system
+    /// has them: queries then take a tenth less time, at the cost of one copy. [`Bvh::from_static`] never copies.
+    ///
+    /// # Errors
+    /// The rule that the header or the object table breaks.
+    pub fn from_bytes(bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, FormatError> {
+        let slice = bytes.as_ref();
+        let copy = (slice.len() >= MIN_LARGE_FILE_BYTES).then(|| mapped::copy(slice).ok()).flatten();
+        Self::new(copy.map_or_else(|| Bytes::from_owner(bytes), Bytes::from_owner))
+    }
+
+    /// Opens bytes that live as long as the program, without a copy: see [`include_cbvh!`](crate::include_cbvh).
+    ///
+    /// # Errors
+    /// The rule that the header or the object table breaks.
+    pub fn from_static(bytes: &'static [u8]) -> Result<Self, FormatError> {
+        Self::new(Bytes::from_static(bytes))
+    }
+
+    fn new(bytes: Bytes) -> Result<Self, FormatError> {
+        let layout = Layout::read(&bytes)?;
+        let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
+        static OPENED: AtomicU64 = AtomicU64::new(0);
+        let identity = OPENED.fetch_add(1, Ordering::Relaxed);
+        let duplicates_checked = AtomicBool::new(false);
+        Ok(Self { bytes, advised: None, layout, checked, duplicates_checked, identity })
+    }
+
+    /// Returns where everything is in the file.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Returns the bytes of the file.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Returns whether queries will mostly read bytes that no cache holds.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        self.bytes.len() >= MIN_LARGE_FILE_BYTES
+    }
+
+    /// Returns a number that no other `Bvh` of this process has or had.
+    pub(crate) fn identity(&self) -> u64 {
+        self.identity
+    }
+
+    /// Returns the objects of the file, of which there is at least one.
+    pub fn objects(&self) -> &[Object] {
+        &self.layout.objects
+    }
+
+    /// Returns the ids of the input's triangles that are exact duplicates of triangle `id`, in ascending order.
+    ///
+    /// Cost: a binary search, and at the first call a pass over all duplicates to check them.
+    ///
+    /// # Errors
+    /// [`QueryError::Damaged`] if the section of duplicates breaks a rule.
+    pub fn duplicates_of(&self, id: u32) -> Result<impl Iterator<Item = u32> + '_, QueryError> {
+        if !self.duplicates_checked.load(Ordering::Acquire) {
+            self.layout.check_duplicates(self.bytes())?;
+            self.duplicates_checked.store(true, Ordering::Release);
+        }
+        let pairs = self.layout.duplicate_ids(self.bytes());
+        let start = pairs.partition_point(|[kept, _]| kept.get() < id);
+        let of_id = pairs[start..].iter().take_while(move |[kept, _]| kept.get() == id);
+        Ok(of_id.map(|[_, dropped]| dropped.get()))
+    }
+
+    /// Checks every page, leaf block and id block now, so that no query has to: otherwise the first touch of a page
+    /// costs some microseconds. This reads the whole file once.
+    ///
+    /// # Errors
+    /// [`QueryError::Damaged`] with the first rule that does not hold.
+    pub fn check_all(&self) -> Result<(), QueryError> {
+        for object in self.objects() {
+            let first = object.record().first_page.get();
+            for number in first..first + object.record().pages.get() {
+                let page = self.page(object, number)?;
+                self.leaf_block(object, &page)?;
+                self.id_block(&page)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns a page, after checking it if this is its first touch.
+    #[inline(always)]
+    pub(crate) fn page(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
+        match self.checked.get(number as usize) {
+            Some(flags) if flags.load(Ordering::Acquire) & PAGE_CHECKED != 0 => {}
+            _ => self.check_page(object, number)?,
+        }
+        self.page_unchecked(object, number)
+    }
+
+    #[inline(always)]
+    fn page_unchecked(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
+        match self.layout.page_bytes(&self.bytes, number) {
+            Some(bytes) => Ok(Page::new(bytes, object.profile())),
+            None => Err(self.no_page(number)),
+        }
+    }
+
+    #[cold]
+    fn no_page(&self, number: u32) -> QueryError {
+        let at = self.layout.page_offset(number);
+        FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section").into()
+    }
+
+    #[cold]
+    fn check_page(&self, object: &Object, number: u32) -> Result<(), QueryError> {
+        let bytes: &[u8; PAGE] =
+            self.layout.page_bytes(self.bytes(), number).ok_or_else(|| self.no_page(number))?;
+        check_page(bytes, number, object, self.layout.page_offset(number))?;
+        self.checked[number as usize].fetch_or(PAGE_CHECKED, Ordering::Release);
+        Ok(())
+    }
+
+    /// Returns the leaf block of a checked page, after checking the block if this is its first touch.
+    #[inline(always)]
+    pub(crate) fn leaf_block(&self, object: &Object, page: &Page) -> Result<&[u8], QueryError> {
+        let number = page.header().page_number.get();
+        match self.checked.get(number as usize) {
+            Some(flags) if flags.load(Ordering::Acquire) & LEAVES_CHECKED != 0 => {}
+            _ => self.check_leaves(object, page, number)?,
+        }
+        Ok(self.layout.leaf_block(&self.bytes, page.header()))
+    }
+
+    #[cold]
+    fn check_leaves(&self, object: &Object, page: &Page, number: u32) -> Result<(), QueryError> {
+        self.will_need(self.layout.leaf_block(self.bytes(), page.header()));
+        self.layout.check_leaf_block(self.bytes(), page, object)?;
+        self.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
+        Ok(())
+    }
+
+    /// Tells the system which block is about to be checked, if the file was opened with [`ReadAhead::Sparse`].
+    fn will_need(&self, block: &[u8]) {
+        if let Some(map) = &self.advised
+            && !block.is_empty()
+        {
+            let start = block.as_ptr() as usize - map.as_ptr() as usize;
+            mapped::will_need(map, start..start + block.len());
+        }
+    }
+
+    /// Returns the id block of a checked page, after checking the block if this is its first touch. It is empty in a file
+    /// without ids.
+    fn id_block(&self, page: &Page) -> Result<&[u8], QueryError> {
+        let number = page.header().page_number.get();
+        let flags = self.checked.get(number as usize).ok_or_else(|| self.no_page(number))?;
+        if flags.load(Ordering::Acquire) & IDS_CHECKED == 0 {
+            self.will_need(self.layout.id_block(self.bytes(), page.header()));
+            self.layout.check_id_block(self.bytes(), page)?;
+            flags.fetch_or(IDS_CHECKED, Ordering::Release);
+        }
+        Ok(self.layout.id_block(self.bytes(), page.header()))
+    }
+
+    /// Returns a leaf packet for a walk that meets it several times: in place if the file holds plain `f32`, otherwise
+    /// decoded in `cache`.
+    #[inline(always)]
+    pub(crate) fn cached_packet<'a>(
+        &'a self,
+        object: &Object,
+        leaf: LeafPacket,
+        cache: &'a mut PacketCache,
+    ) -> Result<&'a Packet, QueryError> {
+        if object.triangle_encoding() == TriangleEncoding::F32 {
+            let page = self.page(object, leaf.page)?;
+            let block = self.leaf_block(object, &page)?;
+            if let Some(packet) = plain_packet(object, block, leaf.packet) {
+                return Ok(packet);
+            }
+        }
+        let (known, room) = cache.place(leaf.page, leaf.packet);
+        if !known {
+            let page = self.page(object, leaf.page)?;
+            let block = self.leaf_block(object, &page)?;
+            *room = decode_packet(object.triangle_encoding(), block, usize::from(leaf.packet));
+        }
+        Ok(room)
+    }
+
+    /// Returns a triangle of a leaf packet.
+    pub(crate) fn triangle(
+        &self,
+        object: &Object,
+        leaf: LeafPacket,
+        lane: u8,
+    ) -> Result<[[f32; 3]; 3], QueryError> {
+        let page = self.page(object, leaf.page)?;
+        let block = self.leaf_block(object, &page)?;
+        Ok(decode_triangle(object.triangle_encoding(), block, usize::from(leaf.packet), usize::from(lane)))
+    }
+
+    /// Returns the bytes of a treelet's leaf packets, which are adjacent; none if the packets are encoded.
+    #[inline(always)]
+    pub(crate) fn packets_to_prefetch(&self, object: &Object, page: &Page, links: &Links) -> &[u8] {
+        if object.triangle_encoding() != TriangleEncoding::F32 {
+            return &[];
+        }
+        let block = self.layout.leaf_block(&self.bytes, page.header());
+        let start = usize::from(links.first_leaf) * F32_PACKET_BYTES;
+        let end = start + links.leaves().count_ones() as usize * F32_PACKET_BYTES;
+        block.get(start..end).unwrap_or(&[])
+    }
+
+    /// Returns the id of a triangle: its number in the input or, in a file without ids, its place in the order of the
+    /// leaves.
+    pub(crate) fn triangle_id(&self, object: &Object, place: TrianglePlace) -> Result<u32, QueryError> {
+        let page = self.page(object, place.page)?;
+        if !self.layout.has_ids() {
+            let packet = page.header().first_packet.get().wrapping_add(u32::from(place.packet));
+            return Ok(packet.wrapping_mul(4).wrapping_add(u32::from(place.lane)));
+        }
+        let block = self.id_block(&page)?;
+        Ok(ids::decode_id(block, usize::from(place.packet), usize::from(place.lane)))
+    }
+}
+
+impl std::fmt::Debug for Bvh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bvh")
+            .field("bytes", &self.bytes().len())
+            .field("objects", &self.objects().len())
+            .finish()
+    }
+}
+
+/// Returns a packet of plain `f32` in place, if its alignment allows that.
+#[inline(always)]
+fn plain_packet<'a>(object: &Object, block: &'a [u8], packet: u16) -> Option<&'a Packet> {
+    if cfg!(target_endian = "big") || object.triangle_encoding() != TriangleEncoding::F32 {
+        return None;
+    }
+    let bytes: &[u8; F32_PACKET_BYTES] =
+        block.get(usize::from(packet) * F32_PACKET_BYTES..)?.first_chunk()?;
+    bytemuck::try_from_bytes(bytes).ok()
+}

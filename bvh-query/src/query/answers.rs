@@ -1,0 +1,60 @@
+//! What queries answer with.
+
+/// A pair of triangles in contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Contact {
+    /// The number that the object of A has in its file.
+    pub object_a: u32,
+    /// The triangle of A: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle_a: u32,
+    /// The number that the object of B has in its file.
+    pub object_b: u32,
+    /// The triangle of B.
+    pub triangle_b: u32,
+}
+
+/// The least distance of two meshes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Distance {
+    /// The distance in mesh units; 0 if and only if the meshes touch.
+    pub distance: f64,
+    /// The two triangles named here are certainly at least this far apart and, if the query allowed an error, no two
+    /// triangles of the meshes are nearer. Exact arithmetic, not this bound, decides whether the meshes touch.
+    pub lower: f64,
+    /// The two triangles, and so the meshes, are certainly at most this far apart.
+    pub upper: f64,
+    /// The closest point on A, in A's frame.
+    pub point_a: [f64; 3],
+    /// The closest point on B, in A's frame.
+    pub point_b: [f64; 3],
+    /// The number that the object of A has in its file.
+    pub object_a: u32,
+    /// The triangle of A with the closest point: its number in the input.
+    pub triangle_a: u32,
+    /// The number that the object of B has in its file.
+    pub object_b: u32,
+    /// The triangle of B with the closest point.
+    pub triangle_b: u32,
+}
+
+/// How much work the last query was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct QueryStats {
+    /// Tests of up to 16 pairs of nodes each.
+    pub node_tests: u64,
+    /// Pairs of leaf packets tested, with up to 16 pairs of triangles each.
+    pub packet_tests: u64,
+    /// Pairs of triangles that went to exact arithmetic.
+    pub exact_tests: u64,
+}
+
+impl QueryStats {
+    /// Adds what a traversal did.
+    pub(super) fn add(&mut self, node_tests: u64, other: Self) {
+        self.node_tests += node_tests;
+        self.packet_tests += other.packet_tests;
+        self.exact_tests += other.exact_tests;
+    }
+}

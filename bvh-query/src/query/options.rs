@@ -1,0 +1,56 @@
+//! The numbers that a caller gives with a question, and the checks on them.
+
+use crate::error::QueryError;
+
+/// How exact a distance has to be. By default it is exact.
+///
+/// ```
+/// use bvh_query::DistanceOptions;
+///
+/// let within_a_percent = DistanceOptions::new().rel_err(0.01);
+/// assert_eq!(within_a_percent.abs_err, 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct DistanceOptions {
+    /// The answer may exceed the least distance by this fraction of it.
+    pub rel_err: f64,
+    /// The answer may exceed the least distance by this length as well, in mesh units.
+    pub abs_err: f64,
+}
+
+impl DistanceOptions {
+    /// Asks for the exact distance.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Lets the answer exceed the least distance by this fraction of it. A query refuses a negative fraction and one that
+    /// is not finite.
+    #[must_use]
+    pub fn rel_err(self, rel_err: f64) -> Self {
+        Self { rel_err, ..self }
+    }
+
+    /// Lets the answer exceed the least distance by this length, in mesh units. A query refuses a negative length and one
+    /// that is not finite.
+    #[must_use]
+    pub fn abs_err(self, abs_err: f64) -> Self {
+        Self { abs_err, ..self }
+    }
+
+    /// Refuses errors that mean nothing.
+    pub(super) fn check(&self) -> Result<(), QueryError> {
+        check("rel_err", "a finite fraction of at least 0", self.rel_err)?;
+        check("abs_err", "a finite length of at least 0", self.abs_err)
+    }
+}
+
+/// Refuses a distance to compare with that is NaN, infinite or negative.
+pub(super) fn check_distance(d: f64) -> Result<(), QueryError> {
+    check("d", "a finite distance of at least 0", d)
+}
+
+fn check(name: &'static str, expected: &'static str, found: f64) -> Result<(), QueryError> {
+    if found.is_finite() && found >= 0.0 { Ok(()) } else { Err(QueryError::Number { name, expected, found }) }
+}

@@ -1,0 +1,84 @@
+//! Two objects in place: what every query of a pair of shapes walks.
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::isa::{Isa, Task};
+use crate::leaf::local::LocalFrame;
+use crate::leaf::queue::TrianglePair;
+use crate::pose::Pose;
+use crate::traverse::placement::{ObjectPair, Placement};
+use crate::traverse::walk::{Visitor, WalkMemory, traverse};
+use std::cell::OnceCell;
+
+/// Two objects in place, with everything that leaf tests need.
+pub(crate) struct PlacedPair<'a> {
+    pub(crate) pair: ObjectPair<'a>,
+    pub(crate) pose: &'a Pose,
+    /// Prepared when the first leaf is visited, which most queries of separated meshes never do.
+    frame: OnceCell<LocalFrame>,
+    /// The numbers that the objects have in their files.
+    pub(crate) numbers: (u32, u32),
+}
+
+impl PlacedPair<'_> {
+    /// Returns what all pairs of packets share.
+    #[inline(always)]
+    pub(crate) fn frame(&self) -> &LocalFrame {
+        let ObjectPair { object_a, object_b, placement, .. } = self.pair;
+        self.frame.get_or_init(|| LocalFrame::new(placement, object_a, object_b))
+    }
+}
+
+/// A pair of triangles that a query has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    /// The numbers that the objects have in their files.
+    pub(super) numbers: (u32, u32),
+    pub(super) pair: TrianglePair,
+}
+
+/// Calls `visit` for each pair of objects of the two sides, in the order of the files, until it returns a result.
+pub(super) fn each_pair<R>(
+    a: Shape<'_>,
+    b: Shape<'_>,
+    pose: &Pose,
+    mut visit: impl FnMut(&PlacedPair<'_>) -> Result<Option<R>, QueryError>,
+) -> Result<Option<R>, QueryError> {
+    for (index_a, object_a) in a.objects().iter().enumerate() {
+        for (index_b, object_b) in b.objects().iter().enumerate() {
+            let placement = Placement::new(pose, object_a, object_b);
+            let placed = PlacedPair {
+                pair: ObjectPair {
+                    bvh_a: a.bvh(),
+                    object_a,
+                    bvh_b: b.bvh(),
+                    object_b,
+                    placement: &placement,
+                },
+                pose,
+                frame: OnceCell::new(),
+                numbers: ((a.first() + index_a) as u32, (b.first() + index_b) as u32),
+            };
+            if let Some(result) = visit(&placed)? {
+                return Ok(Some(result));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// A walk with a visitor, compiled for each backend.
+pub(super) struct Walk<'a, W> {
+    pub(super) pair: ObjectPair<'a>,
+    pub(super) memory: &'a mut WalkMemory,
+    pub(super) visitor: &'a mut W,
+}
+
+impl<W: Visitor> Task for Walk<'_, W> {
+    type Output = Result<u64, QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        traverse(isa, self.pair, self.memory, self.visitor)
+    }
+}

@@ -1,0 +1,89 @@
+//! The querier: the backend and the memory that every query works with.
+
+use crate::error::QueryError;
+use crate::file::packet_cache::PacketCache;
+use crate::isa::Backend;
+use crate::leaf::queue::TriangleQueue;
+use crate::query::answers::QueryStats;
+use crate::query::search::BoundedPair;
+use crate::traverse::walk::WalkMemory;
+
+/// Asks questions about two meshes.
+///
+/// A querier holds the backend and the memory that queries work in, so that a query allocates nothing once the memory has
+/// grown to what the meshes need. Use one querier per thread.
+///
+/// # Worst case
+/// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0
+/// takes a second walk. Let the pages of both objects have t and u treelets, p and q leaf packets in all.
+///
+/// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or
+///   one packet test each. Ordinary meshes need a few hundred visits. Where files come from strangers, bound the
+///   time further by [`Querier::set_budget`].
+/// - Memory: at most 8 KiB for each treelet that the query opens, of either file, and 4 MiB; no recursion.
+///   A page has at most 62 treelets. The answer of [`Querier::contacts`] takes 16 bytes per contact on top.
+/// - Contacts: at most as many as the pages of both files have room for pairs of triangles, listed duplicates
+///   included. More are an error.
+///
+/// A byte that was changed in a page, leaf block or id block that a query touches is an error. A file forged
+/// with right checksums may hold wrong bounds: its answers may then be wrong or an error, but nothing worse happens.
+pub struct Querier {
+    pub(super) backend: Backend,
+    pub(super) memory: WalkMemory,
+    pub(super) queue: TriangleQueue,
+    /// Of A and of B.
+    pub(super) packets: [PacketCache; 2],
+    pub(super) bounded: Vec<BoundedPair>,
+    budget: u64,
+    pub(super) stats: QueryStats,
+}
+
+impl Querier {
+    /// Creates a querier with the fastest backend of this CPU, or with the one that the environment variable `CBVH_ISA`
+    /// names.
+    ///
+    /// # Errors
+    /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new() -> Result<Self, QueryError> {
+        Ok(Self::with_backend(Backend::detect()?))
+    }
+
+    /// Creates a querier with a backend. The portable backend replaces one that the CPU lacks.
+    pub fn with_backend(backend: Backend) -> Self {
+        let backend = if backend.is_available() { backend } else { Backend::Scalar };
+        Self {
+            backend,
+            memory: WalkMemory::default(),
+            queue: TriangleQueue::default(),
+            packets: Default::default(),
+            bounded: Vec::new(),
+            budget: u64::MAX,
+            stats: QueryStats::default(),
+        }
+    }
+
+    /// Lets each query from now on visit at most this many pairs of objects and of nodes. A query that needs more ends with
+    /// [`QueryError::Budget`]. Without a budget, only the sizes of the files bound a query.
+    ///
+    /// A visit takes some 100 ns. Queries of scans and of CAD models with 10^5 to 10^6 triangles take from some hundred
+    /// visits, for separated meshes, to some 10^6, for all contacts of a deep overlap.
+    pub fn set_budget(&mut self, visits: u64) {
+        self.budget = visits;
+    }
+
+    /// Returns the backend in use.
+    pub fn backend(&self) -> Backend {
+        self.backend
+    }
+
+    /// Returns how much work the last query was.
+    pub fn stats(&self) -> QueryStats {
+        self.stats
+    }
+
+    /// Resets what belongs to one query.
+    pub(super) fn start(&mut self) {
+        self.stats = QueryStats::default();
+        self.memory.start(self.budget);
+    }
+}

@@ -1,0 +1,310 @@
+//! Caches opened nodes: a treelet is decoded once per query, however many partners its children meet.
+//!
+//! Each opened node remembers which of its children have been opened, so that finding one again is
+//! one load. Nodes of B are also re-aligned to A's directions when they are opened.
+
+use crate::error::QueryError;
+use crate::file::bvh::Bvh;
+use crate::file::place::LeafPacket;
+use crate::isa::{Isa, Lanes};
+use crate::traverse::decode::decode_group;
+use bvh_format::object::Object;
+use bvh_format::page::{Page, check_crossing};
+use bvh_format::slabs::{Group, NodeSlabs};
+use bvh_format::treelet::{Child, Links};
+use bvh_format::{FormatError, Rule};
+
+/// A child of an opened node: the number of the node and, in the lowest three bits, that of the child.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ChildRef(u32);
+
+impl ChildRef {
+    /// The object's root: the only child of node 0.
+    pub(crate) const ROOT: Self = Self(0);
+
+    #[inline(always)]
+    pub(crate) fn new(node: usize, child: usize) -> Self {
+        Self((node as u32) << 3 | child as u32)
+    }
+
+    #[inline(always)]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// Converts back from `bits`.
+    #[inline(always)]
+    pub(crate) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    #[inline(always)]
+    pub(crate) fn node(self) -> usize {
+        (self.0 >> 3) as usize
+    }
+
+    #[inline(always)]
+    pub(crate) fn child(self) -> usize {
+        (self.0 & 7) as usize
+    }
+}
+
+/// The children of a node, decoded.
+#[derive(Clone, Copy)]
+pub(crate) struct CachedNode {
+    pub(crate) groups: [Group; 2],
+    /// The largest side of each child's box, in mesh units.
+    pub(crate) extents: [f32; 8],
+    /// The numbers of the children's opened nodes; `CLOSED` for children that have not been opened.
+    opened: [u32; 8],
+    /// Where the children are.
+    links: Links,
+    page: u32,
+    pub(crate) count: usize,
+}
+
+const CLOSED: u32 = u32::MAX;
+
+impl CachedNode {
+    const EMPTY: Self = Self {
+        groups: [Group::ZERO; 2],
+        extents: [0.0; 8],
+        opened: [CLOSED; 8],
+        links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
+        page: 0,
+        count: 0,
+    };
+
+    /// Returns the child, if it is a leaf packet.
+    #[inline(always)]
+    pub(crate) fn leaf(&self, child: usize) -> Option<LeafPacket> {
+        match self.links.child(child) {
+            Child::Leaf { packet, triangles } => Some(LeafPacket { page: self.page, packet, triangles }),
+            _ => None,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_leaf(&self, child: usize) -> bool {
+        self.links.kinds >> (4 * child + 2) & 1 == 1
+    }
+
+    /// Returns a bit for each of four children, set for leaf packets.
+    #[inline(always)]
+    pub(crate) fn leaves(&self, part: usize) -> u16 {
+        // Every fourth bit, brought together.
+        let kinds = self.links.kinds >> (16 * (part & 1) + 2) & 0x1111;
+        ((kinds | kinds >> 3 | kinds >> 6 | kinds >> 9) & 0xf) as u16
+    }
+
+    /// Computes the extents, after the slabs have been decoded.
+    #[inline(always)]
+    fn measure<I: Isa>(&mut self, isa: I, parts: usize) {
+        for part in 0..parts {
+            let rows = self.groups[part & 1].rows();
+            let mut widest = isa.load4(&rows[16]).sub(isa.load4(&rows[0]));
+            for axis in 1..3 {
+                widest = widest.max(isa.load4(&rows[16 + axis]).sub(isa.load4(&rows[axis])));
+            }
+            if let Some(extents) = self.extents.as_chunks_mut::<4>().0.get_mut(part) {
+                isa.store4(widest, extents);
+            }
+        }
+    }
+}
+
+/// The opened nodes of one side. Node 0 holds the object's root as its only child.
+///
+/// They are a tree whatever the file says, because a node is opened once, from one child of an earlier node. The
+/// rules of the format make that tree no larger than the object. `max_nodes` enforces this even if the bytes change
+/// after they were checked, so that every walk ends.
+#[derive(Default)]
+pub(crate) struct NodeCache {
+    nodes: Vec<CachedNode>,
+    used: usize,
+    /// One more than the number of treelets that the object can have.
+    max_nodes: usize,
+}
+
+/// The most treelets of a page by rule 17: its header and one anchor take two of its 64 lines.
+const MAX_TREELETS_PER_PAGE: usize = 62;
+/// A `ChildRef` has 29 bits for the number of a node. That many nodes take 600 GB.
+const MAX_NODES: usize = 1 << 29;
+
+impl NodeCache {
+    /// Forgets all nodes and opens the object's root. Returns the slabs of the root.
+    #[inline(always)]
+    pub(crate) fn start<I: Isa>(
+        &mut self,
+        isa: I,
+        bvh: &Bvh,
+        object: &Object,
+    ) -> Result<NodeSlabs, QueryError> {
+        if self.nodes.is_empty() {
+            self.nodes.resize(64, CachedNode::EMPTY);
+        }
+        let page = object.record().first_page.get();
+        let root = &mut self.nodes[0];
+        let slabs = bvh.page(object, page)?.anchor_slabs(0);
+        root.groups[0] = spread(isa, &slabs);
+        root.links = Links { kinds: 1, ..Links::default() };
+        root.page = page;
+        root.extents[0] = f32::INFINITY;
+        root.opened = [CLOSED; 8];
+        root.count = 1;
+        self.used = 1;
+        let pages = object.record().pages.get() as usize;
+        self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
+        Ok(slabs)
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&self, node: usize) -> &CachedNode {
+        &self.nodes[node]
+    }
+
+    /// Returns the opened node of an inner child, and whether it is new. For a leaf that is a node without children.
+    #[inline(always)]
+    pub(crate) fn open<I: Isa>(
+        &mut self,
+        isa: I,
+        bvh: &Bvh,
+        object: &Object,
+        at: ChildRef,
+    ) -> Result<(usize, bool), QueryError> {
+        let known = self.nodes[at.node()].opened[at.child()];
+        if known != CLOSED {
+            return Ok((known as usize, false));
+        }
+        if self.used >= self.max_nodes {
+            return Err(self.too_many(bvh, object));
+        }
+        if self.used == self.nodes.len() {
+            self.nodes.resize(2 * self.used, CachedNode::EMPTY);
+        }
+        let number = self.used;
+        let (before, behind) = self.nodes.split_at_mut(number);
+        let parent = &mut before[at.node()];
+        decode_node(isa, bvh, object, parent, at.child(), &mut behind[0])?;
+        parent.opened[at.child()] = number as u32;
+        self.used += 1;
+        Ok((number, true))
+    }
+
+    #[cold]
+    fn too_many(&self, bvh: &Bvh, object: &Object) -> QueryError {
+        let at = bvh.layout().page_offset(object.record().first_page.get());
+        let expected = format!("at most {} treelets to open", self.max_nodes - 1);
+        FormatError::new(Rule::Counts, at, expected, "more").into()
+    }
+}
+
+#[inline(always)]
+fn decode_node<I: Isa>(
+    isa: I,
+    bvh: &Bvh,
+    object: &Object,
+    parent: &CachedNode,
+    child: usize,
+    to: &mut CachedNode,
+) -> Result<(), QueryError> {
+    let (page, slot, anchor);
+    let (slabs, column) = match parent.links.child(child) {
+        Child::Treelet(place) => {
+            page = bvh.page(object, parent.page)?;
+            slot = place;
+            (&parent.groups[(child / 4) & 1], child % 4)
+        }
+        Child::Remote(link) => {
+            (page, slot) = cross(bvh, object, parent.page, link)?;
+            anchor = spread(isa, &page.anchor_slabs(slot));
+            (&anchor, 0)
+        }
+        Child::Leaf { .. } | Child::Empty => {
+            to.count = 0;
+            return Ok(());
+        }
+    };
+    let profile = object.profile();
+    let treelet = page.treelet(slot);
+    for part in 0..profile.groups() {
+        let coding = (profile, object.f16_scale());
+        decode_group(isa, coding, (treelet, part), (slabs, column), &mut to.groups[part]);
+    }
+    to.links = Links::read(treelet);
+    isa.prefetch(bvh.packets_to_prefetch(object, &page, &to.links));
+    if bvh.is_large() {
+        isa.prefetch(page.treelets_ahead(&to.links));
+    }
+    to.page = page.header().page_number.get();
+    to.count = to.links.children().min(profile.width());
+    to.opened = [CLOSED; 8];
+    to.measure(isa, profile.groups());
+    Ok(())
+}
+
+/// Returns the page and the root that a remote link leads to, after checking that link and root name each other.
+#[inline(always)]
+fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page<'a>, u8), QueryError> {
+    let to = bvh.page(object, from)?.remote(link);
+    let page = bvh.page(object, to.page())?;
+    check_crossing(&page, to, from, link, bvh.layout().page_offset(to.page()))?;
+    Ok((page, to.root()))
+}
+
+/// Returns a group with the same node in all four columns.
+#[inline(always)]
+fn spread<I: Isa>(isa: I, node: &NodeSlabs) -> Group {
+    let mut group = Group::ZERO;
+    let (lo, hi) = (node.lo.as_chunks::<4>().0, node.hi.as_chunks::<4>().0);
+    for q in 0..4 {
+        isa.store(isa.repeat(&lo[q]), &mut group.lo[q]);
+        isa.store(isa.repeat(&hi[q]), &mut group.hi[q]);
+    }
+    group
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::isa::{Backend, Task};
+
+    struct OpenRoot<'a>(&'a Bvh, &'a mut NodeCache);
+
+    struct Start<'a>(&'a Bvh, &'a mut NodeCache);
+
+    impl Task for Start<'_> {
+        type Output = Result<NodeSlabs, QueryError>;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> Self::Output {
+            self.1.start(isa, self.0, &self.0.objects()[0])
+        }
+    }
+
+    impl Task for OpenRoot<'_> {
+        type Output = Result<(usize, bool), QueryError>;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> Self::Output {
+            self.1.open(isa, self.0, &self.0.objects()[0], ChildRef::ROOT)
+        }
+    }
+
+    /// No file that keeps the rules gets so far: the limit is for bytes that change after they were checked.
+    #[test]
+    fn no_more_nodes_are_opened_than_the_pages_can_hold() {
+        let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
+        let bvh = Bvh::from_static(bytes).unwrap();
+        let mut nodes = NodeCache::default();
+        Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
+        assert_eq!(nodes.max_nodes, 1 + 62);
+        nodes.max_nodes = 1;
+        let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
+        assert!(matches!(refused, QueryError::Damaged(error) if error.rule == Rule::Counts));
+        nodes.max_nodes = 2;
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, true)));
+        // A node that is opened again is not new.
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, false)));
+    }
+}

@@ -1,0 +1,454 @@
+//! The pair walk on which every query stands: both trees, visited together.
+//!
+//! ```text
+//! entries := {(root a, root b)}
+//! while entry := pop(entries):
+//!     if its lower bound exceeds the visitor's limit: skip
+//!     if both nodes are leaf packets: visitor.leaves(a, b)
+//!     if one is a leaf packet much larger than the other node, and its triangles are beyond the limit: skip
+//!     else open a, b or both; for each of the pairs of their children:
+//!         bound := lower bound of their distance along A's directions
+//!         if bound <= limit: push
+//! ```
+//!
+//! Depth-first, the entries are a stack. Best-first, they are a list that is searched for the least bound, until the
+//! visitor has seen enough leaves to go on depth-first, or until the list has its full length.
+//!
+//! The walk ends: each file is a tree (its rules say so, and `NodeCache` does not rely on it), an entry
+//! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
+//! visited twice, except those of the first dive, and there are at most (nodes of A) * (nodes of B).
+//!
+//! Memory: each entry that is popped depth-first leaves fewer than 64 on the stack, and those below it are
+//! one level deeper in A or in B. So there are fewer than 64 * (depth of A + depth of B) entries, besides those
+//! that came from the list. A tree is no deeper than its number of treelets. Nothing recurses.
+
+use crate::error::QueryError;
+use crate::file::place::LeafPacket;
+use crate::isa::{Isa, Task};
+use crate::traverse::large_leaf::LargeLeaves;
+use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
+use crate::traverse::node_test::{Measure, NodeTest, Witness};
+use crate::traverse::placement::ObjectPair;
+use crate::traverse::worklist::{Entry, Tested, Worklist};
+use bvh_format::slabs::Group;
+use std::ops::ControlFlow;
+
+/// The order in which pairs are visited.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// Depth-first, the pair of least bound first.
+    Nearest,
+    /// Depth-first in the order of the trees, whatever the bounds: what is found first does not
+    /// depend on how bounds are rounded.
+    Tree,
+    /// First straight down to one leaf pair, for a limit; then the pair of least bound of all, until
+    /// the visitor has seen so many more leaf pairs; then nearest.
+    Best { leaves: u32 },
+}
+
+/// What a query does with the pairs of leaf packets that a walk meets.
+pub(crate) trait Visitor {
+    const MEASURE: Measure;
+
+    fn order(&self) -> Order;
+
+    /// Returns the limit: pairs with a larger bound are not visited.
+    fn limit(&self) -> f32;
+
+    /// Returns a direction in A's frame, at most 1 long, along which A and B are likely apart.
+    fn witness(&self) -> Option<[f32; 3]> {
+        None
+    }
+
+    /// Visits two leaf packets. If `at_once` is set, the walk needs the limit that they lead to now, rather than later at
+    /// a lower cost.
+    fn leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        leaves: (LeafPacket, LeafPacket),
+        at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError>;
+
+    /// Completes what is pending after the last pair.
+    fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError>;
+}
+
+/// The memory of a walk, kept from one query to the next, and the budget of the query.
+#[derive(Default)]
+pub(crate) struct WalkMemory {
+    /// Taken out while a walk is under way.
+    node_test: Option<Box<NodeTest>>,
+    nodes_a: NodeCache,
+    nodes_b: NodeCache,
+    /// The groups of A's opened nodes along B's directions, computed when they are first needed.
+    aligned_a: Vec<[Group; 2]>,
+    is_aligned_a: Vec<bool>,
+    /// The groups of B's opened nodes along A's directions.
+    aligned_b: Vec<[Group; 2]>,
+    /// Depth-first: the last entry is next.
+    entries: Worklist,
+    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
+    leaf_pairs: Worklist,
+    /// Best-first: the entry of least bound is next.
+    list: Worklist,
+    large_leaves: LargeLeaves,
+    /// How many visits the query may make, and how many are left.
+    budget: u64,
+    left: u64,
+}
+
+/// How the next pair is found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Visits only the nearest of each pair's children.
+    Dive,
+    /// Takes the pair of least bound from a list.
+    BestFirst,
+    /// Takes the last pair from a stack.
+    DepthFirst,
+}
+
+/// The most entries in the list before the walk goes on depth-first: as many as are searched in the time of a node test.
+/// Answers do not depend on it.
+const MAX_LISTED_PAIRS: usize = 1024;
+
+/// How many pairs of leaf packets are visited together. Answers do not depend on it.
+const LEAF_PAIRS_PER_BATCH: usize = 4;
+
+/// Visits that a look ahead may make on top of those of the query: they cost less than finding out whether they pay.
+const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
+
+/// A node this many times larger than its partner is opened alone, so that its children meet the partner at its size.
+const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
+
+/// Node tests along A's directions alone, before B's are prepared: most queries of separated meshes end before. In CAD
+/// models, whose faces follow the axes of their own frame, B's directions separate up to half of the pairs that A's
+/// leave, in scans an eighth.
+const NODE_TESTS_BEFORE_B_DIRECTIONS: u64 = 16;
+
+/// Visits all pairs of leaf packets that may be within the visitor's limit. Returns the number of node tests.
+#[inline(always)]
+pub(crate) fn traverse<I: Isa, W: Visitor>(
+    isa: I,
+    pair: ObjectPair<'_>,
+    memory: &mut WalkMemory,
+    visitor: &mut W,
+) -> Result<u64, QueryError> {
+    let mut node_test = memory.node_test.take().unwrap_or_else(|| Box::new(NodeTest::NONE));
+    let tests = walk(isa, pair, memory, &mut node_test, visitor);
+    memory.node_test = Some(node_test);
+    tests
+}
+
+#[inline(always)]
+fn walk<I: Isa, W: Visitor>(
+    isa: I,
+    pair: ObjectPair<'_>,
+    memory: &mut WalkMemory,
+    node_test: &mut NodeTest,
+    visitor: &mut W,
+) -> Result<u64, QueryError> {
+    memory.entries.clear();
+    memory.leaf_pairs.clear();
+    memory.list.clear();
+    memory.large_leaves.start();
+    let root_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
+    let root_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+    node_test.prepare(isa, &pair, &root_a, &root_b);
+    let mut witness: Option<Witness> = None;
+    node_test.update_witness(&mut witness, visitor.witness());
+    let (mut tests, mut leaves) = (0, 0);
+    let order = visitor.order();
+    let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
+    memory.entries.push(Entry::ROOTS);
+    loop {
+        if memory.leaf_pairs.len() >= LEAF_PAIRS_PER_BATCH
+            || memory.entries.len() == 0 && memory.leaf_pairs.len() > 0
+        {
+            if memory.visit_leaf_pairs(isa, visitor)?.is_break() {
+                return Ok(tests);
+            }
+            node_test.update_witness(&mut witness, visitor.witness());
+        }
+        let next = match (memory.entries.pop(), phase) {
+            (Some(top), _) => top,
+            (None, Phase::DepthFirst) => break,
+            (None, Phase::Dive) => {
+                // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
+                phase = Phase::BestFirst;
+                Entry::ROOTS
+            }
+            (None, Phase::BestFirst) => match memory.list.pop_least() {
+                Some(least) => least,
+                None => break,
+            },
+        };
+        if next.bound() > visitor.limit() {
+            if phase == Phase::BestFirst {
+                // It is the least bound of all.
+                break;
+            }
+            continue;
+        }
+        memory.visit()?;
+        if let Some(leaves_of_pair) = memory.leaf_pair(next) {
+            if visitor.leaves(isa, leaves_of_pair, phase != Phase::DepthFirst)?.is_break() {
+                return Ok(tests);
+            }
+            node_test.update_witness(&mut witness, visitor.witness());
+            leaves += u32::from(phase == Phase::BestFirst);
+            if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
+            {
+                phase = Phase::DepthFirst;
+                memory.list_to_stack(visitor.limit());
+            }
+            continue;
+        }
+        let WalkMemory { nodes_a, nodes_b, large_leaves, .. } = memory;
+        if large_leaves.are_beyond(&pair, (nodes_a, nodes_b), node_test.reaches(), next, visitor.limit())? {
+            continue;
+        }
+        if tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_test.looks_along_b() {
+            node_test.look_along_b(isa);
+        }
+        let sides = memory.open(isa, &pair, node_test, next)?;
+        let start = memory.entries.len();
+        let apart = phase == Phase::DepthFirst;
+        tests += memory.push_children(isa, W::MEASURE, node_test, &witness, &sides, (visitor.limit(), apart));
+        match (phase, order) {
+            (Phase::BestFirst, _) => {
+                memory.entries.move_to(start, &mut memory.list);
+                if memory.list.len() > MAX_LISTED_PAIRS {
+                    phase = Phase::DepthFirst;
+                    memory.list_to_stack(visitor.limit());
+                }
+            }
+            (_, Order::Tree) => memory.entries.reverse(start),
+            (Phase::Dive, _) => {
+                memory.entries.nearest_last(start);
+                memory.entries.keep_last(start);
+            }
+            (Phase::DepthFirst, _) => memory.entries.nearest_last(start),
+        }
+    }
+    visitor.finish(isa)?;
+    Ok(tests)
+}
+
+/// Opened nodes of A and B whose children meet. A node that was not opened takes part as the only
+/// child in question of its parent.
+struct Sides {
+    node_a: usize,
+    only_a: Option<usize>,
+    node_b: usize,
+    only_b: Option<usize>,
+}
+
+/// Aligns an opened node of A to B's directions. It is a task, compiled apart from the walk, because few queries need it.
+struct AlignA<'a> {
+    node_test: &'a NodeTest,
+    node: &'a CachedNode,
+    to: &'a mut [Group; 2],
+}
+
+impl Task for AlignA<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        for part in 0..self.node.count.div_ceil(4) {
+            self.node_test.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+        }
+    }
+}
+
+impl WalkMemory {
+    /// Starts a query that may visit this many pairs.
+    pub(crate) fn start(&mut self, budget: u64) {
+        (self.budget, self.left) = (budget, budget);
+    }
+
+    /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.
+    pub(crate) fn allow_as_much_again(&mut self) {
+        self.left = self.left.min((self.budget - self.left).saturating_add(EXTRA_LOOK_AHEAD_VISITS));
+    }
+
+    /// Counts a visit.
+    #[inline(always)]
+    pub(crate) fn visit(&mut self) -> Result<(), QueryError> {
+        self.left = self.left.checked_sub(1).ok_or(QueryError::Budget { visits: self.budget })?;
+        Ok(())
+    }
+
+    /// Visits the pairs of leaf packets that have been collected.
+    #[inline(always)]
+    fn visit_leaf_pairs<I: Isa, W: Visitor>(
+        &mut self,
+        isa: I,
+        visitor: &mut W,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        for at in 0..self.leaf_pairs.len() {
+            let next = self.leaf_pairs.get(at);
+            if next.bound() > visitor.limit() {
+                continue;
+            }
+            self.visit()?;
+            if let Some(leaves) = self.leaf_pair(next)
+                && visitor.leaves(isa, leaves, false)?.is_break()
+            {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        self.leaf_pairs.clear();
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// Returns both leaf packets, if the entry is a pair of them.
+    #[inline(always)]
+    fn leaf_pair(&self, entry: Entry) -> Option<(LeafPacket, LeafPacket)> {
+        let a = self.nodes_a.get(entry.a.node()).leaf(entry.a.child())?;
+        let b = self.nodes_b.get(entry.b.node()).leaf(entry.b.child())?;
+        Some((a, b))
+    }
+
+    /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
+    #[inline(always)]
+    fn open<I: Isa>(
+        &mut self,
+        isa: I,
+        pair: &ObjectPair<'_>,
+        node_test: &NodeTest,
+        entry: Entry,
+    ) -> Result<Sides, QueryError> {
+        let (node_a, node_b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
+        let (child_a, child_b) = (entry.a.child(), entry.b.child());
+        let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
+        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
+        let mut sides = Sides {
+            node_a: entry.a.node(),
+            only_a: Some(child_a),
+            node_b: entry.b.node(),
+            only_b: Some(child_b),
+        };
+        let a_is_small = extent_b > EXTENT_RATIO_TO_OPEN_ONE * extent_a;
+        // In a forged file both comparisons may hold: one node is opened in any case.
+        let b_is_small = extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b && !a_is_small;
+        if !leaf_a && (leaf_b || !a_is_small) {
+            let (number, new) = self.nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            (sides.node_a, sides.only_a) = (number, None);
+            if self.aligned_a.len() <= number {
+                self.aligned_a.resize(2 * number + 64, [Group::ZERO; 2]);
+                self.is_aligned_a.resize(2 * number + 64, false);
+            }
+            self.is_aligned_a[number] &= !new;
+        }
+        if !leaf_b && (leaf_a || !b_is_small) {
+            let (number, new) = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            (sides.node_b, sides.only_b) = (number, None);
+            if self.aligned_b.len() <= number {
+                self.aligned_b.resize(2 * number + 64, [Group::ZERO; 2]);
+            }
+            if new {
+                let opened = self.nodes_b.get(number);
+                for part in 0..opened.count.div_ceil(4) {
+                    node_test.align_b(isa, &opened.groups[part & 1], &mut self.aligned_b[number][part & 1]);
+                }
+            }
+        }
+        Ok(sides)
+    }
+
+    /// Tests all pairs of children and pushes those within the limit. Returns the number of tests.
+    #[inline(always)]
+    fn push_children<I: Isa>(
+        &mut self,
+        isa: I,
+        measure: Measure,
+        node_test: &NodeTest,
+        witness: &Option<Witness>,
+        sides: &Sides,
+        (limit, leaves_apart): (f32, bool),
+    ) -> u64 {
+        let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
+        let aligned_b = &self.aligned_b[sides.node_b];
+        let mut tests = 0;
+        let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
+        while part_a < end_a {
+            let (mut part_b, end_b) = parts(sides.only_b, side_b.count);
+            while part_b < end_b {
+                let mut bounds = [0.0; 16];
+                let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
+                let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut bounds);
+                mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
+                mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
+                if mask != 0 && node_test.looks_along_b() {
+                    let aligned_a = &mut self.aligned_a[sides.node_a];
+                    if !std::mem::replace(&mut self.is_aligned_a[sides.node_a], true) {
+                        isa.run(AlignA { node_test, node: side_a, to: aligned_a });
+                    }
+                    let groups = (&aligned_a[part_a & 1], &side_b.groups[part_b & 1]);
+                    mask &= node_test.run_along_b(isa, measure, groups, limit, &mut bounds);
+                }
+                let first_a = ChildRef::new(sides.node_a, 4 * part_a);
+                let first_b = ChildRef::new(sides.node_b, 4 * part_b);
+                let tested = Tested::new(&bounds, first_a, first_b);
+                let mut leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
+                if !leaves_apart {
+                    leaves = 0;
+                }
+                self.entries.append(isa, &tested, mask & !leaves);
+                self.leaf_pairs.append(isa, &tested, mask & leaves);
+                tests += 1;
+                part_b += 1;
+            }
+            part_a += 1;
+        }
+        tests
+    }
+
+    /// Goes on depth-first with the entries of the list, the least bound next.
+    fn list_to_stack(&mut self, limit: f32) {
+        for at in 0..self.list.len() {
+            let entry = self.list.get(at);
+            if entry.bound() <= limit {
+                self.entries.push(entry);
+            }
+        }
+        self.list.clear();
+        self.entries.nearest_last(0);
+    }
+}
+
+/// Spreads a mask of four children of A to the lanes of their rows.
+#[inline(always)]
+fn rows_of(children: u16) -> u16 {
+    // Each bit to the first lane of its row; times 15 to all of them.
+    15 * ((children | children << 3 | children << 6 | children << 9) & 0x1111)
+}
+
+/// Returns the groups of four children to test: all, or that of the only child in question.
+#[inline(always)]
+fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
+    match only {
+        Some(child) => (child / 4, child / 4 + 1),
+        None => (0, count.div_ceil(4)),
+    }
+}
+
+/// Returns the lanes whose child of A exists, or is the only one in question.
+#[inline(always)]
+fn lanes_of_a(only: Option<usize>, count: usize, part: usize) -> u16 {
+    match only {
+        Some(child) => 0xf << (4 * (child % 4)),
+        None => ((1u32 << (4 * (count - 4 * part).min(4))) - 1) as u16,
+    }
+}
+
+/// Returns the lanes whose child of B exists, or is the only one in question.
+#[inline(always)]
+fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
+    match only {
+        Some(child) => 0x1111 << (child % 4),
+        None => 0x1111 * ((1u16 << (count - 4 * part).min(4)) - 1),
+    }
+}
