@@ -1,8 +1,9 @@
 //! The vector operations that kernels are written in, and the choice of a backend at run time.
 //!
 //! A backend is a zero-sized token that can be created only on a CPU with the features it stands for.
-//! Kernels are generic over the token and `#[inline(always)]`; each backend has one function with
-//! the features enabled, into which a whole query is inlined. Registers are 16 lanes wide (`V`: four
+//! Kernels are generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a function
+//! of its own with the features of the backend enabled. A walk is made of a handful of tasks: in a single function, which
+//! would take 64 KB, registers are allocated badly. Registers are 16 lanes wide (`V`: four
 //! children of A against four of B) or 4 lanes (`H`: four children or triangles of one side).
 //!
 //! Decoding gives the same bits on every backend: it uses exact products only. Other operations may

@@ -26,10 +26,6 @@ type Point = [f64; 3];
 /// The triangles of a leaf packet are bounded one by one if the packet is this many times larger than the node it meets.
 const EXTENT_RATIO_TO_TEST_TRIANGLES: f32 = 8.0;
 
-/// How often a large leaf packet meets a small node before triangles are bounded. Most queries of meshes of similar size
-/// end before; bounding four triangles takes as long as two or three visits.
-const VISITS_BEFORE_TRIANGLE_BOUNDS: u32 = 128;
-
 /// How many visits follow unbounded when the triangles turned out not to be beyond the limit, so that a walk in which
 /// they never are takes at most twice as long.
 const VISITS_AFTER_FAILED_BOUNDS: u32 = 4;
@@ -39,7 +35,7 @@ const VISITS_AFTER_FAILED_BOUNDS: u32 = 4;
 pub(crate) struct LargeLeaves {
     leaf_a: LargeLeaf,
     leaf_b: LargeLeaf,
-    /// How many small nodes large leaf packets still meet before triangles are bounded.
+    /// How many small nodes large leaf packets still meet before triangles are bounded again.
     unbounded_visits: u32,
 }
 
@@ -47,11 +43,11 @@ impl LargeLeaves {
     /// Forgets all packets, before a walk.
     pub(crate) fn start(&mut self) {
         (self.leaf_a.of, self.leaf_b.of) = (None, None);
-        self.unbounded_visits = VISITS_BEFORE_TRIANGLE_BOUNDS;
+        self.unbounded_visits = 0;
     }
 
     /// Returns whether an entry is a leaf packet against a much smaller node and its triangles are certainly beyond `limit`
-    /// of that node. For the first visits of a walk it does not find out.
+    /// of that node. After it has found out in vain, it does not for some visits.
     #[inline(always)]
     pub(crate) fn are_beyond(
         &mut self,

@@ -6,7 +6,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
-use crate::isa::{Isa, Lanes};
+use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::decode_group;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
@@ -185,7 +185,7 @@ impl NodeCache {
         let number = self.used;
         let (before, behind) = self.nodes.split_at_mut(number);
         let parent = &mut before[at.node()];
-        decode_node(isa, bvh, object, parent, at.child(), &mut behind[0])?;
+        isa.run(DecodeNode { bvh, object, parent, child: at.child(), to: &mut behind[0] })?;
         parent.opened[at.child()] = number as u32;
         self.used += 1;
         Ok((number, true))
@@ -196,6 +196,24 @@ impl NodeCache {
         let at = bvh.layout().page_offset(object.record().first_page.get());
         let expected = format!("at most {} treelets to open", self.max_nodes - 1);
         FormatError::new(Rule::Counts, at, expected, "more").into()
+    }
+}
+
+/// Decodes an inner child of an opened node.
+struct DecodeNode<'a> {
+    bvh: &'a Bvh,
+    object: &'a Object,
+    parent: &'a CachedNode,
+    child: usize,
+    to: &'a mut CachedNode,
+}
+
+impl Task for DecodeNode<'_> {
+    type Output = Result<(), QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        decode_node(isa, self.bvh, self.object, self.parent, self.child, self.to)
     }
 }
 

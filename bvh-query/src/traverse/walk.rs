@@ -126,6 +126,10 @@ const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
 /// leave, in scans an eighth.
 const NODE_TESTS_BEFORE_B_DIRECTIONS: u64 = 16;
 
+/// Node tests before the triangles of large leaf packets are bounded one by one. Most queries of meshes of similar size
+/// end before; bounding four triangles takes as long as two or three visits.
+const NODE_TESTS_BEFORE_TRIANGLE_BOUNDS: u64 = 128;
+
 /// Visits all pairs of leaf packets that may be within the visitor's limit. Returns the number of node tests.
 #[inline(always)]
 pub(crate) fn traverse<I: Isa, W: Visitor>(
@@ -192,7 +196,8 @@ fn walk<I: Isa, W: Visitor>(
         }
         memory.visit()?;
         if let Some(leaves_of_pair) = memory.leaf_pair(next) {
-            if visitor.leaves(isa, leaves_of_pair, phase != Phase::DepthFirst)?.is_break() {
+            let at_once = phase != Phase::DepthFirst;
+            if isa.run(VisitLeaves { visitor, leaves: leaves_of_pair, at_once })?.is_break() {
                 return Ok(tests);
             }
             node_test.update_witness(&mut witness, visitor.witness());
@@ -205,7 +210,15 @@ fn walk<I: Isa, W: Visitor>(
             continue;
         }
         let WalkMemory { nodes_a, nodes_b, large_leaves, .. } = memory;
-        if large_leaves.are_beyond(&pair, (nodes_a, nodes_b), node_test.reaches(), next, visitor.limit())? {
+        if tests >= NODE_TESTS_BEFORE_TRIANGLE_BOUNDS
+            && large_leaves.are_beyond(
+                &pair,
+                (nodes_a, nodes_b),
+                node_test.reaches(),
+                next,
+                visitor.limit(),
+            )?
+        {
             continue;
         }
         if tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_test.looks_along_b() {
@@ -231,7 +244,7 @@ fn walk<I: Isa, W: Visitor>(
             (Phase::DepthFirst, _) => memory.entries.nearest_last(start),
         }
     }
-    visitor.finish(isa)?;
+    isa.run(Finish(visitor))?;
     Ok(tests)
 }
 
@@ -244,7 +257,35 @@ struct Sides {
     only_b: Option<usize>,
 }
 
-/// Aligns an opened node of A to B's directions. It is a task, compiled apart from the walk, because few queries need it.
+/// Visits two leaf packets.
+struct VisitLeaves<'a, W> {
+    visitor: &'a mut W,
+    leaves: (LeafPacket, LeafPacket),
+    at_once: bool,
+}
+
+impl<W: Visitor> Task for VisitLeaves<'_, W> {
+    type Output = Result<ControlFlow<()>, QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        self.visitor.leaves(isa, self.leaves, self.at_once)
+    }
+}
+
+/// Completes what is pending after the last pair.
+struct Finish<'a, W>(&'a mut W);
+
+impl<W: Visitor> Task for Finish<'_, W> {
+    type Output = Result<(), QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        self.0.finish(isa)
+    }
+}
+
+/// Aligns an opened node of A to B's directions.
 struct AlignA<'a> {
     node_test: &'a NodeTest,
     node: &'a CachedNode,
@@ -258,6 +299,24 @@ impl Task for AlignA<'_> {
     fn run<I: Isa>(self, isa: I) {
         for part in 0..self.node.count.div_ceil(4) {
             self.node_test.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+        }
+    }
+}
+
+/// Aligns an opened node of B to A's directions.
+struct AlignB<'a> {
+    node_test: &'a NodeTest,
+    node: &'a CachedNode,
+    to: &'a mut [Group; 2],
+}
+
+impl Task for AlignB<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        for part in 0..self.node.count.div_ceil(4) {
+            self.node_test.align_b(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
         }
     }
 }
@@ -294,7 +353,7 @@ impl WalkMemory {
             }
             self.visit()?;
             if let Some(leaves) = self.leaf_pair(next)
-                && visitor.leaves(isa, leaves, false)?.is_break()
+                && isa.run(VisitLeaves { visitor, leaves, at_once: false })?.is_break()
             {
                 return Ok(ControlFlow::Break(()));
             }
@@ -349,10 +408,8 @@ impl WalkMemory {
                 self.aligned_b.resize(2 * number + 64, [Group::ZERO; 2]);
             }
             if new {
-                let opened = self.nodes_b.get(number);
-                for part in 0..opened.count.div_ceil(4) {
-                    node_test.align_b(isa, &opened.groups[part & 1], &mut self.aligned_b[number][part & 1]);
-                }
+                let (node, to) = (self.nodes_b.get(number), &mut self.aligned_b[number]);
+                isa.run(AlignB { node_test, node, to });
             }
         }
         Ok(sides)

@@ -34,7 +34,8 @@ impl Avx2 {
     }
 }
 
-/// Runs the task with the features enabled.
+/// Runs the task with the features enabled, as a function of its own.
+#[inline(never)]
 #[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
 fn run_with_features<T: Task>(isa: Avx2, task: T) -> T::Output {
     task.run(isa)

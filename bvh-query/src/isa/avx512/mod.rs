@@ -39,7 +39,8 @@ impl Avx512 {
     }
 }
 
-/// Runs the task with the features enabled.
+/// Runs the task with the features enabled, as a function of its own.
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
 fn run_with_features<T: Task>(isa: Avx512, task: T) -> T::Output {
     task.run(isa)
