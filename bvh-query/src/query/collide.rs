@@ -6,7 +6,6 @@ use crate::file::place::LeafPacket;
 use crate::file::shape::Shape;
 use crate::isa::Isa;
 use crate::leaf::collide::{drain, face_planes};
-use crate::leaf::local::Local;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
@@ -144,11 +143,7 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Vi
         _at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
-        let pair = &self.placed.pair;
-        let [packets_a, packets_b] = &mut *self.packets;
-        let packet_a = pair.bvh_a.cached_packet(pair.object_a, a, packets_a)?;
-        let packet_b = pair.bvh_b.cached_packet(pair.object_b, b, packets_b)?;
-        let local = Local::new(isa, self.placed.frame(), packet_a, packet_b);
+        let local = self.placed.local(isa, self.packets, (a, b))?;
         let mut mask = face_planes(isa, &local, a, b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;

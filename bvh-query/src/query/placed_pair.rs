@@ -1,9 +1,11 @@
 //! Two objects in place: what every query of a pair of shapes walks.
 
 use crate::error::QueryError;
+use crate::file::packet_cache::PacketCache;
+use crate::file::place::LeafPacket;
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
-use crate::leaf::local::LocalFrame;
+use crate::leaf::local::{Local, LocalFrame};
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
@@ -26,6 +28,20 @@ impl PlacedPair<'_> {
     pub(crate) fn frame(&self) -> &LocalFrame {
         let ObjectPair { object_a, object_b, placement, .. } = self.pair;
         self.frame.get_or_init(|| LocalFrame::new(placement, object_a, object_b))
+    }
+
+    /// Fetches two leaf packets and brings them into their local frame.
+    #[inline(always)]
+    pub(crate) fn local<I: Isa>(
+        &self,
+        isa: I,
+        [packets_a, packets_b]: &mut [PacketCache; 2],
+        (a, b): (LeafPacket, LeafPacket),
+    ) -> Result<Local, QueryError> {
+        let ObjectPair { bvh_a, object_a, bvh_b, object_b, .. } = self.pair;
+        let packet_a = bvh_a.cached_packet(object_a, a, packets_a)?;
+        let packet_b = bvh_b.cached_packet(object_b, b, packets_b)?;
+        Ok(Local::new(isa, self.frame(), packet_a, packet_b))
     }
 }
 

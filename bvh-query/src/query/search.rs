@@ -10,7 +10,7 @@ use crate::file::packet_cache::PacketCache;
 use crate::file::place::LeafPacket;
 use crate::isa::Isa;
 use crate::leaf::distance::{bounds, near, near_along};
-use crate::leaf::local::{Local, valid_lanes};
+use crate::leaf::local::valid_lanes;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_within};
 use crate::query::answers::{Distance, QueryStats};
@@ -292,11 +292,7 @@ impl Visitor for Nearest<'_> {
         at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
-        let pair = &self.placed.pair;
-        let [packets_a, packets_b] = &mut *self.packets;
-        let packet_a = pair.bvh_a.cached_packet(pair.object_a, a, packets_a)?;
-        let packet_b = pair.bvh_b.cached_packet(pair.object_b, b, packets_b)?;
-        let local = Local::new(isa, self.placed.frame(), packet_a, packet_b);
+        let local = self.placed.local(isa, self.packets, (a, b))?;
         let limit = self.search.limit * self.placed.frame().scale;
         let mut mask = valid_lanes(a.triangles, b.triangles);
         if let Some(direction) = self.direction {
