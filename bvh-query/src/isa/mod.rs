@@ -1,14 +1,14 @@
-//! The vector operations that kernels are written in, and the choice of a backend at run time.
+//! Defines the vector operations that kernels are written in, and chooses a backend at run time.
 //!
-//! A backend is a zero-sized token that can be created only on a CPU with the features it stands for.
+//! The token of a backend has size zero and can be created only on a CPU with the features it stands for.
 //! Kernels are generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a function
-//! of its own with the features of the backend enabled. A walk is made of a handful of tasks: in a single function, which
-//! would take 64 KB, registers are allocated badly. Registers are 16 lanes wide (`V`: four
-//! children of A against four of B) or 4 lanes (`H`: four children or triangles of one side).
+//! of its own with the features of the backend enabled. A walk is made of a handful of tasks: a single function would
+//! take 64 KB, in which compilers allocate registers badly. A register has 16 lanes (`V`: four children of A against
+//! four of B) or 4 lanes (`H`: four children or triangles of one side).
 //!
-//! Decoding gives the same bits on every backend: it uses exact products only. Other operations may
-//! round differently (`mul_add` is fused where the CPU can), so what is computed with them only ever
-//! filters, within derived bounds.
+//! Decoding gives the same bits on every backend, because it uses exact products only. Other operations may
+//! round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters
+//! with derived error bounds.
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
@@ -22,9 +22,9 @@ use bvh_format::slabs::Group;
 use std::fmt;
 use std::sync::OnceLock;
 
-/// A set of equal lanes of `f32`.
+/// A register of `f32` lanes.
 pub(crate) trait Lanes: Copy {
-    /// One truth value per lane.
+    /// A truth value per lane.
     type Mask: Copy;
 
     fn sub(self, other: Self) -> Self;
@@ -36,22 +36,22 @@ pub(crate) trait Lanes: Copy {
     fn neg_mul_add(self, factor: Self, term: Self) -> Self;
     fn sqrt(self) -> Self;
     fn abs(self) -> Self;
-    /// The smaller; the second operand if either is NaN.
+    /// Returns the smaller operand of each lane; the second operand if either is NaN.
     fn min(self, other: Self) -> Self;
-    /// The larger; the second operand if either is NaN.
+    /// Returns the larger operand of each lane; the second operand if either is NaN.
     fn max(self, other: Self) -> Self;
     /// `self <= other`, false for NaN.
     fn le(self, other: Self) -> Self::Mask;
     /// `self < other`, false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    /// `yes` where the mask is set, `no` elsewhere.
+    /// Returns `yes` in lanes where the mask is set, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// Bit i is lane i.
+    /// Returns the mask as bits; bit i is lane i.
     fn bits(mask: Self::Mask) -> u16;
 }
 
-/// Rows of a group that are picked from together. The places in a part are those of four lower ends, then those of
-/// the upper ends of the same four slabs. Four more slabs follow, at places 8 higher.
+/// The rows of a group that one call of `pick` picks from. Places 0 to 3 of a part are the lower ends of four slabs,
+/// places 4 to 7 the upper ends of the same slabs. If the part has four more slabs, their places are 8 higher.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     /// Rows 0 to 3.
@@ -62,22 +62,22 @@ pub(crate) enum Part {
     Faces,
 }
 
-/// Which rows to pick, for backends that pick lanes of registers and for those that load rows.
+/// The rows to pick, in two forms: for backends that load rows, and for those that pick lanes of registers.
 #[derive(Clone, Copy)]
 pub(crate) struct FourRows<'a> {
-    /// Rows of a group, upper ends from 16 on.
+    /// Rows of a group; upper ends start at row 16.
     pub(crate) rows: &'a [u32; 4],
-    /// Element `4 * i + j` is four times the place of row i in its part, and j.
+    /// Element `4 * i + j` is four times the place of row i in its part, plus j.
     pub(crate) lanes: &'a [u32; 16],
 }
 
-/// A backend.
+/// The token of a backend, and the operations that its CPU features allow.
 pub(crate) trait Isa: Copy {
-    /// Sixteen lanes.
+    /// A register of sixteen lanes.
     type V: Lanes;
-    /// Four lanes.
+    /// A register of four lanes.
     type H: Lanes;
-    /// The rows of a group, to pick from.
+    /// The rows of a group, in the form that `pick` reads.
     type Rows<'a>: Copy;
 
     fn splat(self, value: f32) -> Self::V;
@@ -89,34 +89,34 @@ pub(crate) trait Isa: Copy {
     fn tile(self, from: &[f32; 4]) -> Self::V;
     /// Lane `4 * i + j` is lane `4 * i + column`.
     fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
-    /// A group to pick rows from.
+    /// Prepares a group for `pick`.
     fn rows<'a>(self, group: &'a Group) -> Self::Rows<'a>;
-    /// Four rows of a group, all of one part, and beside them the other ends of the same slabs.
+    /// Returns four rows of a group, all of one part, and the opposite ends of the same slabs.
     fn pick(self, rows: &Self::Rows<'_>, part: Part, four: FourRows<'_>) -> (Self::V, Self::V);
 
-    /// `bvh_format::quantize::round_step_up` in each lane.
+    /// Applies `bvh_format::quantize::round_step_up` to each lane.
     fn round_step_up(self, step: Self::V) -> Self::V;
 
-    /// 16 codes of a byte.
+    /// Reads 16 codes of one byte each.
     fn codes_u8(self, from: &[u8; 16]) -> Self::V;
-    /// 8 codes of a byte, two a row: lane `4 * i + j` is code `2 * i + j` for j below 2.
+    /// Reads 8 codes of one byte each, two per row: lane `4 * i + j` is code `2 * i + j` for j below 2.
     fn codes_u8_pairs(self, from: &[u8; 8]) -> Self::V;
-    /// The low nibbles of 16 bytes.
+    /// Reads the low nibbles of 16 bytes.
     fn codes_low(self, from: &[u8; 16]) -> Self::V;
-    /// The high nibbles of 16 bytes.
+    /// Reads the high nibbles of 16 bytes.
     fn codes_high(self, from: &[u8; 16]) -> Self::V;
-    /// 16 f16.
+    /// Reads 16 little-endian `f16`.
     fn codes_f16(self, from: &[u8; 32]) -> Self::V;
-    /// 8 f16, two a row, as `codes_u8_pairs`.
+    /// Reads 8 little-endian `f16`, two per row like `codes_u8_pairs`.
     fn codes_f16_pairs(self, from: &[u8; 16]) -> Self::V;
-    /// 16 little-endian f32.
+    /// Reads 16 little-endian `f32`.
     fn codes_f32(self, from: &[u8; 64]) -> Self::V;
 
     fn splat4(self, value: f32) -> Self::H;
     fn load4(self, from: &[f32; 4]) -> Self::H;
     fn store4(self, value: Self::H, to: &mut [f32; 4]);
 
-    /// The elements whose bits are set to the front, in order; what follows them is of no meaning.
+    /// Moves the elements whose bits are set to the front, in order; the elements after them have no meaning.
     #[inline(always)]
     fn compress(self, mask: u16, from: &[u32; 16], to: &mut [u32; 16]) {
         let (mut mask, mut at) = (mask, 0);
@@ -130,8 +130,8 @@ pub(crate) trait Isa: Copy {
     /// Prefetches the cache line of a byte that will soon be read.
     fn prefetch_line(self, byte: &u8);
 
-    /// Prefetches bytes that will soon be read. They may start anywhere in a line, so that the last byte may be in a line
-    /// that no multiple of 64 bytes from the first is in.
+    /// Prefetches bytes that will soon be read. They may start anywhere in a cache line, so steps of 64 bytes from the
+    /// first byte may miss the line of the last byte, which is prefetched as well.
     #[inline(always)]
     fn prefetch(self, bytes: &[u8]) {
         for line in bytes.chunks(64) {
@@ -146,8 +146,8 @@ pub(crate) trait Isa: Copy {
     fn run<T: Task>(self, task: T) -> T::Output;
 }
 
-/// Work that is compiled once for each backend. `run` must be `#[inline(always)]`, and so must all
-/// generic functions it calls.
+/// Work that is compiled once per backend. `run` and all generic functions that it calls must be
+/// `#[inline(always)]`.
 pub(crate) trait Task {
     type Output;
     fn run<I: Isa>(self, isa: I) -> Self::Output;
@@ -202,7 +202,7 @@ impl Backend {
         }
     }
 
-    /// Returns whether this CPU can run it.
+    /// Returns whether this CPU can run the backend.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
@@ -215,7 +215,7 @@ impl Backend {
         }
     }
 
-    /// Runs a task on this backend; on the scalar one if the CPU lacks it.
+    /// Runs a task on this backend, or on the scalar one if the CPU lacks the features.
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
         #[cfg(target_arch = "x86_64")]
         match self {

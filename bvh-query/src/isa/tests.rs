@@ -1,4 +1,4 @@
-//! Every backend decodes every profile to the bits of the scalar reference decoder.
+//! Tests that every backend decodes every profile to the bits of the scalar reference decoder.
 
 use super::{Backend, Isa, Task};
 use crate::traverse::decode::decode_group;

@@ -1,37 +1,38 @@
 //! Measures the distance between two closed triangles, with witness points and certified bounds.
 //!
 //! # Method
-//! Unless the triangles meet, the closest points are in the relative interiors of two features (corner, edge
-//! or face) on which the line between them is perpendicular, and one of four kinds: corner and corner, corner
-//! and edge, edge and edge, corner and face. So the distance is the least over 9 + 18 + 9 + 6 candidates,
-//! each of which counts only where its feet lie strictly inside both features; what is lost to a wrong
-//! decision near a border is found again as a candidate of the border. Whether the triangles meet is never
-//! read off the distance: a positive lower bound proves that they don't, and else [`triangles_intersect`]
-//! decides.
+//! Unless the triangles meet, the two closest points lie in the relative interiors of two features (corners,
+//! edges or faces), and the line between them is perpendicular to both features. There are four kinds of pairs:
+//! corner and corner, corner and edge, edge and edge, corner and face. So the distance is the least of
+//! 9 + 18 + 9 + 6 candidates. A candidate counts only if its feet lie strictly inside both features. If rounding
+//! rejects a foot near the border of a feature, a candidate of that border takes its place. The distance itself
+//! never decides whether the triangles meet: a positive lower bound proves that they do not, and otherwise
+//! [`triangles_intersect`] decides.
 //!
 //! # Why it is accurate
-//! All that enters is differences of two input points, so an offset of both triangles costs nothing, and a
-//! gap between two corners has full relative accuracy. The least-squares problem of two edges, or of a corner
-//! and a face, is solved by modified Gram-Schmidt orthogonalisation (Å. Björck, "Solving Linear Least Squares
-//! Problems by Gram-Schmidt Orthogonalization", BIT 7, 1967), which is backward stable: one direction is
-//! projected out of the other and out of the gap, `r` and `h` are left, and the distance is that of `r` from
-//! the line along `h`. Each has an absolute error of a few roundings of the lengths at hand, and the weight
-//! on `h` is at most 1, so however short `h` is (a sliver, or two nearly parallel edges) the distance is off
-//! by a few roundings of these lengths. The textbook formula divides by `|d|²|e|² - (d·e)²` and loses half
-//! the digits there; one that skips small normals below an absolute length misses the face altogether.
+//! Only differences of two input points enter the computation, so a common offset of both triangles
+//! costs no accuracy, and a gap between two corners has full relative accuracy. The least-squares problem of two
+//! edges, or of a corner and a face, is solved by modified Gram-Schmidt orthogonalisation (Å. Björck, "Solving
+//! Linear Least Squares Problems by Gram-Schmidt Orthogonalization", BIT 7, 1967), which is backward stable. The
+//! first direction is projected out of the second one, which leaves `h`, and out of the gap, which leaves `r`;
+//! the distance is that of `r` from the line along `h`. Both have an absolute error of a few roundings of the
+//! lengths involved, and the weight on `h` is at most 1. So the error of the distance is a few roundings of these
+//! lengths, however short `h` is (for a sliver, or for two nearly parallel edges). The textbook formula divides
+//! by `|d|²|e|² - (d·e)²` and loses half the digits there. A formula that skips normals below an absolute length
+//! misses the face altogether.
 //!
 //! # Units
-//! Differences are scaled by a power of two, exactly, so that the largest coordinate is in [1, 2). What
-//! underflows after that is too small, relative to the sizes at hand, to show in the result.
+//! Differences are scaled by a power of two, exactly, so that the largest coordinate is in [1, 2). Whatever
+//! underflows after that is too small, relative to the lengths involved, to change the result.
 
 use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, subtract, triangles_intersect};
 
 /// How far two triangles are apart, and where; lengths in mesh units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Closest {
-    /// The distance of the closest points found: 0 if and only if the triangles intersect.
+    /// The distance between the closest points found; 0 if and only if the triangles intersect.
     pub(crate) distance: f64,
-    /// A certified lower bound of the exact distance, at most `distance`; 0 where nothing better is proven.
+    /// A certified lower bound of the exact distance, at most `distance`; 0 if no positive bound is proven.
     pub(crate) lower: f64,
     /// A certified upper bound of the exact distance, at least `distance`.
     pub(crate) upper: f64,
@@ -41,15 +42,15 @@ pub(crate) struct Closest {
     pub(crate) point_b: Point,
 }
 
-/// The distance of two closed triangles and a pair of closest points.
+/// Returns the distance between two closed triangles, with bounds and a pair of closest points.
 ///
-/// `distance` is 0 if and only if [`triangles_intersect`], and both witness points then are the same.
-/// Otherwise it is positive, and within a few roundings (2^-53 each) of the size of the triangles and the
-/// gap; the exact value is in `lower..=upper`. Where both bounds of a gap near 2^-53 of the size fail to tell
-/// it from zero, the distance is still positive but may be as small as the smallest normal number. A triangle
-/// without area is the segment or point that its corners span. Constant cost.
+/// `distance` is 0 if and only if [`triangles_intersect`] returns true, and then both witness points are the same.
+/// Otherwise it is positive. Its error is a few roundings (2^-53 each) of the size of the triangles and the gap, and
+/// the exact value is in `lower..=upper`. For a gap near 2^-53 of the size, the bounds may not exclude zero; the
+/// distance is still positive then, but may be as small as the smallest normal number. A triangle without area is
+/// the segment or point that its corners span. The cost is constant.
 ///
-/// The result has the same bits whatever the target: no operation is fused, and no operation combines lanes.
+/// The result has the same bits on every target: no operation is fused, and no operation combines lanes.
 #[must_use]
 #[inline(always)]
 pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
@@ -63,13 +64,13 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
         return Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: point, point_b: point };
     }
     let (distance, upper) = differences.length(&closest);
-    // Between two features that are about as near, the direction of either may be far off that of the gap.
+    // If two pairs of features are about equally near, the chosen direction may be far from that of the gap.
     let lower = if distance - lower > MAX_ERROR_ASYMMETRY * (upper - distance) {
         differences.widest(&closest).max(lower)
     } else {
         lower
     };
-    // A length that rounds to zero is still not a contact.
+    // The triangles do not meet, so the distance must not round to zero.
     let distance = (distance * differences.unit).max(f64::MIN_POSITIVE);
     let lower = lower * differences.unit;
     Closest {
@@ -82,13 +83,13 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
     }
 }
 
-/// A lower bound this many times as far below the distance as the upper bound is above is not taken as it is.
+/// The largest accepted ratio of `distance - lower` to `upper - distance`; beyond it a better lower bound is sought.
 const MAX_ERROR_ASYMMETRY: f64 = 8.0;
 
 /// A point of a triangle: `corner + along * (next - corner) + across * (previous - corner)`.
 ///
-/// In the relative interior of the feature that its nonzero weights span: both are at least 0, and their
-/// exact sum is below 1.
+/// It lies in the relative interior of the feature that its nonzero weights span: both weights are at least 0, and
+/// their exact sum is below 1.
 #[derive(Clone, Copy)]
 struct Foot {
     corner: usize,
@@ -105,13 +106,13 @@ impl Foot {
         Self { corner, along, across: 0.0 }
     }
 
-    /// The two terms that are added to the corner. `edges[i]` leads from corner `i` to the next one.
+    /// Returns the two terms that are added to the corner. `edges[i]` leads from corner `i` to the next one.
     fn offsets(&self, edges: &Triangle) -> [Point; 2] {
         let (next, previous) = (edges[self.corner], edges[(self.corner + 2) % 3]);
         [times(self.along, next), times(-self.across, previous)]
     }
 
-    /// The point in mesh units, given the edges in multiples of `unit`.
+    /// Returns the point in mesh units, given the edges in multiples of `unit`.
     fn place(&self, triangle: &Triangle, edges: &Triangle, unit: f64) -> Point {
         let [along, across] = self.offsets(edges);
         let corner = triangle[self.corner];
@@ -127,11 +128,11 @@ struct Candidate {
     foot_b: Foot,
 }
 
-/// Candidates in order: 9 of two corners, 9 of an edge of `a` and a corner, 9 of an edge of `b` and a corner, 9 of two
-/// edges, 3 of the face of `a`, 3 of the face of `b`; and as many infinite ones as fill registers.
+/// The number of candidates. In order: 9 of two corners, 9 of an edge of `a` and a corner, 9 of an edge of `b` and a
+/// corner, 9 of two edges, 3 of the face of `a`, 3 of the face of `b`, and 6 infinite ones that fill the registers.
 const CANDIDATES: usize = 48;
 
-/// The gaps between two triangles and their edges, in multiples of `unit`, each coordinate rounded once.
+/// The gaps between two triangles, and their edges, in multiples of `unit`; each coordinate is rounded once.
 struct Differences {
     /// `gaps[i][j]` leads from corner `i` of `a` to corner `j` of `b`.
     gaps: [Triangle; 3],
@@ -143,7 +144,7 @@ struct Differences {
 }
 
 impl Differences {
-    /// `None` if all six corners are the same point.
+    /// Returns `None` if all six corners are the same point.
     #[inline(always)]
     fn new(a: &Triangle, b: &Triangle) -> Option<Self> {
         let from = |p: Point| [subtract(b[0], p), subtract(b[1], p), subtract(b[2], p)];
@@ -176,13 +177,13 @@ impl Differences {
         }
     }
 
-    /// From corner `j` of `b` to the corners of `a`.
+    /// Returns the gaps from corner `j` of `b` to the corners of `a`.
     #[inline(always)]
     fn gaps_to(&self, j: usize) -> Triangle {
         [negated(self.gaps[0][j]), negated(self.gaps[1][j]), negated(self.gaps[2][j])]
     }
 
-    /// The closest pair among all candidates. Ties go to the first, so that the result is a function of the input.
+    /// Returns the closest of all candidates. Ties go to the first, so that the result is a function of the input.
     #[inline(always)]
     fn closest(&self) -> Candidate {
         let mut squared = [f64::INFINITY; CANDIDATES];
@@ -207,9 +208,9 @@ impl Differences {
         Candidate { squared: least, foot_a, foot_b }
     }
 
-    /// The direction in which the triangles are most likely separated: the one between the closest points.
+    /// Returns the direction in which the triangles are most likely separated: the one between the closest points.
     ///
-    /// Of a face or of two edges the normal is taken instead, which a small gap doesn't make inaccurate.
+    /// For a face or two edges it returns the normal instead, which stays accurate however small the gap is.
     #[inline(always)]
     fn direction(&self, closest: &Candidate) -> Point {
         let (a, b) = (&closest.foot_a, &closest.foot_b);
@@ -259,12 +260,12 @@ impl Differences {
     /// A certified lower bound of the distance, scaled: the width of the slab across `direction` between the
     /// triangles, on either side, or 0.
     ///
-    /// Any direction gives a bound, so its own error doesn't matter. A computed product `direction · gap` is
-    /// off by at most four roundings (one of the gap, one of the product, two of the additions), relative to
-    /// the sum of the magnitudes of its three terms; subtracting the bound from it rounds once more. Eight of
-    /// them also cover the rounding of the bound itself. The largest coordinate of `direction` is scaled to
-    /// [1, 2), so that what underflows is less than the smallest normal number in total, and that the norm,
-    /// the division and the last product are off by less than eight roundings, relative.
+    /// Any direction gives a bound, so an error of the direction does no harm. The error of a computed product
+    /// `direction · gap` is at most four roundings (one of the gap, one of the product, two of the additions),
+    /// relative to the sum of the magnitudes of its three terms. Subtracting the bound from it rounds once more.
+    /// Eight roundings also cover the rounding of the bound itself. The largest coordinate of `direction` is
+    /// scaled to [1, 2). So all underflow together is less than the smallest normal number, and the relative
+    /// error of the norm, the division and the last product is less than eight roundings.
     #[inline(always)]
     fn separation(&self, direction: Point) -> f64 {
         let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
@@ -288,8 +289,8 @@ impl Differences {
 }
 
 impl Differences {
-    /// The best lower bound that any of eighteen directions gives: both normals, all cross products of edges,
-    /// and the gap as it is and made perpendicular to each edge.
+    /// Returns the best lower bound of eighteen directions: both normals, all cross products of an edge of each
+    /// triangle, the gap, and the gap's component perpendicular to each edge.
     #[cold]
     #[inline(never)]
     fn widest(&self, closest: &Candidate) -> f64 {
@@ -307,24 +308,25 @@ impl Differences {
     }
 }
 
-/// The six edges, each with the three corners of the other triangle, seen from the edge's first corner: element
-/// `3 * i + k` is edge i of `a` and corner k of `b`, `9 + 3 * j + k` edge j of `b` and corner k of `a`. One array a
-/// coordinate, so that all go through vector registers at once; their ends hold nothing of meaning.
+/// The six edges, each with the three corners of the other triangle, seen from the edge's first corner. Element
+/// `3 * i + k` is edge i of `a` with corner k of `b`, element `9 + 3 * j + k` is edge j of `b` with corner k of `a`.
+/// Each coordinate has one array, so that vector registers hold many elements. The elements after these 18 have no
+/// meaning.
 struct Lines {
     gap: [[f64; LINES]; 3],
     edge: [[f64; LINES]; 3],
-    /// 1 over the edge's squared length; infinite or NaN are never used, an edge without length has 0.
+    /// 1 over the edge's squared length, or 0 if that square is not a normal number.
     inverse: [f64; LINES],
-    /// The weight on `edge` of the foot of the corner's perpendicular.
+    /// The weight on `edge` that gives the foot of the perpendicular from the corner.
     along: [f64; LINES],
-    /// The perpendicular that leads to the corner.
+    /// The perpendicular from this foot to the corner.
     perpendicular: [[f64; LINES]; 3],
 }
 
-/// 18, and as many as fill registers.
+/// The number of pairs of an edge and a corner, 18, rounded up to fill the registers.
 const LINES: usize = 24;
 
-/// 9, and as many as fill registers.
+/// The number of pairs of edges, and of pairs of corners, 9, rounded up to fill the registers.
 const EDGES: usize = 16;
 
 impl Lines {
@@ -354,7 +356,8 @@ impl Lines {
         Self { gap, edge, inverse, along, perpendicular }
     }
 
-    /// The squared distances of corners from corners and from edges; infinite unless the foot is inside the edge.
+    /// Computes the squared distances of corners from corners and from edges; infinite unless the foot is inside the
+    /// edge.
     #[inline(always)]
     fn corners(&self, squared: &mut [f64; CANDIDATES]) {
         let (mut between, mut beside) = ([0.0; EDGES], [0.0; LINES]);
@@ -371,7 +374,8 @@ impl Lines {
         squared[9..27].copy_from_slice(&beside[..18]);
     }
 
-    /// The squared distances of edges from edges, and the weights on both; infinite unless the feet are inside both.
+    /// Computes the squared distances of edges from edges, infinite unless both feet are inside their edges. Returns
+    /// the weights on the edges of `a` and of `b`.
     #[inline(always)]
     fn edges(&self, edges_b: &Triangle, squared: &mut [f64; CANDIDATES]) -> ([f64; EDGES], [f64; EDGES]) {
         let mut others = [[0.0; LINES]; 3];
@@ -385,7 +389,7 @@ impl Lines {
                 (at(&self.edge, l), at(&self.perpendicular, l), at(&others, l));
             let slope = dot(other, edge) * self.inverse[l];
             let across = add_scaled(other, -slope, edge);
-            // NaN or infinite, hence not inside, if nothing is left of the edge.
+            // NaN or infinite, and so not inside, if `across` is zero.
             t[l] = -dot(perpendicular, across) / dot(across, across);
             s[l] = self.along[l] + t[l] * slope;
             let inside = (t[l] > 0.0) & (t[l] < 1.0) & (s[l] > 0.0) & (s[l] < 1.0);
@@ -397,7 +401,7 @@ impl Lines {
     }
 }
 
-/// Element `l` of three arrays.
+/// Returns element `l` of three arrays.
 #[inline(always)]
 fn at(arrays: &[[f64; LINES]; 3], l: usize) -> Point {
     [arrays[0][l], arrays[1][l], arrays[2][l]]
@@ -408,7 +412,7 @@ fn put(arrays: &mut [[f64; LINES]; 3], l: usize, value: Point) {
     (arrays[0][l], arrays[1][l], arrays[2][l]) = (value[0], value[1], value[2]);
 }
 
-/// The feet of the other triangle's corners on a face: the base they are given from, and two weights each.
+/// The feet of the other triangle's corners on a face: the base corner, and two weights per foot.
 struct FaceFeet {
     base: usize,
     along: [f64; 3],
@@ -422,9 +426,9 @@ impl FaceFeet {
 }
 
 impl Differences {
-    /// The squared distances of the face of `a` (side 0) or `b` (side 1) from the corners of the other triangle,
-    /// infinite unless the foot is inside the face. The longest edge is projected out first, so that the height
-    /// on it is as small as the sliver.
+    /// Computes the squared distances of the face of `a` (side 0) or `b` (side 1) from the corners of the other
+    /// triangle, infinite unless the foot is inside the face. The longest edge is projected out first, so what is left
+    /// is the triangle's least height, which is as small as a sliver is thin.
     #[inline(always)]
     fn face(&self, lines: &Lines, side: usize, squared: &mut [f64; CANDIDATES]) -> FaceFeet {
         let edges = if side == 0 { &self.edges_a } else { &self.edges_b };
@@ -443,7 +447,7 @@ impl Differences {
             let to_corner = at(&lines.perpendicular, first + k);
             let across = dot(to_corner, height) * inverse;
             let along = lines.along[first + k] - across * slope;
-            // A sum that rounds to less than 1 is less than 1.
+            // If the rounded sum is less than 1, so is the exact one.
             let inside = (across > 0.0) & (along > 0.0) & (across + along < 1.0);
             let shortest = add_scaled(to_corner, -across, height);
             squared[36 + 3 * side + k] = if inside { dot(shortest, shortest) } else { f64::INFINITY };
@@ -453,10 +457,10 @@ impl Differences {
     }
 }
 
-/// A point that two intersecting triangles have in common, as well as f64 gives it.
+/// Returns a point that two intersecting triangles have in common, as accurately as f64 allows.
 ///
-/// Where they touch or overlap in a plane the closest feet are it. Where an edge pierces a face they are
-/// apart, and the crossing is computed; whichever is least far from the other triangle counts.
+/// Where the triangles touch or overlap in a plane, the closest feet are such a point. Where an edge pierces a face,
+/// the closest feet are apart, and the crossing is computed. The result is the point closest to the other triangle.
 #[cold]
 fn common_point(a: &Triangle, b: &Triangle, differences: &Differences, closest: &Candidate) -> Point {
     let swapped = differences.swapped();
@@ -475,15 +479,17 @@ fn common_point(a: &Triangle, b: &Triangle, differences: &Differences, closest: 
 }
 
 impl Differences {
-    /// Of the points where the edges of `a` pass through the plane of `b` the one closest to `b`, with its
-    /// squared distance.
+    /// Returns the point, among those where the edges of `a` pass through the plane of `b`, that is closest to `b`,
+    /// with its squared distance.
     ///
-    /// The plane of a sliver is known well only near the sliver, so each crossing is found by Newton's method
-    /// from the plane: the remaining height is measured from the closest point of `b`, and shrinks by some
-    /// seven digits in a step even where rounding tilts the plane that much.
+    /// The plane of a sliver is accurate only near the sliver. So each crossing starts at the plane and is improved by
+    /// Newton's method: each step measures the remaining height from the closest point of `b`. The height shrinks by
+    /// about seven digits per step, even where rounding tilts the plane that much.
     fn crossing(&self) -> Option<(f64, Foot)> {
+        /// The number of Newton steps per edge.
         const STEPS: usize = 3;
-        // Four roundings of the size, which is at least 1: no step improves on that.
+        /// The squared distance at which the search ends, in squared multiples of `unit`: four roundings of the size,
+        /// which is at least 1, so no step improves on it.
         const ENOUGH: f64 = (4.0 * UNIT_ROUNDOFF) * (4.0 * UNIT_ROUNDOFF);
         let base = longest(&self.edges_b);
         let normal = perpendicular_normal(self.edges_b[base], self.edges_b[(base + 2) % 3]);
@@ -512,7 +518,7 @@ impl Differences {
     }
 }
 
-/// The edge to project out first.
+/// Returns the index of the longest edge, which is projected out first.
 fn longest(edges: &Triangle) -> usize {
     let [p, q, r] = edges.map(|edge| dot(edge, edge));
     if p >= q && p >= r {
@@ -524,13 +530,13 @@ fn longest(edges: &Triangle) -> usize {
     }
 }
 
-/// A normal of two vectors, of which the first is not too short to be squared; perpendicular to it up to one
-/// rounding, however small the angle between them.
+/// Returns a normal of `d` and `e`, where `d` is not too short to be squared. The normal is perpendicular to `d` up to
+/// one rounding, however small the angle between `d` and `e`.
 fn perpendicular_normal(d: Point, e: Point) -> Point {
     cross(d, perpendicular_part(d, e))
 }
 
-/// `e` without its component along `d`, which is not too short to be squared.
+/// Returns `e` without its component along `d`, where `d` is not too short to be squared.
 #[inline(always)]
 fn perpendicular_part(d: Point, e: Point) -> Point {
     add_scaled(e, -dot(d, e) / dot(d, d), d)
@@ -546,7 +552,7 @@ fn negated(p: Point) -> Point {
     [-p[0], -p[1], -p[2]]
 }
 
-/// The power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
+/// Returns the power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
 fn reciprocal_exponent(x: f64) -> f64 {
     let exponent = x.to_bits() >> 52 & 0x7ff;
     f64::from_bits(2046_u64.saturating_sub(exponent) << 52)

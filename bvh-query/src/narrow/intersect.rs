@@ -1,13 +1,14 @@
 //! Decides exactly whether two closed triangles share a point.
 //!
 //! The general case follows P. Guigue and O. Devillers, "Fast and Robust Triangle-Triangle Overlap Test Using
-//! Orientation Predicates", Journal of Graphics Tools 8(1), 2003: three orientations place one triangle
-//! against the other's plane, three more the other way round, and two settle whether the intervals that both
-//! cut out of the common line of the planes overlap. Most pairs that miss end after the first three.
+//! Orientation Predicates", Journal of Graphics Tools 8(1), 2003. Three orientations place the first triangle
+//! relative to the second one's plane, and three more place the second relative to the first one's. Both triangles
+//! cut an interval out of the line in which the planes cross, and two more orientations decide whether these
+//! intervals overlap. Most pairs that miss are decided by the first three orientations.
 //!
 //! Only signs of determinants of input points are used, never a constructed point, so there is no tolerance.
 //! Coplanar pairs are decided in an axis-parallel projection, which is exact because it only drops a
-//! coordinate. A triangle without area is replaced by the segment or point that it is.
+//! coordinate. A triangle without area is replaced by the segment or point that its corners span.
 
 use std::cmp::Ordering;
 
@@ -17,10 +18,10 @@ use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
 
 /// Returns whether two closed triangles share at least one point.
 ///
-/// Exact under the precondition of [`narrow`](super). Touching in a vertex, along an edge or in a plane
-/// counts; a triangle without area is the segment or point that its corners span. The answer depends neither
-/// on the order of the triangles nor on that of their corners. Constant cost: 3 to 8 orientations if the
-/// planes differ, some tens if they don't.
+/// The answer is exact under the precondition of [`narrow`](super). Touching in a vertex, along an edge or in a
+/// plane counts. A triangle without area is the segment or point that its corners span. The answer depends neither
+/// on the order of the triangles nor on that of their corners. The cost is constant: 3 to 8 orientations if the
+/// planes differ, some tens if they are the same.
 #[must_use]
 pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     let sides_a = heights(b, a);
@@ -30,7 +31,7 @@ pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     if sides_a == [0.0; 3] {
         return flat_intersect(a, b);
     }
-    // Some point of `a` is off the plane of `b`, so `b` has one, that is, it has area.
+    // Some corner of `a` has a nonzero height over the plane of `b`, so `b` has area.
     let sides_b = heights(a, b);
     if all_on_one_side(sides_b) {
         return false;
@@ -41,20 +42,20 @@ pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     intervals_overlap(a, sides_a, b, sides_b)
 }
 
-/// A number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
+/// Returns a number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
 /// counterclockwise as seen from `s`.
 fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
     let coordinate = |p: Point| Coord3D { x: p[0], y: p[1], z: p[2] };
-    // `robust` counts as positive what lies below the plane.
+    // `robust` returns a positive number for a point below the plane.
     -robust::orient3d(coordinate(p), coordinate(q), coordinate(r), coordinate(s))
 }
 
-/// For each corner of `points` a number with the exact sign of its height over the plane of `plane`.
+/// Returns, for each corner of `points`, a number with the exact sign of its height over the plane of `plane`.
 ///
 /// The filter is stage A of Shewchuk's `orient3d` (Adaptive Precision Floating-Point Arithmetic and Fast
-/// Robust Geometric Predicates, 1997, section 4.3) with the minors of the plane shared by the three points:
-/// the same differences, products and sums in the same shape, one vertex of the plane in the place of his
-/// point `d`, hence the same error bound.
+/// Robust Geometric Predicates, 1997, section 4.3), but the three points share the minors of the plane. It computes
+/// the same differences, products and sums in the same order, with one vertex of the plane in the place of his
+/// point `d`, so it has the same error bound.
 #[inline(always)]
 fn heights(plane: &Triangle, points: &Triangle) -> [f64; 3] {
     const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
@@ -78,10 +79,11 @@ fn all_on_one_side(sides: [f64; 3]) -> bool {
         || (sides[0] < 0.0 && sides[1] < 0.0 && sides[2] < 0.0)
 }
 
-/// The corner that the plane separates from the other two, and whether it is on the positive side.
+/// Returns the corner that the plane separates from the other two, and whether it is on the positive side or, if it
+/// lies on the plane, the others are on the negative side.
 ///
-/// Either it is strictly on its side and the others on the closed other side, or it lies on the plane and the
-/// others are strictly on one side. So both edges from it meet the plane in exactly one point.
+/// Either the corner is strictly on one side and the others are on the other side or on the plane, or it lies on the
+/// plane and the others are strictly on one side. So each edge from it meets the plane in exactly one point.
 /// `sides` must be neither all zero nor all strictly on one side.
 #[inline(always)]
 fn lone_corner(sides: [f64; 3]) -> (usize, bool) {
@@ -101,13 +103,13 @@ fn lone_corner(sides: [f64; 3]) -> (usize, bool) {
     }
 }
 
-/// The case of two planes that cross in a line, which both triangles reach: each cuts an interval out of it.
+/// Decides the case of two planes that cross in a line which both triangles reach: each cuts an interval out of it.
 ///
-/// With corners renumbered as Guigue and Devillers do (the lone corner first, and on the positive side of the
-/// other's plane) the line, directed along the cross product of the normals, enters `a` through the edge `0
-/// 1` and leaves it through `0 2`, and the same for `b`. Each end of an interval is the only point that its
-/// edge's line has in common with the other plane; two such points on the line are equal exactly if the two
-/// edges are coplanar, and their order is the sign of the edges' volume.
+/// The corners are renumbered as Guigue and Devillers do: the lone corner is the first, and on the positive side of
+/// the other triangle's plane. Then the line, directed along the cross product of the normals, enters `a` through
+/// the edge from 0 to 1 and leaves it through the edge from 0 to 2, and the same holds for `b`. Each end of an
+/// interval is the only point that its edge's line has in common with the other plane. Two such points on the line
+/// are equal exactly if the two edges are coplanar, and their order is the sign of the edges' volume.
 fn intervals_overlap(a: &Triangle, sides_a: [f64; 3], b: &Triangle, sides_b: [f64; 3]) -> bool {
     let (first_a, positive_a) = lone_corner(sides_a);
     let (first_b, positive_b) = lone_corner(sides_b);
@@ -115,13 +117,13 @@ fn intervals_overlap(a: &Triangle, sides_a: [f64; 3], b: &Triangle, sides_b: [f6
         let (second, third) = if flip { (first + 2, first + 1) } else { (first + 1, first + 2) };
         [triangle[first], triangle[second % 3], triangle[third % 3]]
     };
-    // Flipping a triangle turns its normal, and with it the side on which the other's lone corner is.
+    // Flipping a triangle reverses its normal, and so moves the other's lone corner to the positive side.
     let a = renumber(a, first_a, !positive_b);
     let b = renumber(b, first_b, !positive_a);
     volume(a[0], a[1], b[0], b[1]) <= 0.0 && volume(a[0], a[2], b[2], b[0]) <= 0.0
 }
 
-/// The corners of a triangle's convex hull: three, or the two ends of a segment, or one point.
+/// The corners of a triangle's convex hull: three corners, or the two ends of a segment, or one point.
 struct Hull {
     corners: Triangle,
     count: usize,
@@ -133,7 +135,7 @@ impl Hull {
         if !are_collinear(p, q, r) {
             return Self { corners: *triangle, count: 3 };
         }
-        // Along a line the lexicographic order of points is that of the line.
+        // The lexicographic order of points on a line is their order along the line.
         let mut sorted = [p, q, r];
         sorted.sort_by(|p, q| lexicographic(*p, *q));
         let (first, last) = (sorted[0], sorted[2]);
@@ -145,13 +147,13 @@ impl Hull {
         &self.corners[..self.count]
     }
 
-    /// The end of the last edge; for a point the point itself.
+    /// Returns the end of the last edge; for a point, the point itself.
     fn last(&self) -> Point {
         self.corners[self.count - 1]
     }
 }
 
-/// The cases in which all of a triangle lies in the other's plane or one has no area.
+/// Decides the cases in which one triangle lies in the other's plane, or one has no area.
 #[cold]
 fn flat_intersect(a: &Triangle, b: &Triangle) -> bool {
     let (a, b) = (Hull::new(a), Hull::new(b));
@@ -163,7 +165,7 @@ fn flat_intersect(a: &Triangle, b: &Triangle) -> bool {
     }
 }
 
-/// A triangle with area against a segment or point, or against a triangle in the same plane.
+/// Returns whether a triangle with area meets a segment, a point, or a triangle in the same plane.
 fn triangle_meets(triangle: &Triangle, other: &Hull) -> bool {
     let sides = heights(triangle, &other.corners);
     if all_on_one_side(sides) {
@@ -172,14 +174,14 @@ fn triangle_meets(triangle: &Triangle, other: &Hull) -> bool {
     if sides == [0.0; 3] {
         return coplanar_intersect(triangle, other.corners(), area_axis(triangle));
     }
-    // The segment's line crosses the plane in one point, which is in the triangle if no two of its edges see
-    // the line pass on different sides.
+    // The segment's line crosses the plane in one point, which is in the triangle if the line does not pass two
+    // edges on different sides.
     let (p, q) = (other.corners[0], other.last());
     let passes = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| volume(p, q, triangle[i], triangle[j]));
     passes.iter().all(|side| *side >= 0.0) || passes.iter().all(|side| *side <= 0.0)
 }
 
-/// Two segments, of which both or the second alone may be points.
+/// Returns whether two segments meet; the second, or both, may be points.
 fn segments_intersect(a: &Hull, b: &Hull) -> bool {
     let (p, q) = (a.corners[0], a.last());
     let (r, s) = (b.corners[0], b.last());
@@ -188,7 +190,7 @@ fn segments_intersect(a: &Hull, b: &Hull) -> bool {
     }
     for axis in 0..3 {
         if area(axis, p, q, r) != 0.0 || area(axis, p, q, s) != 0.0 {
-            // The four points span a plane that this projection maps one to one.
+            // The projection maps the plane of the four points one to one.
             return coplanar_intersect(a.corners(), b.corners(), axis);
         }
     }
@@ -198,8 +200,8 @@ fn segments_intersect(a: &Hull, b: &Hull) -> bool {
 /// Returns whether two convex hulls in one plane meet, decided in the projection along `axis`, which must map that
 /// plane one to one; the hulls must not all lie on one line.
 ///
-/// If they are disjoint, then the difference of the hulls is a convex polygon (with area) without the origin,
-/// and the line of one of its edges, which are parallel to edges of the hulls, separates.
+/// If the hulls are disjoint, their difference is a convex polygon with area that does not contain the origin. Then
+/// the line of one of its edges separates it from the origin, and its edges are parallel to edges of the hulls.
 fn coplanar_intersect(a: &[Point], b: &[Point], axis: usize) -> bool {
     !has_separating_edge(a, b, axis) && !has_separating_edge(b, a, axis)
 }
@@ -220,7 +222,7 @@ fn has_separating_edge(a: &[Point], b: &[Point], axis: usize) -> bool {
     })
 }
 
-/// An axis along which the triangle projects to one with area; it must have area itself.
+/// Returns an axis along which the triangle projects to one with area; the triangle must have area itself.
 fn area_axis(triangle: &Triangle) -> usize {
     (0..2).find(|axis| area(*axis, triangle[0], triangle[1], triangle[2]) != 0.0).unwrap_or(2)
 }
@@ -229,13 +231,13 @@ fn are_collinear(p: Point, q: Point, r: Point) -> bool {
     (0..3).all(|axis| area(axis, p, q, r) == 0.0)
 }
 
-/// A number with the exact sign of the area of `p, q, r` projected along `axis`.
+/// Returns a number with the exact sign of the area of `p, q, r` projected along `axis`.
 fn area(axis: usize, p: Point, q: Point, r: Point) -> f64 {
     let project = |p: Point| Coord { x: p[(axis + 1) % 3], y: p[(axis + 2) % 3] };
     robust::orient2d(project(p), project(q), project(r))
 }
 
 fn lexicographic(p: Point, q: Point) -> Ordering {
-    // Partial comparison, so that -0 equals 0; coordinates are never NaN.
+    // The partial order treats -0 and 0 as equal; coordinates are never NaN.
     p.partial_cmp(&q).unwrap_or(Ordering::Equal)
 }

@@ -1,19 +1,20 @@
-//! Two triangles at a time, decided exactly: do they meet, how far apart are they, are they nearer than that.
+//! Decides exactly whether two triangles meet or are within a distance, and bounds how far apart they are.
 //!
-//! Everything above this module only filters; what a filter can't decide ends here. All routines are scalar,
-//! use no fused multiply-add and no platform-dependent operation, so the answer is a function of the input numbers
-//! alone.
+//! The other modules only filter: they pass each pair that a filter cannot decide to this one. All routines are
+//! scalar and use neither fused multiply-add nor any other platform-dependent operation, so the answer is a function
+//! of the input numbers alone.
 //!
 //! # Precondition: the range in which nothing under- or overflows
 //! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-266.
 //!
 //! `robust` computes signs of determinants with error-free transformations, which are exact as long as no
-//! intermediate falls off either end of the exponent range. A rounded difference of two multiples of 2^-266
-//! is again one, and so is its rounding error. A product of up to three of them is a multiple of 2^-798, and
-//! with it each partial product, rounding error and Dekker half: all lie on a grid coarser than the smallest
-//! subnormal, 2^-1074, so none is lost. The error bounds, at least 2^-110 times a nonzero permanent, stay
-//! above 2^-908. At the other end a difference is at most 2^126, a product of three 2^378, and splitting
-//! costs a factor 2^27. Outside this range no routine panics, but the answer is no longer proven.
+//! intermediate result underflows or overflows. A rounded difference of two multiples of 2^-266 is again a
+//! multiple of 2^-266, and so is its rounding error. A product of up to three such numbers is a multiple of
+//! 2^-798, and so is each partial product, rounding error and Dekker half. All of them lie on a grid coarser
+//! than the smallest subnormal number, 2^-1074, so none is lost. The error bounds are at least 2^-110 times a
+//! nonzero permanent, so they stay above 2^-908. At the upper end, a difference is at most 2^126 and a product
+//! of three differences at most 2^378, and splitting multiplies by at most 2^27. Outside this range no routine
+//! panics, but the answer is no longer proven.
 
 mod distance;
 mod intersect;
@@ -29,7 +30,7 @@ mod tests;
 /// A point in mesh units.
 pub(crate) type Point = [f64; 3];
 
-/// The closed triangle on three points; collinear ones make a segment, equal ones a point.
+/// The closed triangle with three corners; three collinear corners make a segment, three equal ones a point.
 pub(crate) type Triangle = [Point; 3];
 
 /// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
@@ -50,7 +51,7 @@ fn cross(p: Point, q: Point) -> Point {
     [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
 }
 
-/// `p + factor * q`, each coordinate rounded twice.
+/// Returns `p + factor * q`; each coordinate is rounded twice.
 #[inline(always)]
 fn add_scaled(p: Point, factor: f64, q: Point) -> Point {
     [p[0] + factor * q[0], p[1] + factor * q[1], p[2] + factor * q[2]]

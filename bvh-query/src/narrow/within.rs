@@ -1,19 +1,20 @@
 //! Decides exactly whether two closed triangles are at most `d` apart, where certified bounds cannot.
 //!
-//! All coordinates are multiples of one power of two, so they are taken as integers, of any length. The least
-//! distance of triangles that do not meet is that of two features (corner, edge, face) on whose lines or planes
-//! the feet of the shortest connection lie inside both. Each pair of features with feet inside is some distance of
-//! the triangles, so they are at most `d` apart exactly if one of these is. Feet and squared distances are
-//! quotients of integers: signs and comparisons of products decide, nothing is divided and nothing rounded.
+//! All coordinates are multiples of one power of two, so they are converted to integers of any length. If two
+//! triangles do not meet, their closest points are the feet of the shortest connection between the lines or planes
+//! of two features (corners, edges or faces), and each foot lies inside its feature. Conversely, any two features
+//! with feet inside them have points at that distance. So the triangles are at most `d` apart exactly if one of
+//! these pairs of features is. Feet and squared distances are quotients of integers, so signs and comparisons of
+//! products decide, and nothing is divided or rounded.
 //!
-//! Cost: some hundred microseconds, and memory for the integers. It is asked only for pairs whose distance is
-//! within a few roundings of `d`.
+//! The integers cost a few hundred microseconds and some memory, but only pairs whose distance is within a few
+//! roundings of `d` need them.
 
 use super::{Closest, Point, Triangle};
 use num_bigint::BigInt;
 
-/// True if the exact distance of two triangles is at most `d`, which is not negative. `closest` is what
-/// `triangle_distance` says of them.
+/// Returns whether the exact distance between two triangles is at most `d`, which is not negative. `closest` is the
+/// result of `triangle_distance` for them.
 pub(crate) fn triangles_within(a: &Triangle, b: &Triangle, closest: &Closest, d: f64) -> bool {
     if closest.upper <= d {
         return true;
@@ -41,17 +42,17 @@ fn any_feature_within(a: &Triangle, b: &Triangle, d: f64) -> bool {
         || corners_and_face(&b, &a, &limit)
 }
 
-/// The power of two that the last bit of a number counts.
+/// Returns the exponent of the power of two that the last bit of a number stands for.
 fn exponent(x: f64) -> i32 {
     ((x.to_bits() >> 52 & 0x7ff) as i32).max(1) - 1075
 }
 
-/// A number in multiples of 2^`unit`, of which it is one.
+/// Converts a number, which is a multiple of 2^`unit`, to that multiple.
 fn integer(x: f64, unit: i32) -> BigInt {
     let bits = x.to_bits();
     let implied = u64::from(bits >> 52 & 0x7ff != 0) << 52;
     let magnitude = BigInt::from(bits & ((1 << 52) - 1) | implied);
-    // Of zero the exponent does not matter.
+    // The exponent of zero does not matter.
     let magnitude = magnitude << (exponent(x) - unit).max(0);
     if x < 0.0 { -magnitude } else { magnitude }
 }
@@ -69,12 +70,12 @@ fn cross(p: &Vector, q: &Vector) -> Vector {
     [component(1, 2), component(2, 0), component(0, 1)]
 }
 
-/// True for numbers from 0 to `most`.
+/// Returns whether a number is from 0 to `most`.
 fn is_up_to(x: &BigInt, most: &BigInt) -> bool {
     *x >= BigInt::ZERO && x <= most
 }
 
-/// The start and the vector of each edge.
+/// Returns the start and the vector of each edge.
 fn edges_of(t: &[Vector; 3]) -> [(&Vector, Vector); 3] {
     [0, 1, 2].map(|i: usize| (&t[i], minus(&t[(i + 1) % 3], &t[i])))
 }
@@ -84,8 +85,10 @@ fn corners(a: &[Vector; 3], b: &[Vector; 3], limit: &BigInt) -> bool {
     pairs.into_iter().any(|gap| dot(&gap, &gap) <= *limit)
 }
 
-/// The foot is at (v e) / (e e) of the edge, the squared distance |v|² - (v e)² / (e e). An
-/// edge without length is its corners.
+/// Returns whether a corner is within the limit of an edge, with its foot inside the edge.
+///
+/// The foot is at (v e) / (e e) along the edge, and the squared distance is |v|² - (v e)² / (e e). An edge without
+/// length is skipped, because its corners are tested.
 fn corners_and_edges(corners: &[Vector; 3], t: &[Vector; 3], limit: &BigInt) -> bool {
     edges_of(t).iter().any(|(start, edge)| {
         let squared = dot(edge, edge);
@@ -99,8 +102,11 @@ fn corners_and_edges(corners: &[Vector; 3], t: &[Vector; 3], limit: &BigInt) -> 
     })
 }
 
-/// With n = e × f across both edges and w between their starts, the feet are at (w × f) n / (n n) and
-/// (w × e) n / (n n), the squared distance is (w n)² / (n n). Parallel edges have a corner that is as near.
+/// Returns whether two edges are within the limit of each other, with both feet inside them.
+///
+/// With n = e × f perpendicular to both edges and w from start to start, the feet are at (w × f) n / (n n) and
+/// (w × e) n / (n n), and the squared distance is (w n)² / (n n). Parallel edges are skipped, because a corner of one
+/// is as near to the other.
 fn edges(a: &[Vector; 3], b: &[Vector; 3], limit: &BigInt) -> bool {
     let edges_b = edges_of(b);
     edges_of(a).iter().any(|(start_a, e)| {
@@ -117,8 +123,11 @@ fn edges(a: &[Vector; 3], b: &[Vector; 3], limit: &BigInt) -> bool {
     })
 }
 
+/// Returns whether a corner is within the limit of a face, with its foot inside the face.
+///
 /// With the normal n = e × f of the face, the foot of a corner at v has the weights (v × f) n / (n n) on e and
-/// (e × v) n / (n n) on f; the squared distance is (v n)² / (n n). A face without area is its edges.
+/// (e × v) n / (n n) on f, and the squared distance is (v n)² / (n n). A face without area is skipped, because its
+/// edges are tested.
 fn corners_and_face(corners: &[Vector; 3], t: &[Vector; 3], limit: &BigInt) -> bool {
     let (e, f) = (minus(&t[1], &t[0]), minus(&t[2], &t[0]));
     let normal = cross(&e, &f);

@@ -1,7 +1,7 @@
-//! The AVX2 backend: two registers of 8 lanes, four lanes in an SSE register.
+//! The AVX2 backend: two registers of 8 lanes hold 16 lanes, and an SSE register holds 4.
 //!
-//! All `unsafe` here rests on one fact: an `Avx2` can only be had from `detect`, which makes sure that
-//! the CPU has the features below, and `Y` and `X` can only be made with an `Avx2`.
+//! All `unsafe` here rests on one fact: only `detect` creates an `Avx2`, after it has found the features below on
+//! the CPU, and a `Y` or `X` can be made only with an `Avx2`.
 
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
@@ -11,7 +11,7 @@ use std::arch::x86_64::*;
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(());
 
-/// Sixteen lanes: 0-7 and 8-15.
+/// Sixteen lanes: 0 to 7 in the first register, 8 to 15 in the second.
 #[derive(Clone, Copy)]
 pub(crate) struct Y(__m256, __m256);
 
@@ -20,7 +20,7 @@ pub(crate) struct Y(__m256, __m256);
 pub(crate) struct X(__m128);
 
 impl Avx2 {
-    /// The token, if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
+    /// Returns the token if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
     #[inline]
     pub(crate) fn detect() -> Option<Self> {
         let all = is_x86_feature_detected!("avx2")
@@ -45,8 +45,8 @@ fn run_with_features<T: Task>(isa: Avx2, task: T) -> T::Output {
 macro_rules! with_features {
     ($body:expr) => {
         // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
-        // all features that these intrinsics need; loads and stores go through references to
-        // arrays of just their size, or halves of them, and ask for no alignment.
+        // all features that these intrinsics need. Loads and stores go through references to
+        // arrays of exactly their size, or to halves of such arrays, and need no alignment.
         unsafe { $body }
     };
 }
@@ -320,7 +320,7 @@ fn round_up_half_register(step: __m256) -> __m256 {
     _mm256_castsi256_ps(_mm256_and_si256(bits, _mm256_set1_epi32(!0xff)))
 }
 
-/// Sixteen bytes as lanes.
+/// Converts sixteen bytes to lanes.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn bytes_to_lanes(bytes: __m128i) -> Y {
@@ -329,7 +329,7 @@ fn bytes_to_lanes(bytes: __m128i) -> Y {
     Y(_mm256_cvtepi32_ps(low), _mm256_cvtepi32_ps(high))
 }
 
-/// Eight values, two a row, to the first two columns of four rows.
+/// Spreads eight values, two per row, to the first two columns of four rows.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn spread_pairs(pairs: __m256) -> Y {

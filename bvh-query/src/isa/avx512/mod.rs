@@ -1,7 +1,7 @@
-//! The AVX-512 backend: one register of 16 lanes, four lanes in an SSE register.
+//! The AVX-512 backend: one register holds 16 lanes, and an SSE register holds 4.
 //!
-//! All `unsafe` here rests on one fact: an `Avx512` can only be had from `detect`, which makes sure
-//! that the CPU has the features below, and `Z` and `X` can only be made with an `Avx512`.
+//! All `unsafe` here rests on one fact: only `detect` creates an `Avx512`, after it has found the features below on
+//! the CPU, and a `Z` or `X` can be made only with an `Avx512`.
 
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
@@ -20,7 +20,7 @@ pub(crate) struct Z(__m512);
 pub(crate) struct X(__m128);
 
 impl Avx512 {
-    /// The token, if the CPU has AVX-512 F, VL, DQ and BW, AVX2, FMA, F16C, BMI1, BMI2, LZCNT and
+    /// Returns the token if the CPU has AVX-512 F, VL, DQ and BW, AVX2, FMA, F16C, BMI1, BMI2, LZCNT and
     /// POPCNT.
     #[inline]
     pub(crate) fn detect() -> Option<Self> {
@@ -50,8 +50,8 @@ fn run_with_features<T: Task>(isa: Avx512, task: T) -> T::Output {
 macro_rules! with_features {
     ($body:expr) => {
         // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
-        // all features that these intrinsics need; loads and stores go through references to
-        // arrays of just their size and ask for no alignment.
+        // all features that these intrinsics need. Loads and stores go through references to
+        // arrays of exactly their size and need no alignment.
         unsafe { $body }
     };
 }
@@ -173,7 +173,8 @@ impl Lanes for X {
 impl Isa for Avx512 {
     type V = Z;
     type H = X;
-    /// Lower and upper ends of the axes, the cube's diagonals, and its faces' in two parts.
+    /// The lower and upper ends of four sets of slabs: the axes, the cube's diagonals, and two halves of its faces'
+    /// diagonals.
     type Rows<'a> = [[Z; 2]; 4];
 
     #[inline(always)]
@@ -303,7 +304,7 @@ impl Isa for Avx512 {
     }
 }
 
-/// The last four lanes of one, and the first twelve of another.
+/// Returns the last four lanes of the first register, followed by the first twelve of the second.
 #[inline(always)]
 fn straddle(first: Z, second: Z) -> Z {
     Z(with_features!({
@@ -313,7 +314,8 @@ fn straddle(first: Z, second: Z) -> Z {
 }
 
 impl Avx512 {
-    /// Elements of two registers, and those of the same registers exchanged.
+    /// Returns the elements of two registers at the places `at`, and those at the same places with the registers
+    /// exchanged.
     #[inline(always)]
     fn pick_of(self, [lo, hi]: &[Z; 2], at: &[u32; 16]) -> (Z, Z) {
         with_features!({
@@ -323,7 +325,7 @@ impl Avx512 {
     }
 }
 
-/// Eight values, two a row, to the first two columns of four rows.
+/// Spreads eight values, two per row, to the first two columns of four rows.
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn spread_pairs(pairs: __m256) -> __m512 {

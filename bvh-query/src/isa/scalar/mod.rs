@@ -1,4 +1,4 @@
-//! The portable backend: arrays, one element at a time. What it does defines what the others do.
+//! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::quantize::round_step_up;
@@ -9,7 +9,7 @@ use half::f16;
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar;
 
-/// N lanes.
+/// A register of N lanes, as an array.
 #[derive(Clone, Copy)]
 pub(crate) struct Array<const N: usize>([f32; N]);
 
@@ -175,7 +175,7 @@ impl Isa for Scalar {
     }
     #[inline(always)]
     fn prefetch_line(self, _byte: &u8) {
-        // Portable code has no way to ask.
+        // Portable code has no prefetch instruction.
     }
     fn run<T: Task>(self, task: T) -> T::Output {
         task.run(self)

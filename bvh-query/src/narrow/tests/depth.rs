@@ -1,4 +1,4 @@
-//! The depth of searches, as `depth` of cbvh-testkit defines it: a packaged crate tests itself without that crate.
+//! Sets how many rounds a random search runs, like `depth` of cbvh-testkit, which is missing in a packaged crate.
 
 /// Returns the number of rounds to run: `everyday` times the environment variable `CBVH_TEST_DEPTH`, at least one.
 pub(super) fn rounds(everyday: u64) -> u64 {

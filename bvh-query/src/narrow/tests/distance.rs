@@ -1,10 +1,10 @@
-//! `triangle_distance` against the oracle: value, bounds and witness points.
+//! Compares `triangle_distance` with the oracle: value, bounds and witness points.
 
 use super::generate::{KINDS, Random, float, pair};
 use super::oracle::{Exact, dot_triangle};
 use crate::narrow::{Closest, Point, Triangle, triangle_distance, triangles_intersect};
 
-/// The largest error allowed, relative to the largest difference of two coordinates.
+/// The largest error allowed, as a fraction of the largest difference of two coordinates.
 const TOLERANCE: f64 = 1e-14;
 
 fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
@@ -100,7 +100,7 @@ fn a_common_offset_costs_no_accuracy() {
     let mut random = Random(17);
     for round in 0..KINDS * 20 {
         let (name, a, b) = pair(round % KINDS, &mut random);
-        // The rounded corners are the input, and the distance is as good as if they were at the origin.
+        // The rounded corners are the input, and their distance is as accurate as near the origin.
         let offset = random.point().map(|x| x * 1e10);
         let moved = |t: Triangle| t.map(|p| [0, 1, 2].map(|k| p[k] + offset[k]));
         check(name, &moved(a), &moved(b));

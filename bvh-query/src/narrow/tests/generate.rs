@@ -1,8 +1,8 @@
-//! Seeded triangles that are hard to decide or to measure.
+//! Generates pairs of triangles that are hard to decide or to measure, from a seed.
 
 use crate::narrow::{Point, Triangle, add_scaled, cross, dot};
 
-/// Marsaglia's xorshift64*.
+/// A random number generator: Marsaglia's xorshift64*.
 pub(super) struct Random(pub(super) u64);
 
 impl Random {
@@ -17,12 +17,12 @@ impl Random {
         (((self.bits() >> 32) * n) >> 32) as usize
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a number that is uniform in [0, 1).
     pub(super) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Uniform in [-1, 1).
+    /// Returns a number that is uniform in [-1, 1).
     pub(super) fn signed(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
@@ -35,7 +35,7 @@ impl Random {
         [self.point(), self.point(), self.point()]
     }
 
-    /// 10^-`digits` to 1, log-uniform.
+    /// Returns a number from 10^-`digits` to 1 whose logarithm is uniform.
     pub(super) fn small(&mut self, digits: f64) -> f64 {
         10_f64.powf(-digits * self.unit())
     }
@@ -51,7 +51,7 @@ impl Random {
         t
     }
 
-    /// Three perpendicular unit vectors, up to rounding.
+    /// Returns three perpendicular unit vectors, up to rounding.
     fn frame(&mut self) -> [Point; 3] {
         let unit = |v: Point| v.map(|x| x / dot(v, v).sqrt());
         let u = unit(self.point());
@@ -65,12 +65,13 @@ pub(super) fn float(t: &[[i64; 3]; 3]) -> Triangle {
     t.map(|p| p.map(|x| x as f64))
 }
 
-/// A pair of triangles and the name of what is hard about it.
+/// A pair of triangles and the name of its kind.
 pub(super) type Case = (&'static str, Triangle, Triangle);
 
+/// The number of kinds of pairs.
 pub(super) const KINDS: usize = 11;
 
-/// The given kind of pair, of size about 1 near the origin.
+/// Returns a pair of a kind, of size about 1 and near the origin.
 pub(super) fn pair(kind: usize, random: &mut Random) -> Case {
     let [u, v, n] = random.frame();
     let at = |x: f64, y: f64, z: f64| add_scaled(add_scaled(add_scaled([0.0; 3], x, u), y, v), z, n);

@@ -1,5 +1,5 @@
-//! `triangles_intersect` against the oracle: every touching, coplanar and degenerate position, by name and by
-//! chance on small grids, and positions that rounding can't tell from touching.
+//! Compares `triangles_intersect` with the oracle: in every touching, coplanar and degenerate position, by name and
+//! at random on small grids, and in positions that rounding cannot tell from touching.
 
 use super::depth::rounds;
 use super::generate::{KINDS, Random, float, pair};
@@ -129,7 +129,7 @@ fn triangles_without_area_are_segments_and_points() {
     expect(&A, &point([4.0, 0.0, 0.0]), true);
     expect(&A, &point([3.0, 3.0, 0.0]), false);
     expect(&A, &point([1.0, 1.0, 1.0]), false);
-    // Against a segment; three different corners on a line are one as well.
+    // Against a segment; three different corners on one line are a segment as well.
     let s = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [4.0, 8.0, 12.0]];
     expect(&s, &segment([3.0, 6.0, 9.0], [5.0, 6.0, 9.0]), true);
     expect(&s, &segment([5.0, 6.0, 9.0], [7.0, 6.0, 9.0]), false); // coplanar

@@ -1,7 +1,7 @@
-//! `triangles_intersect` on many pairs that f64 can hardly tell from touching, against the oracles of
-//! `tests/exact`, which are independent of it; the interval of `triangle_distance` on some of them.
+//! Compares `triangles_intersect` with the independent oracles of `tests/exact` on many pairs that f64 can hardly
+//! tell from touching, and the interval of `triangle_distance` on some of them.
 //!
-//! `CBVH_TEST_DEPTH` multiplies the amount.
+//! `CBVH_TEST_DEPTH` multiplies the number of pairs.
 
 use super::depth::rounds;
 use super::exact::decide::{Boxed, Decided, intersect};
@@ -9,7 +9,7 @@ use super::exact::length::Length;
 use super::generate::{KINDS, Random, pair};
 use crate::narrow::{Point, Triangle, subtract, triangle_distance, triangles_intersect};
 
-/// A corner, a point of an edge, or one of the face, rounded.
+/// Returns a corner, a point of an edge or a point of the face, rounded.
 fn point_of(t: &Triangle, random: &mut Random) -> Point {
     let [p, q, r] = random.shuffled(t);
     let (x, y) = match random.below(3) {
@@ -20,7 +20,7 @@ fn point_of(t: &Triangle, random: &mut Random) -> Point {
     [0, 1, 2].map(|k| p[k] + x * (q[k] - p[k]) + y * (r[k] - p[k]))
 }
 
-/// A hard pair, and mostly one that touches but for rounding; somewhere, at some scale.
+/// Returns a hard pair at a random place and scale; three in four would touch if nothing were rounded.
 fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Triangle) {
     let (name, a, b) = pair(round as usize % KINDS, random);
     let mut b = random.shuffled(&b);
@@ -34,7 +34,7 @@ fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Trian
     let (a, mut b) = (place(a), place(b));
     if random.below(4) == 0 {
         let x = &mut b[random.below(3)][random.below(3)];
-        // The neighbours of 0 are finer than the grid that the narrow phase asks for.
+        // The neighbours of 0 are finer than the grid that the narrow phase requires.
         *x = match (*x == 0.0, random.below(2)) {
             (true, _) => 0.0,
             (false, 0) => x.next_up(),
@@ -45,7 +45,7 @@ fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Trian
 }
 
 #[test]
-#[allow(clippy::print_stderr, reason = "counts are what a longer search is run for")]
+#[allow(clippy::print_stderr, reason = "a longer search is run for its counts")]
 fn pairs_that_almost_touch_agree_with_the_exact_oracle() {
     let (mut random, mut decided, mut touching, mut lengths) = (Random(23), Decided::default(), 0_u64, 0_u64);
     let count = rounds(40_000);

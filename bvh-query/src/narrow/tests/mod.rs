@@ -1,4 +1,4 @@
-//! The narrow phase against exact integer arithmetic.
+//! Compares the narrow phase with exact integer arithmetic.
 
 mod depth;
 mod distance;

@@ -1,9 +1,9 @@
-//! Squared distances of triangles in exact arithmetic, from the definition.
+//! Computes squared distances of triangles in exact arithmetic, from the definition.
 //!
-//! Triangles are as far apart as the origin is from the hull of the nine differences of their corners. The
-//! point of a hull nearest to the origin is, for some affinely independent subset of at most four of its
-//! points, the foot of the perpendicular on their affine hull, and every such foot inside its simplex is a
-//! point of the hull. So all subsets are tried.
+//! The distance of two triangles is that of the origin from the hull of the nine differences of their corners.
+//! The point of this hull nearest to the origin is the foot of the perpendicular on the affine hull of some
+//! affinely independent subset of at most four of the nine points. Conversely, every such foot inside its simplex
+//! is a point of the hull. So all subsets are tried.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -12,7 +12,7 @@ use dashu_int::IBig;
 
 use crate::narrow::{Point, Triangle};
 
-/// An exact integer; `i64` does for coordinates of a few bits.
+/// An exact integer; `i64` suffices for coordinates of a few bits.
 pub(super) trait Integer:
     Clone + Ord + From<i8> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
@@ -20,7 +20,7 @@ pub(super) trait Integer:
 impl Integer for i64 {}
 impl Integer for IBig {}
 
-/// The squared distance as numerator and positive denominator.
+/// Returns the squared distance as a numerator and a positive denominator.
 pub(super) fn squared_distance<T: Integer>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> (T, T) {
     let (zero, one) = (T::from(0), T::from(1));
     let gaps: Vec<[T; 3]> = a.iter().flat_map(|p| b.iter().map(|q| subtract(q, p))).collect();
@@ -45,7 +45,7 @@ pub(super) fn squared_distance<T: Integer>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> 
         if whole == zero {
             continue;
         }
-        // Cramer's rule; the matrix is symmetric, so rows do for columns.
+        // Cramer's rule; the matrix is symmetric, so rows can be replaced instead of columns.
         let weights = [0, 1, 2].map(|k| {
             let mut replaced = gram.clone();
             replaced[k] = right.clone();
@@ -99,7 +99,7 @@ impl Exact {
         Self { numerator, denominator, exponent: lowest }
     }
 
-    /// How the distance, not squared, compares with `x`.
+    /// Compares the distance (not its square) with `x`.
     pub(super) fn compare(&self, x: f64) -> Ordering {
         if x < 0.0 {
             return Ordering::Greater;
@@ -115,7 +115,7 @@ impl Exact {
     }
 }
 
-/// Mantissa and exponent; the exponent of 0 is high, so as never to be the lowest.
+/// Returns mantissa and exponent; the exponent of 0 is so high that it is never the lowest.
 fn parts(x: f64) -> (i64, i32) {
     let bits = x.to_bits();
     let field = (bits >> 52 & 0x7ff) as i32;
@@ -141,7 +141,7 @@ fn the_oracle_knows_simple_distances() {
     assert!(Exact::new(&[[0.0; 3]; 3], &[[3e-300, 4e-300, 0.0]; 3]).compare(5.01e-300).is_lt());
 }
 
-/// The point as the triangle that it is.
+/// Returns the triangle whose three corners are the point.
 pub(super) fn dot_triangle(point: Point) -> Triangle {
     [point; 3]
 }

@@ -1,4 +1,4 @@
-//! `triangles_within` against the oracle, at the two neighbouring limits that the exact distance lies between.
+//! Compares `triangles_within` with the oracle, at the two neighbouring limits that the exact distance lies between.
 
 use super::exact::length::Length;
 use super::generate::{KINDS, Random, float, pair};
@@ -13,14 +13,15 @@ fn check(name: &str, exact: &Length, a: &Triangle, b: &Triangle, closest: &Close
     }
 }
 
-/// Bounds that leave every limit to the integers.
+/// Returns bounds so wide that the integers decide about every limit.
 fn unknown(t: &Triangle) -> Closest {
     Closest { distance: 0.0, lower: 0.0, upper: f64::INFINITY, point_a: t[0], point_b: t[0] }
 }
 
 #[test]
 fn grid_pairs_agree_with_the_oracle() {
-    // Integers have no range: subnormal numbers, those that just aren't, and what overflows when it is squared.
+    // The range of integers is unlimited, so the units are 1, the smallest subnormal number, one near the smallest normal
+    // number, and one whose square overflows.
     let units = [1.0, f64::from_bits(1), 2_f64.powi(-1024), 2_f64.powi(900)];
     let mut random = Random(31);
     for round in 0..1600 {
@@ -28,7 +29,7 @@ fn grid_pairs_agree_with_the_oracle() {
         let unit = units[random.below(4)];
         let [a, b] = [(); 2].map(|()| float(&random.grid_triangle(n)).map(|p| p.map(|x| (x - 1.0) * unit)));
         let exact = Length::between(&a, &b);
-        // Of triangles that meet it is never asked.
+        // The function is never asked about triangles that meet.
         if exact.compare(0.0).is_gt() {
             check("grid", &exact, &a, &b, &unknown(&a));
         }
