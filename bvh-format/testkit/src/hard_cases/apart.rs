@@ -4,9 +4,9 @@ use super::shapes::{crowd, cuboid, joined, moved, octahedron, two, unit_cube};
 use super::{Case, question};
 use crate::Triangle;
 
-const UNIT: &str = "one unit in the last place of the pose decides between contact and none";
-const STORED: &str = "one unit in the last place of f32 coordinates decides between contact and none";
-const CANCEL: &str = "the gap is what is left of two large numbers";
+const UNIT: &str = "one unit in the last place of the pose decides whether the meshes touch";
+const STORED: &str = "one unit in the last place of an f32 coordinate decides whether the meshes touch";
+const CANCEL: &str = "the gap is the small difference of two large numbers";
 
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
@@ -18,8 +18,8 @@ pub(super) fn cases() -> Vec<Case> {
             question("one unit", format!("cubes of side 2^{exponent}, {what}"), UNIT, cube(), cube())
         };
         let to = |x: f64| [x, size / 4.0, size / 8.0];
-        cases.push(ask("just").moved(to(size)).touching(13));
-        cases.push(ask("a unit apart").moved(to(size + unit)).apart(unit, "face from face"));
+        cases.push(ask("touching").moved(to(size)).touching(13));
+        cases.push(ask("a unit apart").moved(to(size + unit)).apart(unit, "from face to face"));
         cases.push(ask("half a unit deep").moved(to(size - unit / 2.0)).touching(10));
     }
     let unit = two(-23);
@@ -28,8 +28,8 @@ pub(super) fn cases() -> Vec<Case> {
             (joined(unit_cube(), crowd(-8.0)), joined(cuboid([0.25, 0.5, by], [1.25, 1.5, 2.0]), crowd(8.0)));
         question("one unit", format!("cubes in f32, {what}"), STORED, a, b)
     };
-    cases.push(ask("just", 1.0).touching(13));
-    cases.push(ask("a unit apart", 1.0 + unit).apart(unit, "face from face"));
+    cases.push(ask("touching", 1.0).touching(13));
+    cases.push(ask("a unit apart", 1.0 + unit).apart(unit, "from face to face"));
     cases.push(ask("half a unit deep", 1.0 - unit / 2.0).touching(10));
     // Corners meet along a diagonal.
     let unit = two(-52);
@@ -50,14 +50,17 @@ pub(super) fn cases() -> Vec<Case> {
         question("one unit", format!("brought from 1024, {what}"), CANCEL, unit_cube(), away.clone())
     };
     let unit = two(-43);
-    cases.push(ask("just").moved([-1023.0, -1024.0, -1024.0]).touching(62));
-    cases.push(ask("a unit apart").moved([-1023.0 + unit, -1024.0, -1024.0]).apart(unit, "face from face"));
+    cases.push(ask("touching").moved([-1023.0, -1024.0, -1024.0]).touching(62));
+    cases
+        .push(ask("a unit apart").moved([-1023.0 + unit, -1024.0, -1024.0]).apart(unit, "from face to face"));
     cases.push(ask("a unit deep").moved([-1023.0 - unit, -1024.0, -1024.0]).touching(52));
     // The gaps are far below all units of the coordinates and yet exact, because B's plane is at 0.
     let flat: Triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     for exponent in [-60, -100, -149, -200] {
         let ask = question("one unit", format!("triangles 2^{exponent} apart"), UNIT, vec![flat], vec![flat]);
-        cases.push(ask.moved([0.0, 0.0, two(exponent)]).apart(two(exponent), "one is the other, lifted"));
+        cases.push(
+            ask.moved([0.0, 0.0, two(exponent)]).apart(two(exponent), "one is a lifted copy of the other"),
+        );
     }
     cases
 }

@@ -4,10 +4,10 @@ use super::shapes::{axes, cuboid, moved, terrain, two, unit_cube};
 use super::{Case, question};
 use crate::Triangle;
 
-const JUST: &str = "they have one point or line in common and lie on both sides of a plane";
-const OFF: &str = "apart by 2^-40 of their size: below the rounding of single precision";
-const DEEP: &str = "crossing by 2^-40 of their size: below the rounding of single precision";
-const SHARED: &str = "a shared edge, corner or face is contact of all that meet there";
+const JUST: &str = "the meshes lie on opposite sides of a plane and share only points of it";
+const OFF: &str = "the gap of 2^-40 is below the rounding of single precision at this size";
+const DEEP: &str = "the overlap of 2^-40 is below the rounding of single precision at this size";
+const SHARED: &str = "all triangles that meet at a shared corner, edge or face are in contact";
 
 /// A quarter turn about x.
 const QUARTER: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
@@ -38,8 +38,12 @@ pub(super) fn cases() -> Vec<Case> {
     let off = two(-40);
     for (name, a, b) in pairs() {
         let ask = |what: &str, hard| question("contact", format!("{name}, {what}"), hard, vec![a], vec![b]);
-        cases.push(ask("just", JUST).touching(1));
-        cases.push(ask("2^-40 off", OFF).moved([0.0, 0.0, off]).apart(off, "straight up at the contact"));
+        cases.push(ask("touching", JUST).touching(1));
+        cases.push(
+            ask("2^-40 apart", OFF)
+                .moved([0.0, 0.0, off])
+                .apart(off, "straight up from where they would touch"),
+        );
         let deep = ask("2^-40 deep", DEEP).moved([0.0, 0.0, -off]);
         // A face that sinks has no edge that crosses the other face.
         cases.push(match name {

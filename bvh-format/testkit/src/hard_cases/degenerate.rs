@@ -8,7 +8,7 @@ use std::f64::consts::SQRT_2;
 
 const POINT: &str = "a triangle with three equal corners is a point and has neither a normal nor edges";
 const SEGMENT: &str = "a triangle with three collinear corners is a segment and has no normal";
-const SLIVER: &str = "17 million times as long as wide: its normal is lost in single precision";
+const SLIVER: &str = "a triangle is 17 million times as long as wide: single precision loses its normal";
 
 const FACE: Triangle = [[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
@@ -40,12 +40,12 @@ fn points() -> Vec<Case> {
         ask("a point 2^-30 above a face", vec![FACE], vec![point([1.0, 1.0, two(-30)])])
             .apart(two(-30), "straight down to the face"),
         ask("a point 5 beside a corner", vec![FACE], vec![point([7.0, 0.0, 4.0])])
-            .apart(5.0, "3, 4, 5 to the corner"),
+            .apart(5.0, "the hypotenuse of 3 and 4, to the corner"),
         ask("a point on a point", vec![point([1.0, 2.0, 3.0])], vec![point([1.0, 2.0, 3.0])]).touching(1),
         ask("a point beside a point", vec![point([1.0, 2.0, 3.0])], vec![point([1.0, 2.0, 3.0 + two(-20)])])
-            .apart(two(-20), "they differ in z alone"),
+            .apart(two(-20), "the points differ only in z"),
         ask("27 points and 27 between them", cloud(0.0), cloud(0.5)).above(0.8660254037844386),
-        ask("27 points and the same", cloud(0.0), cloud(0.0)).touching(27),
+        ask("27 points and the same points", cloud(0.0), cloud(0.0)).touching(27),
         ask(
             "a point in a face, among others",
             joined(crowd(-8.0), vec![FACE]),
@@ -73,7 +73,7 @@ fn segments() -> Vec<Case> {
                 segment(left, right, place),
                 segment([0.5, -1.0, two(-30)], [0.5, 3.0, two(-30)], place),
             )
-            .apart(two(-30), "straight down where they cross in plan"),
+            .apart(two(-30), "straight down where they cross as seen from above"),
         );
     }
     let straight = segment(left, right, 1);
@@ -89,8 +89,8 @@ fn segments() -> Vec<Case> {
         ask("on one line, 2^-20 apart", straight, segment([1.0 + two(-20), 0.0, 0.0], [8.0, 0.0, 0.0], 0))
             .apart(two(-20), "end to end along x"),
         ask("parallel, 5 apart", straight, segment([-7.0, 3.0, 4.0], [7.0, 3.0, 4.0], 1))
-            .apart(5.0, "3, 4, 5 across"),
-        ask("askew", straight, segment([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], 1)).above(SQRT_2.next_down()),
+            .apart(5.0, "the hypotenuse of 3 and 4, straight across"),
+        ask("skew", straight, segment([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], 1)).above(SQRT_2.next_down()),
     ]);
     cases
 }
@@ -111,13 +111,15 @@ fn slivers() -> Vec<Case> {
     vec![
         ask("one through another", vec![flat], vec![upright(width / 4.0)]).touching(1),
         ask("2^-30 beside the tip", vec![flat], vec![upright(width + two(-30))])
-            .apart(two(-30), "the tip and an edge straight beside it"),
+            .apart(two(-30), "from the tip straight to the edge beside it"),
         ask("at the tip", vec![flat], vec![upright(width)]).touching(1),
-        ask("as far apart as wide", vec![flat], vec![lifted]).apart(width, "one is the other, lifted"),
+        ask("as far apart as wide", vec![flat], vec![lifted])
+            .apart(width, "one is a lifted copy of the other"),
         ask("across on the slant", vec![oblique], vec![crossing(0.5)]).touching(1),
         ask("past each other on the slant", vec![oblique], vec![crossing(1.0)]).above(0.4082482336857107),
         ask("two fans, one in the other's plane", fan(0.0), fan(0.0)).touching(576),
-        ask("two fans, lifted by their width", fan(0.0), fan(width)).apart(width, "one is the other, lifted"),
+        ask("two fans, lifted by their width", fan(0.0), fan(width))
+            .apart(width, "one is a lifted copy of the other"),
         ask(
             "one through another, 2^40 as large",
             scaled(&[flat], two(40)),

@@ -6,9 +6,12 @@ use crate::Triangle;
 // The f64 nearest to the root of 2 is above the root.
 use std::f64::consts::SQRT_2;
 
-const PLANE: &str = "in one plane there is no side to be on: signs are zero, and overlap is a question in 2D";
-const SLANT: &str = "in a slanted plane coordinates cancel instead of being equal";
-const PARALLEL: &str = "in parallel planes no edge comes near the other plane first";
+const PLANE: &str =
+    "in one plane nothing is above or below: signs are zero, and overlap must be decided in 2D";
+const SLANT: &str =
+    "in a slanted plane, heights are zero because terms cancel, not because coordinates are equal";
+const PARALLEL: &str =
+    "the planes are parallel, so no corner or edge is nearer to the other plane than the rest";
 
 /// Returns a point in the plane x + y + z = 0.
 fn slanted(x: f64, y: f64) -> [f64; 3] {
@@ -37,17 +40,17 @@ pub(super) fn cases() -> Vec<Case> {
         ask("two plates share an edge", plate(4), moved(&plate(4), [4.0, 0.0, 0.0])).touching(27),
         ask("two plates share a corner", plate(4), moved(&plate(4), [4.0, 4.0, 0.0])).touching(1),
         ask("two plates side by side", plate(4), moved(&plate(4), [4.0 + two(-10), 0.5, 0.0]))
-            .apart(two(-10), "edge along edge"),
+            .apart(two(-10), "from edge to parallel edge"),
         ask(
             "two plates corner to corner",
             plate(4),
             moved(&plate(4), [4.0 + 3.0 * two(-10), 4.0 + two(-8), 0.0]),
         )
-        .apart(5.0 * two(-10), "3, 4, 5 from corner to corner"),
+        .apart(5.0 * two(-10), "2^-10 times the hypotenuse of 3 and 4, from corner to corner"),
         ask("two plates in x, 2^-149 apart", upright(plate(4)), {
             moved(&upright(plate(4)), [two(-149), 0.5, 0.25])
         })
-        .apart(two(-149), "one is over the other"),
+        .apart(two(-149), "from plane to plane"),
     ];
     let ask = |name: &str, a: Vec<Triangle>, b: Vec<Triangle>| question(kind, name, SLANT, a, b);
     let large = [slanted(0.0, 0.0), slanted(1.0, 7.0), slanted(9.0, 2.0)];
@@ -67,13 +70,13 @@ pub(super) fn cases() -> Vec<Case> {
     let at = |x: f64, y: f64, z: f64| moved(&plate(4), [x, y, z]);
     cases.extend([
         ask("plates a unit of f32 apart", at(0.0, 0.0, 1.0), at(0.5, 0.25, 1.0 + two(-23)))
-            .apart(two(-23), "one is over the other"),
+            .apart(two(-23), "from plane to plane"),
         ask("plates a unit of f64 apart", plate(4), plate(4))
             .moved([0.5, 0.25, two(-52)])
-            .apart(two(-52), "one is over the other"),
+            .apart(two(-52), "from plane to plane"),
         ask("a plate beside the edge of another", plate(4), plate(4))
             .moved([7.0, 0.5, 4.0])
-            .apart(5.0, "3, 4, 5 from edge to edge"),
+            .apart(5.0, "the hypotenuse of 3 and 4, from edge to edge"),
         ask("slanted, 2^-20 of z apart", vec![large], vec![inside])
             .moved([0.0, 0.0, two(-20)])
             .above(5.506041232963807e-7),

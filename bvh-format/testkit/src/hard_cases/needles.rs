@@ -5,8 +5,8 @@ use super::{Case, question};
 use crate::Triangle;
 
 const NEEDLE: &str =
-    "two million times as long as thick: boxes of all directions overlap, triangles hardly do";
-const EYE: &str = "boxes overlap wholly, but the hole is empty";
+    "a needle is two million times as long as thick: slabs overlap along all directions, few triangles meet";
+const EYE: &str = "the needle's box crosses the ring's box, but the ring is open in the middle";
 
 pub(super) fn cases() -> Vec<Case> {
     let ask = |name: &str, a: Vec<Triangle>, b: Vec<Triangle>| question("needles", name, NEEDLE, a, b);

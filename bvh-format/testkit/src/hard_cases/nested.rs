@@ -4,10 +4,10 @@ use super::shapes::{crowd, cube, cuboid, joined, moved, octahedron, plate, scale
 use super::{Case, question};
 use crate::Triangle;
 
-const INSIDE: &str = "meshes are surfaces: one inside the other is not in contact with it";
+const INSIDE: &str = "meshes are surfaces: a mesh inside another one does not touch it";
 const SAME: &str =
-    "all is equal: each triangle is in contact with itself and its neighbours, in their planes";
-const LIFTED: &str = "each triangle is nearest to itself, and many pairs are equally near";
+    "the meshes are the same: each triangle touches its copy and the copy's neighbours, in their planes";
+const LIFTED: &str = "each triangle is nearest to its own copy, and many pairs are equally near";
 
 pub(super) fn cases() -> Vec<Case> {
     let ask = |name: &str, a: Vec<Triangle>, b: Vec<Triangle>| question("inside", name, INSIDE, a, b);
@@ -17,10 +17,10 @@ pub(super) fn cases() -> Vec<Case> {
         [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]].map(|t: [usize; 3]| t.map(|k| p[k])).to_vec()
     };
     let mut cases = vec![
-        ask("a cube in a cube", scaled(&cube(), 2.0), cube()).apart(1.0, "face from face"),
+        ask("a cube in a cube", scaled(&cube(), 2.0), cube()).apart(1.0, "from face to face"),
         ask("a cube in a cube, 2^-30 off a face", scaled(&cube(), 2.0), cube())
             .moved([1.0 - two(-30), 0.0, 0.0])
-            .apart(two(-30), "face from face"),
+            .apart(two(-30), "from face to face"),
         ask("a cube in a cube, at a face from inside", scaled(&cube(), 2.0), cube())
             .moved([1.0, 0.0, 0.0])
             .touching(18),
@@ -28,8 +28,8 @@ pub(super) fn cases() -> Vec<Case> {
         ask("an octahedron in a cube, tips at its faces", cube(), octahedron(1.0)).touching(48),
         ask("an octahedron in a tetrahedron", tetrahedron(4.0), octahedron(1.0)).above(1.7320508075688772),
         ask("a speck in a cube", scaled(&cube(), two(20)), scaled(&cube(), two(-20)))
-            .apart(two(20) - two(-20), "face from face"),
-        ask("shells between shells", shells(0), shells(1)).apart(1.0, "between the two innermost"),
+            .apart(two(20) - two(-20), "from face to face"),
+        ask("shells between shells", shells(0), shells(1)).apart(1.0, "between the two innermost shells"),
         ask("shells between shells, moved to contact", shells(0), shells(1))
             .moved([1.0, 0.0, 0.0])
             .touching(18),
@@ -51,7 +51,7 @@ pub(super) fn cases() -> Vec<Case> {
     let ask = |name: &str, mesh: Vec<Triangle>, by: f64| {
         question("identical", name, LIFTED, mesh.clone(), mesh).moved([0.0, 0.0, by])
     };
-    let lifted = "each point is as far from itself, and the planes are as far apart";
+    let lifted = "each point is this far from its copy, and the planes are as far apart";
     cases.extend([
         ask("plates, lifted by 2^-52", plate(4), two(-52)).apart(two(-52), lifted),
         ask("plates, lifted by 2^-10", plate(4), two(-10)).apart(two(-10), lifted),

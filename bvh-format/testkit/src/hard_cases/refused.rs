@@ -3,8 +3,10 @@
 use super::shapes::unit_cube;
 use super::{Case, question};
 
-const RIGID: &str = "the matrix changes lengths or angles, so the answer would be about another shape";
-const NUMBERS: &str = "no number comes of it";
+const RIGID: &str =
+    "the matrix changes lengths, angles or handedness, so the answer would be about another shape";
+const NUMBERS: &str =
+    "the pose would place corners at coordinates that are NaN, infinite or beyond the limit";
 
 pub(super) fn cases() -> Vec<Case> {
     let rows = |change: &dyn Fn(&mut [[f64; 3]; 3])| {
@@ -17,13 +19,13 @@ pub(super) fn cases() -> Vec<Case> {
     vec![
         // The product of the row with itself is off by 1.001^2 - 1.
         ask("one axis longer by 0.1 %", RIGID).turned(rows(&|r| r[0][0] = 1.001)).refused("2.00099"),
-        ask("all twice as large", RIGID)
+        ask("all axes twice as long", RIGID)
             .turned(rows(&|r| (0..3).for_each(|k| r[k][k] = 2.0)))
             .refused("scaled by 2"),
         ask("sheared by 2^-19", RIGID)
             .turned(rows(&|r| r[0][1] = 1.0 / 524288.0))
             .refused("1.9073486328125e-6 away"),
-        ask("a row lost", RIGID).turned(rows(&|r| r[1] = [0.0; 3])).refused("1e0 away"),
+        ask("a row of zeros", RIGID).turned(rows(&|r| r[1] = [0.0; 3])).refused("1e0 away"),
         ask("two rows the same", RIGID).turned(rows(&|r| r[1] = r[0])).refused("1e0 away"),
         ask("a mirror", RIGID).turned(rows(&|r| r[2][2] = -1.0)).refused("a reflection"),
         ask("NaN in the rotation", NUMBERS)

@@ -5,17 +5,18 @@ use super::shapes::{crowd, cube, joined, moved, octahedron, scaled, two, unit_cu
 use super::{Case, question};
 use crate::Triangle;
 
-const FAR: &str = "far from the origin few bits are left for the shape: single precision has none there";
+const FAR: &str =
+    "far from the origin, few bits of a coordinate are left for the shape, and none in single precision";
 const FAR_F32: &str =
-    "far from the origin, though on f32's grid, so that all precisions hold the same meshes";
-const SMALL: &str =
-    "squares and products of such lengths underflow in single precision, fourth powers in f64 nearly";
-const LARGE: &str = "squares and products of such lengths overflow in single precision";
-const UNEQUAL: &str = "the two meshes differ in size by 2^80 and more";
-const MIXED: &str = "triangles of one mesh differ in size by 2^40 and more, around one point";
-const SUBNORMAL: &str = "a few of the smallest numbers of f32: products of them are zero in single precision";
-const OVER: &str = "larger than f16 holds (65504)";
-const UNDER: &str = "smaller than f16 holds (2^-24), beside what is not";
+    "far from the origin, but all coordinates are f32 numbers, so all precisions hold the same meshes";
+const SMALL: &str = "products of three such lengths underflow in single precision";
+const LARGE: &str = "products of three such lengths overflow in single precision";
+const UNEQUAL: &str = "one mesh is at least 2^80 times as large as the other";
+const MIXED: &str = "the triangles of a mesh differ in size by a factor of 2^40 or more, around one point";
+const SUBNORMAL: &str =
+    "coordinates are small multiples of 2^-149: their products are zero in single precision";
+const OVER: &str = "coordinates reach or exceed the largest f16 number, 65504";
+const UNDER: &str = "coordinates are as small as the smallest positive f16 number, 2^-24, or smaller";
 
 pub(super) fn cases() -> Vec<Case> {
     [far(), sizes(), unequal(), mixed(), subnormal(), half_precision()].concat()
@@ -32,8 +33,8 @@ fn far() -> Vec<Case> {
     let other_side =
         |mesh: &[Triangle]| mesh.iter().map(|t| t.map(|[x, y, z]| [-x, -y, z])).collect::<Vec<_>>();
     let mut cases = vec![
-        ask("cubes, just", out(&unit_cube()), out(&beside(1.0))).touching(13),
-        ask("cubes, 2^-20 apart", out(&unit_cube()), out(&beside(1.0 + gap))).apart(gap, "face from face"),
+        ask("cubes, touching", out(&unit_cube()), out(&beside(1.0))).touching(13),
+        ask("cubes, 2^-20 apart", out(&unit_cube()), out(&beside(1.0 + gap))).apart(gap, "from face to face"),
         ask("cubes, 2^-20 deep", out(&unit_cube()), out(&beside(1.0 - gap))).touching(10),
         ask("octahedra, tips 2^-20 apart", out(&octahedron(1.0)), {
             out(&moved(&octahedron(1.0), [2.0 + gap, 0.0, 0.0]))
@@ -44,22 +45,22 @@ fn far() -> Vec<Case> {
             out(&unit_cube()),
             out(&moved(&scaled(&unit_cube(), 0.5), [0.125, 0.25, 0.25])),
         )
-        .apart(0.125, "face from face"),
+        .apart(0.125, "from face to face"),
         ask("brought there by the pose, 2^-20 apart", out(&unit_cube()), unit_cube())
             .moved([1e7 + 1.0 + gap, -1e7, 1e7])
-            .apart(gap, "face from face"),
-        ask("brought back by the pose, just", unit_cube(), out(&unit_cube()))
+            .apart(gap, "from face to face"),
+        ask("brought back by the pose, touching", unit_cube(), out(&unit_cube()))
             .moved([1.0 - 1e7, 1e7, -1e7])
             .touching(62),
         ask("turned by half a turn, 2^-20 apart", out(&unit_cube()), other_side(&out(&beside(1.0 + gap))))
             .turned(half_turn)
-            .apart(gap, "face from face"),
+            .apart(gap, "from face to face"),
     ];
     let ask = |name: &str, a: Vec<Triangle>, b: Vec<Triangle>| question("offset 1e7", name, FAR_F32, a, b);
     let big = |x: f64| out(&moved(&scaled(&unit_cube(), 8.0), [x, 2.0, 4.0]));
     cases.extend([
-        ask("cubes of side 8, just", big(0.0), big(8.0)).touching(62),
-        ask("cubes of side 8, 1 apart", big(0.0), big(9.0)).apart(1.0, "face from face"),
+        ask("cubes of side 8, touching", big(0.0), big(8.0)).touching(62),
+        ask("cubes of side 8, 1 apart", big(0.0), big(9.0)).apart(1.0, "from face to face"),
         ask("cubes of side 8, 1 deep", big(0.0), big(7.0)).touching(52),
     ]);
     cases
@@ -84,14 +85,15 @@ fn sizes() -> Vec<Case> {
         let octahedra = || (scaled(&octahedron(4.0), size), scaled(&octahedron(1.0), size));
         let ((outer, inner), gap) = (octahedra(), size * two(-20));
         cases.extend([
-            ask("cubes, just", cube(0.0), cube(1.0)).touching(62),
-            ask("cubes, 2^-20 of it apart", cube(0.0), cube(1.0 + two(-20))).apart(gap, "face from face"),
-            ask("cubes, 2^-20 of it deep", cube(0.0), cube(1.0 - two(-20))).touching(52),
+            ask("cubes, touching", cube(0.0), cube(1.0)).touching(62),
+            ask("cubes, 2^-20 of their side apart", cube(0.0), cube(1.0 + two(-20)))
+                .apart(gap, "from face to face"),
+            ask("cubes, 2^-20 of their side deep", cube(0.0), cube(1.0 - two(-20))).touching(52),
             ask("an octahedron in another", outer.clone(), inner).above(1.7320508075688772 * size),
             ask("tilted triangles, apart", tilted(size), tilted(size))
                 .moved([0.0, 0.0, size])
                 .above(0.7896307495304999 * size),
-            ask("the same", outer.clone(), outer).touching(56),
+            ask("the same octahedra", outer.clone(), outer).touching(56),
         ]);
     }
     cases
@@ -122,7 +124,7 @@ fn mixed() -> Vec<Case> {
     };
     vec![
         ask("shells of all scales between each other", shells(0), shells(-6))
-            .apart(two(-48) - two(-54), "between the two innermost"),
+            .apart(two(-48) - two(-54), "between the two innermost shells"),
         ask("shells of all scales, the same", shells(0), shells(0)).touching(540),
         ask("shells of all scales, the innermost in contact", shells(0), shells(-6))
             .moved([two(-48) - two(-54), 0.0, 0.0])
@@ -130,7 +132,7 @@ fn mixed() -> Vec<Case> {
         ask("dust on dust under large triangles", dust(-1.0), dust(0.0)).touching(62),
         ask("dust beside dust under large triangles", dust(-1.0), dust(0.0))
             .moved([0.0, 0.0, two(-70)])
-            .apart(two(-70), "face from face"),
+            .apart(two(-70), "from face to face"),
     ]
 }
 
@@ -143,17 +145,17 @@ fn subnormal() -> Vec<Case> {
     vec![
         ask("one through another", units(&[face]), units(&[through])).touching(1),
         ask("over another", units(&[face]), units(&[beside])).above(6.9792825399138576e-46),
-        ask("cubes of side 1, just", units(&unit_cube()), units(&moved(&unit_cube(), [1.0, 0.0, 0.0])))
+        ask("cubes of side 1, touching", units(&unit_cube()), units(&moved(&unit_cube(), [1.0, 0.0, 0.0])))
             .touching(62),
         ask(
             "cubes of side 1, a unit apart",
             units(&unit_cube()),
             units(&moved(&unit_cube(), [2.0, 0.0, 0.0])),
         )
-        .apart(two(-149), "face from face"),
+        .apart(two(-149), "from face to face"),
         ask("an octahedron in another", units(&octahedron(9.0)), units(&octahedron(2.0)))
             .above(5.663280319150595e-45),
-        ask("the same", units(&octahedron(5.0)), units(&octahedron(5.0))).touching(56),
+        ask("the same octahedra", units(&octahedron(5.0)), units(&octahedron(5.0))).touching(56),
     ]
 }
 
@@ -186,7 +188,7 @@ fn half_precision() -> Vec<Case> {
             vec![edge(reach)],
             vec![edge(reach)],
         );
-        cases.push(ask.moved([0.0, 0.0, two(-10)]).apart(two(-10), "one is the other, lifted"));
+        cases.push(ask.moved([0.0, 0.0, two(-10)]).apart(two(-10), "one is a lifted copy of the other"));
     }
     for exponent in [-24, -25, -40] {
         let size = two(exponent);
@@ -199,15 +201,15 @@ fn half_precision() -> Vec<Case> {
                 vec![edge(1.0).map(|[x, y, _]| [x, y - 2.0, z])],
             )
         };
-        cases.push(ask("tiny cubes beside large triangles, just", small(-1.0), small(0.0)).touching(62));
+        cases.push(ask("tiny cubes beside large triangles, touching", small(-1.0), small(0.0)).touching(62));
         cases.push(
             ask("tiny cubes beside large triangles, a size apart", small(-1.0), small(1.0))
-                .apart(size, "face from face"),
+                .apart(size, "from face to face"),
         );
         cases.push(
             ask("tiny cubes alone", scaled(&unit_cube(), size), scaled(&unit_cube(), size))
                 .moved([2.0 * size, 0.0, 0.0])
-                .apart(size, "face from face"),
+                .apart(size, "from face to face"),
         );
     }
     cases

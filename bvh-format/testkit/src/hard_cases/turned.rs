@@ -7,9 +7,10 @@ use super::{Case, question};
 use crate::Triangle;
 
 const SLIGHT: &str =
-    "turned by 1e-9 rad: planes are nearly parallel, and the turn is lost in single precision";
-const HALF: &str = "turned by half a turn less 1e-9 rad: planes are nearly parallel, and facing back";
-const ANY: &str = "turned by 3, 4, 5: no corner is placed without rounding";
+    "the pose turns by 1e-9 rad: planes are nearly parallel, and single precision loses the turn";
+const HALF: &str =
+    "the pose turns by half a turn less 1e-9 rad: planes are nearly parallel, with opposite normals";
+const ANY: &str = "the rotation has the entries 0.6 and 0.8, so the placed corners are rounded";
 
 const ANGLE: f64 = 1e-9;
 /// The cosine of 1e-9 is 1 to the last bit.

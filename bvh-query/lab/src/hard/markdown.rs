@@ -32,16 +32,17 @@ fn head(record: &Record) -> String {
     format!(
         "# Hard cases\n\n\
          {} pairs of small meshes whose exact answers are known, in {questions} orders of corners, triangles and \
-         sides. cbvh {} was asked in {} profiles, two triangle encodings and the backends {}. In orders other than the \
-         listed one, a fifth of the profiles and encodings were asked, in turns. In {asked} combinations there were \
-         **{} wrong answers**. Each combination was asked for contact, the number of contacts, the distance with its \
-         interval, and nine times whether the meshes are within a distance.\n\n\
+         sides. cbvh {} was asked in {} profiles, two triangle encodings and the backends {}. The order as listed was \
+         asked in all of them, each other order in a fifth of the profiles and encodings, which changes from case to \
+         case. In {asked} combinations there were **{} wrong answers**. Each combination was asked whether the meshes \
+         touch, for the number of contacts, for the distance with its interval, and nine times whether the meshes are \
+         within a distance.\n\n\
          Generated on {} on {} by `cargo run --release -p cbvh-lab -- hard --out DIR{peers}`, which writes this page as \
-         `hard.md`; `hard.csv` and `hard.json` beside it have every answer. The cases are in \
+         `hard.md`; `hard.csv` and `hard.json` beside it contain every answer. The cases are in \
          `bvh-format/testkit/src/hard_cases/`, and `cargo test -p bvh-query --test exact hard_cases` proves what they \
          state by integer arithmetic.\n\n\
-         A distance that ends in ... lies between the number and the next larger `f64`. cbvh's interval is the widest \
-         over all profiles, encodings and backends, in the order listed.\n",
+         A distance that ends in ... lies between the number shown and the next larger `f64`. The interval of cbvh is \
+         the widest of all profiles, encodings and backends, in the order as listed.\n",
         record.cases.len(),
         record.origin.version,
         Profile::ALL.len(),
@@ -54,14 +55,14 @@ fn head(record: &Record) -> String {
 
 fn peers(record: &Record) -> String {
     let mut text = "\n## Other libraries\n\n\
-        The other libraries read the same meshes as OBJ with all digits, in one process per question, which may take \
-        10 seconds. Poses that must be refused are left out. A distance is *wrong* if its error is more than 1e-6 of the \
-        size of both meshes in place, and *off* if it is more than 1e-6 of the distance; for contact the distance is 0, \
-        and any other answer is off. The last two columns count only the cases whose numbers single precision holds. \
-        Margins and tolerances of the libraries are set to 0 where there is such a setting. embree-boxes is Embree's \
-        tree of boxes with the program's own triangle test. Some of these libraries require more than the cases give, \
-        such as triangles with an area, or sizes far from the limits of their numbers: a wrong answer here need not be \
-        a defect there.\n\n\
+        The other libraries read the same meshes from OBJ files that state all digits. Each question runs in a process \
+        of its own, which may take 10 seconds. Poses that must be refused are left out. A distance is *wrong* if its \
+        error exceeds 1e-6 of the size of both meshes as placed. Otherwise it is *off* if its error exceeds 1e-6 of \
+        the distance, which is 0 for meshes that touch, so any error counts. The last two columns count only the cases \
+        whose numbers are all numbers of single precision. Margins and tolerances of the libraries are set to 0 where \
+        there is such a setting. embree-boxes is Embree's tree of boxes with the program's own triangle test. Some of \
+        these libraries require more than the cases give, such as triangles with an area, or sizes far from the limits \
+        of their numbers, so a wrong answer here is not necessarily a defect of the library.\n\n\
         | library | version | precision | mode | asked | wrong | off | crashes | over 10 s | asked in single | not right |\n\
         |---|---|---|---|---|---|---|---|---|---|---|\n"
         .to_owned();
@@ -168,11 +169,12 @@ fn mode(case: &Asked, peer: &str, mode: &str) -> Option<String> {
             let off = if verdict == Verdict::Off { "off, " } else { "" };
             let answer = if mode == "distance" { format!("{answer:.3e}") } else { format!("{answer}") };
             let by = |error: Option<f64>, of: &str| error.map(|error| format!("{error:.0e} of {of}"));
-            let by: Vec<_> = [by(first.error_of_distance, "it"), by(first.error_of_size, "the size")]
-                .into_iter()
-                .flatten()
-                .collect();
-            let by = if by.is_empty() { String::new() } else { format!(" ({off}by {})", by.join(", ")) };
+            let by: Vec<_> =
+                [by(first.error_of_distance, "the distance"), by(first.error_of_size, "the size")]
+                    .into_iter()
+                    .flatten()
+                    .collect();
+            let by = if by.is_empty() { String::new() } else { format!(" ({off}error {})", by.join(", ")) };
             format!("{answer}{by}")
         }
     };

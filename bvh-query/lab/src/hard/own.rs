@@ -173,17 +173,17 @@ fn misjudged(answers: &Answers, truth: &Truth, scale: f64) -> Vec<String> {
         wrong.push(format!("collide {collide}"));
     }
     if contacts != expected {
-        wrong.push(format!("{contacts} contacts, not {expected}"));
+        wrong.push(format!("{contacts} contacts, expected {expected}"));
     }
     if (distance == 0.0) != touching {
         wrong.push(format!("distance {distance:e}"));
     }
     // Where the truth lies between two neighbouring f64, an end that equals one of them is on the right side.
     if !(lower <= floor && ceil <= upper && lower <= distance && distance <= upper) {
-        wrong.push(format!("distance {distance:e} from {lower:e} to {upper:e}, not {floor:e}"));
+        wrong.push(format!("distance {distance:e} in [{lower:e}, {upper:e}], expected {floor:e}"));
     }
     if distance < floor - ACCURACY * scale || distance > ceil + ACCURACY * scale {
-        wrong.push(format!("distance {distance:e}, not {floor:e} to within {:e}", ACCURACY * scale));
+        wrong.push(format!("distance {distance:e}, expected {floor:e} to within {:e}", ACCURACY * scale));
     }
     wrong
 }
