@@ -151,7 +151,9 @@ fn what_is_no_file_is_refused() {
     let path = folder.0.path().join("f.cbvh");
     assert!(matches!(StoredFile::open(&path, None), Err(FileError::Io { .. })));
     fs::write(&path, b"x").unwrap();
-    assert!(matches!(StoredFile::open(&path, Some(1 << 20)), Err(FileError::Memory { .. })));
+    let told = StoredFile::open(&path, Some(1 << 20)).unwrap_err();
+    assert!(matches!(told, FileError::Memory { .. }), "{told}");
+    assert!(told.to_string().ends_with("; raise the memory budget"), "{told}");
     let told = StoredFile::open(&path, None).and_then(|file| validate_in_parallel(&file)).unwrap_err();
     assert!(matches!(told, FileError::Format(error) if error.rule == Rule::Magic));
 }

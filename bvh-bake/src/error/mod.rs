@@ -52,7 +52,7 @@ pub enum BakeError {
     /// The bake needs more memory than it may use, even with scratch files.
     #[error(
         "{}: expected a mesh that bakes in at most {budget} bytes of memory, found {} that takes at least \
-         {needed}", input.display(), counted(*triangles)
+         {needed}; raise the memory budget", input.display(), counted(*triangles)
     )]
     Memory {
         /// The first input.

@@ -39,15 +39,15 @@ pub enum FileError {
     },
     /// The file cannot be checked in the memory allowed.
     #[error(
-        "{}: expected a file that is checked in at most {budget} bytes of memory, found one that takes at least {needed}",
-        path.display()
+        "{}: expected a file that is checked in at most {budget} bytes of memory, found one that takes at least {needed}; \
+         raise the memory budget", path.display()
     )]
     Memory {
         /// The file.
         path: PathBuf,
-        /// Bytes that the check needs.
+        /// The bytes that the check needs.
         needed: u64,
-        /// Bytes that it may use.
+        /// The bytes that it may use.
         budget: u64,
     },
     /// The file breaks a rule of the format.

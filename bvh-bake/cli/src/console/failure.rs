@@ -60,7 +60,7 @@ impl Failure {
             BakeError::OutputIsInput { .. } => Self::Usage(error.to_string()),
             // The mesh is valid, and other options bake it.
             BakeError::MaxError { .. } => Self::Usage(named),
-            BakeError::Memory { needed, .. } => Self::Limit(format!("{error}; {}", enough(*needed))),
+            BakeError::Memory { needed, .. } => Self::Limit(format!("{error}: {}", enough(*needed))),
             BakeError::Limit(_) => Self::Limit(named),
             // `Unproved` is a defect of the baker: neither the system nor the command line is to blame.
             BakeError::Unproved(_) | BakeError::NoOutDir => Self::Invalid(named),
@@ -89,7 +89,7 @@ impl Failure {
     pub(crate) fn from_file(path: &Path, error: FileError) -> Self {
         match error {
             FileError::Io { path, source } => Self::from_input(&path, &source),
-            FileError::Memory { needed, .. } => Self::Limit(format!("{error}; {}", enough(needed))),
+            FileError::Memory { needed, .. } => Self::Limit(format!("{error}: {}", enough(needed))),
             FileError::Format(error) => Self::invalid(path, error),
             error => Self::System(error.to_string()),
         }
@@ -151,7 +151,7 @@ fn unreadable(error: &io::Error) -> String {
     }
 }
 
-/// Says which budget of memory is enough.
+/// Says which budget of memory is enough. This completes the remedy that the library's message ends with.
 fn enough(needed: u64) -> String {
     format!("give --max-memory {}MiB or more", needed.div_ceil(1 << 20))
 }
