@@ -1,4 +1,4 @@
-//! The numbered rules of the specification, one name each.
+//! Lists the numbered rules of the specification, one name each.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ macro_rules! rules {
             /// All rules in the order of their numbers.
             pub const ALL: &'static [Rule] = &[$(Rule::$name,)*];
 
-            /// The rule in one phrase, in the words of the specification.
+            /// Returns the rule in one phrase, in the words of the specification.
             pub fn text(self) -> &'static str {
                 match self { $(Rule::$name => $text,)* }
             }
@@ -26,7 +26,7 @@ rules! {
     Magic = 1, "the file starts with the magic bytes";
     Version = 2, "the major version is one that this reader knows";
     HeaderSize = 3, "the file holds a whole header page";
-    HeaderChecksum = 4, "the header page has the checksum it states";
+    HeaderChecksum = 4, "the checksum in the header page is that of the page";
     FileLength = 5, "the file is as long as the header states";
     SectionCount = 6, "the section table has at most 64 entries";
     SectionPlace = 7, "sections are page-aligned, in order, and within the file";
@@ -37,17 +37,17 @@ rules! {
     ObjectNumbers = 12, "an object's numbers are finite, ordered and within the limits";
     ObjectPages = 13, "the objects' pages follow each other and fill the node section";
     ObjectProfile = 14, "an object's profile and triangle encoding are known";
-    PageChecksum = 15, "a page has the checksum that it states";
-    PageNumber = 16, "a page states its own number";
+    PageChecksum = 15, "the checksum in a page header is that of the page";
+    PageNumber = 16, "a page header gives the page's place in the node section";
     PageShape = 17, "header, anchors, remote links and treelets of a page fit in it";
     PageProfile = 18, "a page has its object's profile";
     AnchorSlabs = 19, "an anchor's slabs are finite and ordered";
-    AnchorParent = 20, "a subtree root names the page and remote link that lead to it";
+    AnchorParent = 20, "an anchor names the page and the remote link that lead to its root";
     ChildKinds = 21, "a treelet has at least one child, of known kinds, without gaps, at most its width";
     TreeletLinks = 22, "treelets are numbered breadth-first: roots first, then the children in order";
     RemoteLinks = 23, "remote links are numbered in treelet order and lead to later pages of the object";
     LeafLinks = 24, "leaf packets are numbered in treelet order";
-    Reserved = 25, "reserved bytes are zero";
+    Reserved = 25, "the reserved byte of a page header is zero";
     LeafPlace = 26, "a leaf block lies within the leaf section and has the size its packets need";
     LeafChecksum = 27, "a leaf block has the checksum that its page states";
     PackedHeader = 28, "a packed leaf block's bit widths are within the limits and its parts within the block";
@@ -64,16 +64,16 @@ rules! {
 }
 
 impl Rule {
-    /// The rule's number in the specification, from 1.
+    /// Returns the rule's number in the specification, from 1.
     pub fn number(self) -> u32 {
         self as u32
     }
 
-    /// What helps against a file that breaks the rule, in one phrase.
+    /// Returns what to do about a file that breaks the rule, in one phrase.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Magic => "this is not a .cbvh file: bake it first",
-            // What this reader does not know, a later version may have written.
+            // A later version may have written what this reader does not know.
             Self::Version | Self::SectionKnown | Self::ObjectProfile => "bake it again with this cbvh",
             _ => "the file is damaged: copy it again, or bake it again",
         }
