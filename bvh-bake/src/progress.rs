@@ -129,7 +129,7 @@ struct Work {
     total: AtomicU64,
 }
 
-/// The sum of the weights of all passes of a step over one triangle or byte.
+/// The sum of the weights of all passes of a step over one triangle or byte: a weight counts sixteenths of the step.
 pub(crate) const WHOLE: u64 = 16;
 
 impl Progress {

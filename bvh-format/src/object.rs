@@ -12,9 +12,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 /// The largest magnitude of a coordinate and of an origin: 2^120 mesh units.
 pub const MAX_COORDINATE: f64 = (1u128 << 120) as f64;
-/// The exponents of f16 residuals with which every product of a code and the unit is exact.
+/// The exponents e for which every product of an f16 code and 2^e mesh units is exact.
 pub const F16_EXPONENTS: std::ops::RangeInclusive<i32> = -125..=112;
-/// Bytes before the first record.
+/// The number of bytes before the first record.
 const TABLE_HEAD: usize = 16;
 
 /// The record of an object as stored. Lengths are in mesh units, and coordinates are relative to `origin`.

@@ -11,9 +11,9 @@
 use crate::profile::Encoding;
 use half::f16;
 
-/// `1 / 255`, rounded to `f32`.
+/// The step of a code of 8 bits, as a fraction of the slab's width: `1 / 255`, rounded to `f32`.
 pub const STEP_U8: f32 = 1.0 / 255.0;
-/// `1 / 15`, rounded to `f32`.
+/// The step of a code of 4 bits, as a fraction of the slab's width: `1 / 15`, rounded to `f32`.
 pub const STEP_U4: f32 = 1.0 / 15.0;
 /// The largest code of an f16 residual: the largest finite f16.
 pub(crate) const F16_MAX_CODE: u16 = 0x7bff;

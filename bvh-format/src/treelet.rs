@@ -59,7 +59,7 @@ pub struct Links {
     pub first_leaf: u16,
 }
 
-/// The lowest bit of each nibble.
+/// A mask of the lowest bit of each nibble.
 const LOWEST_BITS: u32 = 0x1111_1111;
 
 /// The nibble of a child that is a treelet of the same page.

@@ -22,7 +22,7 @@ use crate::treelet::{Child, Links};
 use counts::CountsFromStart;
 use std::ops::Range;
 
-/// Pages that workers share, and whose counts are in memory at a time.
+/// The number of pages that workers share, and whose counts are in memory at a time.
 const PAGES_PER_BATCH: u32 = 1 << 12;
 
 /// How the work of [`validate_with`] is shared: by one thread, or by several.

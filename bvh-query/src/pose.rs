@@ -15,14 +15,14 @@ pub struct Pose {
 /// How far from orthonormal a rotation may be: the largest entry of `R R^T - I`. This is ten digits more than a product
 /// of a few f64 rotations loses, and five fewer than a wrong matrix is off by.
 const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 20) as f64;
-/// A matrix closer to orthonormal than this, 2^-10, is not called scaled: its factor would round to 1 for a reader, and
-/// the remedy for a rounded rotation is another.
+/// The least error, 2^-10, measured like `MAX_RIGID_ERROR`, for which a message calls a matrix scaled. A factor nearer
+/// to 1 would look like 1 to a reader, and a rounded rotation needs another remedy.
 const MIN_SCALED_ERROR: f64 = 1.0 / 1024.0;
-/// The largest translation along an axis, as large as the largest coordinate of the format.
+/// The largest translation along an axis in mesh units, as large as the largest coordinate of the format.
 const MAX_TRANSLATION: f64 = bvh_format::object::MAX_COORDINATE;
 /// Rotation entries below this, 2^-64, count as 0: see `Pose`.
 const MIN_ROTATION_ENTRY: f64 = 1.0 / (1u128 << 64) as f64;
-/// Translations below this, 2^-213, count as 0: see `Pose`.
+/// Translations below this, 2^-213 mesh units, count as 0: see `Pose`.
 const MIN_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
 
 impl Pose {

@@ -15,7 +15,7 @@ use earcut::Earcut;
 
 /// The most corners of a polygon, because clipping takes up to quadratic time.
 pub(crate) const MAX_CORNERS: usize = 1 << 16;
-/// Polygons with more corners than this are clipped only if they do not cross themselves.
+/// The most corners of a polygon that is clipped even if it crosses itself.
 const MAX_TANGLED: usize = 256;
 /// The most visits of a long polygon to one point. A hole that is connected by a bridge takes two visits.
 const MAX_VISITS: usize = 8;

@@ -244,6 +244,7 @@ struct Solid {
     seed: u64,
 }
 
+/// Marks a free place in the hash table; no vertex has this number.
 const FREE: u32 = u32::MAX;
 
 impl Solid {

@@ -31,8 +31,8 @@ const FAST_PROFILES: [(Profile, f64); 3] =
 /// The same for profiles with treelets of one line, for files that must be small.
 const COMPACT_PROFILES: [(Profile, f64); 3] =
     [(Profile::Dop6F16, 90.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U4, 112.0)];
-/// The factor by which the wider bounds of 4-bit codes increase node tests: those of dop26-u4 over those of dop26-u8,
-/// from traversals of a scanned surface (123 to 87) and of CAD parts (683 to 510).
+/// The number of node tests with dop26-u4 per node test with dop26-u8, because 4-bit codes give wider bounds. From
+/// traversals of a scanned surface (123 to 87) and of CAD parts (683 to 510).
 const U4_TESTS: f64 = 1.4;
 /// The bytes of nodes and plain triangles beyond which reading the file costs more than unpacking it. With warm caches,
 /// packed triangles take 1.3 to 1.6 times as long as plain ones. This also holds where the caches are too small for
@@ -40,6 +40,7 @@ const U4_TESTS: f64 = 1.4;
 const MAX_PLAIN_BYTES: u64 = 256 << 20;
 /// Bytes of nodes and plain lanes per triangle.
 const PLAIN_BYTES_PER_TRIANGLE: u64 = 52;
+/// The number of trials per object.
 const TRIAL_COUNT: usize = 400;
 
 /// The number of triangles in the longest patch.

@@ -18,7 +18,7 @@ use duplicates::{DuplicateCandidate, Hashed};
 use layout_choice::Trial;
 use rayon::prelude::*;
 
-/// The shares of the passes in the stage's work: measuring, finding duplicates, and surveying.
+/// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
 const MEASURE_WEIGHT: u64 = 8;
 const DUPLICATES_WEIGHT: u64 = 4;
 const SURVEY_WEIGHT: u64 = 4;

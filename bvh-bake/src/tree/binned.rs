@@ -5,10 +5,11 @@ use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::swept;
 use super::{Builder, PACKET, PacketTriangles};
 
+/// The number of bins along each axis of a node's box.
 const BINS_PER_AXIS: usize = 16;
 /// A node of more triangles is split by several threads. With fewer, threads cost more time than they save.
 const MAX_SEQUENTIAL_TRIANGLES: usize = 8192;
-/// Beyond this depth only medians are used, which bounds the depth of any tree.
+/// The number of levels below which only medians are used, which bounds the depth of any tree.
 const MAX_COSTED_DEPTH: usize = 64;
 
 impl Builder {

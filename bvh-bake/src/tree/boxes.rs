@@ -99,6 +99,7 @@ impl Reference {
     pub(super) fn aabb(&self) -> Aabb {
         // Masking takes one load and one instruction, less than putting the box together from six numbers.
         let lanes: &[u32; 8] = bytemuck::cast_ref(self);
+        /// Bit masks of the lanes: all bits for an end of the box, none for another number.
         const AXES: [u32; 8] = [!0, !0, !0, 0, !0, !0, !0, 0];
         Aabb(std::array::from_fn(|lane| f32::from_bits(lanes[lane] & AXES[lane])))
     }

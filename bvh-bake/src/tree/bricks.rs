@@ -20,7 +20,7 @@ use crate::triangles::{Grouped, InStream, Triangle, Triangles, distribute, fold}
 
 /// The number of cells of the grid along each axis.
 const CELLS_PER_AXIS: usize = 64;
-/// Beyond this depth, splits of one grid halve the number of triangles, which bounds the depth of the tree.
+/// The number of levels below which splits of one grid halve the number of triangles, which bounds the tree's depth.
 const MAX_COSTED_DEPTH: usize = 32;
 
 /// The number of a brick.

@@ -34,8 +34,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The number of triangles in a full leaf packet.
 const PACKET: usize = bvh_format::leaf::PACKET;
 
-/// The shares of two passes over the triangles in the stage's work: dividing them into bricks, and building the bricks'
-/// trees. The rest is the encoding.
+/// The shares of two passes over the triangles in the stage's work, in parts of [`WHOLE`]: dividing them into bricks,
+/// and building the bricks' trees. The rest is the encoding.
 const DIVIDE_WEIGHT: u64 = 2;
 const TREES_WEIGHT: u64 = 9;
 

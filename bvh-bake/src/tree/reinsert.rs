@@ -15,7 +15,7 @@ use super::PacketTriangles;
 use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::Aabb;
 
-/// The most nodes that a search visits; hardly any search comes near it. It bounds the time for meshes in which every
+/// The most nodes that a search visits; hardly any search visits so many. It bounds the time for meshes in which every
 /// part overlaps every other.
 const MAX_VISITS: usize = 1024;
 /// The most levels of a tree. A pass that makes a deeper tree is left out.

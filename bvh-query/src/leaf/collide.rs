@@ -17,7 +17,7 @@ use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
 use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, largest_of, max3, min3, project, sub};
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 
-/// 2^-120: more than all underflows of a projection together.
+/// A bound of all underflows of a projection together: 2^-120, in cubes of the frame's unit.
 const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
 
 /// Stage two: the candidates of a queue, in the order of arrival, that no edge axis separates.

@@ -27,7 +27,7 @@ pub(crate) struct Bounds {
     pub(crate) direction: [[f32; 16]; 3],
 }
 
-/// 2^-100: the least square of a guess that is certified.
+/// The least squared distance of a guess that is certified: 2^-100, in squares of the frame's unit.
 const MIN_CERTIFIED_SQUARE: f32 = f32::from_bits((127 - 100) << 23);
 
 /// The error of a bound: see above. `Local` charges 2^-140 to every coordinate.

@@ -19,10 +19,10 @@ use crate::traverse::placement::Placement;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 
-/// Unit roundoff of f32.
+/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
 pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
 
-/// Absolute error charged to each coordinate: 2^-140 units of the frame.
+/// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
 const UNDERFLOW: f32 = f32::from_bits(1 << 9);
 
 /// The frame that all pairs of packets of a query share.

@@ -58,6 +58,7 @@ fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
 /// point `d`, so it has the same error bound.
 #[inline(always)]
 fn heights(plane: &Triangle, points: &Triangle) -> [f64; 3] {
+    /// The bound of the filter's error, as a fraction of the permanent.
     const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
     let u = subtract(plane[1], plane[0]);
     let v = subtract(plane[2], plane[0]);

@@ -110,7 +110,7 @@ fn max_triangles(side: Shape<'_>) -> u64 {
     pages * MAX_TRIANGLES_PER_PAGE + layout.duplicate_ids(bytes).len() as u64
 }
 
-/// A page has at most 62 treelets of 8 children, each of which may be a packet.
+/// The most triangles of a page: it has at most 62 treelets of 8 children, each of which may be a packet.
 const MAX_TRIANGLES_PER_PAGE: u64 = 62 * 8 * PACKET as u64;
 
 /// Returns the rule that is broken where there are more contacts than pairs of triangles.

@@ -17,9 +17,9 @@ use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::realign::{cone, magnitudes, rows_by_cone};
 use bvh_format::slabs::{Group, row};
 
-/// Unit roundoff of f32.
+/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
-/// Absolute error charged to an end, mesh units: 2^-147, twice what four roundings of subnormal numbers give.
+/// The error that underflow adds to an end, in mesh units: 2^-147, twice what four roundings of subnormal numbers give.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 
 /// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end

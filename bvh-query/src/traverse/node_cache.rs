@@ -63,6 +63,7 @@ pub(crate) struct CachedNode {
     pub(crate) count: usize,
 }
 
+/// Stands for the number of a node that has not been opened.
 const CLOSED: u32 = u32::MAX;
 
 impl CachedNode {
@@ -128,7 +129,7 @@ pub(crate) struct NodeCache {
 
 /// The most treelets of a page by rule 17: its header and one anchor take two of its 64 lines.
 const MAX_TREELETS_PER_PAGE: usize = 62;
-/// A `ChildRef` has 29 bits for the number of a node. That many nodes take 600 GB.
+/// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
 
 impl NodeCache {

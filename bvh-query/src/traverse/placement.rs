@@ -4,7 +4,7 @@ use crate::file::bvh::Bvh;
 use crate::pose::Pose;
 use bvh_format::object::Object;
 
-/// Relative error charged to all f64 work of a pose: 32 roundings, three times what there are at most.
+/// The relative error of all computations of a pose in `f64`: 32 roundings, three times the most that occur.
 pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// The pose of object B in the frame of object A, both around their origins.

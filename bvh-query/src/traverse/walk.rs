@@ -115,15 +115,16 @@ const MAX_LISTED_PAIRS: usize = 1024;
 /// How many pairs of leaf packets are visited together. Answers do not depend on it.
 const LEAF_PAIRS_PER_BATCH: usize = 4;
 
-/// Visits that a look ahead may make on top of those of the query: they cost less than finding out whether they pay.
+/// The number of visits that a look ahead may make beyond those of the query: they cost less than finding out whether
+/// they pay.
 const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
 
 /// A node this many times larger than its partner is opened alone, so that its children meet the partner at its size.
 const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
 
-/// Node tests along A's directions alone, before B's are prepared: most queries of separated meshes end before. In CAD
-/// models, whose faces follow the axes of their own frame, B's directions separate up to half of the pairs that A's
-/// leave, in scans an eighth.
+/// The number of node tests along A's directions alone before B's are prepared: most queries of separated meshes end
+/// before. In CAD models, whose faces follow the axes of their own frame, B's directions separate up to half of the
+/// pairs that A's leave, in scans an eighth.
 const NODE_TESTS_BEFORE_B_DIRECTIONS: u64 = 16;
 
 /// Node tests before the triangles of large leaf packets are bounded one by one. Most queries of meshes of similar size

@@ -16,13 +16,13 @@ const FAINT: RGBColor = RGBColor(200, 200, 200);
 
 /// Width and height of a panel in pixels.
 const PANEL: (u32, u32) = (560, 360);
-/// Height of the title and the legend of a figure.
+/// Height of the title and the legend of a figure, in pixels.
 const HEAD: u32 = 54;
-/// Room at the right of a panel for its labels.
+/// Width of the room at the right of a panel for its labels, in pixels.
 const LABELS: u32 = 170;
-/// Height of a line of labels.
+/// Height of a line of labels, in pixels.
 const LINE: f64 = 15.0;
-/// The part of an axis that is left of its least figure and holds those that are 0.
+/// The part of an axis that is left of its least figure and holds those that are 0, as a fraction of the rest.
 const ZERO: f64 = 0.1;
 
 type Error = Box<dyn std::error::Error>;

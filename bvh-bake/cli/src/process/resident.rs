@@ -31,6 +31,7 @@ pub(crate) fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     #[allow(unsafe_code, reason = "no safe function limits what the C library keeps")]
     {
+        /// The size in bytes from which the allocator takes a block from the system and returns it at once.
         const LARGE_BYTES: i32 = 1 << 20;
         // SAFETY: `mallopt` takes two integers by value and may be called at any time. A value out of range makes it
         // return 0 and change nothing.

@@ -4,7 +4,7 @@ use crate::console::Failure;
 use bvh_query::Pose;
 use std::path::Path;
 
-/// The numbers of a pose.
+/// The number of numbers of a pose: the entries of a 3 by 4 matrix.
 const NUMBERS: usize = 12;
 /// The form of a pose, as messages state it.
 const EXPECTED: &str = "expected 12 numbers, the rows of the 3 by 4 matrix [R | t]";

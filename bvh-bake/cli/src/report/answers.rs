@@ -12,7 +12,8 @@ use bvh_format::leaf::TriangleEncoding;
 use cbvh_measure::rounds::{Asked, Question};
 use cbvh_measure::spread::median;
 
-/// The rounding allowed to the product of a distance and 1 + an allowed error: two of 2^-53 each, with room.
+/// The factor that allows for rounding in the product of a distance and 1 + an allowed error: two roundings of 2^-53
+/// each are needed, and the factor allows eight.
 const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
 
 /// Returns the wrong answers, one line each, and the errors of each layout's answers, by question.

@@ -35,7 +35,7 @@ const QUESTIONS: [Question; 5] = [
     Question::Distance(1e-2),
     Question::Distance(1e-1),
 ];
-/// The place of the exact distance among them.
+/// The index of the exact distance in `QUESTIONS`.
 const EXACT_DISTANCE: usize = 1;
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {

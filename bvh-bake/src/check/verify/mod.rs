@@ -136,7 +136,7 @@ impl VerifyOptions {
     }
 }
 
-/// The value of `VerifyOptions::max_memory` if the caller gives none.
+/// The bytes of memory for a process whose caller gives no `VerifyOptions::max_memory`.
 const USUAL_MEMORY: u64 = 3 << 29;
 
 /// Verifies a file of any size like [`verify`]. The file and the meshes are read piece by piece.

@@ -32,7 +32,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::thread;
 
-/// The share of OBJ text and of PLY bytes in the step of reading. The rest of the step is spent on their corners.
+/// The shares of OBJ text and of PLY bytes in the work of reading, in parts of [`WHOLE`]. The rest is spent on their
+/// corners.
 const OBJ_TEXT: u64 = 10;
 const PLY_BYTES: u64 = 10;
 

@@ -25,8 +25,8 @@ use gltf::mesh::{Mode, Semantic};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// The most vertices and indices of a scene beyond the bytes of its buffers. A small file can require any number of
-/// them by placing one mesh many times.
+/// The number of vertices and indices that a scene may have besides one per byte of its buffers. A small file can
+/// require any number of them by placing one mesh many times.
 const MAX_COPIES: u64 = 1 << 26;
 /// The number of vertices that a primitive counts as, besides its own, to bound the time that primitives take.
 const PRIMITIVE_ITEMS: usize = 16;
