@@ -7,7 +7,7 @@
 //! A k-DOP is a pair of `f32` ends per direction, rounded outward: along each direction, the true extent of the geometry
 //! lies within `[lo, hi]`.
 
-use crate::leaf::{PACKET, Packet, from_ordered, to_ordered};
+use crate::ordered::{from_ordered, to_ordered};
 
 /// The list of directions. `DIRECTIONS[..3]` are a box's, `[..7]` dop14's, `[..13]` dop26's.
 pub const DIRECTIONS: [[i8; 3]; 13] = [
@@ -69,13 +69,13 @@ impl Kdop {
     /// The bound of nothing. Joined with another k-DOP it gives that k-DOP.
     pub const EMPTY: Self = Self { lo: [f32::INFINITY; 13], hi: [f32::NEG_INFINITY; 13] };
 
-    /// The first `slabs` slabs of the k-DOP of a packet's lanes, as [`of_points`](Self::of_points) finds them.
+    /// The first `slabs` slabs of the k-DOP of four triangles, `[corner][axis][triangle]`, as
+    /// [`of_points`](Self::of_points) finds them.
     ///
     /// Twelve points at a time along one direction after the other: compilers turn the loops into vector code.
-    pub(crate) fn of_lanes(packet: &Packet, slabs: usize) -> Self {
-        let axes: &[[[f32; PACKET]; 3]; 3] = &packet.corners;
+    pub(crate) fn of_lanes(corners: &[[[f32; 4]; 3]; 3], slabs: usize) -> Self {
         let coordinates: [[f32; 12]; 3] =
-            [0, 1, 2].map(|axis| std::array::from_fn(|place| axes[place / PACKET][axis][place % PACKET]));
+            [0, 1, 2].map(|axis| std::array::from_fn(|place| corners[place / 4][axis][place % 4]));
         if !all_sums_are_exact(&coordinates) {
             let points = (0..12).map(|place| [0, 1, 2].map(|axis| coordinates[axis][place]));
             let (mut kdop, whole) = (Self::EMPTY, Self::of_points(points));
@@ -263,6 +263,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::leaf::Packet;
 
     /// A number of the test in units of 2^-100. Points and sums are multiples of 2^-62, and the neighbours of sums that
     /// are not 0 are multiples of 2^-86.

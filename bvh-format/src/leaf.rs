@@ -13,6 +13,7 @@
 
 use crate::bits::{BitWriter, bit_width, read_bits};
 use crate::kdop::Kdop;
+use crate::ordered::{from_ordered, to_ordered};
 use bytemuck::{Pod, Zeroable};
 
 /// Triangles in a full leaf packet.
@@ -85,7 +86,7 @@ impl Packet {
     /// other slabs are empty.
     pub fn kdop(&self, triangles: usize, slabs: usize) -> Kdop {
         if !(1..PACKET).contains(&triangles) {
-            return Kdop::of_lanes(self, slabs);
+            return Kdop::of_lanes(&self.corners, slabs);
         }
         // A file from elsewhere may hold anything in the lanes beyond.
         let mut packet = *self;
@@ -93,7 +94,7 @@ impl Packet {
             let last = lanes[triangles - 1];
             lanes[triangles..].fill(last);
         }
-        Kdop::of_lanes(&packet, slabs)
+        Kdop::of_lanes(&packet.corners, slabs)
     }
 
     /// The three corners of the triangle in a lane.
@@ -332,24 +333,6 @@ pub fn decode_packet(encoding: TriangleEncoding, block: &[u8], index: usize) -> 
     }
 }
 
-/// Maps the bits of a float to an integer. Integers are in the same order as their floats.
-#[inline]
-pub fn to_ordered(value: f32) -> i32 {
-    flip(value.to_bits() as i32)
-}
-
-/// Returns the float of an ordered integer.
-#[inline]
-pub(crate) fn from_ordered(ordered: i32) -> f32 {
-    f32::from_bits(flip(ordered) as u32)
-}
-
-/// Flips all bits but the sign of a negative number. It is its own inverse.
-#[inline]
-fn flip(bits: i32) -> i32 {
-    bits ^ ((bits >> 31) as u32 >> 1) as i32
-}
-
 /// Returns 2^exponent for the exponent of a normal float, and 0 for a smaller one.
 #[inline]
 fn power_of_two(exponent: i8) -> f32 {
@@ -569,17 +552,6 @@ mod tests {
             }
         }
         assert!(at_once > 1000, "{at_once} of 20000 at once");
-    }
-
-    #[test]
-    fn ordered_integers_keep_the_order() {
-        let values = [-1e30f32, -1.0, -1e-40, 0.0, 1e-45, 1e-40, 0.5, 1.0, 1e30];
-        for pair in values.windows(2) {
-            assert!(to_ordered(pair[0]) < to_ordered(pair[1]));
-        }
-        for value in values {
-            assert_eq!(from_ordered(to_ordered(value)).to_bits(), value.to_bits());
-        }
     }
 
     #[test]

@@ -61,6 +61,7 @@ pub mod kdop;
 pub mod layout;
 pub mod leaf;
 pub mod object;
+pub mod ordered;
 pub mod page;
 pub mod profile;
 pub mod quantize;

@@ -54,7 +54,8 @@ fn forged_files_end_with_an_exit_code() {
             invalid += u64::from(ended.code == 3);
         }
     }
-    assert!(fine > 0 && fine + invalid > 3 * files && invalid > files / 2, "{fine} fine, {invalid} invalid");
+    // Of six ways per file, two to three are fine and three invalid; the rest asks for a page or treelet that is not there.
+    assert!(fine > files && invalid > 2 * files, "{fine} fine, {invalid} invalid");
 }
 
 /// Only `validate` checks rule 34. The other commands must not add up the numbers that the records state.

@@ -5,7 +5,7 @@
 
 use crate::pages::plan::{PagePlan, Place};
 use crate::tree::arena::Arena;
-use crate::tree::treelets::ChildKind;
+use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::page::{PAGE, PagePatcher, PagePlace, PageShape, PageWriter, RootRef, WrittenPage};

@@ -1,13 +1,29 @@
 //! Treelets in one array: those of a brick, or the tree above the bricks followed by what the bricks left over.
 
 use crate::tree::PacketTriangles;
-use crate::tree::treelets::{Child, ChildKind};
+use crate::tree::bricks::BrickIndex;
 use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use std::ops::Range;
 
 /// A treelet by number in an arena; children have higher numbers than their parents.
 pub(crate) type TreeletIndex = u32;
+
+/// A child of a treelet.
+#[derive(Clone, Copy)]
+pub(crate) struct Child {
+    /// The tight k-DOP of all triangles below, in the slabs that the profile stores.
+    pub(crate) kdop: Kdop,
+    pub(crate) kind: ChildKind,
+}
+
+#[derive(Clone, Copy)]
+pub(crate) enum ChildKind {
+    Leaf(PacketTriangles),
+    Treelet(TreeletIndex),
+    /// The first treelet of a brick whose treelets are in an arena of their own.
+    Brick(BrickIndex),
+}
 
 /// A tree of treelets, depth-first. The children of all treelets are in one array, treelet after treelet.
 pub(crate) struct Arena {

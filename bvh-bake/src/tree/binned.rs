@@ -3,7 +3,8 @@
 use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::swept;
-use super::{Builder, PACKET, PacketTriangles};
+use super::{Builder, PacketTriangles};
+use wide::f32x4;
 
 /// The number of bins along each axis of a node's box.
 const BINS_PER_AXIS: usize = 16;
@@ -92,14 +93,14 @@ impl Builder {
         }
         // All centres are nearly equal, or the tree is deep: split into halves of whole treelets.
         let axis = centres.longest();
-        let centre = |reference: &Reference| reference.aabb().centre();
+        let centre = |reference: &Reference| reference.aabb().centre().to_array();
         references.sort_unstable_by(|a, b| {
-            centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.triangle.cmp(&b.triangle))
+            centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.triangle().cmp(&b.triangle()))
         });
         let middle = (references.len() / 2).next_multiple_of(self.treelet);
         let centres = [&references[..middle], &references[middle..]].map(|side| {
             let mut centres = Aabb::EMPTY;
-            side.iter().for_each(|reference| centres.join(&Aabb::of_point(centre(reference))));
+            side.iter().for_each(|reference| centres.join(&Aabb::of_point(reference.aabb().centre())));
             centres
         });
         Split { middle, bounds, centres }
@@ -113,7 +114,7 @@ impl Builder {
         for plane in (1..N).rev() {
             right += bins[plane].0;
             bounds.join(&bins[plane].1);
-            right_cost[plane] = if right > 0 { cost.of(&bounds, weight(right)) } else { f32::INFINITY };
+            right_cost[plane] = if right > 0 { cost.of(&bounds, right) } else { f32::INFINITY };
         }
         let mut best: Option<(f32, usize)> = None;
         let (mut bounds, mut left) = (Aabb::EMPTY, 0);
@@ -123,7 +124,7 @@ impl Builder {
             if left == 0 || right_cost[plane] == f32::INFINITY {
                 continue;
             }
-            let cost = cost.of(&bounds, weight(left)) + right_cost[plane];
+            let cost = cost.of(&bounds, left) + right_cost[plane];
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, plane));
             }
@@ -135,13 +136,6 @@ impl Builder {
 /// Estimates the nodes of a tree of `triangles` triangles. Packets hold more than three triangles on average.
 fn expected_nodes(triangles: usize) -> usize {
     triangles * 5 / 8 + 1
-}
-
-/// Returns the weight of `count` triangles, which counts whole packets. This fills the packets; without it, a fifth
-/// of their places stay empty.
-#[inline(always)]
-pub(super) fn weight(count: usize) -> f32 {
-    count.next_multiple_of(PACKET) as f32
 }
 
 struct Split {
@@ -175,7 +169,7 @@ fn fill_bins(references: &[Reference], binning: &Binning<BINS_PER_AXIS>) -> Bins
 fn partition(
     references: &mut [Reference],
     scratch: &mut [Reference],
-    is_left: impl Fn([f32; 4]) -> bool,
+    is_left: impl Fn(f32x4) -> bool,
 ) -> (usize, [Aabb; 2]) {
     let mut ends = [0; 2];
     let mut centres = [Aabb::EMPTY; 2];
@@ -187,7 +181,10 @@ fn partition(
         references[ends[0]] = reference;
         scratch[ends[1]] = reference;
         ends[side] += 1;
-        centres[side].join(&Aabb::of_point(centre));
+        // Both boxes stay in registers: the one that the centre is not in is joined with an empty box.
+        let is_right = f32x4::splat(f32::from_bits((side as u32).wrapping_neg()));
+        centres[0].join(&Aabb::of_point(centre).unless(is_right));
+        centres[1].join(&Aabb::of_point(centre).unless(!is_right));
     }
     references[ends[0]..].copy_from_slice(&scratch[..ends[1]]);
     (ends[0], centres)

@@ -1,21 +1,24 @@
-//! Boxes of triangles in eight lanes, which compilers join with two vector instructions, and the cost of splitting
-//! them.
+//! Boxes of triangles in two registers of four lanes, and the cost of splitting them.
 
 use crate::triangles::Corners;
-use bytemuck::{Pod, Zeroable};
+use bvh_format::leaf::PACKET;
+use wide::f32x4;
 
-/// A box. It holds the lower ends of three axes and the negated upper ends, each with a spare lane, so that two boxes
-/// are joined by taking the lesser of all lanes.
+/// A box: the lower ends along three axes and the negated upper ends, each with a lane to spare, so that two boxes are
+/// joined by taking the lesser of all lanes. The spare lanes mean nothing.
 #[derive(Clone, Copy)]
-#[repr(align(32))]
-pub(crate) struct Aabb([f32; 8]);
+pub(crate) struct Aabb {
+    lo: f32x4,
+    negated_hi: f32x4,
+}
 
 impl Aabb {
-    pub(crate) const EMPTY: Self = Self([f32::INFINITY; 8]);
+    pub(crate) const EMPTY: Self =
+        Self { lo: f32x4::new([f32::INFINITY; 4]), negated_hi: f32x4::new([f32::INFINITY; 4]) };
 
-    pub(crate) fn of_point(point: [f32; 4]) -> Self {
-        let [x, y, z, w] = point;
-        Self([x, y, z, w, -x, -y, -z, -w])
+    #[inline(always)]
+    pub(crate) fn of_point(point: f32x4) -> Self {
+        Self { lo: point, negated_hi: -point }
     }
 
     /// Returns the box of a triangle.
@@ -26,33 +29,45 @@ impl Aabb {
 
     #[inline(always)]
     pub(crate) fn join(&mut self, other: &Self) {
-        for lane in 0..8 {
-            // This is `min` without its handling of NaN, which does not occur here.
-            let (mine, its) = (self.0[lane], other.0[lane]);
-            self.0[lane] = if its < mine { its } else { mine };
-        }
+        // This is `min` without its handling of NaN, which does not occur here. Of equal ends the box keeps its own.
+        self.lo = other.lo.fast_min(self.lo);
+        self.negated_hi = other.negated_hi.fast_min(self.negated_hi);
     }
 
+    /// Returns the box, or an empty one if all bits of the condition are set.
+    #[inline(always)]
+    pub(super) fn unless(&self, condition: f32x4) -> Self {
+        let chosen = |own: f32x4| condition.bitselect(f32x4::splat(f32::INFINITY), own);
+        Self { lo: chosen(self.lo), negated_hi: chosen(self.negated_hi) }
+    }
+
+    #[inline(always)]
     pub(crate) fn lo(&self, axis: usize) -> f32 {
-        self.0[axis]
+        self.lo.as_array()[axis]
     }
 
+    #[inline(always)]
     pub(crate) fn hi(&self, axis: usize) -> f32 {
         // Files store positive zeros only.
-        0.0 - self.0[axis + 4]
+        0.0 - self.negated_hi.as_array()[axis]
     }
 
     /// Returns the extent along an axis. It does not overflow for coordinates of at most 2^120, nor for twice as
     /// large ones.
     #[inline(always)]
     pub(super) fn extent(&self, axis: usize) -> f32 {
-        -(self.0[axis] + self.0[axis + 4])
+        self.extents().as_array()[axis]
     }
 
-    /// Returns twice the centre, and a spare lane.
     #[inline(always)]
-    pub(crate) fn centre(&self) -> [f32; 4] {
-        std::array::from_fn(|axis| self.0[axis] - self.0[axis + 4])
+    fn extents(&self) -> f32x4 {
+        -(self.lo + self.negated_hi)
+    }
+
+    /// Returns twice the centre. The spare lane of a triangle's box is 0.
+    #[inline(always)]
+    pub(crate) fn centre(&self) -> f32x4 {
+        self.lo - self.negated_hi
     }
 
     /// Returns the axis of the largest extent, and the first of several that are equal.
@@ -63,7 +78,8 @@ impl Aabb {
     /// Returns the sum of the extents, which is at most 3 * 2^121.
     #[inline(always)]
     pub(super) fn girth(&self) -> f32 {
-        self.extent(0) + self.extent(1) + self.extent(2)
+        let [x, y, z, _] = self.extents().to_array();
+        x + y + z
     }
 
     /// Returns the square of the sum of the extents, an estimate of how likely a traversal is to visit the box. See
@@ -74,42 +90,40 @@ impl Aabb {
     }
 }
 
-/// The box of a triangle and the triangle's number.
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C, align(32))]
-pub(super) struct Reference {
-    lo: [f32; 3],
-    pub(super) triangle: u32,
-    negated_hi: [f32; 3],
-    spare: u32,
-}
+/// The box of a triangle and the triangle's number, which stands in both spare lanes of the box: taking lesser lanes
+/// costs the same whatever they hold, and their difference is 0.
+#[derive(Clone, Copy)]
+pub(super) struct Reference(Aabb);
 
 impl Reference {
+    /// A reference that does not matter.
+    pub(super) const NONE: Self = Self(Aabb::EMPTY);
+
     #[inline(always)]
     pub(super) fn new(triangle: u32, corners: &Corners) -> Self {
-        let end = |lesser: fn(f32, f32) -> f32, axis: usize| {
-            lesser(lesser(corners[0][axis], corners[1][axis]), corners[2][axis])
-        };
-        let lo = [0, 1, 2].map(|axis| end(f32::min, axis));
-        let negated_hi = [0, 1, 2].map(|axis| -end(f32::max, axis));
-        Self { lo, triangle, negated_hi, spare: 0 }
+        let lesser = |ends: [f32x4; 3]| ends[2].fast_min(ends[1].fast_min(ends[0]));
+        let number = f32::from_bits(triangle);
+        let lanes = corners.map(|[x, y, z]| f32x4::new([x, y, z, number]));
+        let negated = corners.map(|[x, y, z]| f32x4::new([-x, -y, -z, number]));
+        Self(Aabb { lo: lesser(lanes), negated_hi: lesser(negated) })
+    }
+
+    #[inline(always)]
+    pub(super) fn triangle(&self) -> u32 {
+        self.0.lo.as_array()[3].to_bits()
     }
 
     #[inline(always)]
     pub(super) fn aabb(&self) -> Aabb {
-        // Masking takes one load and one instruction, less than putting the box together from six numbers.
-        let lanes: &[u32; 8] = bytemuck::cast_ref(self);
-        /// Bit masks of the lanes: all bits for an end of the box, none for another number.
-        const AXES: [u32; 8] = [!0, !0, !0, 0, !0, !0, !0, 0];
-        Aabb(std::array::from_fn(|lane| f32::from_bits(lanes[lane] & AXES[lane])))
+        self.0
     }
 }
 
 /// Sorts centres into bins along each axis. The first and the last bin are half as wide as the others.
 #[derive(Clone, Copy)]
 pub(super) struct Binning<const BINS: usize> {
-    from: [f32; 4],
-    scale: [f32; 4],
+    from: f32x4,
+    scale: f32x4,
 }
 
 impl<const BINS: usize> Binning<BINS> {
@@ -117,21 +131,19 @@ impl<const BINS: usize> Binning<BINS> {
     pub(super) fn new(centres: &Aabb) -> Self {
         let scale = |axis: usize| {
             let extent = centres.extent(axis);
-            if axis < 3 && extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 }
+            if extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 }
         };
-        let from = std::array::from_fn(|axis| if axis < 3 { centres.lo(axis) } else { 0.0 });
-        Self { from, scale: std::array::from_fn(scale) }
+        let axes = |value: &dyn Fn(usize) -> f32| f32x4::new([value(0), value(1), value(2), 0.0]);
+        Self { from: axes(&|axis| centres.lo(axis)), scale: axes(&scale) }
     }
 
     /// Returns the bins of a centre, each less than `BINS`, which is a power of two.
     #[inline(always)]
-    pub(super) fn bins(&self, centre: [f32; 4]) -> [usize; 4] {
+    pub(super) fn bins(&self, centre: f32x4) -> [usize; 3] {
         // Adding 2^23 leaves the nearest whole number in the last bits. A scale that overflowed, as it does for tiny
         // extents, puts all centres into one bin.
-        std::array::from_fn(|axis| {
-            let bin = (centre[axis] - self.from[axis]) * self.scale[axis] + 8388608.0;
-            bin.to_bits() as usize & (BINS - 1)
-        })
+        let [x, y, z, _] = ((centre - self.from) * self.scale + f32x4::splat(8388608.0)).to_array();
+        [x, y, z].map(|bin| bin.to_bits() as usize & (BINS - 1))
     }
 }
 
@@ -155,8 +167,21 @@ impl Cost {
     }
 
     #[inline(always)]
-    pub(super) fn of(self, bounds: &Aabb, weight: f32) -> f32 {
-        let girth = bounds.girth() * self.scale + 1.0;
-        weight * (girth * girth)
+    pub(super) fn of(self, bounds: &Aabb, triangles: usize) -> f32 {
+        self.of_girth(bounds.girth(), triangles)
     }
+
+    /// Returns the cost of a side whose extents add up to `girth`.
+    #[inline(always)]
+    pub(super) fn of_girth(self, girth: f32, triangles: usize) -> f32 {
+        let girth = girth * self.scale + 1.0;
+        weight(triangles) * (girth * girth)
+    }
+}
+
+/// Returns the weight of `count` triangles, which counts whole packets. This fills the packets; without it, a fifth
+/// of their places stay empty.
+#[inline(always)]
+fn weight(count: usize) -> f32 {
+    count.next_multiple_of(PACKET) as f32
 }

@@ -193,7 +193,7 @@ impl Builder {
         let references =
             triangles.iter().zip(0..).map(|(triangle, number)| Reference::new(number, &triangle.corners));
         let mut references: Vec<Reference> = references.collect();
-        let mut scratch = vec![Reference::default(); references.len()];
+        let mut scratch = vec![Reference::NONE; references.len()];
         self.brick(&mut references, &mut scratch)
     }
 }

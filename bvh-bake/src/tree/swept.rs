@@ -3,10 +3,9 @@
 //! The references are sorted along each axis once, and splits keep these orders.
 
 use super::binary::{Content, NONE, NodeIndex, Tree};
-use super::binned::weight;
 use super::boxes::{Aabb, Cost, Reference};
 use super::{Builder, PACKET, PacketTriangles};
-use bvh_format::leaf::to_ordered;
+use bvh_format::ordered::to_ordered;
 
 /// The most triangles that are swept, because sets of them have 64 bits.
 pub(super) const MAX_SWEPT: usize = 64;
@@ -22,7 +21,7 @@ pub(super) fn add(
     let mut keys = [[0u64; MAX_SWEPT]; 3];
     for (place, reference) in references.iter().enumerate() {
         boxes[place] = reference.aabb();
-        let centre = boxes[place].centre();
+        let centre = boxes[place].centre().to_array();
         for axis in 0..3 {
             // The key holds the centre and below it the place in the list, so that equal centres keep their order.
             let ordered = to_ordered(centre[axis]) as u32 ^ 1 << 31;
@@ -58,7 +57,7 @@ impl Sweep<'_> {
         let mut bounds = Aabb::EMPTY;
         orders[0].iter().for_each(|&place| bounds.join(self.aabb(place)));
         if count <= PACKET {
-            let numbers = orders[0].iter().map(|&place| self.references[usize::from(place)].triangle);
+            let numbers = orders[0].iter().map(|&place| self.references[usize::from(place)].triangle());
             return tree.add(bounds, Content::Leaf(PacketTriangles::new(numbers)));
         }
         let index = tree.add(bounds, Content::Inner([NONE; 2]));
@@ -88,16 +87,23 @@ impl Sweep<'_> {
         let mut best = (f32::INFINITY, 0, PACKET);
         for axis in 0..3 {
             let order = &orders[axis][..count];
-            let mut right_cost = [0.0; MAX_SWEPT];
-            let mut right = Aabb::EMPTY;
-            for position in (1..count).rev() {
-                right.join(self.aabb(order[position]));
-                right_cost[position % MAX_SWEPT] = cost.of(&right, weight(count - position));
-            }
-            let mut left = Aabb::EMPTY;
+            // The girths come first, one after the other; what follows has no order and takes several at a time.
+            let mut girths = [[0.0; MAX_SWEPT]; 2];
+            let (mut left, mut right) = (Aabb::EMPTY, Aabb::EMPTY);
             for position in 1..count {
                 left.join(self.aabb(order[position - 1]));
-                let cost = cost.of(&left, weight(position)) + right_cost[position % MAX_SWEPT];
+                girths[0][position % MAX_SWEPT] = left.girth();
+                right.join(self.aabb(order[count - position]));
+                girths[1][(count - position) % MAX_SWEPT] = right.girth();
+            }
+            let mut costs = [0.0; MAX_SWEPT];
+            for position in 1..count {
+                let at = position % MAX_SWEPT;
+                costs[at] =
+                    cost.of_girth(girths[0][at], position) + cost.of_girth(girths[1][at], count - position);
+            }
+            for position in 1..count {
+                let cost = costs[position % MAX_SWEPT];
                 if cost < best.0 && may(position) {
                     best = (cost, axis, position);
                 }

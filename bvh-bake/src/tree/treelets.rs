@@ -8,7 +8,7 @@
 
 use crate::tree::MAX_CHILDREN;
 use crate::tree::PacketTriangles;
-use crate::tree::arena::{Arena, TreeletIndex};
+use crate::tree::arena::{Arena, Child, ChildKind, TreeletIndex};
 use crate::tree::binary::{Content, NodeIndex, Tree};
 use crate::tree::bricks::BrickIndex;
 use crate::triangles::Triangle;
@@ -21,22 +21,6 @@ const CHILDREN_PER_TASK: usize = 2048;
 
 /// The fixed cost of a treelet, in mean sizes of nodes with two leaves.
 const TREELET_COST: f64 = 0.5;
-
-/// A child of a treelet.
-#[derive(Clone, Copy)]
-pub(crate) struct Child {
-    /// The tight k-DOP of all triangles below, in the slabs that the profile stores.
-    pub(crate) kdop: Kdop,
-    pub(crate) kind: ChildKind,
-}
-
-#[derive(Clone, Copy)]
-pub(crate) enum ChildKind {
-    Leaf(PacketTriangles),
-    Treelet(TreeletIndex),
-    /// The first treelet of a brick whose treelets are in an arena of their own.
-    Brick(BrickIndex),
-}
 
 /// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child.
 pub(crate) fn cut_brick(

@@ -5,7 +5,7 @@
 //! these are compared with the reference for the same moved triangles, and their difference from the answers for the
 //! mesh itself is an error that is reported.
 
-use super::measured::Baked;
+use super::layout::Layout;
 use super::row::Errors;
 use super::{EXACT_DISTANCE, QUESTIONS};
 use bvh_format::leaf::TriangleEncoding;
@@ -17,17 +17,17 @@ use cbvh_measure::spread::median;
 const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
 
 /// Returns the wrong answers, one line each, and the errors of each layout's answers, by question.
-pub(super) fn judge(pair: &str, bakes: &[Baked], asked: &[Vec<Asked>]) -> (Vec<String>, Vec<Vec<Errors>>) {
+pub(super) fn judge(pair: &str, layouts: &[Layout], asked: &[Vec<Asked>]) -> (Vec<String>, Vec<Vec<Errors>>) {
     let reference = |triangles: TriangleEncoding| {
-        let place = bakes.iter().position(|bake| bake.layout.is_reference(triangles));
+        let place = layouts.iter().position(|layout| layout.is_reference(triangles));
         &asked[place.unwrap_or(0)]
     };
     let exact = &reference(TriangleEncoding::F32)[EXACT_DISTANCE].answers;
     let mut wrong = Vec::new();
     let mut errors = Vec::new();
-    for (bake, found) in bakes.iter().zip(asked) {
-        let right = reference(bake.layout.triangles);
-        let name = format!("{pair}, {}", bake.layout.name());
+    for (layout, found) in layouts.iter().zip(asked) {
+        let right = reference(layout.triangles);
+        let name = format!("{pair}, {}", layout.name());
         let mut errors_of = Vec::new();
         for (number, question) in QUESTIONS.into_iter().enumerate() {
             let expected = match question {
@@ -78,7 +78,6 @@ fn errors_against(exact: &[f64], found: &[f64]) -> Errors {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::Layout;
     use super::*;
 
     #[test]
@@ -102,25 +101,18 @@ mod tests {
 
     #[test]
     fn one_wrong_answer_is_named() {
-        let mesh = bvh_bake::mesh::Mesh::from_triangles(
-            vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            vec![[0, 1, 2]],
-        );
-        let (bytes, _) = bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default()).unwrap();
-        let a = std::sync::Arc::new(bvh_query::Bvh::from_bytes(bytes).unwrap());
-        let baked = |layout| Baked { layout, b: a.clone(), a: a.clone(), size: Default::default() };
-        let bakes: Vec<Baked> = Layout::all().map(baked).collect();
+        let layouts: Vec<Layout> = Layout::all().collect();
         // The answers in two poses, of which the second is 2 apart.
         let asked = |question: Question| {
             let answers = if question == Question::Collide { vec![1.0, 0.0] } else { vec![0.0, 2.0] };
             Asked { answers, ..Asked::default() }
         };
-        let mut found = vec![QUESTIONS.map(asked).to_vec(); bakes.len()];
-        assert!(judge("pair", &bakes, &found).0.is_empty());
-        let layout = bakes.iter().position(|bake| bake.layout.name() == "dop6-u8 packed").unwrap();
-        found[layout][0].answers[1] = 1.0;
+        let mut found = vec![QUESTIONS.map(asked).to_vec(); layouts.len()];
+        assert!(judge("pair", &layouts, &found).0.is_empty());
+        let place = layouts.iter().position(|layout| layout.name() == "dop6-u8 packed").unwrap();
+        found[place][0].answers[1] = 1.0;
         assert_eq!(
-            judge("pair", &bakes, &found).0,
+            judge("pair", &layouts, &found).0,
             ["pair, dop6-u8 packed, collide with an allowed error of 0, pose 2: expected 0.0, found 1.0"]
         );
     }

@@ -2,7 +2,6 @@
 
 use super::arguments::ReportArguments;
 use super::layout::Layout;
-use super::measured::Measured;
 use super::row::Row;
 use crate::query::stem;
 use bvh_query::{Backend, Bvh};
@@ -89,6 +88,14 @@ impl PairRecord {
             pinned,
         }
     }
+}
+
+/// The results of a pair.
+pub(super) struct Measured {
+    pub(super) record: PairRecord,
+    pub(super) rows: Vec<Row>,
+    /// Wrong answers, one line each.
+    pub(super) wrong: Vec<String>,
 }
 
 /// All of it.

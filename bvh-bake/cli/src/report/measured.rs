@@ -1,6 +1,6 @@
 //! Bakes one pair of meshes in all layouts, asks all questions and judges the answers.
 
-use super::document::{PairRecord, Settings};
+use super::document::{Measured, PairRecord, Settings};
 use super::layout::Layout;
 use super::row::{Row, Size};
 use super::{EXACT_DISTANCE, QUESTIONS, answers, pareto};
@@ -25,14 +25,6 @@ pub(super) struct Subject<'a> {
     pub(super) settings: &'a Settings,
     pub(super) backend: Backend,
     pub(super) tell: &'a (dyn Fn(&str) + Sync),
-}
-
-/// The results of a pair.
-pub(super) struct Measured {
-    pub(super) record: PairRecord,
-    pub(super) rows: Vec<Row>,
-    /// Wrong answers, one line each.
-    pub(super) wrong: Vec<String>,
 }
 
 /// Both meshes in one layout.
@@ -64,7 +56,8 @@ impl Subject<'_> {
             bakes.iter().map(|bake| Asking { a: &bake.a, b: &bake.b, poses: &poses }).collect();
         let (pinned, asked) = pinned(|| rounds(&subjects, &QUESTIONS, self.backend, self.settings.rounds));
         let asked = asked.map_err(failed)?;
-        let (wrong, errors) = answers::judge(&self.pair.name, &bakes, &asked);
+        let layouts: Vec<Layout> = bakes.iter().map(|bake| bake.layout).collect();
+        let (wrong, errors) = answers::judge(&self.pair.name, &layouts, &asked);
         let mut rows = Vec::new();
         let touching = touching(&bakes, &asked);
         for ((bake, asked), errors) in bakes.iter().zip(&asked).zip(errors) {
