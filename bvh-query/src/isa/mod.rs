@@ -27,6 +27,7 @@ pub(crate) trait Lanes: Copy {
     /// A truth value per lane.
     type Mask: Copy;
 
+    fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
@@ -125,6 +126,21 @@ pub(crate) trait Isa: Copy {
             mask &= mask - 1;
             at += 1;
         }
+    }
+
+    /// The lane of the least of the elements whose bits are set, none of which is NaN; of equal ones, the first. Without any
+    /// bit set, no lane: 16 or more.
+    #[inline(always)]
+    fn least(self, of: &[f32; 16], mask: u16) -> u32 {
+        let (mut mask, mut least) = (mask, mask.trailing_zeros());
+        while mask != 0 {
+            let lane = mask.trailing_zeros();
+            mask &= mask - 1;
+            if of[lane as usize & 15] < of[least as usize & 15] {
+                least = lane;
+            }
+        }
+        least
     }
 
     /// Prefetches the cache line of a byte that will soon be read.

@@ -1,4 +1,4 @@
-//! Tests that every backend decodes every profile to the bits of the scalar reference decoder.
+//! Tests that backends agree: they decode every profile to the bits of the reference, and find the same least lane.
 
 use super::{Backend, Isa, Task};
 use crate::traverse::decode::decode_group;
@@ -74,6 +74,43 @@ fn every_backend_decodes_to_the_bits_of_the_reference() {
                     }
                 }
             }
+        }
+    }
+}
+
+struct Least<'a>(&'a [f32; 16], u16);
+
+impl Task for Least<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> u32 {
+        isa.least(self.0, self.1)
+    }
+}
+
+#[test]
+fn every_backend_finds_the_first_of_the_least_lanes() {
+    let mut state = 5u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 40) as u32
+    };
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        assert!(backend.run(Least(&[0.0; 16], 0)) >= 16);
+        for round in 0..5000 {
+            // Few different values, so that some are equal; infinities and zeros of both signs among them.
+            let values = [f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1.5, -2.5, 1e-40, f32::MAX];
+            let lanes: [f32; 16] = std::array::from_fn(|_| values[random() as usize % values.len()]);
+            let mask = random() as u16;
+            let set = (0..16).filter(|lane| mask >> lane & 1 == 1);
+            let expected = set.reduce(|best, lane| if lanes[lane] < lanes[best] { lane } else { best });
+            let found = backend.run(Least(&lanes, mask));
+            assert_eq!(
+                (found < 16).then_some(found as usize),
+                expected,
+                "{backend}, round {round}: {lanes:?}"
+            );
         }
     }
 }

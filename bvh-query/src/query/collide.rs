@@ -1,4 +1,4 @@
-//! Decides whether the meshes touch, and finds the first contact in the order of the trees.
+//! Decides whether the meshes touch, and finds the first contact that a walk meets.
 
 use crate::error::QueryError;
 use crate::file::packet_cache::PacketCache;
@@ -45,16 +45,16 @@ impl Querier {
         pose: &Pose,
     ) -> Result<Option<Found>, QueryError> {
         each_pair(a, b, pose, |placed| {
-            let pair = self.find_contact(placed, Order::Nearest)?;
+            let pair = self.find_contact(placed)?;
             Ok(pair.map(|pair| Found { numbers: placed.numbers, pair }))
         })
     }
 
-    /// Returns one pair of triangles in contact. In `Order::Tree` it is the same pair on every backend.
+    /// Returns the first pair of triangles in contact that a walk meets. It is the same on every backend: bounds for contact
+    /// have the same bits, so pairs of nodes are met in the same order, and filters drop no pair in contact.
     pub(super) fn find_contact(
         &mut self,
         placed: &PlacedPair<'_>,
-        order: Order,
     ) -> Result<Option<TrianglePair>, QueryError> {
         self.memory.visit()?;
         if surely_apart(&placed.pair) {
@@ -66,7 +66,7 @@ impl Querier {
             placed,
             queue: &mut self.queue,
             packets: &mut self.packets,
-            order,
+            order: Order::Nearest,
             stats: QueryStats::default(),
             visit: |candidate| Ok(ControlFlow::Break(candidate)),
             found: None,

@@ -88,7 +88,7 @@ impl Querier {
             placed,
             queue: &mut self.queue,
             packets: &mut self.packets,
-            order: Order::Tree,
+            order: Order::Any,
             stats: QueryStats::default(),
             visit: |candidate| report(placed, candidate, visit),
             found: None,

@@ -1,19 +1,20 @@
 //! How far apart the meshes are, and whether they are within a distance.
 //!
-//! Touching meshes are at distance 0; the pair of triangles named is then the first in the order of the trees.
+//! Touching meshes are at distance 0; the pair of triangles named is then the first contact that a walk for contact
+//! meets.
 
 use crate::error::QueryError;
 use crate::file::packet_cache::PacketCache;
 use crate::file::shape::Shape;
+use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::query::answers::{Distance, QueryStats};
 use crate::query::bounding_volumes::sphere_gap;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
-use crate::query::placed_pair::{Found, Walk, each_pair};
+use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::search::{Best, Nearest, Search, ids};
-use crate::traverse::walk::Order;
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their
@@ -65,8 +66,15 @@ impl Querier {
         search: &mut Search,
     ) -> Result<Option<Best>, QueryError> {
         self.search(a, b, pose, search)?;
-        if search.best.is_some_and(|best| best.closest.distance == 0.0) {
-            return Ok(self.first_contact(a, b, pose)?.or(search.best));
+        if let Some(touching) = search.touching {
+            return Ok(match self.first_contact(a, b, pose)? {
+                Some(first) => Some(first),
+                // In a file with forged bounds the walk for contact may miss what the search has met.
+                None => each_pair(a, b, pose, |placed| {
+                    let is_its = placed.numbers == touching.numbers;
+                    is_its.then(|| self.contact(placed, touching.pair)).transpose()
+                })?,
+            });
         }
         Ok(search.best)
     }
@@ -132,7 +140,7 @@ impl Querier {
         Ok(())
     }
 
-    /// Returns the answer for touching meshes: the first contact in the order of the trees.
+    /// Returns the answer for touching meshes: the first contact that a walk meets, the same on every backend.
     #[cold]
     pub(super) fn first_contact(
         &mut self,
@@ -141,13 +149,17 @@ impl Querier {
         pose: &Pose,
     ) -> Result<Option<Best>, QueryError> {
         each_pair(a, b, pose, |placed| {
-            let Some(pair) = self.find_contact(placed, Order::Tree)? else { return Ok(None) };
-            let triangle_a = placed.triangle_a(pair.a, pair.lane_a)?;
-            let triangle_b = placed.triangle_b(pair.b, pair.lane_b)?;
-            let closest = self.backend.run(TriangleDistance(&triangle_a, &triangle_b));
-            let ids = ids(placed, &pair)?;
-            Ok(Some(Best { closest, found: Found { numbers: placed.numbers, pair }, ids }))
+            let pair = self.find_contact(placed)?;
+            pair.map(|pair| self.contact(placed, pair)).transpose()
         })
+    }
+
+    /// Returns the answer that names a pair of triangles in contact.
+    fn contact(&self, placed: &PlacedPair<'_>, pair: TrianglePair) -> Result<Best, QueryError> {
+        let triangle_a = placed.triangle_a(pair.a, pair.lane_a)?;
+        let triangle_b = placed.triangle_b(pair.b, pair.lane_b)?;
+        let closest = self.backend.run(TriangleDistance(&triangle_a, &triangle_b));
+        Ok(Best { closest, found: Found { numbers: placed.numbers, pair }, ids: ids(placed, &pair)? })
     }
 }
 

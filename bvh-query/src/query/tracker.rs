@@ -206,7 +206,7 @@ impl Tracker {
         }
         querier.search(a, b, pose, &mut search)?;
         if search.done {
-            self.pair = search.best.map(|best| best.found);
+            self.pair = search.found();
         } else {
             self.look_ahead(querier, a, b, pose, (d, moved));
         }
@@ -271,7 +271,7 @@ impl Tracker {
             self.waited = 0;
         } else {
             // The nearest pair known is perhaps the first to touch.
-            self.pair = search.best.map(|best| best.found).or(self.pair);
+            self.pair = search.found().or(self.pair);
             self.waited = (2 * self.waited + 1).min(MAX_QUESTIONS_BETWEEN_LOOKS);
             self.wait = self.waited;
         }

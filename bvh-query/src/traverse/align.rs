@@ -211,8 +211,9 @@ impl Alignment {
                 let four = FourRows { rows: &self.rows[term].as_chunks().0[q], lanes: &self.lanes[term][q] };
                 let (end, other) = isa.pick(&rows, parts[term], four);
                 let coefficients = isa.load(&self.coefficients[term][q]);
-                hi = end.mul_add(coefficients, hi);
-                lo = other.mul_add(coefficients, lo);
+                // Not fused, so that the ends, and with them the order of visits, are the same on every backend.
+                hi = end.mul(coefficients).add(hi);
+                lo = other.mul(coefficients).add(lo);
             }
             isa.store(lo, &mut aligned.lo[q]);
             isa.store(hi, &mut aligned.hi[q]);

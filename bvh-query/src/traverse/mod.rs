@@ -2,9 +2,10 @@
 
 pub(crate) mod align;
 pub(crate) mod decode;
+pub(crate) mod frames;
 pub(crate) mod large_leaf;
+pub(crate) mod leaf_pairs;
 pub(crate) mod node_cache;
 pub(crate) mod node_test;
 pub(crate) mod placement;
 pub(crate) mod walk;
-pub(crate) mod worklist;

@@ -1,7 +1,7 @@
-//! Caches opened nodes: a treelet is decoded once per query, however many partners its children meet.
+//! Caches opened nodes: a treelet is decoded once, however many partners its children meet.
 //!
-//! Each opened node remembers which of its children have been opened, so that finding one again is
-//! one load. Nodes of B are also re-aligned to A's directions when they are opened.
+//! Each opened node remembers which of its children have been opened, so that finding one again is one load. Decoded
+//! nodes do not depend on the pose, so they stay from one query to the next until there are many of them.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -125,15 +125,20 @@ pub(crate) struct NodeCache {
     used: usize,
     /// One more than the number of treelets that the object can have.
     max_nodes: usize,
+    /// The file and the first page of the object whose nodes these are.
+    of: Option<(u64, u32)>,
 }
 
 /// The most treelets of a page by rule 17: its header and one anchor take two of its 64 lines.
 const MAX_TREELETS_PER_PAGE: usize = 62;
 /// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
+/// With more nodes than this, the next walk starts anew. They take 300 KiB, less than the second-level cache of a core.
+const MAX_KEPT_NODES: usize = 256;
 
 impl NodeCache {
-    /// Forgets all nodes and opens the object's root. Returns the slabs of the root.
+    /// Starts a walk of an object. Nodes of the same object stay from the walk before, unless there are many. Returns the
+    /// slabs of the root.
     #[inline(always)]
     pub(crate) fn start<I: Isa>(
         &mut self,
@@ -141,21 +146,24 @@ impl NodeCache {
         bvh: &Bvh,
         object: &Object,
     ) -> Result<NodeSlabs, QueryError> {
-        if self.nodes.is_empty() {
-            self.nodes.resize(64, CachedNode::EMPTY);
-        }
         let page = object.record().first_page.get();
-        let root = &mut self.nodes[0];
         let slabs = bvh.page(object, page)?.anchor_slabs(0);
-        root.groups[0] = spread(isa, &slabs);
-        root.links = Links { kinds: 1, ..Links::default() };
-        root.page = page;
-        root.extents[0] = f32::INFINITY;
-        root.opened = [CLOSED; 8];
-        root.count = 1;
-        self.used = 1;
-        let pages = object.record().pages.get() as usize;
-        self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
+        if self.of != Some((bvh.identity(), page)) || self.used > MAX_KEPT_NODES {
+            self.of = Some((bvh.identity(), page));
+            if self.nodes.is_empty() {
+                self.nodes.resize(64, CachedNode::EMPTY);
+            }
+            let root = &mut self.nodes[0];
+            root.groups[0] = spread(isa, &slabs);
+            root.links = Links { kinds: 1, ..Links::default() };
+            root.page = page;
+            root.extents[0] = f32::INFINITY;
+            root.opened = [CLOSED; 8];
+            root.count = 1;
+            self.used = 1;
+            let pages = object.record().pages.get() as usize;
+            self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
+        }
         Ok(slabs)
     }
 
@@ -164,7 +172,7 @@ impl NodeCache {
         &self.nodes[node]
     }
 
-    /// Returns the opened node of an inner child, and whether it is new. For a leaf that is a node without children.
+    /// Returns the number of the opened node of an inner child. For a leaf that is a node without children.
     #[inline(always)]
     pub(crate) fn open<I: Isa>(
         &mut self,
@@ -172,16 +180,17 @@ impl NodeCache {
         bvh: &Bvh,
         object: &Object,
         at: ChildRef,
-    ) -> Result<(usize, bool), QueryError> {
+    ) -> Result<usize, QueryError> {
         let known = self.nodes[at.node()].opened[at.child()];
         if known != CLOSED {
-            return Ok((known as usize, false));
+            return Ok(known as usize);
         }
         if self.used >= self.max_nodes {
             return Err(self.too_many(bvh, object));
         }
         if self.used == self.nodes.len() {
-            self.nodes.resize(2 * self.used, CachedNode::EMPTY);
+            // Not many at once, because filling them takes time in the middle of a query.
+            self.nodes.resize(self.used + 64, CachedNode::EMPTY);
         }
         let number = self.used;
         let (before, behind) = self.nodes.split_at_mut(number);
@@ -189,7 +198,7 @@ impl NodeCache {
         isa.run(DecodeNode { bvh, object, parent, child: at.child(), to: &mut behind[0] })?;
         parent.opened[at.child()] = number as u32;
         self.used += 1;
-        Ok((number, true))
+        Ok(number)
     }
 
     #[cold]
@@ -302,7 +311,7 @@ mod tests {
     }
 
     impl Task for OpenRoot<'_> {
-        type Output = Result<(usize, bool), QueryError>;
+        type Output = Result<usize, QueryError>;
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
@@ -322,8 +331,17 @@ mod tests {
         let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
         assert!(matches!(refused, QueryError::Damaged(error) if error.rule == Rule::Counts));
         nodes.max_nodes = 2;
-        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, true)));
-        // A node that is opened again is not new.
-        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok((1, false)));
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok(1));
+        // A node that is opened again is the same, in the next walk as well.
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok(1));
+        Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
+        assert_eq!((Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), nodes.used), (Ok(1), 2));
+        // Nodes of another file are not.
+        let other = Bvh::from_static(bytes).unwrap();
+        Backend::Scalar.run(Start(&other, &mut nodes)).unwrap();
+        assert_eq!(nodes.used, 1);
+        nodes.used = MAX_KEPT_NODES + 1;
+        Backend::Scalar.run(Start(&other, &mut nodes)).unwrap();
+        assert_eq!(nodes.used, 1);
     }
 }

@@ -12,24 +12,26 @@
 //! ```
 //!
 //! Depth-first, the entries are a stack. Best-first, they are a list that is searched for the least bound, until the
-//! visitor has seen enough leaves to go on depth-first, or until the list has its full length.
+//! visitor has seen enough leaves to go on depth-first, or until the list has its full length. Then the list becomes the
+//! stack.
 //!
 //! The walk ends: each file is a tree (its rules say so, and `NodeCache` does not rely on it), an entry
 //! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
 //! visited twice, except those of the first dive, and there are at most (nodes of A) * (nodes of B).
 //!
-//! Memory: each entry that is popped depth-first leaves fewer than 64 on the stack, and those below it are
-//! one level deeper in A or in B. So there are fewer than 64 * (depth of A + depth of B) entries, besides those
-//! that came from the list. A tree is no deeper than its number of treelets. Nothing recurses.
+//! Memory: each entry that is popped depth-first leaves at most four frames on the stack, one per node test, and those
+//! above it are one level deeper in A or in B. So there are at most 4 * (depth of A + depth of B) frames. A tree is no
+//! deeper than its number of treelets. Nothing recurses.
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
+use crate::traverse::frames::Frames;
 use crate::traverse::large_leaf::LargeLeaves;
+use crate::traverse::leaf_pairs::{Entry, LeafPairs};
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_test::{Measure, NodeTest, Witness};
 use crate::traverse::placement::ObjectPair;
-use crate::traverse::worklist::{Entry, Tested, Worklist};
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -38,9 +40,8 @@ use std::ops::ControlFlow;
 pub(crate) enum Order {
     /// Depth-first, the pair of least bound first.
     Nearest,
-    /// Depth-first in the order of the trees, whatever the bounds: what is found first does not
-    /// depend on how bounds are rounded.
-    Tree,
+    /// Depth-first, in whatever order is cheapest.
+    Any,
     /// First straight down to one leaf pair, for a limit; then the pair of least bound of all, until
     /// the visitor has seen so many more leaf pairs; then nearest.
     Best { leaves: u32 },
@@ -81,20 +82,55 @@ pub(crate) struct WalkMemory {
     nodes_a: NodeCache,
     nodes_b: NodeCache,
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: Vec<[Group; 2]>,
-    is_aligned_a: Vec<bool>,
+    aligned_a: Aligned,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: Vec<[Group; 2]>,
-    /// Depth-first: the last entry is next.
-    entries: Worklist,
+    aligned_b: Aligned,
+    /// Depth-first: the pairs that node tests left.
+    stack: Frames,
     /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
-    leaf_pairs: Worklist,
+    leaf_pairs: LeafPairs,
     /// Best-first: the entry of least bound is next.
-    list: Worklist,
+    list: Frames,
     large_leaves: LargeLeaves,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
+}
+
+/// The groups of opened nodes along the directions of the other side, by the number of the node.
+#[derive(Default)]
+struct Aligned {
+    groups: Vec<[Group; 2]>,
+    /// The walk for which each was computed; 0 for none.
+    walks: Vec<u32>,
+    walk: u32,
+}
+
+impl Aligned {
+    /// Forgets all groups, before a walk.
+    fn start(&mut self) {
+        self.walk = self.walk.wrapping_add(1);
+        if self.walk == 0 {
+            self.walks.fill(0);
+            self.walk = 1;
+        }
+    }
+
+    /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
+    #[inline(always)]
+    fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
+        if self.walks.len() <= node {
+            self.grow(node);
+        }
+        let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
+        (&mut self.groups[node], known)
+    }
+
+    #[cold]
+    fn grow(&mut self, node: usize) {
+        self.groups.resize(node + 64, [Group::ZERO; 2]);
+        self.walks.resize(node + 64, 0);
+    }
 }
 
 /// How the next pair is found.
@@ -108,9 +144,9 @@ enum Phase {
     DepthFirst,
 }
 
-/// The most entries in the list before the walk goes on depth-first: as many as are searched in the time of a node test.
+/// The most frames in the list before the walk goes on depth-first: as many as are searched in the time of a node test.
 /// Answers do not depend on it.
-const MAX_LISTED_PAIRS: usize = 1024;
+const MAX_LISTED_TESTS: usize = 256;
 
 /// How many pairs of leaf packets are visited together. Answers do not depend on it.
 const LEAF_PAIRS_PER_BATCH: usize = 4;
@@ -153,10 +189,12 @@ fn walk<I: Isa, W: Visitor>(
     node_test: &mut NodeTest,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    memory.entries.clear();
+    memory.stack.clear();
     memory.leaf_pairs.clear();
     memory.list.clear();
     memory.large_leaves.start();
+    memory.aligned_a.start();
+    memory.aligned_b.start();
     let root_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
     let root_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
     node_test.prepare(isa, &pair, &root_a, &root_b);
@@ -165,36 +203,35 @@ fn walk<I: Isa, W: Visitor>(
     let (mut tests, mut leaves) = (0, 0);
     let order = visitor.order();
     let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
-    memory.entries.push(Entry::ROOTS);
+    memory.stack.push_one(Entry::ROOTS);
+    if phase == Phase::Dive {
+        // What follows the dive starts at the roots again.
+        memory.list.push_one(Entry::ROOTS);
+    }
     loop {
         if memory.leaf_pairs.len() >= LEAF_PAIRS_PER_BATCH
-            || memory.entries.len() == 0 && memory.leaf_pairs.len() > 0
+            || memory.stack.is_empty() && memory.leaf_pairs.len() > 0
         {
             if memory.visit_leaf_pairs(isa, visitor)?.is_break() {
                 return Ok(tests);
             }
             node_test.update_witness(&mut witness, visitor.witness());
         }
-        let next = match (memory.entries.pop(), phase) {
-            (Some(top), _) => top,
-            (None, Phase::DepthFirst) => break,
-            (None, Phase::Dive) => {
-                // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
-                phase = Phase::BestFirst;
-                Entry::ROOTS
+        let next = match memory.stack.pop(isa) {
+            Some(next) if next.bound > visitor.limit() => continue,
+            Some(next) => next,
+            None => {
+                if phase == Phase::Dive {
+                    // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
+                    phase = Phase::BestFirst;
+                }
+                match memory.list.pop_least(isa) {
+                    Some(least) if least.bound <= visitor.limit() => least,
+                    // If there is one, it is the least bound of all.
+                    _ => break,
+                }
             }
-            (None, Phase::BestFirst) => match memory.list.pop_least() {
-                Some(least) => least,
-                None => break,
-            },
         };
-        if next.bound() > visitor.limit() {
-            if phase == Phase::BestFirst {
-                // It is the least bound of all.
-                break;
-            }
-            continue;
-        }
         memory.visit()?;
         if let Some(leaves_of_pair) = memory.leaf_pair(next) {
             let at_once = phase != Phase::DepthFirst;
@@ -206,7 +243,7 @@ fn walk<I: Isa, W: Visitor>(
             if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
             {
                 phase = Phase::DepthFirst;
-                memory.list_to_stack(visitor.limit());
+                memory.list_to_stack();
             }
             continue;
         }
@@ -226,23 +263,18 @@ fn walk<I: Isa, W: Visitor>(
             node_test.look_along_b(isa);
         }
         let sides = memory.open(isa, &pair, node_test, next)?;
-        let start = memory.entries.len();
-        let apart = phase == Phase::DepthFirst;
-        tests += memory.push_children(isa, W::MEASURE, node_test, &witness, &sides, (visitor.limit(), apart));
-        match (phase, order) {
-            (Phase::BestFirst, _) => {
-                memory.entries.move_to(start, &mut memory.list);
-                if memory.list.len() > MAX_LISTED_PAIRS {
-                    phase = Phase::DepthFirst;
-                    memory.list_to_stack(visitor.limit());
-                }
-            }
-            (_, Order::Tree) => memory.entries.reverse(start),
-            (Phase::Dive, _) => {
-                memory.entries.nearest_last(start);
-                memory.entries.keep_last(start);
-            }
-            (Phase::DepthFirst, _) => memory.entries.nearest_last(start),
+        tests += memory.push_children(
+            isa,
+            W::MEASURE,
+            node_test,
+            &witness,
+            &sides,
+            visitor.limit(),
+            (phase, order),
+        );
+        if phase == Phase::BestFirst && memory.list.len() > MAX_LISTED_TESTS {
+            phase = Phase::DepthFirst;
+            memory.list_to_stack();
         }
     }
     isa.run(Finish(visitor))?;
@@ -340,6 +372,12 @@ impl WalkMemory {
         Ok(())
     }
 
+    /// Goes on depth-first with the frames of the list, the least bound next. The stack is empty.
+    fn list_to_stack(&mut self) {
+        self.list.nearest_last();
+        std::mem::swap(&mut self.list, &mut self.stack);
+    }
+
     /// Visits the pairs of leaf packets that have been collected.
     #[inline(always)]
     fn visit_leaf_pairs<I: Isa, W: Visitor>(
@@ -349,7 +387,7 @@ impl WalkMemory {
     ) -> Result<ControlFlow<()>, QueryError> {
         for at in 0..self.leaf_pairs.len() {
             let next = self.leaf_pairs.get(at);
-            if next.bound() > visitor.limit() {
+            if next.bound > visitor.limit() {
                 continue;
             }
             self.visit()?;
@@ -394,30 +432,23 @@ impl WalkMemory {
         // In a forged file both comparisons may hold: one node is opened in any case.
         let b_is_small = extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b && !a_is_small;
         if !leaf_a && (leaf_b || !a_is_small) {
-            let (number, new) = self.nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            let number = self.nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
             (sides.node_a, sides.only_a) = (number, None);
-            if self.aligned_a.len() <= number {
-                self.aligned_a.resize(2 * number + 64, [Group::ZERO; 2]);
-                self.is_aligned_a.resize(2 * number + 64, false);
-            }
-            self.is_aligned_a[number] &= !new;
         }
         if !leaf_b && (leaf_a || !b_is_small) {
-            let (number, new) = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            let number = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             (sides.node_b, sides.only_b) = (number, None);
-            if self.aligned_b.len() <= number {
-                self.aligned_b.resize(2 * number + 64, [Group::ZERO; 2]);
-            }
-            if new {
-                let (node, to) = (self.nodes_b.get(number), &mut self.aligned_b[number]);
-                isa.run(AlignB { node_test, node, to });
+            let (to, is_aligned) = self.aligned_b.of(number);
+            if !is_aligned {
+                isa.run(AlignB { node_test, node: self.nodes_b.get(number), to });
             }
         }
         Ok(sides)
     }
 
-    /// Tests all pairs of children and pushes those within the limit. Returns the number of tests.
+    /// Tests all pairs of children and keeps those within the limit. Returns the number of tests.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "inlined at one place")]
     fn push_children<I: Isa>(
         &mut self,
         isa: I,
@@ -425,55 +456,55 @@ impl WalkMemory {
         node_test: &NodeTest,
         witness: &Option<Witness>,
         sides: &Sides,
-        (limit, leaves_apart): (f32, bool),
+        limit: f32,
+        (phase, order): (Phase, Order),
     ) -> u64 {
+        let first_frame = self.stack.len();
         let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
-        let aligned_b = &self.aligned_b[sides.node_b];
+        let (aligned_b, _) = self.aligned_b.of(sides.node_b);
         let mut tests = 0;
         let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
         while part_a < end_a {
             let (mut part_b, end_b) = parts(sides.only_b, side_b.count);
             while part_b < end_b {
-                let mut bounds = [0.0; 16];
+                let tested = if phase == Phase::BestFirst { self.list.room() } else { self.stack.room() };
+                tested.a = ChildRef::new(sides.node_a, 4 * part_a);
+                tested.b = ChildRef::new(sides.node_b, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
-                let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut bounds);
+                let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut tested.bounds);
                 mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
                 mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
                 if mask != 0 && node_test.looks_along_b() {
-                    let aligned_a = &mut self.aligned_a[sides.node_a];
-                    if !std::mem::replace(&mut self.is_aligned_a[sides.node_a], true) {
-                        isa.run(AlignA { node_test, node: side_a, to: aligned_a });
+                    let (to, is_aligned) = self.aligned_a.of(sides.node_a);
+                    if !is_aligned {
+                        isa.run(AlignA { node_test, node: side_a, to });
                     }
-                    let groups = (&aligned_a[part_a & 1], &side_b.groups[part_b & 1]);
-                    mask &= node_test.run_along_b(isa, measure, groups, limit, &mut bounds);
+                    let groups = (&to[part_a & 1], &side_b.groups[part_b & 1]);
+                    mask &= node_test.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
-                let first_a = ChildRef::new(sides.node_a, 4 * part_a);
-                let first_b = ChildRef::new(sides.node_b, 4 * part_b);
-                let tested = Tested::new(&bounds, first_a, first_b);
-                let mut leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
-                if !leaves_apart {
-                    leaves = 0;
+                if phase == Phase::DepthFirst {
+                    let leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
+                    self.leaf_pairs.append(isa, tested, mask & leaves);
+                    mask &= !leaves;
                 }
-                self.entries.append(isa, &tested, mask & !leaves);
-                self.leaf_pairs.append(isa, &tested, mask & leaves);
+                let first = match order {
+                    Order::Any => mask.trailing_zeros(),
+                    _ => isa.least(&tested.bounds, mask),
+                };
+                match phase {
+                    Phase::DepthFirst => self.stack.push(mask, first),
+                    Phase::BestFirst => self.list.push(mask, first),
+                    Phase::Dive => self.stack.push(mask & 1u16.unbounded_shl(first), first),
+                }
                 tests += 1;
                 part_b += 1;
             }
             part_a += 1;
         }
-        tests
-    }
-
-    /// Goes on depth-first with the entries of the list, the least bound next.
-    fn list_to_stack(&mut self, limit: f32) {
-        for at in 0..self.list.len() {
-            let entry = self.list.get(at);
-            if entry.bound() <= limit {
-                self.entries.push(entry);
-            }
+        if phase == Phase::Dive {
+            self.stack.keep_nearest(first_frame);
         }
-        self.list.clear();
-        self.entries.nearest_last(0);
+        tests
     }
 }
 

@@ -55,6 +55,10 @@ impl Lanes for Y {
     type Mask = Y;
 
     #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm256_add_ps(self.0, other.0)), with_features!(_mm256_add_ps(self.1, other.1)))
+    }
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm256_sub_ps(self.0, other.0)), with_features!(_mm256_sub_ps(self.1, other.1)))
     }
@@ -126,6 +130,10 @@ impl Lanes for Y {
 impl Lanes for X {
     type Mask = X;
 
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm_add_ps(self.0, other.0)))
+    }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm_sub_ps(self.0, other.0)))
@@ -292,6 +300,28 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn store4(self, value: X, to: &mut [f32; 4]) {
         with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
+    }
+    #[inline(always)]
+    fn least(self, of: &[f32; 16], mask: u16) -> u32 {
+        with_features!({
+            // All ones in the lanes whose bits are set.
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let lanes = |mask: u16| {
+                let mask = _mm256_and_si256(_mm256_set1_epi32(i32::from(mask)), bits);
+                _mm256_castsi256_ps(_mm256_cmpeq_epi32(mask, bits))
+            };
+            let (low, high) = (lanes(mask & 0xff), lanes(mask >> 8));
+            let infinity = _mm256_set1_ps(f32::INFINITY);
+            let first = _mm256_blendv_ps(infinity, _mm256_loadu_ps(of.as_ptr()), low);
+            let last = _mm256_blendv_ps(infinity, _mm256_loadu_ps(of.as_ptr().add(8)), high);
+            let least = _mm256_min_ps(first, last);
+            let least = _mm256_min_ps(least, _mm256_permute2f128_ps::<1>(least, least));
+            let least = _mm256_min_ps(least, _mm256_shuffle_ps::<0b01_00_11_10>(least, least));
+            let least = _mm256_min_ps(least, _mm256_shuffle_ps::<0b10_11_00_01>(least, least));
+            let equal_low = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(first, least)) as u32;
+            let equal_high = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(last, least)) as u32;
+            (u32::from(mask) & (equal_low | equal_high << 8)).trailing_zeros()
+        })
     }
     #[inline(always)]
     fn prefetch_line(self, byte: &u8) {

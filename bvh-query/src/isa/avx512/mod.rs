@@ -60,6 +60,10 @@ impl Lanes for Z {
     type Mask = __mmask16;
 
     #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm512_add_ps(self.0, other.0)))
+    }
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm512_sub_ps(self.0, other.0)))
     }
@@ -116,6 +120,10 @@ impl Lanes for Z {
 impl Lanes for X {
     type Mask = __mmask8;
 
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(with_features!(_mm_add_ps(self.0, other.0)))
+    }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(with_features!(_mm_sub_ps(self.0, other.0)))
@@ -293,6 +301,14 @@ impl Isa for Avx512 {
             let chosen = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(from.as_ptr().cast()));
             _mm512_storeu_si512(to.as_mut_ptr().cast(), chosen);
         });
+    }
+    #[inline(always)]
+    fn least(self, of: &[f32; 16], mask: u16) -> u32 {
+        with_features!({
+            let of = _mm512_loadu_ps(of.as_ptr());
+            let least = _mm512_mask_reduce_min_ps(mask, of);
+            _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(mask, of, _mm512_set1_ps(least)).trailing_zeros()
+        })
     }
     #[inline(always)]
     fn prefetch_line(self, byte: &u8) {

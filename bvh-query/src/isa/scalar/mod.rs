@@ -29,6 +29,10 @@ impl<const N: usize> Lanes for Array<N> {
     type Mask = u16;
 
     #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         self.zip(other, |a, b| a - b)
     }
