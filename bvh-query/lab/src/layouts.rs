@@ -7,18 +7,17 @@ mod markdown;
 mod row;
 #[cfg(test)]
 mod tests;
-mod tree;
 mod walk;
 
 use crate::arguments::LayoutArguments;
-use crate::{Failure, output};
-use bvh_bake::mesh::Mesh;
-use bvh_bake::{Options, to_bytes};
+use crate::tree::Tree;
+use crate::{Failure, input, output};
+use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Backend, Bvh, Pose, Querier};
 use cbvh_measure::origin::Origin;
-use cbvh_measure::pairs::{self, Pair, spread_evenly};
+use cbvh_measure::pairs::{Pair, spread_evenly};
 use cbvh_measure::pin::pinned;
 use cbvh_measure::rounds::{Question, Subject};
 use cbvh_measure::spread::Spread;
@@ -27,10 +26,7 @@ use cold::Sweep;
 use rayon::prelude::*;
 use row::{Row, Walked};
 use serde::Serialize;
-use std::fs;
-use std::path::Path;
 use std::sync::Arc;
-use tree::Tree;
 use walk::{Counts, walk};
 
 /// The lossless triangle encodings.
@@ -56,9 +52,7 @@ struct Report {
 pub(crate) fn run(arguments: &LayoutArguments) -> Result<String, Failure> {
     let (list, out) = (&arguments.pairs, &arguments.out);
     let backend = arguments.isa.map_or_else(Backend::detect, Ok)?;
-    let bytes = fs::read(list).map_err(|error| in_file(list, error))?;
-    let pairs = pairs::parse(&bytes, list, arguments.meshes.as_deref(), arguments.poses.as_deref());
-    let pairs = pairs.map_err(|error| in_file(list, error))?;
+    let pairs = input::pairs(list, arguments.meshes.as_deref(), arguments.poses.as_deref())?;
     output::make_folder(out)?;
     let origin = Origin::of("cbvh-lab layouts");
     let largest = origin.machine.caches.iter().map(|cache| cache.bytes).max().unwrap_or(UNKNOWN_CACHE);
@@ -79,10 +73,6 @@ pub(crate) fn run(arguments: &LayoutArguments) -> Result<String, Failure> {
     Ok(format!("{}: {} pairs, {} rows\n", out.join("layouts.md").display(), pairs.len(), report.rows.len()))
 }
 
-fn in_file(path: &Path, error: impl std::fmt::Display) -> String {
-    format!("{}: {error}", path.display())
-}
-
 /// Both meshes of a pair in one layout.
 struct Baked {
     profile: Profile,
@@ -92,19 +82,19 @@ struct Baked {
 }
 
 fn measure(pair: &Pair, backend: Backend, sweep: &Sweep, limit: usize) -> Result<Vec<Row>, Failure> {
-    let read = |path: &Path| bvh_bake::input::read(path).map(|input| input.merged());
-    let (mesh_a, mesh_b) = (read(&pair.a)?, read(&pair.b)?);
+    let (mesh_a, mesh_b) = (input::mesh(&pair.a)?, input::mesh(&pair.b)?);
     let mut bakes = Vec::new();
     for profile in Profile::ALL {
         for triangles in LOSSLESS {
-            let a = Arc::new(bake(&mesh_a, profile, triangles)?);
-            let b = if pair.a == pair.b { a.clone() } else { Arc::new(bake(&mesh_b, profile, triangles)?) };
+            let options = Options::default().profile(profile).triangles(triangles);
+            let a = Arc::new(input::bake(&mesh_a, &options)?);
+            let b = if pair.a == pair.b { a.clone() } else { Arc::new(input::bake(&mesh_b, &options)?) };
             bakes.push(Baked { profile, triangles, a, b });
         }
     }
     let mut given = Vec::new();
     for file in &pair.poses {
-        given.extend(read_poses(file)?);
+        given.extend(input::poses(file)?);
     }
     let mut querier = Querier::with_backend(backend);
     let (a, b) = (&*bakes[0].a, &*bakes[0].b);
@@ -133,31 +123,6 @@ fn measure(pair: &Pair, backend: Backend, sweep: &Sweep, limit: usize) -> Result
         }
     }
     Ok(rows)
-}
-
-fn bake(mesh: &Mesh, profile: Profile, triangles: TriangleEncoding) -> Result<Bvh, Failure> {
-    let options = Options::default().profile(profile).triangles(triangles);
-    let bvh = Bvh::from_bytes(to_bytes(mesh, &options)?.0)?;
-    bvh.check_all()?;
-    Ok(bvh)
-}
-
-/// Reads 12 numbers per line, the rows of a 3 by 4 matrix; `#` starts a comment.
-fn read_poses(path: &Path) -> Result<Vec<Pose>, Failure> {
-    let text = fs::read_to_string(path).map_err(|error| in_file(path, error))?;
-    let mut poses = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
-        if words.is_empty() {
-            continue;
-        }
-        let numbers = words.iter().map(|word| word.parse()).collect::<Result<Vec<f64>, _>>()?;
-        let wrong =
-            |found: &str| in_file(path, format!("line {}: expected 12 numbers, found {found}", number + 1));
-        let rows: [f64; 12] = numbers.try_into().map_err(|_| wrong(&words.len().to_string()))?;
-        poses.push(Pose::from_rows(&rows).map_err(|error| wrong(&error.to_string()))?);
-    }
-    Ok(poses)
 }
 
 /// Walks both trees in all poses, for contact and for distance. Where one walk was given up, there are no figures.

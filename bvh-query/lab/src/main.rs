@@ -5,9 +5,13 @@
 
 mod arguments;
 mod hard;
+mod input;
 mod layouts;
 mod output;
+mod placed;
 mod scaling;
+mod tree;
+mod walk;
 
 use arguments::{Arguments, Experiment};
 use clap::Parser;

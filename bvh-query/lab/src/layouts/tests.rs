@@ -1,7 +1,7 @@
 //! Checks that walks do the same work as queries that visit everything.
 
-use super::tree::Tree;
 use super::walk::walk;
+use crate::tree::Tree;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes};
 use bvh_format::leaf::TriangleEncoding;

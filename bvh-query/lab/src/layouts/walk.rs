@@ -1,20 +1,13 @@
-//! Walks two trees in memory completely and counts the tests, including those that tight bounds would save.
+//! Counts the tests of a complete walk, including those that tight bounds would save.
 //!
-//! A walk visits what a query must visit in whatever order: all pairs of nodes whose bounds are within a limit, 0 for
-//! contact and the true distance for distance. Queries of meshes that touch stop at the first contact and do less;
-//! queries for a distance do not know it at the start and do more. Nodes are tested along the directions of both sides
-//! from the start; a query does so after its first tests.
+//! Bounds are let through within a limit, 0 for contact and the true distance for distance. Nodes are tested along the
+//! directions of both sides from the start; a query does so after its first tests.
 
-use super::tree::{Node, Tree};
-use bvh_format::kdop::{DirectionSet, FACTORS, Kdop};
-use bvh_format::realign::{Form, upper_form};
-use bvh_format::slabs::{Group, NodeSlabs};
+use crate::placed::{Aligned, Frame, Placed};
+use crate::tree::Tree;
+use crate::walk;
+use bvh_format::kdop::Kdop;
 use bvh_query::Pose;
-
-/// Nodes this many times larger than their partner are opened alone, as in a query.
-const MUCH_LARGER: f32 = 2.0;
-/// The number of node tests after which a walk is given up: some thousand times what good bounds need, half a second.
-const MAX_NODE_TESTS: u64 = 1 << 17;
 
 /// What a walk counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -44,28 +37,9 @@ impl Counts {
 /// Visits all pairs of nodes whose bounds are at most `limit` apart (mesh units; 0 for overlap). Returns `None` if the walk
 /// does not end in reasonable time.
 pub(super) fn walk(a: &Tree, b: &Tree, pose: &Pose, limit: f64) -> Option<Counts> {
-    let placed = Placed::new(a, b, pose);
+    let placed = Placed::new(a, b, pose, [a.set, b.set]);
     let mut counts = Counts::default();
-    let mut stack = vec![(0u32, 0u32)];
-    while let Some((at_a, at_b)) = stack.pop() {
-        if counts.node_tests > MAX_NODE_TESTS {
-            return None;
-        }
-        let (node_a, node_b) = (&a.nodes[at_a as usize], &b.nodes[at_b as usize]);
-        let (leaf_a, leaf_b) = (node_a.triangles > 0, node_b.triangles > 0);
-        if leaf_a && leaf_b {
-            counts.packet_tests += u64::from(node_a.triangles.div_ceil(4) * node_b.triangles.div_ceil(4));
-            continue;
-        }
-        // The root counts as larger than anything, as in a query.
-        let extent = |at: u32, node: &Node| if at == 0 { f32::INFINITY } else { extent(&node.bound) };
-        let (extent_a, extent_b) = (extent(at_a, node_a), extent(at_b, node_b));
-        let a_is_small = extent_b > MUCH_LARGER * extent_a;
-        let b_is_small = extent_a > MUCH_LARGER * extent_b && !a_is_small;
-        let (own_a, own_b) = ([at_a], [at_b]);
-        let side_a = if !leaf_a && (leaf_b || !a_is_small) { &node_a.children[..] } else { &own_a };
-        let side_b = if !leaf_b && (leaf_a || !b_is_small) { &node_b.children[..] } else { &own_b };
-        counts.node_tests += (side_a.len().div_ceil(4) * side_b.len().div_ceil(4)) as u64;
+    let tests = walk::walk(a, b, |[side_a, side_b], stack| {
         let seen = |tree: &Tree, side: &[u32], frame: &Frame| -> Vec<[Aligned; 2]> {
             let nodes = side.iter().map(|&child| &tree.nodes[child as usize]);
             nodes.map(|node| [frame.aligned(&node.bound), frame.aligned(&node.tight)]).collect()
@@ -86,85 +60,8 @@ pub(super) fn walk(a: &Tree, b: &Tree, pose: &Pose, limit: f64) -> Option<Counts
                 }
             }
         }
-    }
-    Some(counts)
-}
-
-/// The largest side of a node's box.
-fn extent(bound: &Kdop) -> f32 {
-    (0..3).map(|slab| bound.hi[slab] - bound.lo[slab]).fold(0.0, f32::max)
-}
-
-/// The slab ends along the other side's directions, lower and upper.
-type Aligned = [[f64; 2]; 13];
-
-/// A pose of one tree beside another, seen from both.
-struct Placed {
-    /// B along A's directions.
-    along_a: Frame,
-    /// A along B's directions.
-    along_b: Frame,
-}
-
-impl Placed {
-    fn new(a: &Tree, b: &Tree, pose: &Pose) -> Self {
-        let (r, origin) = (pose.rotation(), pose.place(b.origin));
-        let t = [0, 1, 2].map(|axis| origin[axis] - a.origin[axis]);
-        let inverse = [0, 1, 2].map(|i| [0, 1, 2].map(|j| r[j][i]));
-        let back = inverse.map(|row| -(0..3).map(|axis| row[axis] * t[axis]).sum::<f64>());
-        Self { along_a: Frame::new(r, t, a.set, b.set), along_b: Frame::new(&inverse, back, b.set, a.set) }
-    }
-}
-
-/// The directions of one side, along which the other's nodes are seen.
-struct Frame {
-    /// Per direction the form of the other's upper end along it, and what the pose adds.
-    axes: Vec<(Form, f64)>,
-    /// Lengths of the directions.
-    lengths: Vec<f64>,
-    /// Slabs of the other side.
-    slabs: usize,
-}
-
-impl Frame {
-    fn new(rotation: &[[f64; 3]; 3], translation: [f64; 3], own: DirectionSet, other: DirectionSet) -> Self {
-        let axis = |direction: &[f64; 3]| {
-            let seen = [0, 1, 2].map(|i| (0..3).map(|j| rotation[j][i] * direction[j]).sum());
-            let offset: f64 = (0..3).map(|i| direction[i] * translation[i]).sum();
-            (upper_form(seen, other), offset)
-        };
-        let directions = &FACTORS[..own.slabs()];
-        let length = |d: &[f64; 3]| d.iter().map(|c| c * c).sum::<f64>().sqrt();
-        Self {
-            axes: directions.iter().map(axis).collect(),
-            lengths: directions.iter().map(length).collect(),
-            slabs: other.slabs(),
-        }
-    }
-
-    fn aligned(&self, bound: &Kdop) -> Aligned {
-        let group = Group::of_one(&NodeSlabs::from_kdop(bound, self.slabs));
-        let rows = group.rows();
-        let mut aligned = [[0.0; 2]; 13];
-        for (ends, (form, offset)) in aligned.iter_mut().zip(&self.axes) {
-            let end = |form: Form| -> f64 {
-                let term = |j: usize| {
-                    f64::from(form.coefficients[j]) * f64::from(rows[usize::from(form.rows[j])][0])
-                };
-                term(0) + term(1) + term(2) + offset
-            };
-            *ends = [end(form.mirrored()), end(*form)];
-        }
-        aligned
-    }
-
-    /// Returns a lower bound of the distance between a node of this side and one of the other side. It is negative
-    /// where they overlap along all directions of this side.
-    fn gap(&self, own: &Kdop, other: &Aligned) -> f64 {
-        let along = |slab: usize| {
-            let [lo, hi] = other[slab];
-            (lo - f64::from(own.hi[slab])).max(f64::from(own.lo[slab]) - hi) / self.lengths[slab]
-        };
-        (0..self.lengths.len()).map(along).fold(f64::NEG_INFINITY, f64::max)
-    }
+    });
+    let Counts { through, in_vain, .. } = counts;
+    let found = Counts { node_tests: tests.node_tests, packet_tests: tests.packet_tests, through, in_vain };
+    (!tests.given_up).then_some(found)
 }

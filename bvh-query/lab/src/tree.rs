@@ -9,27 +9,27 @@ use bvh_format::treelet::{Child, Links};
 use bvh_query::Bvh;
 
 /// A tree of bounds. Children have higher numbers than their parents; node 0 is the root.
-pub(super) struct Tree {
-    pub(super) nodes: Vec<Node>,
-    pub(super) set: DirectionSet,
+pub(crate) struct Tree {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) set: DirectionSet,
     /// The object's origin, mesh units.
-    pub(super) origin: [f64; 3],
+    pub(crate) origin: [f64; 3],
 }
 
 /// A node: a treelet, or a leaf if it has triangles.
-pub(super) struct Node {
+pub(crate) struct Node {
     /// The bound that a query decodes.
-    pub(super) bound: Kdop,
+    pub(crate) bound: Kdop,
     /// The least bound that contains the triangles below.
-    pub(super) tight: Kdop,
-    pub(super) children: Vec<u32>,
+    pub(crate) tight: Kdop,
+    pub(crate) children: Vec<u32>,
     /// Triangles of a leaf, 0 for a treelet.
-    pub(super) triangles: u32,
+    pub(crate) triangles: u32,
 }
 
 impl Tree {
     /// Reads the tree of a file's first object. The file has been proved.
-    pub(super) fn of_file(bvh: &Bvh) -> Option<Self> {
+    pub(crate) fn of_file(bvh: &Bvh) -> Option<Self> {
         let object = bvh.objects().first()?;
         let (layout, bytes, profile) = (bvh.layout(), bvh.bytes(), object.profile());
         let slabs = profile.directions().slabs();
