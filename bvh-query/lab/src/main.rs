@@ -10,6 +10,7 @@ mod layouts;
 mod output;
 mod placed;
 mod scaling;
+mod slabs;
 mod tree;
 mod walk;
 
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
         Experiment::Hard(arguments) => hard::run(arguments),
         Experiment::Scaling(arguments) => scaling::run(arguments),
         Experiment::Layouts(arguments) => layouts::run(arguments),
+        Experiment::Slabs(arguments) => slabs::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {
         Ok(()) => ExitCode::SUCCESS,

@@ -14,7 +14,7 @@ use cbvh_measure::spread::Spread;
 use cbvh_testkit::ball::ball;
 
 /// Gaps as fractions of the diagonal.
-pub(super) const GAPS: [f64; 3] = [1e-6, 0.01, 0.05];
+pub(crate) const GAPS: [f64; 3] = [1e-6, 0.01, 0.05];
 /// The number of triangles of a ball is about one of these times a power of ten.
 const STEPS: [u64; 2] = [1, 3];
 
