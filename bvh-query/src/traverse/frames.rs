@@ -5,8 +5,20 @@
 //! best-first, the frame with the least bound.
 
 use crate::isa::Isa;
-use crate::traverse::leaf_pairs::Entry;
 use crate::traverse::node_cache::ChildRef;
+
+/// A pair of nodes to visit, and a lower bound of their distance; see `Measure`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Entry {
+    pub(crate) bound: f32,
+    pub(crate) a: ChildRef,
+    pub(crate) b: ChildRef,
+}
+
+impl Entry {
+    /// Both roots, with the least bound of all.
+    pub(crate) const ROOTS: Self = Self { bound: f32::NEG_INFINITY, a: ChildRef::ROOT, b: ChildRef::ROOT };
+}
 
 /// The result of a node test for 16 pairs, four nodes of A against four of B: element `4 * a + b`.
 #[derive(Clone, Copy)]

@@ -14,7 +14,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::traverse::align::form_error;
-use crate::traverse::leaf_pairs::Entry;
+use crate::traverse::frames::Entry;
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::DirectionSet;

@@ -4,21 +4,8 @@
 //! instructions without a branch.
 
 use crate::isa::Isa;
-use crate::traverse::frames::Tested;
+use crate::traverse::frames::{Entry, Tested};
 use crate::traverse::node_cache::ChildRef;
-
-/// A pair of nodes to visit, and a lower bound of their distance; see `Measure`.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Entry {
-    pub(crate) bound: f32,
-    pub(crate) a: ChildRef,
-    pub(crate) b: ChildRef,
-}
-
-impl Entry {
-    /// Both roots, with the least bound of all.
-    pub(crate) const ROOTS: Self = Self { bound: f32::NEG_INFINITY, a: ChildRef::ROOT, b: ChildRef::ROOT };
-}
 
 /// Pairs of leaf packets in the order in which they were met.
 #[derive(Default)]

@@ -26,9 +26,9 @@
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
-use crate::traverse::frames::Frames;
+use crate::traverse::frames::{Entry, Frames};
 use crate::traverse::large_leaf::LargeLeaves;
-use crate::traverse::leaf_pairs::{Entry, LeafPairs};
+use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_test::{Measure, NodeTest, Witness};
 use crate::traverse::placement::ObjectPair;
