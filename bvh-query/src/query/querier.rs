@@ -11,7 +11,8 @@ use crate::traverse::walk::WalkMemory;
 /// Asks questions about two meshes.
 ///
 /// A querier holds the backend and the memory that queries work in, so that a query allocates nothing once the memory has
-/// grown to what the meshes need. Use one querier per thread.
+/// grown to what the meshes need. It keeps some decoded treelets from one query to the next, which changes no answer.
+/// Use one querier per thread.
 ///
 /// # Worst case
 /// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0
