@@ -461,7 +461,9 @@ impl WalkMemory {
     ) -> u64 {
         let first_frame = self.stack.len();
         let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
-        let (aligned_b, _) = self.aligned_b.of(sides.node_b);
+        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b);
+        // It was when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
+        debug_assert!(is_aligned, "node {} of B was not aligned in this walk", sides.node_b);
         let mut tests = 0;
         let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
         while part_a < end_a {
