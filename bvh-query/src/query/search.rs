@@ -163,7 +163,7 @@ impl Search {
         let triangle_a = placed.triangle_a(pair.a, pair.lane_a)?;
         let triangle_b = placed.triangle_b(pair.b, pair.lane_b)?;
         let found = Found { numbers: placed.numbers, pair };
-        // Most pairs without a gap touch, and deciding that costs a tenth of a distance.
+        // Most pairs without a gap touch, and a touching pair needs no distance.
         if may_touch && triangles_intersect(&triangle_a, &triangle_b) {
             (self.touching, self.done) = (Some(found), true);
             return Ok(());
