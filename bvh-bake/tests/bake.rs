@@ -242,6 +242,56 @@ fn repair_page(page: &mut [u8]) {
     page[..8].copy_from_slice(&sum.to_le_bytes());
 }
 
+/// Returns a baked ball in the profile with turning slabs, and where its pages start.
+fn ball_with_turning_slabs() -> (Vec<u8>, usize) {
+    let (positions, triangles) = cbvh_testkit::ball::ball(6_000);
+    let mesh = Mesh::from_triangles(positions, triangles);
+    let (bytes, _) = to_bytes(&mesh, &options(Profile::Dop26U8Wide, TriangleEncoding::F32)).unwrap();
+    let at = validate(&bytes).unwrap().page_offset(0) as usize;
+    (bytes, at)
+}
+
+/// Raises each code of each turning slab by one and each direction by many, in treelets all over the tree.
+#[test]
+fn a_tightened_turning_slab_fails_the_proof() {
+    let (bytes, at) = ball_with_turning_slabs();
+    let pages = validate(&bytes).unwrap().objects[0].record().pages.get() as usize;
+    let (mut refused, mut changes) = (0, 0);
+    for page in (0..pages).step_by(9).map(|page| at + PAGE * page) {
+        let first = page + 64 * usize::from(bytes[page + 61]);
+        for treelet in (0..usize::from(bytes[page + 59])).map(|slot| first + 128 * slot) {
+            // Rows 7 and 14 of both halves; see the table in section 7.4 of the specification.
+            for place in [28, 92, 56, 120] {
+                let mut changed = bytes.clone();
+                let slab = [28, 92, 56, 120].map(|row| changed[treelet + row]);
+                if slab == [0; 4] || slab[..2].contains(&255) {
+                    continue;
+                }
+                let code = &mut changed[treelet + place];
+                *code = if place < 56 || place == 92 { *code + 1 } else { code.wrapping_add(60) };
+                repair_page(&mut changed[page..page + PAGE]);
+                let error = prove_bounds(&Layout::read(&changed).unwrap(), &changed[..]).err();
+                changes += 1;
+                refused += usize::from(error.is_some());
+                assert!(error.is_none_or(|error| error.rule == Rule::BoundContains));
+            }
+        }
+    }
+    assert!(changes > 100 && refused * 10 >= changes * 9, "{refused} of {changes}");
+}
+
+/// A slab of a child with more triangles than a reader has to keep is refused, even one that contains them.
+#[test]
+fn a_turning_slab_over_too_many_triangles_fails_the_proof() {
+    let (mut bytes, at) = ball_with_turning_slabs();
+    let treelet = at + 64 * usize::from(bytes[at + 61]);
+    assert_eq!([28, 92, 56, 120].map(|row| bytes[treelet + row]), [0; 4]);
+    (bytes[treelet + 56], bytes[treelet + 120]) = (127, 127);
+    repair_page(&mut bytes[at..at + PAGE]);
+    let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap_err();
+    assert_eq!(error.rule, Rule::TurningTriangles, "{error}");
+}
+
 /// The slabs of roots are proved too.
 #[test]
 fn a_tightened_anchor_fails_the_proof() {

@@ -66,6 +66,14 @@ fn profiles() -> Vec<u8> {
     seal::put_together(&[(1, 1, write_objects(&records)), (2, 1, nodes), (3, 1, leaves)])
 }
 
+/// A ball of 48 triangles whose children have turning slabs.
+fn turning() -> Vec<u8> {
+    let (positions, triangles) = cbvh_testkit::ball::ball(48);
+    let options =
+        Options::default().profile(Profile::Dop26U8Wide).triangles(TriangleEncoding::F32).ids(false);
+    to_bytes(&Mesh::from_triangles(positions, triangles), &options).unwrap().0
+}
+
 fn check(name: &str, bytes: Vec<u8>) {
     validate(&bytes).unwrap();
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata");
@@ -89,4 +97,5 @@ fn the_baker_still_makes_the_frozen_files() {
     check("plain", plain());
     check("everything", everything());
     check("profiles", profiles());
+    check("turning", turning());
 }

@@ -15,9 +15,21 @@ pub fn decode_child(
     child: usize,
     parent: &NodeSlabs,
 ) -> NodeSlabs {
+    decode_slabs(profile, object_scale, treelet, child, parent, profile.directions().slabs())
+}
+
+/// Decodes the first `slabs` slabs of a child.
+pub(crate) fn decode_slabs(
+    profile: Profile,
+    object_scale: f32,
+    treelet: &[u8],
+    child: usize,
+    parent: &NodeSlabs,
+    slabs: usize,
+) -> NodeSlabs {
     let encoding = profile.encoding();
     let mut node = NodeSlabs::default();
-    for slab in 0..profile.directions().slabs() {
+    for slab in 0..slabs {
         let row = row(slab);
         if encoding == Encoding::F32 {
             (node.lo[row], node.hi[row]) = read_ends(profile, treelet, child, slab);

@@ -237,7 +237,7 @@ fn round_down(value: f64) -> f32 {
 }
 
 /// Returns the nearest `f64` at or below, and at or above, the exact sum of three `f32` numbers.
-fn sum_of_three(a: f64, b: f64, c: f64) -> (f64, f64) {
+pub(crate) fn sum_of_three(a: f64, b: f64, c: f64) -> (f64, f64) {
     let (sum_ab, error_ab) = two_sum(a, b);
     let (sum, error_c) = two_sum(sum_ab, c);
     // Where c cancels a + b, the errors may be larger than the sum.

@@ -85,16 +85,21 @@ impl Packet {
     /// The first `slabs` slabs of the tight k-DOP of the first `triangles` lanes, as [`Kdop::of_points`] finds them. The
     /// other slabs are empty.
     pub fn kdop(&self, triangles: usize, slabs: usize) -> Kdop {
-        if !(1..PACKET).contains(&triangles) {
-            return Kdop::of_lanes(&self.corners, slabs);
-        }
-        // A file from elsewhere may hold anything in the lanes beyond.
+        Kdop::of_lanes(&self.filled(triangles).corners, slabs)
+    }
+
+    /// The packet with the last of the first `triangles` lanes in all lanes beyond: a file from elsewhere may hold anything
+    /// there.
+    #[inline]
+    pub(crate) fn filled(&self, triangles: usize) -> Self {
         let mut packet = *self;
-        for lanes in packet.corners.iter_mut().flatten() {
-            let last = lanes[triangles - 1];
-            lanes[triangles..].fill(last);
+        if (1..PACKET).contains(&triangles) {
+            for lanes in packet.corners.iter_mut().flatten() {
+                let last = lanes[triangles - 1];
+                lanes[triangles..].fill(last);
+            }
         }
-        Kdop::of_lanes(&packet.corners, slabs)
+        packet
     }
 
     /// The three corners of the triangle in a lane.

@@ -70,6 +70,7 @@ mod rule;
 pub mod slabs;
 pub mod source;
 pub mod treelet;
+pub mod turning;
 pub mod validate;
 
 pub use error::FormatError;

@@ -18,7 +18,7 @@ mod writer;
 pub use check::{check_crossing, check_page};
 pub use patcher::PagePatcher;
 pub use reader::Page;
-pub use writer::{PageWriter, WrittenPage};
+pub use writer::{PageWriter, TightBound, WrittenPage};
 
 use crate::checksum::checksum;
 use crate::ids::WORD;

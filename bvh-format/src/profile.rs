@@ -112,6 +112,12 @@ impl Profile {
         }
     }
 
+    /// Whether children have turning slabs, in rows that fixed slabs leave empty.
+    #[inline]
+    pub const fn has_turning_slabs(self) -> bool {
+        matches!(self, Self::Dop26U8Wide)
+    }
+
     /// The most children that a treelet can have: 2, 4 or 8.
     #[inline]
     pub const fn width(self) -> usize {

@@ -61,6 +61,7 @@ rules! {
     DuplicateIds = 36, "duplicate ids come in ascending pairs (kept, dropped)";
     VertexOnGrid = 37, "the origin plus a vertex is exact in 64-bit floating point";
     Codes = 38, "codes that are floats are finite, and f16 codes not negative";
+    TurningTriangles = 39, "a child with a turning slab has at most 1024 triangles below";
 }
 
 impl Rule {

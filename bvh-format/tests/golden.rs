@@ -108,7 +108,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     vec![
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
-        (2, "major-2", header(|f| f.header(8, &[2]))),
+        (2, "major-3", header(|f| f.header(8, &[3]))),
         (3, "short", change(&[], |f| f.bytes.truncate(100))),
         (4, "flipped-bit", change(&[], |f| f.bytes[4000] ^= 1)),
         (5, "truncated", change(&[1], |f| f.bytes.truncate(4096 + 100))),
@@ -320,8 +320,8 @@ fn bad_files_break_the_rule_in_their_name() {
     }
     let covered: BTreeSet<u32> = bad.iter().map(|(rule, _, _)| *rule).collect();
     let missing: Vec<u32> = Rule::ALL.iter().map(|r| r.number()).filter(|r| !covered.contains(r)).collect();
-    // `validate` does not check R35: see `bvh-bake/tests/bake.rs`.
-    assert_eq!(missing, [35]);
+    // `validate` does not check R35 and R39: see `bvh-bake/tests/bake.rs`.
+    assert_eq!(missing, [35, 39]);
 }
 
 #[test]

@@ -11,11 +11,12 @@ use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::leaf::{F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PackedHead, TriangleEncoding};
 use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
-use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter};
+use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{Child, Links};
+use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, decode_turning};
 use std::any::type_name_of_val;
 use std::mem::offset_of;
 use zerocopy::FromZeros;
@@ -150,7 +151,7 @@ fn anchors() {
         let mut writer = PageWriter::new(profile, 1.0, PageShape { roots: 1, remotes: 0, treelets: 1 });
         writer.root(&slabs, Some((3, 4)));
         writer.begin_treelet();
-        writer.leaf(&slabs, std::iter::once(([[0.0; 3]; 3], 0)));
+        writer.leaf(&TightBound::of_kdop(slabs), std::iter::once(([[0.0; 3]; 3], 0)));
         let page = writer.finish(TriangleEncoding::F32, false).bytes;
         let anchor = &page[PAGE_HEADER_BYTES..PAGE_HEADER_BYTES + profile.anchor_bytes()];
         let mut next = 0;
@@ -189,9 +190,10 @@ fn lists() {
     let profiles = Profile::ALL.map(|p| {
         let (slabs, encoding) = (p.directions().slabs(), format!("{:?}", p.encoding()).to_lowercase());
         let head = format!("{}|{}|{}|{slabs}|{encoding}", p.number(), p.name(), 2 * slabs);
-        format!("{head}|{}|{}|{}", p.width(), p.treelet_bytes(), p.anchor_bytes())
+        let turning = yes(p.has_turning_slabs());
+        format!("{head}|{}|{}|{}|{turning}", p.width(), p.treelet_bytes(), p.anchor_bytes())
     });
-    assert_eq!(rows("profiles", 8), profiles);
+    assert_eq!(rows("profiles", 9), profiles);
 
     let numbered = (0..).zip(DIRECTIONS);
     let directions =
@@ -214,6 +216,7 @@ macro_rules! named {
 #[test]
 fn constants() {
     const LOG2_MAX_COORDINATE: i32 = 120;
+    const TURNING_TRIANGLES: usize = MAX_TRIANGLES;
     assert_eq!(2f64.powi(LOG2_MAX_COORDINATE), MAX_COORDINATE);
     let mut expected = named![
         PAGE,
@@ -228,7 +231,8 @@ fn constants() {
         F32_PACKET_BYTES,
         PACKED_HEAD_BYTES,
         ID_HEAD_BYTES,
-        LOG2_MAX_COORDINATE
+        LOG2_MAX_COORDINATE,
+        TURNING_TRIANGLES
     ]
     .to_vec();
     let steps = [("STEP_U8", STEP_U8), ("STEP_U4", STEP_U4)];
@@ -281,6 +285,40 @@ fn places_of_codes() {
         let mut treelet = zero.clone();
         (treelet[kinds], treelet[links]) = (1, 9);
         assert_eq!(Links::read(&treelet).child(0), Child::Treelet(9), "{}", profile.name());
+    }
+}
+
+/// Writes the four bytes of one child at the places that the table states, and expects its turning slab and no other.
+#[test]
+fn places_of_turning_slabs() {
+    let rows = table("format.md", "turning");
+    let with = Profile::ALL.into_iter().filter(|profile| profile.has_turning_slabs());
+    assert!(rows.iter().map(|row| row[0].as_str()).eq(with.map(Profile::name)));
+    for row in rows {
+        let profile = Profile::from_name(&row[0]).unwrap();
+        for child in 0..profile.width() {
+            let mut treelet = vec![0; profile.treelet_bytes()];
+            let node = NodeSlabs { lo: [-1.0; 16], hi: [1.0; 16] };
+            for (column, code) in (1..).zip([51, 102, 127 + 20, 127 - 100]) {
+                let (at, c) = row[column].split_once(" + ").unwrap();
+                assert_eq!(c, "c");
+                treelet[number(at) as usize + child] = code;
+            }
+            for other in 0..profile.width() {
+                let slab = decode_turning(profile, &treelet, other, &node);
+                assert_eq!(slab.is_some(), other == child, "child {other}");
+                let Some(slab) = slab else { continue };
+                assert_eq!(slab.direction, TurningDirection { a: 147, b: 27 });
+                let n = [-80.0, 120.0, 54.0].map(|c| c / 256.0);
+                assert_eq!(slab.direction.vector(), n);
+                // The box reaches 254/256 both ways; 51 and 102 of 255 steps are a fifth and two fifths of that twice.
+                let reach = 254.0 / 256.0;
+                assert!(
+                    (slab.lo - -reach * 0.6).abs() < 1e-4 && (slab.hi - reach * 0.2).abs() < 1e-4,
+                    "{slab:?}"
+                );
+            }
+        }
     }
 }
 

@@ -13,13 +13,14 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR = 1
+MAJOR = 2
 MAX_SECTIONS = 64
 NO_PARENT = 0xFFFFFFFF
 PACKET = 4
 F32_PACKET_BYTES = 144
 PACKED_HEAD_BYTES = 32
 ID_HEAD_BYTES = 8
+TURNING_TRIANGLES = 1024
 STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
 
 MAGIC = bytes.fromhex("89636276680d0a1a")
@@ -128,10 +129,11 @@ DIRECTIONS = np.array(
     ]
 )
 
-# 5 and 7.1
+# 5, 7.1 and 7.4: `turning` has the offsets of lower, upper, A and B of child 0; child c has its own c bytes further
 Profile = namedtuple(
     "Profile",
-    "name slabs encoding width treelet_bytes anchor_bytes code_bytes block row child hi kinds_at links_at",
+    "name slabs encoding width treelet_bytes anchor_bytes code_bytes block row child hi kinds_at links_at turning",
+    defaults=[()],
 )
 PROFILES = [
     Profile("dop14-u8", 7, "u8", 4, 64, 64, 1, 0, 4, 1, 32, 28, 60),
@@ -142,7 +144,7 @@ PROFILES = [
     Profile("dop26-u4", 13, "u4", 4, 64, 128, 1, 0, 4, 1, 0, 28, 60),
     Profile("dop26-u8", 13, "u8", 2, 64, 128, 1, 0, 2, 1, 32, 28, 60),
     Profile("dop14-f16-wide", 7, "f16", 4, 128, 64, 2, 0, 8, 2, 64, 60, 124),
-    Profile("dop26-u8-wide", 13, "u8", 4, 128, 128, 1, 0, 4, 1, 64, 60, 124),
+    Profile("dop26-u8-wide", 13, "u8", 4, 128, 128, 1, 0, 4, 1, 64, 60, 124, (28, 92, 56, 120)),
     Profile("dop14-f32", 7, "f32", 4, 256, 64, 4, 0, 16, 4, 128, 124, 252),
 ]
 ENCODINGS = ["f32", "packed", "quantized"]
@@ -363,6 +365,13 @@ class Page(Record):
                     own_lo[target], own_hi[target] = lo[slot, child], hi[slot, child]
         return own_lo, own_hi, lo, hi
 
+    def turning_codes(self):
+        """The bytes lower, upper, A and B of turning slabs: [slot, child, 4]. All are 0 where there is none (7.4)."""
+        layout = self.layout
+        if not layout.turning:
+            return np.zeros((self.treelets, layout.width, 4), np.uint8)
+        return self.treelet_bytes()[:, np.array(layout.turning) + np.arange(layout.width)[:, None]]
+
     # Leaf block (10, 11)
 
     def is_packed(self):
@@ -459,6 +468,25 @@ def round_up_to_16_bits(t):
     """Rounds f32 numbers to 16 significant bits, away from zero: the function `up` of section 8."""
     bits = np.asarray(t, np.float32).view(np.uint32)
     return (bits + np.uint32(0xFF) & np.uint32(0xFFFFFF00)).view(np.float32)
+
+
+def turning_directions(codes):
+    """256 times the directions of turning slabs, as integers [..., axis], from their bytes [..., 4] (7.4)."""
+    a, b = codes[..., 2].astype(int) - 127, codes[..., 3].astype(int) - 127
+    return np.stack([a + b, a - b, 254 - 2 * np.maximum(np.abs(a), np.abs(b))], axis=-1)
+
+
+def decode_turning(codes, box_lo, box_hi):
+    """Decodes the ends of turning slabs from their bytes [..., 4] and the boxes [..., axis] of their children (8.1)."""
+    n = turning_directions(codes)
+    direction = n.astype(np.float32) / np.float32(256)
+    with np.errstate(all="ignore"):  # a damaged treelet may decode to anything
+        of_lo, of_hi = direction * box_lo, direction * box_hi
+        lower, upper = np.where(n < 0, of_hi, of_lo), np.where(n < 0, of_lo, of_hi)
+        least, greatest = ((reach[..., 0] + reach[..., 1]) + reach[..., 2] for reach in (lower, upper))
+        unit = round_up_to_16_bits((greatest - least) * STEP_U8)
+        a, b = codes[..., 0].astype(np.float32), codes[..., 1].astype(np.float32)
+        return least + a * unit, greatest - b * unit
 
 
 def decode_slabs(profile, f16_exponent, own_lo, own_hi, code_lo, code_hi):

@@ -1,6 +1,6 @@
 """The command of the reader: checks .cbvh files against the specification, or answers queries between two files.
 
-    python3 check.py FILE...                                      checks every rule, including R35
+    python3 check.py FILE...                                      checks every rule, including R35 and R39
     python3 check.py --strict FILE...                             also checks what binds only writers
     python3 check.py --query collide|contacts|distance A B POSES  prints one answer per line
     python3 check.py --query ... A B --pose "12 numbers"

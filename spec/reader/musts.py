@@ -131,6 +131,8 @@ def of_page(page):
         for byte in range(layout.code_bytes):
             used[at + present + byte] = True
             used[at + present + layout.hi + byte] = True
+        for first in layout.turning:
+            used[at + first :][: page.children(slot)] = True
         used[at + layout.kinds_at :][:4] = True
         used[at + layout.links_at :][:4] = True
     if np.frombuffer(page.data, "u1", PAGE, page.at)[~used].any():
@@ -149,8 +151,12 @@ def of_page(page):
 
 
 def of_slabs(page):
-    """(8) Decoded slabs are ordered and below 2^122, and those decoded from residuals lie within the treelet's."""
+    """(8) Decoded slabs are ordered and below 2^122, and those decoded from residuals lie within the treelet's. A
+    turning slab's ends are ordered and below 2^122 too, and its direction has codes of at most 254 (7.4).
+    """
     own_lo, own_hi, lo, hi = page.decode()
+    codes = page.turning_codes()
+    turning_lo, turning_hi = cbvh.decode_turning(codes, lo[..., :3], hi[..., :3])
     for slot in range(page.treelets):
         present = page.children(slot)
         child_lo, child_hi = lo[slot, :present], hi[slot, :present]
@@ -159,6 +165,12 @@ def of_slabs(page):
             good &= (own_lo[slot] <= child_lo) & (child_hi <= own_hi[slot])
         if not good.all():
             yield f"(8) page {page.number}, slot {slot}: slabs out of order, or outside those of the treelet"
+        there = codes[slot, :present].any(axis=1)
+        ends_lo, ends_hi = turning_lo[slot, :present][there], turning_hi[slot, :present][there]
+        if not ((ends_lo <= ends_hi) & (-(2.0**122) < ends_lo) & (ends_hi < 2.0**122)).all():
+            yield f"(8) page {page.number}, slot {slot}: a turning slab out of order, or not below 2^122"
+        if (codes[slot, :present, 2:] > 254).any():
+            yield f"(7.4) page {page.number}, slot {slot}: a code of a turning slab's direction above 254"
 
 
 def of_leaf_block(page, lines):

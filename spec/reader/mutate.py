@@ -119,17 +119,21 @@ def seal(data, sums=ALL):
     store(32, xxh3_64(data[: cbvh.PAGE]))
 
 
-def verdict(data):
-    """Returns the number of the broken rule, or 0 for a valid file."""
+def verdict(data, bounds=False):
+    """Returns the number of the broken rule, or 0 for a valid file. `bounds` adds the rules of *verify*."""
     try:
-        rules.validate(bytes(data))
+        file = rules.validate(bytes(data))
+        if bounds:
+            rules.verify(file)
     except rules.Broken as broken:
         return broken.rule
     return 0
 
 
-def verdict_of_command(command, path):
-    run = subprocess.run([command, "validate", path, "--json"], capture_output=True, text=True)
+def verdict_of_command(command, path, *meshes):
+    """The verdict of *validate*, or of *verify* if the meshes are given from which the file was baked."""
+    verb = "verify" if meshes else "validate"
+    run = subprocess.run([command, verb, path, *meshes, "--json"], capture_output=True, text=True)
     if run.returncode not in (0, 3):
         return f"exit code {run.returncode}: {run.stderr}"
     found = json.loads(run.stdout)

@@ -1,8 +1,10 @@
-"""Checks the rules R01 to R38 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R39 of spec/format.md, section 16, in the order in which a reader reports them.
 
 Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
 exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
 """
+
+from collections import namedtuple
 
 import numpy as np
 
@@ -292,7 +294,7 @@ def check_id_block(page):
 
 
 def validate(data):
-    """Returns the file if every rule except R35 holds."""
+    """Returns the file if every rule except R35 and R39 holds."""
     file = open_file(data)
     for entry in file.entries:
         if entry.kind in file.sections:
@@ -386,62 +388,115 @@ def check_duplicates(file):
 
 # Verify
 
+# What lies below a node: the range of the projections on each direction of the profile, and the number of triangles.
+# `points` are the triangles' corners [point, axis], for up to TURNING_TRIANGLES triangles; they are for turning slabs.
+Subtree = namedtuple("Subtree", "lo hi triangles points")
+
 
 def verify(file):
-    """Checks R35 for a validated file: every decoded slab contains the triangles below it, in exact arithmetic."""
+    """Checks R35 and R39 for a validated file. Slabs contain the triangles below them in exact arithmetic."""
     for one in file.objects:
-        below = {}  # by page and root: the range of the projections of the triangles
+        below = {}  # the subtrees of roots to which no link was met yet, by page and root
         for page in reversed(one.pages_read):
-            verify_page(page, below)
-        reach_lo, reach_hi = below[one.first_page, 0]
-        if not ((one.box_lo <= reach_lo[:3]) & (reach_hi[:3] <= one.box_hi)).all():
-            raise Broken(35, one.place("box_lo"), f"a box around {reach_lo[:3]} to {reach_hi[:3]}", one.box_lo)
+            own, children = subtrees_of(page, below)
+            below.update({(page.number, root): own[root] for root in range(page.roots)})
+            verify_page(page, own, children)
+        whole = below[one.first_page, 0]
+        if not ((one.box_lo <= whole.lo[:3]) & (whole.hi[:3] <= one.box_hi)).all():
+            raise Broken(35, one.place("box_lo"), f"a box around {whole.lo[:3]} to {whole.hi[:3]}", one.box_lo)
 
 
-def verify_page(page, below):
+def verify_page(page, own, children):
     _, _, lo, hi = page.decode()
-    packet_lo, packet_hi = reach_of_packets(page)
-    own = {}
-    for slot in reversed(range(page.treelets)):
-        reaches = []
-        for child, (kind, target) in enumerate(page.targets(slot)):
-            if kind == TREELET:
-                reach = own[target]
-            elif kind == REMOTE:
-                reach = below[page.remote(target)]
-            else:
-                reach = packet_lo[target], packet_hi[target]
-            need_contained(page.treelet_at(slot), f"child {child}", lo[slot, child], hi[slot, child], *reach)
-            reaches.append(reach)
-        own[slot] = np.min([lo for lo, _ in reaches], axis=0), np.max([hi for _, hi in reaches], axis=0)
     for root in range(page.roots):
-        need_contained(page.anchor_at(root), "anchor", *page.anchor(root), *own[root])
-        below[page.number, root] = own[root]
+        need_contained(page.anchor_at(root), "anchor", *page.anchor(root), own[root])
+    turning = turning_slabs_that_hold(page, lo, hi, children)
+    for slot in range(page.treelets):
+        at = page.treelet_at(slot)
+        for child, subtree in enumerate(children[slot]):
+            need_contained(at, f"child {child}", lo[slot, child], hi[slot, child], subtree)
+            if (slot, child) in turning:
+                place, count, most = at + page.layout.turning[0] + child, subtree.triangles, cbvh.TURNING_TRIANGLES
+                need(count <= most, 39, place, f"at most {most} triangles", count)
+                need(turning[slot, child], 35, place, f"a turning slab around child {child}", "one that cuts")
 
 
-def need_contained(at, what, lo, hi, reach_lo, reach_hi):
-    good = (lo <= reach_lo) & (reach_hi <= hi)  # false for NaN
+def subtrees_of(page, below):
+    """The subtree of each slot, and those of its children. Takes out of `below` the roots to which the page links."""
+    packets = subtrees_of_packets(page)
+    own, children = {}, {}
+    for slot in reversed(range(page.treelets)):
+        children[slot] = []
+        for kind, target in page.targets(slot):
+            if kind == TREELET:
+                subtree = own[target]
+            elif kind == REMOTE:
+                subtree = below.pop(page.remote(target))
+            else:
+                subtree = packets[target]
+            children[slot].append(subtree)
+        own[slot] = join(children[slot])
+    return own, children
+
+
+def join(parts):
+    lows, highs, counts, points = zip(*parts)
+    count = sum(counts)
+    kept = np.concatenate(points) if count <= cbvh.TURNING_TRIANGLES else None
+    return Subtree(np.min(lows, axis=0), np.max(highs, axis=0), count, kept)
+
+
+def need_contained(at, what, lo, hi, subtree):
+    good = (lo <= subtree.lo) & (subtree.hi <= hi)  # false for NaN
     if not good.all():
         slab = int((~good).argmax())
-        found = f"[{lo[slab]}, {hi[slab]}]"
-        raise Broken(35, at, f"slab {slab} of {what} around [{reach_lo[slab]}, {reach_hi[slab]}]", found)
+        expected = f"slab {slab} of {what} around [{subtree.lo[slab]}, {subtree.hi[slab]}]"
+        raise Broken(35, at, expected, f"[{lo[slab]}, {hi[slab]}]")
 
 
-def reach_of_packets(page):
-    """The least and greatest projection of each packet on each direction of the profile, rounded outward to f64.
+def turning_slabs_that_hold(page, lo, hi, children):
+    """Whether the turning slab of each child that has one contains the triangles below, by slot and child.
+
+    256 n has integer coordinates of at most 9 bits, so its products with f32 coordinates are exact in f64. Ends are
+    compared as in `subtrees_of_packets`. The value for a child with too many triangles (R39) has no meaning.
+    """
+    codes = page.turning_codes()
+    ends_lo, ends_hi = (256 * ends.astype(np.float64) for ends in cbvh.decode_turning(codes, lo[..., :3], hi[..., :3]))
+    found = ((slot, child) for slot in range(page.treelets) for child in range(len(children[slot])))
+    holds = {place: False for place in found if codes[place].any()}
+    small = [(slot, child) for slot, child in holds if children[slot][child].points is not None]
+    if small:
+        points = [children[slot][child].points for slot, child in small]
+        sizes = [len(part) for part in points]
+        places = tuple(np.transpose(small))
+        n = np.repeat(cbvh.turning_directions(codes[places]), sizes, axis=0).astype(np.float64)
+        down, up = exact_sum_outward(*(n * np.concatenate(points)).T)
+        starts = np.cumsum([0, *sizes[:-1]])
+        reach_lo, reach_hi = np.minimum.reduceat(down, starts), np.maximum.reduceat(up, starts)
+        good = (ends_lo[places] <= reach_lo) & (reach_hi <= ends_hi[places])  # false for NaN
+        holds.update(zip(small, good.tolist()))
+    return holds
+
+
+def subtrees_of_packets(page):
+    """The subtree of each packet, with projections rounded outward to f64.
 
     An f32 end is also an f64 number. It is therefore at most the exact projection if and only if it is at most the
     projection rounded down, so comparing it with the result is exact.
     """
-    corners = page.triangles().astype(np.float64)
-    directions = cbvh.DIRECTIONS[: page.layout.slabs]
+    corners, used = page.triangles().astype(np.float64), page.lanes_used()
+    corners = np.where(used[..., None, None], corners, corners[:, :1])  # the other lanes hold no triangles
     lows, highs = [], []
-    for direction in directions:
-        x, y, z = (corners[..., axis] * float(direction[axis]) for axis in range(3))
-        low, high = exact_sum_outward(x, y, z)
+    for direction in cbvh.DIRECTIONS[: page.layout.slabs]:
+        low, high = exact_sum_outward(*(corners[..., axis] * float(direction[axis]) for axis in range(3)))
         lows.append(low.min(axis=(1, 2)))
         highs.append(high.max(axis=(1, 2)))
-    return np.stack(lows, axis=1), np.stack(highs, axis=1)
+    lows, highs, counts = np.stack(lows, axis=1), np.stack(highs, axis=1), used.sum(axis=1).tolist()
+    if page.layout.turning:
+        points = [lanes[:count].reshape(-1, 3) for lanes, count in zip(corners, counts)]
+    else:
+        points = [np.empty((0, 3))] * page.packets
+    return list(map(Subtree, lows, highs, counts, points))
 
 
 def exact_sum_outward(x, y, z):

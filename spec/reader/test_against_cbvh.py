@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -245,6 +246,84 @@ class AgainstCbvh(unittest.TestCase):
         write_obj(mesh, [("cancel", np.array([[[1, 2.0**-60, -1], [-1, 0, -1], [0, -1, -1]]]))])
         self.check_bake(self.bake(mesh, "dop14-u8", "f32"), mesh)
 
+    def test_turning_slabs(self):
+        """Changes turning slabs of one child each: `cbvh verify` and this reader find the same rule broken."""
+        path = self.bake(ROOM, "dop26-u8-wide", "f32")
+        file = load(path)
+        there, absent = [], []
+        for page in file.objects[0].pages_read:
+            codes = page.turning_codes()
+            for slot in range(page.treelets):
+                for child in range(page.children(slot)):
+                    places = [page.treelet_at(slot) + first + child for first in page.layout.turning]
+                    (there if codes[slot, child].any() else absent).append(places)
+        self.assertGreater(len(there), 100)
+        broken = set()
+        for number in range(60):
+            data = bytearray(file.data)
+            places = self.chance.choice(there if number % 2 else absent)
+            if number % 4 == 1:
+                at = self.chance.choice(places)
+                data[at] = (data[at] + self.chance.choice((-1, 1, 1, 2, 5))) % 256
+            else:
+                for at in places:
+                    data[at] = self.chance.choice((0, 1, 127, self.chance.randrange(256)))
+            mutate.seal(data)
+            forged = os.path.join(self.folder, "forged.cbvh")
+            with open(forged, "wb") as stream:
+                stream.write(data)
+            ours = mutate.verdict(data, bounds=True)
+            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), places)
+            broken.add(ours)
+        self.assertEqual(broken, {0, 35, 39})
+
+    def test_limit_of_turning_slabs(self):
+        """R39 depends on the greatest number of triangles that occurs, and comes after R35 in a later page."""
+        file = load(self.bake(ROOM, "dop26-u8-wide", "f32"))
+        pages, below, counts = file.objects[0].pages_read, {}, {}
+        for page in reversed(pages):
+            own, children = rules.subtrees_of(page, below)
+            below.update({(page.number, root): own[root] for root in range(page.roots)})
+            for slot, child in np.ndindex(page.treelets, page.layout.width):
+                if child < page.children(slot):
+                    place = page.treelet_at(slot) + page.layout.turning[0] + child
+                    has_slab = page.turning_codes()[slot, child].any()
+                    counts[place] = children[slot][child].triangles, has_slab
+        most = max(count for count, has_slab in counts.values() if has_slab)
+        self.assertTrue(256 < most <= cbvh.TURNING_TRIANGLES)
+        for limit, rule in ((most, 0), (most - 1, 39)):
+            with mock.patch("cbvh.TURNING_TRIANGLES", limit):
+                self.assertEqual(mutate.verdict(file.data, bounds=True), rule)
+
+        data, at = bytearray(file.data), pages[-1].anchor_at(0)
+        data[at : at + 4] = data[at + 4 * 13 : at + 4 * 14]  # slab 0 has no width
+        mutate.seal(data)
+        self.assertEqual(mutate.verdict(data, bounds=True), 35)
+        place = next(place for place, (count, _) in counts.items() if count > cbvh.TURNING_TRIANGLES)
+        self.assertLess(place, pages[1].at)
+        data[place] = 1
+        mutate.seal(data)
+        self.assertEqual(mutate.verdict(data, bounds=True), 35)
+        data = bytearray(file.data)
+        data[place] = 1
+        mutate.seal(data)
+        self.assertEqual(mutate.verdict(data, bounds=True), 39)
+
+    def test_bounds_ignore_lanes_without_triangles(self):
+        file = load(self.bake(ROOM, "dop26-u8-wide", "f32"))
+        data = bytearray(file.data)
+        for page in file.objects[0].pages_read:
+            for packet, lane in np.argwhere(~page.lanes_used()):
+                at = page.leaf_block_at() + cbvh.F32_PACKET_BYTES * int(packet) + 4 * int(lane)
+                data[at : at + 4] = np.float32(9e9).tobytes()
+        mutate.seal(data)
+        path = os.path.join(self.folder, "lanes.cbvh")
+        with open(path, "wb") as stream:
+            stream.write(data)
+        self.assertNotEqual(data, file.data)
+        self.assertEqual(mutate.verdict(data, bounds=True), 0)
+        self.assertEqual(mutate.verdict_of_command(COMMAND, path, ROOM), 0)
+
     def test_larger_meshes(self):
         for name in ("piano", "apartment"):
             mesh = self.shared("meshes", name + ".obj")
@@ -302,6 +381,7 @@ class AgainstCbvh(unittest.TestCase):
             ("dop6-f16", "packed"),
             ("dop14-f32", "quantized"),
             ("dop26-u4", "f32"),
+            ("dop26-u8-wide", "packed"),
         ):
             meshes += [self.bake(mesh, profile, triangles) for mesh in (ROBOT, ROOM)]
         count = int(os.environ.get("CBVH_MUTANTS", "1000"))

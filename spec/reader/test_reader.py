@@ -10,15 +10,18 @@ import glob
 import os
 import random
 import re
+import types
 import unittest
 from contextlib import redirect_stderr, redirect_stdout
 from fractions import Fraction
+from unittest import mock
 
 import numpy as np
 
 import cbvh
 import check
 import musts
+import mutate
 import query
 import rules
 from xxh3 import xxh3_64
@@ -55,6 +58,41 @@ def exit_code(arguments, output):
             return end.code
 
 
+def exponent_of(exact):
+    """The greatest e such that 2^e is at most the magnitude of a fraction that is not 0."""
+    size = abs(exact)
+    e = size.numerator.bit_length() - size.denominator.bit_length()
+    return e if Fraction(2) ** e <= size else e - 1
+
+
+def nearest_f32(exact):
+    """The f32 number nearest to a fraction, ties to even, as a fraction."""
+    unit = Fraction(2) ** max(exponent_of(exact) - 23, -149) if exact else 1
+    return round(exact / unit) * unit
+
+
+def up(exact):
+    """The function `up` of section 8 for an f32 number of at least 0."""
+    unit = Fraction(2) ** max(exponent_of(exact) - 15, -141) if exact else 1
+    return -(-exact // unit) * unit
+
+
+def turning_direction(codes):
+    a, b = (code - 127 for code in codes[2:])
+    return [Fraction(c, 256) for c in (a + b, a - b, 254 - 2 * max(abs(a), abs(b)))]
+
+
+def turning_slab(codes, lo, hi):
+    """Decodes a turning slab from its four bytes and the box of its child, one number at a time (8.1)."""
+    least = greatest = 0
+    for axis, n in enumerate(turning_direction(codes)):
+        p, q = (nearest_f32(n * Fraction(float(ends[axis]))) for ends in (lo, hi))
+        lower, upper = (q, p) if n < 0 else (p, q)
+        least, greatest = nearest_f32(least + lower), nearest_f32(greatest + upper)
+    unit = up(nearest_f32(nearest_f32(greatest - least) * Fraction(float(cbvh.STEP_U8))))
+    return nearest_f32(least + nearest_f32(codes[0] * unit)), nearest_f32(greatest - nearest_f32(codes[1] * unit))
+
+
 class Tables(unittest.TestCase):
     def test_structures(self):
         structures = {
@@ -76,9 +114,11 @@ class Tables(unittest.TestCase):
         self.assertEqual([[int(c) for c in row[2:]] for row in table("directions")], cbvh.DIRECTIONS.tolist())
         self.assertEqual([int(row[1]) for row in table("directions")], [cbvh.row_of(slab) for slab in range(13)])
         for row, places, profile in zip(table("profiles"), table("places"), cbvh.PROFILES, strict=True):
-            ours = [profile.name, 2 * profile.slabs, *profile[1:6]]
+            ours = [profile.name, 2 * profile.slabs, *profile[1:6], "yes" if profile.turning else "no"]
             self.assertEqual(row[1:], [str(value) for value in ours])
-            self.assertEqual(places, [str(value) for value in (profile.name, *profile[6:])])
+            self.assertEqual(places, [str(value) for value in (profile.name, *profile[6:-1])])
+        turning = [[profile.name, *profile.turning] for profile in cbvh.PROFILES if profile.turning]
+        self.assertEqual(table("turning"), [[row[0], *(f"{first} + c" for first in row[1:])] for row in turning])
         self.assertEqual([row[1] for row in table("triangle-encodings")], cbvh.ENCODINGS)
         kinds = {int(row[0]): (row[2] == "yes", row[3] == "yes") for row in table("sections")}
         self.assertEqual(kinds, {kind: (kind in cbvh.NEEDED, kind in cbvh.CONTENT) for kind in range(1, 7)})
@@ -92,6 +132,12 @@ class Tables(unittest.TestCase):
             self.assertEqual(getattr(cbvh, name), np.float32(1) / np.float32(parts))
         for name, value in stated.items():
             self.assertEqual(getattr(cbvh, name), value, name)
+
+    def test_rows_of_turning_slabs(self):
+        for profile in cbvh.PROFILES:
+            if profile.turning:
+                starts = [profile.row * row + hi for row in (7, 14) for hi in (0, profile.hi)]
+                self.assertEqual(list(profile.turning), starts)
 
     def test_example_of_decoding(self):
         treelet = np.array([bytes.fromhex("".join(row[1] for row in table("example-treelet")))], "S64").view("u1")
@@ -162,6 +208,50 @@ class Arithmetic(unittest.TestCase):
             self.assertTrue(Fraction(low) <= exact <= Fraction(high))
             self.assertEqual(high, low if Fraction(low) == exact else np.nextafter(low, np.inf))
 
+    def test_turning_directions(self):
+        """Tests what 7.4 states about directions, for all codes."""
+        codes = np.zeros((256, 256, 4), np.uint8)
+        codes[..., 2], codes[..., 3] = np.arange(256)[:, None], np.arange(256)
+        n = cbvh.turning_directions(codes)
+        self.assertTrue((np.abs(n) <= 256).all() and n.any(axis=-1).all())
+        lengths = np.sqrt((n[:255, :255] ** 2).sum(axis=-1)) / 256
+        self.assertTrue(0.57 <= lengths.min() and lengths.max() <= 1)
+        for a, b in ((0, 0), (127, 127), (211, 127), (3, 250), (255, 255), (0, 255)):
+            self.assertEqual([Fraction(int(c), 256) for c in n[a, b]], turning_direction((0, 0, a, b)))
+
+    def test_decoding_of_turning_slabs(self):
+        chance, rows = random.Random(3), []
+        for _ in range(4000):
+            size = chance.choice((0, 0, 0, -30, 115, -130, -149))
+            ends = np.array([chance.uniform(-1, 1) * 2.0 ** (size - chance.choice((0, 0, 8, 40))) for _ in range(6)])
+            lo, hi = np.sort(ends.astype(np.float32).reshape(2, 3), axis=0)
+            if chance.random() < 0.1:
+                hi = lo
+            rows.append((list(chance.randbytes(4)), lo, hi))
+        codes, lo, hi = map(np.array, zip(*rows))
+        found = cbvh.decode_turning(codes.astype(np.uint8), lo, hi)
+        self.assertEqual([ends.dtype for ends in found], [np.float32, np.float32])
+        for row, ends in zip(rows, zip(*found)):
+            self.assertEqual(tuple(Fraction(float(end)) for end in ends), turning_slab(*row), row)
+
+    def test_turning_slabs_are_compared_exactly(self):
+        """Slabs without width around one point. The sum 84 + 86 2^-60 - 84 is 0 in f64 and in f32, but not exactly."""
+        for a, b, n, corner, holds in (
+            (212, 126, [84, 86, 84], (1, 0, -1), True),
+            (212, 126, [84, 86, 84], (1, 2.0**-60, -1), False),
+            (212, 126, [84, 86, 84], (1, -(2.0**-60), -1), False),
+            (212, 126, [84, 86, 84], (2.0**120, 2.0**-149, -(2.0**120)), False),
+            (255, 255, [256, 0, -2], (2.0**120, 0, -(2.0**120)), True),  # 256 times the ends is no f32 number
+        ):
+            codes = np.array([[[0, 0, a, b]]], np.uint8)
+            self.assertEqual(cbvh.turning_directions(codes).tolist(), [[n]])
+            page = types.SimpleNamespace(treelets=1, turning_codes=lambda codes=codes: codes)
+            points = np.array([corner] * 3)
+            slabs = points[:1, None].astype(np.float32)
+            children = [[rules.Subtree(None, None, 1, points)]]
+            found = rules.turning_slabs_that_hold(page, slabs, slabs, children)
+            self.assertEqual(found, {(0, 0): holds}, corner)
+
     def test_contacts_of_two_triangles(self):
         flat = [[0, 0, 0], [4, 0, 0], [0, 4, 0]]
         cases = [
@@ -216,7 +306,8 @@ class Golden(unittest.TestCase):
                 with self.assertRaises(rules.Broken) as broken:
                     rules.validate(data)
                 self.assertEqual(broken.exception.rule, rule)
-        self.assertEqual(seen, set(range(1, 39)) - {35})
+        self.assertEqual([row[0] for row in table("rules")], [f"R{rule:02}" for rule in range(1, 40)])
+        self.assertEqual(seen, set(range(1, 40)) - {35, 39})
 
     def test_bounds_that_cut(self):
         """R35 has no golden file. Here, codes of ok-plain are raised so that bounds cut, without new checksums."""
@@ -232,10 +323,84 @@ class Golden(unittest.TestCase):
                     rules.verify(file)
                 self.assertEqual(broken.exception.rule, 35)
 
+    def forged(self, slabs):
+        """Returns ok-profiles with the bytes of turning slabs, by child, in the root of its dop26-u8-wide object."""
+        (_, data) = next(golden("ok-profiles.cbvh"))
+        page = next(one for one in rules.validate(data).objects if one.layout.turning).pages_read[0]
+        data = bytearray(data)
+        for child, codes in slabs.items():
+            for first, code in zip(page.layout.turning, codes):
+                data[page.treelet_at(0) + first + child] = code
+        mutate.seal(data)
+        file = rules.validate(bytes(data))
+        return file, file.objects[page.owner.number].pages_read[0]
+
+    def assert_cuts(self, file, rule):
+        with self.assertRaises(rules.Broken) as broken:
+            rules.verify(file)
+        self.assertEqual(broken.exception.rule, rule)
+
+    def test_turning_slabs(self):
+        """R35 holds for the greatest codes that leave the triangles inside, and fails if one of them is raised."""
+        chance = random.Random(4)
+        for _ in range(4):
+            slabs = {}
+            a, b = chance.randrange(255), chance.randrange(255)
+            file, page = self.forged({child: (0, 1, a, b) for child in range(3)})
+            _, _, lo, hi = page.decode()
+            lanes = page.triangles()
+            n = turning_direction((0, 0, a, b))
+            for child, (kind, packet) in enumerate(page.targets(0)):
+                corners = lanes[packet, : kind - 3].reshape(-1, 3).tolist()
+                reach = [sum(c * Fraction(v) for c, v in zip(n, corner)) for corner in corners]
+                box = lo[0, child, :3], hi[0, child, :3]
+                lower = max(code for code in range(256) if turning_slab((code, 0, a, b), *box)[0] <= min(reach))
+                upper = max(code for code in range(256) if turning_slab((0, code, a, b), *box)[1] >= max(reach))
+                slabs[child] = (lower, upper, a, b)
+            file, _ = self.forged(slabs)
+            rules.verify(file)
+            self.assertEqual(list(musts.violations(file)), [])
+            for child, (lower, upper, a, b) in slabs.items():
+                for raised in ((lower + 1, upper, a, b), (lower, upper + 1, a, b)):
+                    if max(raised) < 256:
+                        self.assert_cuts(self.forged(slabs | {child: raised})[0], 35)
+
+    def test_turning_slabs_with_many_triangles_below(self):
+        """R39 has no golden file. It comes before R35 for the turning slab, and after R35 for the child's slabs."""
+        holds, _ = self.forged({1: (0, 0, 127, 127)})
+        cuts, page = self.forged({1: (255, 255, 127, 127)})
+        count = page.targets(0)[1][0] - 3
+        with mock.patch("cbvh.TURNING_TRIANGLES", count):
+            rules.verify(holds)
+            self.assert_cuts(cuts, 35)
+        with mock.patch("cbvh.TURNING_TRIANGLES", count - 1):
+            self.assert_cuts(holds, 39)
+            self.assert_cuts(cuts, 39)
+            at = page.treelet_at(0) + int(cbvh.places_of_codes(page.layout)[1, 0])
+            cuts.data = page.data = page.data[:at] + b"\xff" + page.data[at + 1 :]
+            self.assert_cuts(cuts, 35)
+
+    def test_bytes_of_turning_slabs_that_writers_leave(self):
+        """Writers use direction codes of at most 254, and absent children have no turning slab."""
+        for slabs, found in (
+            ({0: (0, 0, 254, 254)}, 0),
+            ({0: (0, 0, 255, 127)}, 1),
+            ({0: (0, 0, 127, 255)}, 1),
+            ({3: (0, 0, 127, 127)}, 1),
+        ):
+            file, page = self.forged(slabs)
+            self.assertEqual(page.children(0), 3)
+            rules.verify(file)
+            self.assertEqual(len(list(musts.violations(file))), found, slabs)
+
     def test_what_is_in_them(self):
         files = {name: rules.validate(data) for name, data in golden("ok-*.cbvh")}
+        ball = files["ok-turning.cbvh"]
+        page = ball.objects[0].pages_read[0]
+        self.assertTrue(all(page.turning_codes()[slot, : page.children(slot)].any() for slot in range(page.treelets)))
+        rules.verify(ball)
         for name, file in files.items():
-            for one in file.objects:
+            for one in file.objects if file is not ball else ():
                 corners = one.triangles_f32()
                 cube = (corners - (one.box_lo + one.box_hi) / 2).reshape(-1, 3)
                 self.assertTrue((np.abs(cube) == 1).all(), name)  # corners of a cube of side 2

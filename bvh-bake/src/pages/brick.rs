@@ -9,6 +9,7 @@ use crate::storage::Spill;
 use crate::storage::resources::Resources;
 use crate::tree::arena::Arena;
 use crate::tree::treelets::{cut_brick, cut_top};
+use crate::tree::turning;
 use crate::tree::{Bricks, PacketTriangles, Tree};
 use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
@@ -105,7 +106,10 @@ fn encode_brick(
     spill: &Spill,
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
-    let arena = cut_brick(&tree, triangles, width, slabs);
+    let mut arena = cut_brick(&tree, triangles, width, slabs);
+    if style.profile.has_turning_slabs() {
+        turning::fit(&mut arena, triangles);
+    }
     drop(tree);
     let kdop = arena.kdop(0, slabs);
     let plan = plan::plan_brick(&arena, style.profile);

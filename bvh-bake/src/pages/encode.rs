@@ -99,7 +99,7 @@ impl Encoder<'_> {
                     ChildKind::Leaf(packet) => {
                         let numbers = packet.numbers().iter();
                         let triangles = numbers.map(|&number| &self.triangles[number as usize]);
-                        writer.leaf(&child.kdop, triangles.map(|triangle| (triangle.corners, triangle.id)));
+                        writer.leaf(&child.bound, triangles.map(|triangle| (triangle.corners, triangle.id)));
                         continue;
                     }
                     ChildKind::Treelet(below) => self.places[*below as usize],
@@ -108,9 +108,9 @@ impl Encoder<'_> {
                     ChildKind::Brick(_) => Place::default(),
                 };
                 if matches!(child.kind, ChildKind::Treelet(_)) && place.page as usize == number {
-                    writer.treelet(&child.kdop);
+                    writer.treelet(&child.bound);
                 } else {
-                    writer.remote(&child.kdop, RootRef::new(place.page, place.slot));
+                    writer.remote(&child.bound, RootRef::new(place.page, place.slot));
                 }
             }
         }

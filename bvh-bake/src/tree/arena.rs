@@ -4,6 +4,7 @@ use crate::tree::PacketTriangles;
 use crate::tree::bricks::BrickIndex;
 use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
+use bvh_format::page::TightBound;
 use std::ops::Range;
 
 /// A treelet by number in an arena; children have higher numbers than their parents.
@@ -12,8 +13,8 @@ pub(crate) type TreeletIndex = u32;
 /// A child of a treelet.
 #[derive(Clone, Copy)]
 pub(crate) struct Child {
-    /// The tight k-DOP of all triangles below, in the slabs that the profile stores.
-    pub(crate) kdop: Kdop,
+    /// The tight bound of all triangles below: the slabs that the profile stores.
+    pub(crate) bound: TightBound,
     pub(crate) kind: ChildKind,
 }
 
@@ -65,7 +66,13 @@ impl Arena {
         &mut self.children
     }
 
-    fn range(&self, treelet: TreeletIndex) -> Range<usize> {
+    /// Returns a child by its place among all children.
+    pub(crate) fn child(&self, place: usize) -> &Child {
+        &self.children[place]
+    }
+
+    /// Returns the places of the children of a treelet among all children.
+    pub(crate) fn range(&self, treelet: TreeletIndex) -> Range<usize> {
         let treelet = treelet as usize;
         let start = if treelet == 0 { 0 } else { self.ends[treelet - 1] };
         start as usize..self.ends[treelet] as usize
@@ -90,7 +97,7 @@ impl Arena {
     /// Returns the first `slabs` slabs of the k-DOP of all children of a treelet.
     pub(crate) fn kdop(&self, treelet: TreeletIndex, slabs: usize) -> Kdop {
         let mut kdop = Kdop::EMPTY;
-        self.children(treelet).iter().for_each(|child| kdop.join(&child.kdop, slabs));
+        self.children(treelet).iter().for_each(|child| kdop.join(&child.bound.kdop, slabs));
         kdop
     }
 
@@ -100,7 +107,7 @@ impl Arena {
         for treelet in (0..self.len() as u32).rev() {
             for place in self.range(treelet) {
                 if let ChildKind::Treelet(below) = self.children[place].kind {
-                    self.children[place].kdop = self.kdop(below, slabs);
+                    self.children[place].bound.kdop = self.kdop(below, slabs);
                 }
             }
         }

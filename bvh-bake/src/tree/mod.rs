@@ -15,6 +15,7 @@ mod bricks;
 mod reinsert;
 mod swept;
 pub(crate) mod treelets;
+pub(crate) mod turning;
 
 use crate::error::BakeError;
 use crate::options::Effort;

@@ -14,6 +14,7 @@ use crate::tree::bricks::BrickIndex;
 use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{PACKET, Packet};
+use bvh_format::page::TightBound;
 use rayon::prelude::*;
 
 /// Children whose k-DOPs one thread fits at a time.
@@ -29,12 +30,12 @@ pub(crate) fn cut_brick(
     width: usize,
     slabs: usize,
 ) -> Arena {
-    let leaf = |packet| Child { kdop: Kdop::EMPTY, kind: ChildKind::Leaf(packet) };
+    let leaf = |packet| Child { bound: TightBound::EMPTY, kind: ChildKind::Leaf(packet) };
     let mut arena = cut(tree, width, leaf);
     arena.children_mut().par_chunks_mut(CHILDREN_PER_TASK).for_each(|children| {
         for child in children {
             if let ChildKind::Leaf(packet) = &child.kind {
-                child.kdop = kdop_of_packet(triangles, packet, slabs);
+                child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
             }
         }
     });
@@ -49,7 +50,7 @@ pub(crate) fn cut_top(
     width: usize,
     slabs: usize,
 ) -> Arena {
-    let leaf = |brick| Child { kdop: kdop_of(brick), kind: ChildKind::Brick(brick) };
+    let leaf = |brick| Child { bound: TightBound::of_kdop(kdop_of(brick)), kind: ChildKind::Brick(brick) };
     let mut arena = cut(tree, width, leaf);
     arena.join_kdops(slabs);
     arena
@@ -122,7 +123,7 @@ impl<L: Copy> Cutter<'_, L> {
         let nodes = closed.nodes[..closed.count].iter();
         let (treelet, first) = arena.add(nodes.map(|&node| match self.tree.at(node).content {
             Content::Leaf(content) => leaf(content),
-            Content::Inner(_) => Child { kdop: Kdop::EMPTY, kind: ChildKind::Treelet(0) },
+            Content::Inner(_) => Child { bound: TightBound::EMPTY, kind: ChildKind::Treelet(0) },
         }));
         for (child, &node) in (first..).zip(&closed.nodes[..closed.count]) {
             if self.tree.children(node).is_some() {
@@ -175,12 +176,11 @@ fn add_pairs<L>(tree: &Tree<L>, node: NodeIndex, sum: &mut f64, count: &mut f64)
     }
 }
 
-/// Returns the first `slabs` slabs of the tight k-DOP of a packet.
-fn kdop_of_packet(triangles: &[Triangle], packet: &PacketTriangles, slabs: usize) -> Kdop {
+/// Returns the packet of some triangles.
+pub(crate) fn packet_of(triangles: &[Triangle], packet: &PacketTriangles) -> Packet {
     let mut corners = [[[0.0; 3]; 3]; PACKET];
     for (corners, &number) in corners.iter_mut().zip(packet.numbers()) {
         *corners = triangles[number as usize].corners;
     }
-    let count = packet.numbers().len();
-    Packet::new(&corners[..count]).kdop(count, slabs)
+    Packet::new(&corners[..packet.numbers().len()])
 }

@@ -1,13 +1,13 @@
 //! Decodes a whole file page by page, even if the file is not valid.
 
 use bvh_format::Layout;
-use bvh_format::bounds::check_bounds;
+use bvh_format::bounds::{Subtree, check_bounds};
 use bvh_format::decode::decode_child;
 use bvh_format::ids::decode_id;
-use bvh_format::kdop::Kdop;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::{Page, check_crossing, check_page};
 use bvh_format::treelet::Links;
+use bvh_format::turning::decode_turning;
 use bvh_format::validate::{packets, validate};
 
 pub fn decode(bytes: &[u8]) {
@@ -36,7 +36,8 @@ pub fn decode(bytes: &[u8]) {
                 let treelet = page.treelet(slot);
                 let node = page.anchor(slot % header.roots.max(1)).slabs;
                 for child in 0..Links::read(treelet).children().min(object.profile().width()) {
-                    let _ = decode_child(object.profile(), object.f16_scale(), treelet, child, &node);
+                    let slabs = decode_child(object.profile(), object.f16_scale(), treelet, child, &node);
+                    let _ = decode_turning(object.profile(), treelet, child, &slabs);
                 }
             }
             for link in 0..header.remotes {
@@ -47,7 +48,7 @@ pub fn decode(bytes: &[u8]) {
                 }
             }
             if checked.is_ok() && blocks {
-                let _ = check_bounds(&layout, object, &page, leaves, |_| Kdop::EMPTY);
+                let _ = check_bounds(&layout, object, &page, leaves, |_| &Subtree::UNKNOWN);
             }
         }
     }

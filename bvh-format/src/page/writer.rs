@@ -9,13 +9,14 @@ use super::{
     link_at,
 };
 use crate::checksum::checksum;
-use crate::decode::decode_child;
+use crate::decode::decode_slabs;
 use crate::ids::{WORD, encode_ids};
 use crate::kdop::Kdop;
 use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, encode_block};
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
 use crate::treelet::{ChildKind, Links, SlabEncoder};
+use crate::turning::{TurningSlab, encode_turning};
 use zerocopy::IntoBytes;
 
 /// A page and its blocks. Its numbers count from itself until a [`PagePatcher`](super::PagePatcher) changes them: it is
@@ -52,6 +53,25 @@ pub struct PageWriter {
     packets: Vec<Packet>,
     ids: Vec<LaneIds>,
     open: OpenTreelet,
+}
+
+/// The tightest bound of the triangles below a child.
+#[derive(Debug, Clone, Copy)]
+pub struct TightBound {
+    /// The slabs of the profile's directions.
+    pub kdop: Kdop,
+    /// A slab along a direction of the child's own. Profiles without turning slabs leave it out.
+    pub turning: Option<TurningSlab>,
+}
+
+impl TightBound {
+    /// The bound of nothing.
+    pub const EMPTY: Self = Self::of_kdop(Kdop::EMPTY);
+
+    /// A bound without a turning slab.
+    pub const fn of_kdop(kdop: Kdop) -> Self {
+        Self { kdop, turning: None }
+    }
 }
 
 /// The treelet that is being written.
@@ -130,42 +150,51 @@ impl PageWriter {
     }
 
     /// Adds a child that is a treelet of this page: the one in the next free slot.
-    pub fn treelet(&mut self, slabs: &Kdop) {
-        let child = self.child(slabs, ChildKind::Treelet);
-        let treelet = &self.bytes[self.open.at..][..self.profile.treelet_bytes()];
-        let parent = &self.open.slabs.parent;
-        self.decoded.push(decode_child(self.profile, self.f16_scale, treelet, child, parent));
+    pub fn treelet(&mut self, bound: &TightBound) {
+        self.child(bound, ChildKind::Treelet);
     }
 
     /// Adds a child that is a subtree root of another page.
-    pub fn remote(&mut self, slabs: &Kdop, to: RootRef) {
-        self.child(slabs, ChildKind::Remote);
+    pub fn remote(&mut self, bound: &TightBound, to: RootRef) {
+        self.child(bound, ChildKind::Remote);
         write_remote(&mut self.bytes, self.profile, self.shape.roots as u8, self.remotes as u8, to);
         self.remotes += 1;
     }
 
     /// Adds a child that is a leaf packet of one to four triangles: their corners, around the object's origin, and ids.
-    pub fn leaf(&mut self, slabs: &Kdop, triangles: impl Iterator<Item = ([[f32; 3]; 3], u32)>) {
+    pub fn leaf(&mut self, bound: &TightBound, triangles: impl Iterator<Item = ([[f32; 3]; 3], u32)>) {
         let (mut corners, mut ids) = ([[[0.0; 3]; 3]; PACKET], LaneIds { ids: [0; PACKET], count: 0 });
         for (lane, triangle) in triangles.enumerate() {
             (corners[lane], ids.ids[lane]) = triangle;
             ids.count += 1;
         }
-        self.child(slabs, ChildKind::Leaf { triangles: ids.count });
+        self.child(bound, ChildKind::Leaf { triangles: ids.count });
         self.packets.push(Packet::new(&corners[..ids.count]));
         self.ids.push(ids);
     }
 
-    /// Writes the slabs and the kind of the next child of the treelet; returns its number.
-    fn child(&mut self, slabs: &Kdop, kind: ChildKind) -> usize {
+    /// Writes the bound and the kind of the next child of the treelet.
+    fn child(&mut self, bound: &TightBound, kind: ChildKind) {
         let open = &mut self.open;
         let child = open.children;
         open.children += 1;
         open.links.set_kind(child, kind);
         let treelet = &mut self.bytes[open.at..][..self.profile.treelet_bytes()];
-        open.slabs.encode(child, slabs, treelet);
+        open.slabs.encode(child, &bound.kdop, treelet);
         open.links.write(treelet);
-        child
+        let turning = bound.turning.as_ref().filter(|_| self.profile.has_turning_slabs());
+        if kind != ChildKind::Treelet && turning.is_none() {
+            return;
+        }
+        // Of a child that is not a treelet, only the box is needed.
+        let slabs = if kind == ChildKind::Treelet { self.profile.directions().slabs() } else { 3 };
+        let decoded = decode_slabs(self.profile, self.f16_scale, treelet, child, &open.slabs.parent, slabs);
+        if let Some(turning) = turning {
+            encode_turning(self.profile, treelet, child, &decoded, turning);
+        }
+        if kind == ChildKind::Treelet {
+            self.decoded.push(decoded);
+        }
     }
 
     /// Encodes the blocks and writes the header.
@@ -221,10 +250,12 @@ pub(super) fn write_remote(bytes: &mut [u8; PAGE], profile: Profile, roots: u8, 
 mod tests {
     use super::super::{Page, PagePatcher, PagePlace, check_page};
     use super::*;
+    use crate::decode::decode_child;
     use crate::ids::decode_id;
     use crate::leaf::decode_packet;
     use crate::object::{Object, ObjectRecord};
     use crate::treelet::Child;
+    use crate::turning::{TurningDirection, decode_turning};
     use std::ops::Range;
     use zerocopy::FromZeros;
 
@@ -240,8 +271,15 @@ mod tests {
         ([[at, 0.25, 0.0], [at + 0.5, 0.0, -0.125], [at, 0.75, 0.5]], 100 + 3 * number)
     }
 
-    fn bound(numbers: Range<u32>) -> Kdop {
+    fn kdop(numbers: Range<u32>) -> Kdop {
         Kdop::of_points(numbers.flat_map(|number| triangle(number).0))
+    }
+
+    fn bound(numbers: Range<u32>) -> TightBound {
+        let triangles = numbers.clone().map(|number| triangle(number).0);
+        let packets: Vec<Packet> = triangles.map(|triangle| Packet::new(&[triangle])).collect();
+        let direction = TurningDirection::near([0.25, 0.5, 1.0]);
+        TightBound { kdop: kdop(numbers), turning: Some(TurningSlab::around(direction, &packets)) }
     }
 
     /// A page of two roots. The first has a packet of four triangles, a treelet and, if the profile has room for a
@@ -250,8 +288,8 @@ mod tests {
         let remotes = usize::from(profile.width() > 2);
         let mut writer =
             PageWriter::new(profile, 2f32.powi(-12), PageShape { roots: 2, remotes, treelets: 3 });
-        writer.root(&bound(0..8), None);
-        writer.root(&bound(8..9), Some(PARENT));
+        writer.root(&kdop(0..8), None);
+        writer.root(&kdop(8..9), Some(PARENT));
         writer.begin_treelet();
         writer.leaf(&bound(0..4), (0..4).map(triangle));
         writer.treelet(&bound(4..5));
@@ -294,7 +332,7 @@ mod tests {
             assert_eq!([page.anchor_parent(0), page.anchor_parent(1)], [(4, 1), PARENT]);
             assert_eq!(
                 page.anchor_slabs(1).to_kdop(slabs),
-                NodeSlabs::from_kdop(&bound(8..9), slabs).to_kdop(slabs)
+                NodeSlabs::from_kdop(&kdop(8..9), slabs).to_kdop(slabs)
             );
             let header = page.header();
             assert_eq!(header.leaf_bytes(), 64_000..64_000 + written.leaf_block.len());
@@ -314,14 +352,21 @@ mod tests {
             };
             let root = page.anchor_slabs(0);
             let inner = decode(0, 1, &root);
-            for (decoded, held) in [
-                (root, bound(0..8)),
-                (decode(0, 0, &root), bound(0..4)),
-                (inner, bound(4..5)),
-                (decode(2, 0, &inner), bound(4..5)),
-                (decode(1, 0, &page.anchor_slabs(1)), bound(8..9)),
+            assert!(root.to_kdop(slabs).contains(&kdop(0..8), slabs), "{}", profile.name());
+            for (slot, child, parent, held) in [
+                (0, 0, root, bound(0..4)),
+                (0, 1, root, bound(4..5)),
+                (2, 0, inner, bound(4..5)),
+                (1, 0, page.anchor_slabs(1), bound(8..9)),
             ] {
-                assert!(decoded.to_kdop(slabs).contains(&held, slabs), "{}", profile.name());
+                let decoded = decode(slot, child, &parent);
+                assert!(decoded.to_kdop(slabs).contains(&held.kdop, slabs), "{}", profile.name());
+                let turning = decode_turning(profile, page.treelet(slot), child, &decoded);
+                assert_eq!(turning.is_some(), profile.has_turning_slabs());
+                if let (Some(decoded), Some(held)) = (turning, held.turning) {
+                    assert_eq!(decoded.direction, held.direction);
+                    assert!(decoded.lo <= held.lo && held.hi <= decoded.hi, "{decoded:?} around {held:?}");
+                }
             }
             for (packet, lane, number) in [(0, 0, 0), (0, 3, 3), (1, 0, 8), (2, 0, 4)] {
                 let corners = decode_packet(ENCODING, &written.leaf_block, packet).triangle(lane);
@@ -359,7 +404,7 @@ mod tests {
     fn a_page_without_packets_has_no_blocks() {
         let shape = PageShape { roots: 1, remotes: 1, treelets: 1 };
         let mut writer = PageWriter::new(Profile::Dop14U8, 1.0, shape);
-        writer.root(&bound(0..3), None);
+        writer.root(&kdop(0..3), None);
         writer.begin_treelet();
         writer.remote(&bound(0..3), REMOTE);
         let page = writer.finish(ENCODING, true);

@@ -12,6 +12,7 @@ use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
 use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::{Child, Links};
+use bvh_format::turning::TurningCodes;
 use bvh_format::{FormatError, Rule};
 
 /// A child of an opened node: the number of the node and, in the lowest three bits, that of the child.
@@ -53,6 +54,8 @@ impl ChildRef {
 #[derive(Clone, Copy)]
 pub(crate) struct CachedNode {
     pub(crate) groups: [Group; 2],
+    /// The turning slabs of the first group. Only profiles of four children have them.
+    pub(crate) turning: TurningCodes,
     /// The largest side of each child's box, in mesh units.
     pub(crate) extents: [f32; 8],
     /// The numbers of the children's opened nodes; `CLOSED` for children that have not been opened.
@@ -69,6 +72,7 @@ const CLOSED: u32 = u32::MAX;
 impl CachedNode {
     const EMPTY: Self = Self {
         groups: [Group::ZERO; 2],
+        turning: TurningCodes::NONE,
         extents: [0.0; 8],
         opened: [CLOSED; 8],
         links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
@@ -125,6 +129,8 @@ pub(crate) struct NodeCache {
     used: usize,
     /// One more than the number of treelets that the object can have.
     max_nodes: usize,
+    /// How often the cache has started anew.
+    generation: u32,
     /// The file and the first page of the object whose nodes these are.
     of: Option<(u64, u32)>,
 }
@@ -155,6 +161,8 @@ impl NodeCache {
             }
             let root = &mut self.nodes[0];
             root.groups[0] = spread(isa, &slabs);
+            root.turning = TurningCodes::NONE;
+            self.generation = self.generation.wrapping_add(1);
             root.links = Links { kinds: 1, ..Links::default() };
             root.page = page;
             root.extents[0] = f32::INFINITY;
@@ -165,6 +173,11 @@ impl NodeCache {
             self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
         }
         Ok(slabs)
+    }
+
+    /// Changes whenever the nodes of all numbers do.
+    pub(crate) fn generation(&self) -> u32 {
+        self.generation
     }
 
     #[inline(always)]
@@ -259,6 +272,10 @@ fn decode_node<I: Isa>(
         let coding = (profile, object.f16_scale());
         decode_group(isa, coding, (treelet, part), (slabs, column), &mut to.groups[part]);
     }
+    to.turning = match treelet.first_chunk() {
+        Some(treelet) if profile.has_turning_slabs() => TurningCodes::read(treelet),
+        _ => TurningCodes::NONE,
+    };
     to.links = Links::read(treelet);
     isa.prefetch(bvh.packets_to_prefetch(object, &page, &to.links));
     if bvh.is_large() {

@@ -39,6 +39,17 @@ fn reach(root: &NodeSlabs) -> f32 {
     reach[0]
 }
 
+/// Returns a bound on the coordinates of all nodes, from those of the root.
+#[inline(always)]
+fn magnitude(root: &NodeSlabs) -> f32 {
+    let mut magnitude = 0.0f32;
+    for end in [root.lo[0], root.lo[1], root.lo[2], root.hi[0], root.hi[1], root.hi[2]] {
+        let end = end.abs();
+        magnitude = if magnitude < end { end } else { magnitude };
+    }
+    magnitude
+}
+
 /// A direction in A's frame along which one more pair of slab ends is compared.
 #[derive(Clone, Copy)]
 pub(crate) struct Witness {
@@ -62,6 +73,8 @@ pub(crate) struct NodeTest {
     set_b: DirectionSet,
     reach_a: f32,
     reach_b: f32,
+    /// Bounds on the coordinates of A's nodes and of B's.
+    magnitudes: (f32, f32),
 }
 
 impl NodeTest {
@@ -75,6 +88,7 @@ impl NodeTest {
         set_b: DirectionSet::Dop6,
         reach_a: 0.0,
         reach_b: 0.0,
+        magnitudes: (0.0, 0.0),
     };
 
     /// Prepares a pose.
@@ -91,6 +105,7 @@ impl NodeTest {
         (self.set_a, self.set_b) =
             (pair.object_a.profile().directions(), pair.object_b.profile().directions());
         (self.reach_a, self.reach_b) = (reach(root_a), reach(root_b));
+        self.magnitudes = (magnitude(root_a), magnitude(root_b));
         self.alignment.prepare(isa, pair.placement, self.set_b, self.reach_b);
     }
 
@@ -130,6 +145,16 @@ impl NodeTest {
         let (alignment, set, reach) = (&mut self.inverse, self.set_a, self.reach_a);
         isa.run(Prepare { alignment, placement: &placement, set, reach });
         self.looks_along_b = true;
+    }
+
+    /// Returns bounds on the coordinates of A's nodes and of B's.
+    pub(crate) fn magnitudes(&self) -> (f32, f32) {
+        self.magnitudes
+    }
+
+    /// Returns where B is.
+    pub(crate) fn placement(&self) -> &Placement {
+        &self.placement
     }
 
     /// Returns whether the test along B's directions has been prepared.
@@ -181,11 +206,12 @@ impl NodeTest {
         bounds: &mut [f32; 16],
     ) -> u16 {
         let gaps = gaps_along(isa, measure, self.set_b, (aligned_a, group_b));
+        if measure == Measure::Overlap {
+            return I::V::bits(gaps.le(isa.splat(limit)));
+        }
         // Seen from A, B's directions are longer or shorter by at most 2^-19, all together: so far a rotation
         // may be off.
-        let shrunk = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32));
-        let gaps = if measure == Measure::Overlap { gaps } else { shrunk };
-        let gaps = gaps.max(isa.load(bounds));
+        let gaps = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32)).max(isa.load(bounds));
         isa.store(gaps, bounds);
         I::V::bits(gaps.le(isa.splat(limit)))
     }

@@ -32,6 +32,7 @@ use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_test::{Measure, NodeTest, Witness};
 use crate::traverse::placement::ObjectPair;
+use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -82,9 +83,11 @@ pub(crate) struct WalkMemory {
     nodes_a: NodeCache,
     nodes_b: NodeCache,
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: Aligned,
+    aligned_a: PerNode<[Group; 2]>,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: Aligned,
+    aligned_b: PerNode<[Group; 2]>,
+    /// The test along turning slabs.
+    slabs: SlabMemory,
     /// Depth-first: the pairs that node tests left.
     stack: Frames,
     /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
@@ -98,15 +101,20 @@ pub(crate) struct WalkMemory {
 }
 
 /// The groups of opened nodes along the directions of the other side, by the number of the node.
-#[derive(Default)]
-struct Aligned {
-    groups: Vec<[Group; 2]>,
+struct PerNode<T> {
+    items: Vec<T>,
     /// The walk for which each was computed; 0 for none.
     walks: Vec<u32>,
     walk: u32,
 }
 
-impl Aligned {
+impl<T> Default for PerNode<T> {
+    fn default() -> Self {
+        Self { items: Vec::new(), walks: Vec::new(), walk: 0 }
+    }
+}
+
+impl<T: Copy> PerNode<T> {
     /// Forgets all groups, before a walk.
     fn start(&mut self) {
         self.walk = self.walk.wrapping_add(1);
@@ -118,17 +126,17 @@ impl Aligned {
 
     /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
     #[inline(always)]
-    fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
+    fn of(&mut self, node: usize, none: T) -> (&mut T, bool) {
         if self.walks.len() <= node {
-            self.grow(node);
+            self.grow(node, none);
         }
         let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
-        (&mut self.groups[node], known)
+        (&mut self.items[node], known)
     }
 
     #[cold]
-    fn grow(&mut self, node: usize) {
-        self.groups.resize(node + 64, [Group::ZERO; 2]);
+    fn grow(&mut self, node: usize, none: T) {
+        self.items.resize(node + 64, none);
         self.walks.resize(node + 64, 0);
     }
 }
@@ -197,6 +205,7 @@ fn walk<I: Isa, W: Visitor>(
     memory.aligned_b.start();
     let root_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
     let root_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+    memory.slabs.start(&pair);
     node_test.prepare(isa, &pair, &root_a, &root_b);
     let mut witness: Option<Witness> = None;
     node_test.update_witness(&mut witness, visitor.witness());
@@ -438,7 +447,7 @@ impl WalkMemory {
         if !leaf_b && (leaf_a || !b_is_small) {
             let number = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             (sides.node_b, sides.only_b) = (number, None);
-            let (to, is_aligned) = self.aligned_b.of(number);
+            let (to, is_aligned) = self.aligned_b.of(number, [Group::ZERO; 2]);
             if !is_aligned {
                 isa.run(AlignB { node_test, node: self.nodes_b.get(number), to });
             }
@@ -461,7 +470,7 @@ impl WalkMemory {
     ) -> u64 {
         let first_frame = self.stack.len();
         let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
-        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b);
+        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b, [Group::ZERO; 2]);
         // It was when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
         debug_assert!(is_aligned, "node {} of B was not aligned in this walk", sides.node_b);
         let mut tests = 0;
@@ -476,8 +485,13 @@ impl WalkMemory {
                 let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut tested.bounds);
                 mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
                 mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
+                if mask != 0 && self.slabs.are_due() {
+                    let memory = &mut self.slabs;
+                    let nodes = ((&self.nodes_a, sides.node_a), (&self.nodes_b, sides.node_b));
+                    mask = isa.run(TestSlabs { memory, node_test, measure, nodes, limit, tested, mask });
+                }
                 if mask != 0 && node_test.looks_along_b() {
-                    let (to, is_aligned) = self.aligned_a.of(sides.node_a);
+                    let (to, is_aligned) = self.aligned_a.of(sides.node_a, [Group::ZERO; 2]);
                     if !is_aligned {
                         isa.run(AlignA { node_test, node: side_a, to });
                     }

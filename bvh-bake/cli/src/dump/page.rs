@@ -9,6 +9,7 @@ use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::{Child, Links};
+use bvh_format::turning::decode_turning;
 use bvh_format::{FormatError, Layout, Rule};
 use serde::Serialize;
 
@@ -78,6 +79,15 @@ struct ChildDump {
     /// Empty unless slabs are asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     slabs: Vec<[f32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turning: Option<TurningDump>,
+}
+
+/// The turning slab of a child.
+#[derive(Serialize)]
+struct TurningDump {
+    direction: [f32; 3],
+    slab: [f32; 2],
 }
 
 impl ChildDump {
@@ -90,6 +100,7 @@ impl ChildDump {
             packet: None,
             triangles: None,
             slabs: Vec::new(),
+            turning: None,
         };
         match child {
             Child::Empty => None,
@@ -255,6 +266,9 @@ impl TreeletDump {
         for (child, dump) in children.iter_mut().enumerate() {
             let node = decode_child(object.profile(), object.f16_scale(), page.treelet(slot), child, &own);
             dump.slabs = slabs_of(&node.to_kdop(slabs), slabs);
+            let turning = decode_turning(object.profile(), page.treelet(slot), child, &node);
+            dump.turning = turning
+                .map(|slab| TurningDump { direction: slab.direction.vector(), slab: [slab.lo, slab.hi] });
         }
         let page_number = header.page_number.get();
         let within =
@@ -285,6 +299,9 @@ impl TreeletDump {
         for (number, child) in self.children.iter().enumerate() {
             text +=
                 &format!("  child {number}: {}\n         {}\n", child.to_text(), slabs_text(&child.slabs));
+            if let Some(TurningDump { direction, slab }) = &child.turning {
+                text += &format!("         turning {} along {direction:?}\n", slabs_text(&[*slab]));
+            }
         }
         text
     }

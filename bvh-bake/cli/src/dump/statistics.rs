@@ -7,8 +7,7 @@
 use super::Contents;
 use super::levels::RootLevels;
 use bvh_bake::FileError;
-use bvh_format::bounds::{Inflation, visit_bounds};
-use bvh_format::kdop::Kdop;
+use bvh_format::bounds::{Inflation, Subtree, visit_bounds};
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
 use bvh_format::treelet::{Child, Links};
@@ -92,14 +91,14 @@ impl Statistics {
         }
         let slabs = object.profile().directions().slabs();
         // The bounds of roots whose link has not been reached.
-        let mut below: HashMap<RootRef, Kdop> = HashMap::new();
+        let mut below: HashMap<RootRef, Subtree> = HashMap::new();
         for number in object.pages().rev() {
             let bytes = contents.checked(object, number)?;
             let page = bytes.page(object);
             let levels = slot_levels(&page, &root_levels.retreat(page.header().roots));
             let leaves = layout.read_leaf_block(file, page.header())?;
-            let known = |to: RootRef| below.get(&to).copied().unwrap_or(Kdop::EMPTY);
-            let tight = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
+            let known = |to: RootRef| below.get(&to).unwrap_or(&Subtree::UNKNOWN);
+            let subtrees = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
                 if bound.child.is_some() {
                     let level = statistics.level(levels[usize::from(bound.slot)]);
                     level.inflation.add(&bound.decoded, &bound.tight, slabs);
@@ -109,7 +108,7 @@ impl Statistics {
             for link in 0..page.header().remotes {
                 below.remove(&page.remote(link));
             }
-            below.extend((0..).map(|root| RootRef::new(number, root)).zip(tight));
+            below.extend((0..).map(|root| RootRef::new(number, root)).zip(subtrees));
         }
         if statistics.levels.is_empty() {
             let at = layout.page_offset(object.record().first_page.get());

@@ -1,13 +1,12 @@
 //! Checks the pages of a file from the last to the first, a run of pages at a time.
 //!
 //! Links lead to later pages. Of each page that has been checked, only the subtree roots are kept, each with its tight
-//! k-DOP and the link that it names, until the walk reaches that link. Only few roots wait at any time, since bricks
-//! follow one after the other: the memory for them hardly grows with the file.
+//! k-DOP, the link that it names and, if there are few, its triangles, until the walk reaches that link. Only few roots
+//! wait at any time, since bricks follow one after the other: the memory for them hardly grows with the file.
 
 use super::InParallel;
 use crate::progress::{Progress, Stage, Step, WHOLE};
-use bvh_format::bounds::{Inflation, check_bounds};
-use bvh_format::kdop::Kdop;
+use bvh_format::bounds::{Inflation, Subtree, check_bounds};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef};
 use bvh_format::source::{Block, PageBytes, Source};
@@ -35,7 +34,7 @@ pub(crate) fn prove<S: Source>(source: &S, progress: &Progress) -> Result<(Layou
 
 /// A subtree root whose link the walk has not reached yet.
 struct Root {
-    kdop: Kdop,
+    subtree: Subtree,
     parent: (u32, u8),
 }
 
@@ -119,19 +118,19 @@ impl Walk<'_> {
                 let at = self.layout.page_offset(stop - 1);
                 return Err(FormatError::new(Rule::RemoteLinks, at, "links to later pages", "another"));
             }
-            let below = |root: RootRef| self.roots.get(&root).map_or(Kdop::EMPTY, |root| root.kdop);
+            let below = |root: RootRef| self.roots.get(&root).map_or(&Subtree::UNKNOWN, |root| &root.subtree);
             let check = |number: u32| {
                 let (page, leaves) = window.page(number, self.object);
                 check_bounds(self.layout, self.object, &page, leaves, below)
             };
             let results = InParallel.each(start..stop, check)?;
-            for (number, (tight, sums)) in (start..stop).zip(results).rev() {
+            for (number, (subtrees, sums)) in (start..stop).zip(results).rev() {
                 self.inflation.join(&sums);
                 let (page, _) = window.page(number, self.object);
                 self.follow_links(&page, number)?;
-                for (root, kdop) in (0..).zip(tight) {
+                for (root, subtree) in (0..).zip(subtrees) {
                     let parent = page.anchor_parent(root);
-                    self.roots.insert(RootRef::new(number, root), Root { kdop, parent });
+                    self.roots.insert(RootRef::new(number, root), Root { subtree, parent });
                 }
             }
             stop = start;
@@ -163,7 +162,7 @@ impl Walk<'_> {
             let found = format!("{} roots without a link", self.roots.len());
             return Err(FormatError::new(Rule::AnchorParent, at, "the object's root and no other", found));
         };
-        let kdop = &root.kdop;
+        let kdop = &root.subtree.kdop;
         let inside =
             (0..3).all(|a| record.box_lo[a].get() <= kdop.lo[a] && kdop.hi[a] <= record.box_hi[a].get());
         if !inside {

@@ -1,0 +1,148 @@
+//! When the slab test is made, and what it remembers of nodes.
+//!
+//! A slab test costs about a third of a node test, so it has to pay. Short walks do without, and a walk in which slabs have
+//! kept too few pairs apart leaves some tests out. Answers do not depend on it.
+
+use crate::isa::{Isa, Task};
+use crate::traverse::frames::Tested;
+use crate::traverse::node_cache::{CachedNode, NodeCache};
+use crate::traverse::node_test::{Measure, NodeTest};
+use crate::traverse::placement::ObjectPair;
+use crate::traverse::slab_test::{Seen, SlabTest, TurningGroup};
+
+/// Builds with debug assertions, which tests are, make all slab tests, so that small meshes take part.
+const ALWAYS: bool = cfg!(debug_assertions);
+/// Node tests of a walk before slab tests begin.
+const NODE_TESTS_BEFORE_SLABS: u32 = if ALWAYS { 0 } else { 24 };
+/// What keeping a pair apart saves, in slab memory.
+const TESTS_SAVED_PER_PAIR: i32 = 2;
+/// Slab tests are left out for a while when they have cost so many more than they saved, and this many count at most.
+const MAX_BALANCE: i32 = 6;
+/// Slab tests are left out for a while when they have cost so many more than they saved.
+const MAX_LOSS: i32 = 3;
+/// How many tests are left out then.
+const PAUSE: u32 = 24;
+
+/// The slab test of the walk under way, and what it needs of opened nodes.
+#[derive(Default)]
+pub(crate) struct SlabMemory {
+    nodes_a: Vec<NodeSlabs>,
+    nodes_b: Vec<NodeSlabs>,
+    test: Option<Box<SlabTest>>,
+    /// The walk for which `test` was prepared.
+    prepared: u32,
+    /// Numbers walks.
+    walk: u32,
+    /// Node tests that are still made without.
+    pause: u32,
+    /// What slab tests have saved, less their number.
+    balance: i32,
+}
+
+impl SlabMemory {
+    /// Starts a walk.
+    pub(crate) fn start(&mut self, pair: &ObjectPair<'_>) {
+        self.walk = self.walk.wrapping_add(1).max(1);
+        let both = pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
+        self.pause = if both { NODE_TESTS_BEFORE_SLABS } else { u32::MAX };
+        self.balance = 0;
+    }
+
+    /// Returns whether the next slab test is to be made.
+    #[inline(always)]
+    pub(crate) fn are_due(&mut self) -> bool {
+        let due = self.pause == 0;
+        self.pause = self.pause.saturating_sub(1);
+        due
+    }
+}
+
+/// Turning slabs of an opened node, and what the other side sees of them.
+#[derive(Clone, Copy)]
+struct NodeSlabs {
+    group: TurningGroup,
+    seen: Seen,
+    /// The generation of nodes for which `group` was computed, and the walk for which `seen` was; 0 for none.
+    generation: u32,
+    walk: u32,
+}
+
+impl NodeSlabs {
+    const NONE: Self = Self { group: TurningGroup::NONE, seen: Seen::NONE, generation: 0, walk: 0 };
+
+    #[inline(always)]
+    fn decode<I: Isa>(&mut self, isa: I, node: &CachedNode, generation: u32) {
+        if self.generation != generation {
+            (self.generation, self.walk) = (generation, 0);
+            self.group.decode(isa, &node.turning, &node.groups[0]);
+        }
+    }
+}
+
+#[inline(always)]
+fn of(nodes: &mut Vec<NodeSlabs>, node: usize) -> &mut NodeSlabs {
+    if nodes.len() <= node {
+        grow(nodes, node);
+    }
+    &mut nodes[node]
+}
+
+#[cold]
+fn grow(nodes: &mut Vec<NodeSlabs>, node: usize) {
+    nodes.resize(node + 64, NodeSlabs::NONE);
+}
+
+/// Tests pairs that a node test has left along their turning slabs, and returns the lanes that are left.
+pub(crate) struct TestSlabs<'a> {
+    pub(crate) memory: &'a mut SlabMemory,
+    pub(crate) node_test: &'a NodeTest,
+    pub(crate) measure: Measure,
+    pub(crate) nodes: ((&'a NodeCache, usize), (&'a NodeCache, usize)),
+    pub(crate) limit: f32,
+    pub(crate) tested: &'a mut Tested,
+    pub(crate) mask: u16,
+}
+
+impl Task for TestSlabs<'_> {
+    type Output = u16;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> u16 {
+        let Self { memory, node_test, measure, nodes, limit, tested, mask } = self;
+        let ((cache_a, number_a), (cache_b, number_b)) = nodes;
+        let (node_a, node_b) = (cache_a.get(number_a), cache_b.get(number_b));
+        if !node_a.turning.any() && !node_b.turning.any() {
+            return mask;
+        }
+        let test = memory.test.get_or_insert_with(|| Box::new(SlabTest::NONE));
+        if memory.prepared != memory.walk {
+            memory.prepared = memory.walk;
+            prepare(test, node_test);
+        }
+        let (a, b) = (of(&mut memory.nodes_a, number_a), of(&mut memory.nodes_b, number_b));
+        a.decode(isa, node_a, cache_a.generation());
+        b.decode(isa, node_b, cache_b.generation());
+        if a.walk != memory.walk {
+            a.walk = memory.walk;
+            test.see_a(isa, &a.group, &mut a.seen);
+        }
+        if b.walk != memory.walk {
+            b.walk = memory.walk;
+            test.see_b(isa, &b.group, &mut b.seen);
+        }
+        let (a, b) = ((&a.group, &a.seen), (&b.group, &b.seen));
+        let left = mask & test.run(isa, measure, a, b, limit, &mut tested.bounds);
+        let apart = (mask & !left).count_ones() as i32;
+        memory.balance = MAX_BALANCE.min(memory.balance + TESTS_SAVED_PER_PAIR * apart - 1);
+        if memory.balance < -MAX_LOSS && !ALWAYS {
+            (memory.balance, memory.pause) = (0, PAUSE);
+        }
+        left
+    }
+}
+
+#[inline(never)]
+fn prepare(test: &mut SlabTest, node_test: &NodeTest) {
+    let placement = node_test.placement();
+    test.prepare(placement, &placement.inverse(), node_test.magnitudes());
+}
