@@ -20,8 +20,8 @@ const TESTS_SAVED_PER_PAIR: i32 = 2;
 const MAX_BALANCE: i32 = 6;
 /// Slab tests are left out for a while when they have cost so many more than they saved.
 const MAX_LOSS: i32 = 3;
-/// How many tests are left out then.
-const PAUSE: u32 = 24;
+/// How many tests are left out then: at first; each time twice as many, until slabs pay again.
+const FIRST_PAUSE: u32 = 24;
 
 /// The slab test of the walk under way, and what it needs of opened nodes.
 #[derive(Default)]
@@ -37,6 +37,8 @@ pub(crate) struct SlabMemory {
     pause: u32,
     /// What slab tests have saved, less their number.
     balance: i32,
+    /// The length of the next pause.
+    next_pause: u32,
 }
 
 impl SlabMemory {
@@ -45,7 +47,7 @@ impl SlabMemory {
         self.walk = self.walk.wrapping_add(1).max(1);
         let both = pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
         self.pause = if both { NODE_TESTS_BEFORE_SLABS } else { u32::MAX };
-        self.balance = 0;
+        (self.balance, self.next_pause) = (0, FIRST_PAUSE);
     }
 
     /// Returns whether the next slab test is to be made.
@@ -133,9 +135,12 @@ impl Task for TestSlabs<'_> {
         let (a, b) = ((&a.group, &a.seen), (&b.group, &b.seen));
         let left = mask & test.run(isa, measure, a, b, limit, &mut tested.bounds);
         let apart = (mask & !left).count_ones() as i32;
-        memory.balance = MAX_BALANCE.min(memory.balance + TESTS_SAVED_PER_PAIR * apart - 1);
-        if memory.balance < -MAX_LOSS && !ALWAYS {
-            (memory.balance, memory.pause) = (0, PAUSE);
+        memory.balance += TESTS_SAVED_PER_PAIR * apart - 1;
+        if memory.balance > MAX_BALANCE {
+            (memory.balance, memory.next_pause) = (MAX_BALANCE, FIRST_PAUSE);
+        } else if memory.balance < -MAX_LOSS && !ALWAYS {
+            (memory.balance, memory.pause) = (0, memory.next_pause);
+            memory.next_pause = memory.next_pause.saturating_mul(2);
         }
         left
     }
