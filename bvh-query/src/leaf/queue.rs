@@ -48,6 +48,9 @@ impl Default for TriangleQueue {
 }
 
 impl TriangleQueue {
+    /// The number of pairs in a full queue.
+    pub(crate) const FULL: usize = 16;
+
     pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
@@ -57,7 +60,11 @@ impl TriangleQueue {
     }
 
     pub(crate) fn is_full(&self) -> bool {
-        self.len == 16
+        self.len == Self::FULL
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.len
     }
 
     pub(crate) fn push(&mut self, local: &Local, candidate: TrianglePair) {

@@ -17,6 +17,10 @@ use crate::traverse::node_test::Measure;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
+/// The number of candidates that a search for any contact decides first. Where meshes touch, they are likely to be in
+/// contact; where they do not, some lanes of one more test stay empty.
+const FIRST_DRAIN: usize = 6;
+
 impl Querier {
     /// Returns whether the meshes touch or intersect, with B placed by `pose` in A's frame.
     ///
@@ -50,8 +54,8 @@ impl Querier {
         })
     }
 
-    /// Returns the first pair of triangles in contact that a walk meets. It is the same on every backend: bounds for contact
-    /// have the same bits, so pairs of nodes are met in the same order, and filters drop no pair in contact.
+    /// Returns the first pair of triangles in contact that a walk meets. It is the same on every backend: bounds along A's
+    /// directions have the same bits, so pairs of nodes are met in the same order, and filters drop no pair in contact.
     pub(super) fn find_contact(
         &mut self,
         placed: &PlacedPair<'_>,
@@ -67,6 +71,7 @@ impl Querier {
             queue: &mut self.queue,
             packets: &mut self.packets,
             order: Order::Nearest,
+            drain_at: FIRST_DRAIN,
             stats: QueryStats::default(),
             visit: |candidate| Ok(ControlFlow::Break(candidate)),
             found: None,
@@ -86,6 +91,8 @@ pub(super) struct ContactVisitor<'a, F> {
     /// Of A and of B.
     pub(super) packets: &'a mut [PacketCache; 2],
     pub(super) order: Order,
+    /// The number of candidates that are decided together next; after that, a full queue.
+    pub(super) drain_at: usize,
     pub(super) stats: QueryStats,
     pub(super) visit: F,
     /// What `visit` broke with.
@@ -149,8 +156,11 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Vi
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
             self.queue.push(&local, TrianglePair::in_lane(a, b, lane));
-            if self.queue.is_full() && self.drain(isa)?.is_break() {
-                return Ok(ControlFlow::Break(()));
+            if self.queue.len() >= self.drain_at {
+                self.drain_at = TriangleQueue::FULL;
+                if self.drain(isa)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
             }
         }
         Ok(ControlFlow::Continue(()))

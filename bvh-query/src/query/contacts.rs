@@ -5,7 +5,7 @@ use crate::file::bvh::Bvh;
 use crate::file::packet_cache::PacketCache;
 use crate::file::place::TrianglePlace;
 use crate::file::shape::Shape;
-use crate::leaf::queue::TrianglePair;
+use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
 use crate::query::bounding_volumes::surely_apart;
@@ -89,6 +89,7 @@ impl Querier {
             queue: &mut self.queue,
             packets: &mut self.packets,
             order: Order::Any,
+            drain_at: TriangleQueue::FULL,
             stats: QueryStats::default(),
             visit: |candidate| report(placed, candidate, visit),
             found: None,
