@@ -143,25 +143,23 @@ impl<'a> Baker<'a> {
         let advised = advised_error(options, diagonal(&measured.bounds), stream.count);
         self.advised_max_error = self.advised_max_error.into_iter().chain(advised).reduce(f64::min);
         let kept = Kept::new(&stream, &measured.dropped);
-        let trials = layout_choice::trials(kept.count(), options);
-        let mut surveyed = survey(&kept, &measured, &trials, resources)?;
-        let choice = layout_choice::choose(kept.count(), &trials, &surveyed.patches, options);
+        let mut surveyed = survey(&kept, &measured, resources)?;
         self.triangles += stream.count;
         resources.progress.leave_out(left_out);
         resources.progress.reach(Step::Bake(Stage::Prepare), self.triangles);
         begin(Stage::Build);
         let f16_exponent = f16_exponent(&measured.bounds);
-        let style = Style {
-            profile: choice.profile,
-            encoding: choice.encoding,
-            f16_scale: 2f32.powi(f16_exponent),
-            ids: options.ids,
-        };
-        let (grid, width) = (surveyed.grid.take(), choice.profile.width());
+        let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
         let bricks = Bricks::divide(&kept, grid, width, options.effort, resources)?;
         let triangles = kept.count();
         drop(stream);
-        let EncodedObject { pages, packets, treelets, children } = encode_object(bricks, style, resources)?;
+        let style = |tree: &_, of_brick: &_| {
+            let choice = layout_choice::choose(triangles, tree, of_brick, options);
+            let (profile, encoding) = (choice.profile, choice.encoding);
+            (Style { profile, encoding, f16_scale: 2f32.powi(f16_exponent), ids: options.ids }, choice.reason)
+        };
+        let encoded = encode_object(bricks, style, resources)?;
+        let EncodedObject { style, reason, pages, packets, treelets, children } = encoded;
         self.kept += triangles;
         resources.progress.reach(Step::Bake(Stage::Build), self.kept);
         let (first_page, page_count) = (self.contents.page_count(), pages.page_count());
@@ -186,13 +184,13 @@ impl<'a> Baker<'a> {
             degenerate: surveyed.degenerate.into(),
             duplicates: left_out.into(),
             f16_exponent: f16_exponent.into(),
-            profile: choice.profile.number(),
-            triangle_encoding: choice.encoding as u8,
+            profile: style.profile.number(),
+            triangle_encoding: style.encoding as u8,
             sphere_centre: surveyed.centre.map(Into::into),
             sphere_radius: surveyed.radius.into(),
             ..ObjectRecord::new_zeroed()
         };
-        self.reason.get_or_insert(choice.reason);
+        self.reason.get_or_insert(reason);
         self.vertices += vertices;
         self.children += children;
         self.treelets += treelets;

@@ -35,6 +35,9 @@ struct EncodedBrick {
 
 /// The pages of an object and what they hold.
 pub(crate) struct EncodedObject {
+    pub(crate) style: Style,
+    /// Why the style was chosen.
+    pub(crate) reason: String,
     pub(crate) pages: ObjectPages,
     pub(crate) packets: u64,
     pub(crate) treelets: u64,
@@ -42,15 +45,17 @@ pub(crate) struct EncodedObject {
     pub(crate) children: u64,
 }
 
-/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them.
+/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. `style` chooses how, given
+/// the tree and the triangles of one brick, and says why.
 pub(crate) fn encode_object(
     bricks: Bricks,
-    style: Style,
+    style: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> (Style, String),
     resources: &Resources,
 ) -> Result<EncodedObject, BakeError> {
     let spill = resources.scratch.spill();
-    let (bricks, top) =
-        bricks.build(resources, |tree, triangles| encode_brick(tree, triangles, style, &spill))?;
+    let ((style, reason), bricks, top) = bricks.build(resources, style, |tree, triangles, (style, _)| {
+        encode_brick(tree, triangles, *style, &spill)
+    })?;
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut top = if top.is_leaf() {
         Arena::empty()
@@ -96,7 +101,7 @@ pub(crate) fn encode_object(
     let (packets, treelets) = (packets + encoded.packets, treelets + encoded.treelets);
     parts.insert(0, UnnumberedPages::new(encoded, &spill)?);
     let pages = ObjectPages { profile: style.profile, parts, parents };
-    Ok(EncodedObject { pages, packets, treelets, children })
+    Ok(EncodedObject { style, reason, pages, packets, treelets, children })
 }
 
 fn encode_brick(

@@ -1,14 +1,15 @@
 //! Chooses the profile and the triangle encoding of an object by estimated query cost.
 //!
 //! A pair traversal costs its number of node tests times the cost of one test, and that number depends on how often
-//! bounds overlap whose contents do not. Trials estimate this: patches of the mesh (runs of 1, 8 and 64 consecutive
-//! triangles, which files mostly keep together) are placed beside each other in random orientations, with gaps from 0
-//! to the size of a patch. They are tested with the k-DOPs of each direction set, the second one re-aligned as in a
-//! query. The estimate is the number of overlaps per trial times the measured cost of a test with that set. The random
-//! numbers have constant seeds, so that equal meshes get equal choices.
+//! bounds overlap whose contents do not. Trials estimate this: nodes of a brick's tree, with at least 1, 8 and 64 triangles
+//! below them, are placed beside each other in random orientations, with gaps from 0 to the size of a node. They are tested
+//! with the k-DOPs of each direction set, the second one re-aligned as in a query. The estimate is the number of overlaps
+//! per trial times the measured cost of a test with that set. The tree is the one that the file will have: all candidates
+//! have treelets of the same width. The random numbers have constant seeds, so that equal meshes get equal choices.
 
 use crate::options::Options;
-use crate::triangles::Corners;
+use crate::tree::{PacketTriangles, Tree};
+use crate::triangles::{Corners, Triangle};
 use bvh_format::kdop::{DIRECTIONS, DirectionSet, Kdop};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
@@ -43,49 +44,53 @@ const PLAIN_BYTES_PER_TRIANGLE: u64 = 52;
 /// The number of trials per object.
 const TRIAL_COUNT: usize = 400;
 
-/// The number of triangles in the longest patch.
-pub(crate) const MAX_PATCH_TRIANGLES: u64 = 64;
+/// The least numbers of triangles below the nodes of trials, which take turns.
+const TRIAL_SIZES: [usize; 3] = [1, 8, 64];
+/// A node that has so many times more triangles than wanted is not taken, but its child.
+const MAX_EXCESS: usize = 4;
 
-/// A trial: two patches, each given by its first triangle and its length, and the placement of one beside the other.
-pub(crate) struct Trial {
-    patches: [(u64, u64); 2],
+/// The width of all profiles among which the choice is open.
+const WIDTH: usize = 4;
+
+/// Returns the width of the treelets, which the builder of trees has to know before the choice is made.
+pub(crate) fn width(options: &Options) -> usize {
+    options.profile.map_or(WIDTH, Profile::width)
+}
+
+/// A trial: two nodes, by their triangles, and the placement of one beside the other.
+struct Trial {
+    nodes: [Vec<Corners>; 2],
     rotation: [[f64; 3]; 3],
     away: [f64; 3],
     gap: f64,
 }
 
-/// Returns the trials for an object of `triangles` triangles, or none if the choice is not open.
-pub(crate) fn trials(triangles: u64, options: &Options) -> Vec<Trial> {
-    if options.profile.is_some() {
-        return Vec::new();
-    }
+/// Makes the trials of a tree.
+fn trials(tree: &Tree<PacketTriangles>, triangles: &[Triangle]) -> Vec<Trial> {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let node = |random: &mut Random, least: usize| {
+        let place = random.below(tree.node_count() as u64) as u32;
+        let numbers = tree.triangles_around(place, least, MAX_EXCESS * least);
+        numbers.into_iter().map(|number| triangles[number as usize].corners).collect()
+    };
     let mut trial = |number: usize| {
-        let run = [1, 8, MAX_PATCH_TRIANGLES][number % 3].min(triangles);
-        let patches = [(); 2].map(|()| (random.below(triangles - run + 1), run));
-        Trial { patches, rotation: random.rotation(), away: random.direction(), gap: random.unit() }
+        let least = TRIAL_SIZES[number % 3];
+        let nodes = [(); 2].map(|()| node(&mut random, least));
+        Trial { nodes, rotation: random.rotation(), away: random.direction(), gap: random.unit() }
     };
     (0..TRIAL_COUNT).map(&mut trial).collect()
 }
 
-/// Returns the patches that the trials use, in ascending order and each once.
-pub(crate) fn patches(trials: &[Trial]) -> Vec<(u64, u64)> {
-    let mut patches: Vec<_> = trials.iter().flat_map(|trial| trial.patches).collect();
-    patches.sort_unstable();
-    patches.dedup();
-    patches
-}
-
-/// Chooses what the options leave open for an object of `triangles` triangles. `corners` holds those of the patches.
+/// Chooses what the options leave open for an object of `count` triangles, given the tree of one of its bricks.
 pub(crate) fn choose(
-    triangles: u64,
-    trials: &[Trial],
-    corners: &[Vec<Corners>],
+    count: u64,
+    tree: &Tree<PacketTriangles>,
+    triangles: &[Triangle],
     options: &Options,
 ) -> Choice {
     let mut reasons = Vec::new();
     let encoding = options.triangles.unwrap_or_else(|| {
-        let bytes = triangles * PLAIN_BYTES_PER_TRIANGLE;
+        let bytes = count * PLAIN_BYTES_PER_TRIANGLE;
         let (encoding, why) = if bytes > MAX_PLAIN_BYTES {
             (TriangleEncoding::Packed, "more than")
         } else {
@@ -107,15 +112,15 @@ pub(crate) fn choose(
             Some(TriangleEncoding::Packed) => &COMPACT_PROFILES,
             Some(TriangleEncoding::Quantized) => &COMPACT_PROFILES[..2],
         };
-        let (profile, reason) = cheapest(trials, corners, candidates);
+        let (profile, reason) = cheapest(&trials(tree, triangles), candidates);
         reasons.push(reason);
         profile
     });
     Choice { profile, encoding, reason: reasons.join("; ") }
 }
 
-fn cheapest(trials: &[Trial], corners: &[Vec<Corners>], candidates: &[(Profile, f64)]) -> (Profile, String) {
-    let rates = overlap_rates(trials, corners);
+fn cheapest(trials: &[Trial], candidates: &[(Profile, f64)]) -> (Profile, String) {
+    let rates = overlap_rates(trials);
     let cost = |(profile, nanoseconds): &(Profile, f64)| {
         let widened = if *profile == Profile::Dop26U4 { U4_TESTS } else { 1.0 };
         rates[profile.directions() as usize] * widened * nanoseconds
@@ -130,15 +135,10 @@ fn cheapest(trials: &[Trial], corners: &[Vec<Corners>], candidates: &[(Profile, 
     (best.0, format!("{}, by estimated query cost: {}", best.0.name(), relative.join(", ")))
 }
 
-/// Returns how often patches that are apart overlap, for each direction set.
-fn overlap_rates(trials: &[Trial], corners: &[Vec<Corners>]) -> [f64; 3] {
-    let patches = patches(trials);
+/// Returns how often nodes that are apart overlap, for each direction set.
+fn overlap_rates(trials: &[Trial]) -> [f64; 3] {
     let overlaps = trials.par_iter().map(|trial| {
-        let points = |patch| {
-            let place = patches.binary_search(&patch).unwrap_or_default();
-            centred(corners.get(place).map_or(&[], |corners| corners))
-        };
-        let [points_a, points_b] = trial.patches.map(points);
+        let [points_a, points_b] = trial.nodes.each_ref().map(|corners| centred(corners));
         trial_overlaps(&points_a, &points_b, &trial.rotation, trial.away, trial.gap).map(u32::from)
     });
     let overlaps = overlaps.reduce(|| [0; 3], |a, b| [0, 1, 2].map(|set| a[set] + b[set]));
@@ -147,7 +147,7 @@ fn overlap_rates(trials: &[Trial], corners: &[Vec<Corners>]) -> [f64; 3] {
 }
 
 /// Returns, for each set, whether the k-DOPs overlap if B is placed beside A so that their extents along `away` leave a
-/// gap of `gap` times the radius of the smaller patch.
+/// gap of `gap` times the radius of the smaller node.
 fn trial_overlaps(
     points_a: &[[f64; 3]],
     points_b: &[[f64; 3]],
@@ -189,9 +189,9 @@ fn kdop_of(points: &[[f64; 3]]) -> Kdop {
     Kdop::of_points(points.iter().map(|point| point.map(|v| v as f32)))
 }
 
-/// Returns the corners of a patch relative to the middle of its box, in units of its largest extent.
-fn centred(patch: &[Corners]) -> Vec<[f64; 3]> {
-    let points: Vec<[f64; 3]> = patch.iter().flatten().map(|corner| corner.map(f64::from)).collect();
+/// Returns the corners of a node relative to the middle of its box, in units of its largest extent.
+fn centred(triangles: &[Corners]) -> Vec<[f64; 3]> {
+    let points: Vec<[f64; 3]> = triangles.iter().flatten().map(|corner| corner.map(f64::from)).collect();
     let ends = [0, 1, 2].map(|axis| {
         let values = points.iter().map(|p| p[axis]);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
@@ -247,6 +247,7 @@ impl Random {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tree::tree_of;
 
     /// Thin bars along the axes. Boxes fit them only until they are rotated.
     fn bars() -> Vec<Corners> {
@@ -258,12 +259,45 @@ mod tests {
             .collect()
     }
 
-    fn chosen(triangles: &[Corners], options: &Options) -> (Choice, [f64; 3]) {
-        let count = triangles.len() as u64;
-        let trials = trials(count, options);
-        let patch = |&(start, length): &(u64, u64)| triangles[start as usize..][..length as usize].to_vec();
-        let corners: Vec<Vec<Corners>> = patches(&trials).iter().map(patch).collect();
-        (choose(count, &trials, &corners, options), overlap_rates(&trials, &corners))
+    fn chosen(corners: &[Corners], options: &Options) -> (Choice, [f64; 3]) {
+        let triangles: Vec<Triangle> =
+            corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id }).collect();
+        let tree = tree_of(&triangles, width(options), options.effort);
+        let rates = overlap_rates(&trials(&tree, &triangles));
+        (choose(corners.len() as u64, &tree, &triangles, options), rates)
+    }
+
+    /// Numbers of a permutation of `count` numbers.
+    fn shuffled(count: usize) -> Vec<usize> {
+        let (mut random, mut numbers) = (Random(77), (0..count).collect::<Vec<_>>());
+        (1..count).rev().for_each(|last| numbers.swap(last, random.below(last as u64 + 1) as usize));
+        numbers
+    }
+
+    #[test]
+    fn candidates_have_the_width_for_which_the_tree_is_built() {
+        for (profile, _) in FAST_PROFILES.iter().chain(&COMPACT_PROFILES) {
+            assert_eq!(profile.width(), WIDTH, "{}", profile.name());
+        }
+    }
+
+    /// Neighbours in a tree are near each other, whatever the order of the input is.
+    #[test]
+    fn the_order_of_the_input_hardly_matters() {
+        let (positions, faces) = cbvh_testkit::ball::ball(4_000);
+        let corner = |index: u32| positions[index as usize].map(|c| c as f32);
+        let ball: Vec<Corners> = faces.iter().map(|face| face.map(corner)).collect();
+        let mixed: Vec<Corners> = shuffled(ball.len()).into_iter().map(|number| ball[number]).collect();
+        let (options, mut rates) = (Options::default(), Vec::new());
+        for triangles in [&ball, &mixed] {
+            let (choice, found) = chosen(triangles, &options);
+            assert_eq!(choice.profile, Profile::Dop26U8Wide, "{}", choice.reason);
+            rates.push(found);
+        }
+        for set in 0..3 {
+            let ratio = rates[0][set] / rates[1][set];
+            assert!((0.7..1.4).contains(&ratio), "{rates:?}");
+        }
     }
 
     #[test]

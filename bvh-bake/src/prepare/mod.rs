@@ -15,7 +15,6 @@ use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
 use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
 use duplicates::{DuplicateCandidate, Hashed};
-use layout_choice::Trial;
 use rayon::prelude::*;
 
 /// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
@@ -84,34 +83,23 @@ pub(crate) struct Surveyed {
     pub(crate) degenerate: u64,
     /// Counts and boxes for the division into bricks, if there is more than one.
     pub(crate) grid: Option<Grid>,
-    /// The patches that the trials use, in the order of `layout_choice::patches`.
-    pub(crate) patches: Vec<Vec<Corners>>,
 }
 
-/// Runs the second pass. `trials` are the trials for choosing a profile, or empty if the choice is not open.
-pub(crate) fn survey(
-    kept: &Kept,
-    measured: &Measured,
-    trials: &[Trial],
-    resources: &Resources,
-) -> Result<Surveyed, BakeError> {
+/// Runs the second pass.
+pub(crate) fn survey(kept: &Kept, measured: &Measured, resources: &Resources) -> Result<Surveyed, BakeError> {
     let tally =
         resources.progress.tally(Step::Bake(Stage::Prepare), SURVEY_WEIGHT, kept.count(), kept.count());
     let bounds = &measured.bounds;
     let centre = [0, 1, 2].map(|a| ((f64::from(bounds.lo(a)) + f64::from(bounds.hi(a))) / 2.0) as f32);
-    let wanted = layout_choice::patches(trials);
     struct Sum {
         squared: f64,
         degenerate: u64,
         grid: Option<Grid>,
-        /// The number of a patch, and some of its corners.
-        patches: Vec<(usize, Vec<Corners>)>,
     }
     let new = || Sum {
         squared: 0.0,
         degenerate: 0,
         grid: (!is_one_brick(kept.count())).then(|| Grid::empty(&measured.centres)),
-        patches: Vec::new(),
     };
     let add = |sum: &mut Sum, part: usize| {
         let triangles = kept.part(part)?;
@@ -126,25 +114,10 @@ pub(crate) fn survey(
                 grid.add(&Aabb::of_triangle(&triangle.corners));
             }
         }
-        let first = kept.first(part);
-        let end = first + triangles.len() as u64;
-        // The patches are in the order of their starts, and none is longer than the longest.
-        let near = wanted.partition_point(|(start, _)| *start + layout_choice::MAX_PATCH_TRIANGLES <= first);
-        for (number, (start, length)) in wanted.iter().enumerate().skip(near) {
-            if *start >= end {
-                break;
-            }
-            let (from, to) = ((*start).max(first), (start + length).min(end));
-            if from < to {
-                let some = &triangles[(from - first) as usize..(to - first) as usize];
-                sum.patches.push((number, some.iter().map(|triangle| triangle.corners).collect()));
-            }
-        }
         tally.add(triangles.len() as u64);
         Ok(())
     };
-    let mut all = Surveyed { centre, radius: 0.0, degenerate: 0, grid: None, patches: Vec::new() };
-    all.patches.resize(wanted.len(), Vec::new());
+    let mut all = Surveyed { centre, radius: 0.0, degenerate: 0, grid: None };
     let mut squared = 0f64;
     for sum in fold(kept.parts(), new, add)? {
         squared = squared.max(sum.squared);
@@ -153,7 +126,6 @@ pub(crate) fn survey(
             (Some(a), Some(b)) => Some(a.merged(&b)),
             (a, b) => a.or(b),
         };
-        sum.patches.into_iter().for_each(|(number, corners)| all.patches[number].extend(corners));
     }
     // Differences of f32 in f64, three squares, two sums and a root each round by at most 2^-53 relative. The factor 1
     // + 2^-40 covers these, and the next f32 covers the last rounding.

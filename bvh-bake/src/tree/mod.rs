@@ -99,13 +99,15 @@ impl Bricks {
         Ok(Self { bricks, top, builder })
     }
 
-    /// Builds the tree of each brick and passes it to `make`, several bricks at a time. Returns the results of `make`
-    /// by brick, and the tree above the bricks. Packets number the triangles of their brick.
-    pub(crate) fn build<T: Send>(
+    /// Builds the tree of each brick and passes it to `make`, several bricks at a time. The first tree goes to `settle`
+    /// before, whose result `make` gets each time. Returns that result, those of `make` by brick, and the tree above the
+    /// bricks. Packets number the triangles of their brick.
+    pub(crate) fn build<S: Sync, T: Send>(
         self,
         resources: &Resources,
-        make: impl Fn(Tree<PacketTriangles>, &[Triangle]) -> Result<T, BakeError> + Sync,
-    ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
+        settle: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> S,
+        make: impl Fn(Tree<PacketTriangles>, &[Triangle], &S) -> Result<T, BakeError> + Sync,
+    ) -> Result<(S, Vec<T>, Tree<BrickIndex>), BakeError> {
         let Self { bricks, top, builder } = self;
         let count = bricks.len();
         let triangles = bricks.iter().map(Stream::count).sum();
@@ -118,18 +120,24 @@ impl Bricks {
         order.sort_by_key(|&number| std::cmp::Reverse(bricks[number].count()));
         let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
-        let lock = |mutex: &Mutex<Option<Stream<Triangle>>>| match mutex.lock() {
-            Ok(mut brick) => brick.take(),
-            Err(_) => None,
+        let tree_of = |number: usize| {
+            let brick = bricks[number].lock().ok().and_then(|mut brick| brick.take());
+            let triangles = brick.map_or_else(|| Ok(Vec::new().into()), Stream::take)?;
+            let tree = builder.tree(&triangles);
+            trees.add(triangles.len() as u64);
+            Ok::<_, BakeError>((tree, triangles))
         };
+        // All threads work on the first tree, and then one on each of the others. An object has triangles, and so a brick.
+        let (first, first_triangles) = tree_of(order[0])?;
+        let settled = settle(&first, &first_triangles);
+        let first = Mutex::new(Some((first, first_triangles)));
         let next = AtomicUsize::new(0);
         let work = || {
             while let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let Some(brick) = lock(&bricks[number]) else { break };
-                let result = brick.take().and_then(|triangles| {
-                    let tree = builder.tree(&triangles);
-                    trees.add(triangles.len() as u64);
-                    let made = make(tree, &triangles)?;
+                let is_first = number == order[0];
+                let built = first.lock().ok().filter(|_| is_first).and_then(|mut first| first.take());
+                let result = built.map_or_else(|| tree_of(number), Ok).and_then(|(tree, triangles)| {
+                    let made = make(tree, &triangles, &settled)?;
                     rest.add(triangles.len() as u64);
                     Ok(made)
                 });
@@ -146,13 +154,19 @@ impl Bricks {
         // start bricks.
         rayon::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
         let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
-        Ok((results.collect::<Result<_, _>>()?, top))
+        Ok((settled, results.collect::<Result<_, _>>()?, top))
     }
 }
 
 /// Starts a tally of a pass over `triangles` triangles.
 fn tally(resources: &Resources, weight: u64, triangles: u64) -> Tally<'_> {
     resources.progress.tally(Step::Bake(Stage::Build), weight, triangles, triangles)
+}
+
+/// Builds the tree of triangles that are a brick.
+#[cfg(test)]
+pub(crate) fn tree_of(triangles: &[Triangle], width: usize, effort: Effort) -> Tree<PacketTriangles> {
+    Builder::new(width, effort).tree(triangles)
 }
 
 struct Builder {

@@ -97,32 +97,24 @@ pub(crate) struct Kept<'a> {
     pub(crate) stream: &'a TriangleStream,
     /// One bit per triangle, set for those that are left out; empty if none is.
     dropped: &'a [u64],
-    /// For each part, the number of triangles kept in all parts before it; then the number in all parts.
-    firsts: Vec<u64>,
+    /// The number of triangles kept in each part.
+    counts: Vec<u64>,
 }
 
 impl<'a> Kept<'a> {
     pub(crate) fn new(stream: &'a TriangleStream, dropped: &'a [u64]) -> Self {
-        let mut firsts = vec![0];
-        let mut first = 0;
-        for part in 0..stream.parts.len() {
+        let kept_of = |part: usize| {
             let size = (stream.count - (part * TRIANGLES_PER_PART) as u64).min(TRIANGLES_PER_PART as u64);
             let words = dropped.get(part * TRIANGLES_PER_PART / 64..).unwrap_or(&[]);
             let missing: u32 = words.iter().take(TRIANGLES_PER_PART / 64).map(|word| word.count_ones()).sum();
-            first += size - u64::from(missing);
-            firsts.push(first);
-        }
-        Self { stream, dropped, firsts }
+            size - u64::from(missing)
+        };
+        Self { stream, dropped, counts: (0..stream.parts.len()).map(kept_of).collect() }
     }
 
     /// Returns the number of triangles kept.
     pub(crate) fn count(&self) -> u64 {
-        self.firsts[self.stream.parts.len()]
-    }
-
-    /// Returns the number of triangles kept before a part.
-    pub(crate) fn first(&self, part: usize) -> u64 {
-        self.firsts[part]
+        self.counts.iter().sum()
     }
 }
 
@@ -133,7 +125,7 @@ impl Triangles for Kept<'_> {
 
     fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
         let all = self.stream.part(number)?;
-        if self.firsts[number + 1] - self.firsts[number] == all.len() as u64 {
+        if self.counts[number] == all.len() as u64 {
             return Ok(all);
         }
         let first = number * TRIANGLES_PER_PART;
