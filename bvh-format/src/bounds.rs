@@ -16,6 +16,7 @@ use crate::rule::Rule;
 use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, Links};
 use crate::turning::{MAX_TRIANGLES, TurningSlab, decode_turning};
+use crate::validate::packets as packets_of;
 
 /// A child of a treelet or a subtree root of a page, with both of its bounds.
 pub struct Bound<'a> {
@@ -38,40 +39,87 @@ pub struct Bound<'a> {
 pub struct Subtree {
     /// The tightest k-DOP of its triangles.
     pub kdop: Kdop,
-    /// Its triangles, unless there are more than [`MAX_TRIANGLES`], or the profile has no turning slabs.
-    pub patch: Option<Patch>,
+    /// The number of its triangles; more than [`MAX_TRIANGLES`] if it is not known.
+    pub triangles: usize,
+    /// Its triangles, in packets whose unused lanes repeat the last one. None are kept if there are more than
+    /// [`MAX_TRIANGLES`], or if the profile has no turning slabs.
+    pub packets: Vec<Packet>,
 }
 
 impl Subtree {
     /// A subtree of which nothing is known.
-    pub const UNKNOWN: Self = Self { kdop: Kdop::EMPTY, patch: None };
-
-    fn packets(&self) -> Option<&[Packet]> {
-        self.patch.as_ref().map(|patch| &patch.packets[..])
-    }
-
-    /// The k-DOP, and the packets with the number of their triangles.
-    fn parts(&self) -> (Kdop, Option<(&[Packet], usize)>) {
-        (self.kdop, self.patch.as_ref().map(|patch| (&patch.packets[..], patch.triangles)))
+    pub fn unknown() -> &'static Self {
+        static UNKNOWN: Subtree = Subtree { kdop: Kdop::EMPTY, triangles: usize::MAX, packets: Vec::new() };
+        &UNKNOWN
     }
 }
 
-/// At most [`MAX_TRIANGLES`] triangles, in packets whose unused lanes repeat the last one.
-#[derive(Debug, Clone, Default)]
-pub struct Patch {
+/// The packets of all subtrees of a page that are small enough for a turning slab, those of each subtree together.
+struct Patches {
     packets: Vec<Packet>,
-    triangles: usize,
+    /// Per slot, where its packets start, if they are kept.
+    starts: Vec<Option<usize>>,
+    /// Per slot, the number of packets and of triangles below.
+    sizes: Vec<(usize, usize)>,
 }
 
-impl Patch {
-    /// Adds the triangles of packets, unless they are too many.
-    fn joined(mut self, packets: &[Packet], triangles: usize) -> Option<Self> {
-        self.triangles += triangles;
-        if self.triangles > MAX_TRIANGLES {
-            return None;
+impl Patches {
+    /// Takes the packets of a page, in the order of their numbers, and those of subtrees in later pages.
+    fn of_page<'b>(page: &Page, own: &[Packet], below: impl Fn(RootRef) -> &'b Subtree) -> Self {
+        let treelets = page.header().treelets;
+        let mut sizes = vec![(0, 0); usize::from(treelets)];
+        let size_of = |sizes: &[(usize, usize)], child: Child| match child {
+            Child::Treelet(slot) => sizes[usize::from(slot)],
+            Child::Remote(link) => {
+                let subtree = below(page.remote(link));
+                (subtree.packets.len(), subtree.triangles)
+            }
+            Child::Leaf { triangles, .. } => (1, usize::from(triangles)),
+            Child::Empty => (0, 0),
+        };
+        let children = |slot: u8| {
+            let links = Links::read(page.treelet(slot));
+            (0..links.children()).map(move |child| links.child(child))
+        };
+        for slot in (0..treelets).rev() {
+            sizes[usize::from(slot)] = children(slot).fold((0, 0), |(packets, triangles), child| {
+                let size = size_of(&sizes, child);
+                (packets + size.0, size.1.saturating_add(triangles))
+            });
         }
-        self.packets.extend_from_slice(packets);
-        Some(self)
+        // Parents come before children, and give them their places.
+        let (mut packets, mut starts) = (Vec::new(), vec![None; usize::from(treelets)]);
+        for slot in 0..treelets {
+            let place = usize::from(slot);
+            let (count, triangles) = sizes[place];
+            if triangles > MAX_TRIANGLES {
+                continue;
+            }
+            let start = *starts[place].get_or_insert(packets.len());
+            if start == packets.len() {
+                packets.resize(start + count, Packet::default());
+            }
+            let mut next = start;
+            for child in children(slot) {
+                match child {
+                    Child::Treelet(slot) => starts[usize::from(slot)] = Some(next),
+                    Child::Leaf { packet, .. } => packets[next] = own[usize::from(packet)],
+                    Child::Remote(link) => {
+                        let subtree = &below(page.remote(link)).packets;
+                        packets[next..next + subtree.len()].copy_from_slice(subtree);
+                    }
+                    Child::Empty => {}
+                }
+                next += size_of(&sizes, child).0;
+            }
+        }
+        Self { packets, starts, sizes }
+    }
+
+    /// The packets below a slot, unless there are too many triangles.
+    fn of_slot(&self, slot: usize) -> Option<&[Packet]> {
+        let start = self.starts[slot]?;
+        self.packets.get(start..start + self.sizes[slot].0)
     }
 }
 
@@ -91,40 +139,34 @@ pub fn visit_bounds<'b>(
     let (header, profile) = (page.header(), object.profile);
     let slabs = profile.directions().slabs();
     let treelets = usize::from(header.treelets);
-    let packet_of = |packet: u16, triangles: u8| {
-        decode_packet(object.triangle_encoding, leaf_block, usize::from(packet)).filled(triangles.into())
-    };
+    let mut packets = vec![Packet::default(); usize::from(header.packets.get())];
+    for (number, triangles) in packets_of(page) {
+        let place = usize::from(number);
+        packets[place] = decode_packet(object.triangle_encoding, leaf_block, place).filled(triangles);
+    }
     // A child has a higher slot than its parent: tight bounds go up from the last slot, decoded ones down from the first.
-    let nothing = Subtree { kdop: Kdop::EMPTY, patch: profile.has_turning_slabs().then(Patch::default) };
-    let mut subtrees = vec![nothing; treelets];
+    let mut tight = vec![Kdop::EMPTY; treelets];
     let width = profile.width();
     let mut children = vec![Kdop::EMPTY; treelets * width];
     for slot in (0..treelets).rev() {
         let links = Links::read(page.treelet(slot as u8));
-        let (before, behind) = subtrees.split_at_mut(slot + 1);
-        let whole = &mut before[slot];
         for child in 0..links.children() {
-            let packets;
-            let (kdop, patch) = match links.child(child) {
-                Child::Leaf { packet, triangles } => {
-                    packets = [packet_of(packet, triangles)];
-                    (packets[0].kdop(PACKET, slabs), Some((&packets[..], usize::from(triangles))))
-                }
-                Child::Treelet(below) => behind[usize::from(below) - (slot + 1)].parts(),
-                Child::Remote(link) => below(page.remote(link)).parts(),
+            let kdop = match links.child(child) {
+                Child::Treelet(slot) => tight[usize::from(slot)],
+                Child::Remote(link) => below(page.remote(link)).kdop,
+                Child::Leaf { packet, .. } => packets[usize::from(packet)].kdop(PACKET, slabs),
                 Child::Empty => continue,
             };
-            whole.kdop.join(&kdop, slabs);
-            let all = whole.patch.take().zip(patch);
-            whole.patch = all.and_then(|(all, (packets, triangles))| all.joined(packets, triangles));
             children[slot * width + child] = kdop;
+            tight[slot].join(&kdop, slabs);
         }
     }
+    let patches = profile.has_turning_slabs().then(|| Patches::of_page(page, &packets, &below));
     let mut decoded = vec![NodeSlabs::default(); treelets];
     for root in 0..header.roots {
         let slot = usize::from(root);
         decoded[slot] = page.anchor_slabs(root);
-        let (held, tight) = (decoded[slot].to_kdop(slabs), subtrees[slot].kdop);
+        let (held, tight) = (decoded[slot].to_kdop(slabs), tight[slot]);
         visit(Bound { slot: root, child: None, decoded: held, turning: None, tight, patch: None })?;
     }
     for slot in 0..treelets {
@@ -133,14 +175,14 @@ pub fn visit_bounds<'b>(
         for child in 0..links.children() {
             let node = decode_child(profile, object.f16_scale, treelet, child, &decoded[slot]);
             let turning = decode_turning(profile, treelet, child, &node);
-            let packets;
-            let patch = match links.child(child) {
-                Child::Leaf { packet, triangles } if turning.is_some() => {
-                    packets = [packet_of(packet, triangles)];
-                    Some(&packets[..])
+            let patch = match (&patches, links.child(child)) {
+                (Some(_), Child::Leaf { packet, .. }) => {
+                    packets.get(usize::from(packet)..=usize::from(packet))
                 }
-                Child::Treelet(slot) => subtrees[usize::from(slot)].packets(),
-                Child::Remote(link) => below(page.remote(link)).packets(),
+                (Some(patches), Child::Treelet(slot)) => patches.of_slot(usize::from(slot)),
+                (Some(_), Child::Remote(link)) => Some(below(page.remote(link)))
+                    .filter(|subtree| subtree.triangles <= MAX_TRIANGLES)
+                    .map(|subtree| &subtree.packets[..]),
                 _ => None,
             };
             visit(Bound {
@@ -156,8 +198,12 @@ pub fn visit_bounds<'b>(
             }
         }
     }
-    subtrees.truncate(usize::from(header.roots));
-    Ok(subtrees)
+    let subtree = |slot: usize| Subtree {
+        kdop: tight[slot],
+        triangles: patches.as_ref().map_or(usize::MAX, |patches| patches.sizes[slot].1),
+        packets: patches.as_ref().and_then(|patches| patches.of_slot(slot)).unwrap_or_default().to_vec(),
+    };
+    Ok((0..usize::from(header.roots)).map(subtree).collect())
 }
 
 /// Checks that each slab decoded in a page contains the triangles below it.

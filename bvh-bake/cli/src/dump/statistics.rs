@@ -97,7 +97,7 @@ impl Statistics {
             let page = bytes.page(object);
             let levels = slot_levels(&page, &root_levels.retreat(page.header().roots));
             let leaves = layout.read_leaf_block(file, page.header())?;
-            let known = |to: RootRef| below.get(&to).unwrap_or(&Subtree::UNKNOWN);
+            let known = |to: RootRef| below.get(&to).unwrap_or(Subtree::unknown());
             let subtrees = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
                 if bound.child.is_some() {
                     let level = statistics.level(levels[usize::from(bound.slot)]);

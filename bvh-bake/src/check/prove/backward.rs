@@ -118,7 +118,8 @@ impl Walk<'_> {
                 let at = self.layout.page_offset(stop - 1);
                 return Err(FormatError::new(Rule::RemoteLinks, at, "links to later pages", "another"));
             }
-            let below = |root: RootRef| self.roots.get(&root).map_or(&Subtree::UNKNOWN, |root| &root.subtree);
+            let below =
+                |root: RootRef| self.roots.get(&root).map_or(Subtree::unknown(), |root| &root.subtree);
             let check = |number: u32| {
                 let (page, leaves) = window.page(number, self.object);
                 check_bounds(self.layout, self.object, &page, leaves, below)
