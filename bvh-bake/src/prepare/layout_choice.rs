@@ -25,15 +25,15 @@ pub(crate) struct Choice {
 }
 
 /// The candidates, and the cost in nanoseconds of testing 16 pairs of their nodes, with everything that belongs to a
-/// test: the growth of a collide query's mean time divided by the growth of its node tests, from bunny poses 10 % of
-/// the size apart to poses 1 % apart; AVX-512, Intel Xeon (model 167), 2026-11-21.
+/// test: the median time of a collide query divided by the mean number of its node tests, bunny poses 1e-6 of the size
+/// apart; AVX-512, AMD EPYC (Zen 5 class), 2026-11-22.
 const FAST_PROFILES: [(Profile, f64); 3] =
-    [(Profile::Dop6F16, 90.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U8Wide, 151.0)];
+    [(Profile::Dop6F16, 94.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U8Wide, 150.0)];
 /// The same for profiles with treelets of one line, for files that must be small.
 const COMPACT_PROFILES: [(Profile, f64); 3] =
-    [(Profile::Dop6F16, 90.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U4, 112.0)];
-/// The number of node tests with dop26-u4 per node test with dop26-u8, because 4-bit codes give wider bounds. From
-/// traversals of a scanned surface (123 to 87) and of CAD parts (683 to 510).
+    [(Profile::Dop6F16, 94.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U4, 121.0)];
+/// The number of node tests with dop26-u4 per node test with 8-bit codes and the same width, because 4-bit codes give
+/// wider bounds: 111 to 78 for bunny poses 1e-6 apart.
 const U4_TESTS: f64 = 1.4;
 /// The bytes of nodes and plain triangles beyond which reading the file costs more than unpacking it. With warm caches,
 /// packed triangles take 1.03 to 1.17 times as long as plain ones. This also holds where the caches are too small for
