@@ -226,10 +226,7 @@ fn places_of_codes(profile: Profile) -> Vec<usize> {
         Profile::Dop14U8 => (4, 32),
         Profile::Dop6U8 => (4, 16),
         Profile::Dop6F16 => (8, 32),
-        Profile::Dop14F16 => (4, 32),
         Profile::Dop14U4 | Profile::Dop26U4 => (4, 0),
-        Profile::Dop26U8 => (2, 32),
-        Profile::Dop14F16Wide => (8, 64),
         Profile::Dop26U8Wide => (4, 64),
         Profile::Dop14F32 => (16, 128),
     };

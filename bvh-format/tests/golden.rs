@@ -128,7 +128,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
         (12, "box-inverted", objects_alone(|f| f.record(44, &(-1e9f32).to_le_bytes()))),
         (13, "no-pages", objects_alone(|f| f.record(84, &[0]))),
         (13, "more-pages", objects_alone(|_| ())),
-        (14, "profile-10", objects_alone(|f| f.record(132, &[10]))),
+        (14, "profile-7", objects_alone(|f| f.record(132, &[7]))),
         (14, "encoding-3", objects_alone(|f| f.record(133, &[3]))),
     ]
 }
@@ -200,8 +200,8 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
         (24, "packet-numbers", page(|f| f.treelet(62, &[1, 0]))),
         (25, "reserved", page(|f| f.page(63, &[1]))),
         (38, "f16-negative", cube_of_profile(2, 1, &[0x80])),
-        (38, "f16-infinite", cube_of_profile(3, 1, &[0x7c])),
-        (38, "f32-nan", cube_of_profile(9, 0, &f32::NAN.to_le_bytes())),
+        (38, "f16-infinite", cube_of_profile(2, 1, &[0x7c])),
+        (38, "f32-nan", cube_of_profile(6, 0, &f32::NAN.to_le_bytes())),
     ]
 }
 

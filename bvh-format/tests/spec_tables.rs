@@ -147,7 +147,7 @@ fn heads_of_blocks() {
 #[test]
 fn anchors() {
     let slabs = Kdop { lo: [1; 13].map(f32::from_bits), hi: [2; 13].map(f32::from_bits) };
-    for (column, profile) in [(2, Profile::Dop6U8), (3, Profile::Dop14U8), (4, Profile::Dop26U8)] {
+    for (column, profile) in [(2, Profile::Dop6U8), (3, Profile::Dop14U8), (4, Profile::Dop26U8Wide)] {
         let mut writer = PageWriter::new(profile, 1.0, PageShape { roots: 1, remotes: 0, treelets: 1 });
         writer.root(&slabs, Some((3, 4)));
         writer.begin_treelet();

@@ -279,7 +279,7 @@ fn real_meshes() {
         let (Some(a), Some(b)) = (a, b) else { return };
         let bakes = |mesh| -> Vec<_> {
             let choose = |i: usize| options(Profile::ALL[i], LOSSLESS[i % 2]);
-            (0..10).map(|i| bake(mesh, &choose(i))).collect()
+            (0..Profile::ALL.len()).map(|i| bake(mesh, &choose(i))).collect()
         };
         let poses: Vec<_> = (0..4).map(|_| random_pose(&mut random, reach)).collect();
         check(&bakes(&a), &bakes(&b), &poses, &mut queriers);

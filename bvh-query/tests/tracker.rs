@@ -151,7 +151,7 @@ fn several_objects_and_meshes_that_change_under_the_tracker() {
     ];
     let a = several(&parts, Profile::Dop14U8);
     let same = Bvh::from_bytes(a.bytes().to_vec()).unwrap();
-    let fewer = several(&parts[1..], Profile::Dop26U8);
+    let fewer = several(&parts[1..], Profile::Dop26U4);
     let b = several(&[parts[2].clone(), parts[0].clone()], Profile::Dop6U8);
     let small = bake(&mesh(&cube()[..1]), &Options::default());
     let large = bake(&mesh(&soup(900, 3)), &Options::default());

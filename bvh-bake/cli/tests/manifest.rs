@@ -319,6 +319,7 @@ fn a_wrong_line_is_told_by_its_number() {
         (r#"{"input": "", "output": "b"}"#, "empty"),
         (r#"{"input": "a", "output": "b", "jobs": 3}"#, "unknown field `jobs`"),
         (r#"{"input": "a", "output": "b", "profile": "dop7"}"#, "profile: expected auto, dop14-u8"),
+        (r#"{"input": "a", "output": "b", "profile": "dop26-u8"}"#, "dropped: choose dop26-u8-wide"),
         (r#"{"input": "a", "output": "b", "triangles": "f64"}"#, "triangles: expected auto, f32"),
         (r#"{"input": "a", "output": "b", "effort": "low"}"#, "effort: expected fast"),
         (r#"{"input": "a", "output": "b", "max_error": 0.1}"#, "quantized"),

@@ -122,7 +122,7 @@ impl Bricks {
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
         let tree_of = |number: usize| {
             let brick = bricks[number].lock().ok().and_then(|mut brick| brick.take());
-            let triangles = brick.map_or_else(|| Ok(Vec::new().into()), Stream::take)?;
+            let triangles = brick.map_or_else(|| Ok(Vec::new()), Stream::take)?;
             let tree = builder.tree(&triangles);
             trees.add(triangles.len() as u64);
             Ok::<_, BakeError>((tree, triangles))

@@ -282,20 +282,16 @@ mod tests {
         TightBound { kdop: kdop(numbers), turning: Some(TurningSlab::around(direction, &packets)) }
     }
 
-    /// A page of two roots. The first has a packet of four triangles, a treelet and, if the profile has room for a
-    /// third child, a remote link. That treelet has a packet of one triangle, and so has the second root.
+    /// A page of two roots. The first has a packet of four triangles, a treelet and a remote link. That treelet has a packet of one triangle, and so has the second root.
     fn write(profile: Profile, with_ids: bool) -> WrittenPage {
-        let remotes = usize::from(profile.width() > 2);
         let mut writer =
-            PageWriter::new(profile, 2f32.powi(-12), PageShape { roots: 2, remotes, treelets: 3 });
+            PageWriter::new(profile, 2f32.powi(-12), PageShape { roots: 2, remotes: 1, treelets: 3 });
         writer.root(&kdop(0..8), None);
         writer.root(&kdop(8..9), Some(PARENT));
         writer.begin_treelet();
         writer.leaf(&bound(0..4), (0..4).map(triangle));
         writer.treelet(&bound(4..5));
-        if remotes == 1 {
-            writer.remote(&bound(5..8), REMOTE);
-        }
+        writer.remote(&bound(5..8), REMOTE);
         writer.begin_treelet();
         writer.leaf(&bound(8..9), (8..9).map(triangle));
         writer.begin_treelet();
@@ -341,9 +337,7 @@ mod tests {
             let first = Links::read(page.treelet(0));
             let leaf = |packet, triangles| Child::Leaf { packet, triangles };
             assert_eq!([first.child(0), first.child(1)], [leaf(0, 4), Child::Treelet(2)]);
-            if profile.width() > 2 {
-                assert_eq!((first.child(2), page.remote(0)), (Child::Remote(0), REMOTE));
-            }
+            assert_eq!((first.child(2), page.remote(0)), (Child::Remote(0), REMOTE));
             assert_eq!(Links::read(page.treelet(1)).child(0), leaf(1, 1));
             assert_eq!(Links::read(page.treelet(2)).child(0), leaf(2, 1));
 

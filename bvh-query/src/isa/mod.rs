@@ -100,16 +100,12 @@ pub(crate) trait Isa: Copy {
 
     /// Reads 16 codes of one byte each.
     fn codes_u8(self, from: &[u8; 16]) -> Self::V;
-    /// Reads 8 codes of one byte each, two per row: lane `4 * i + j` is code `2 * i + j` for j below 2.
-    fn codes_u8_pairs(self, from: &[u8; 8]) -> Self::V;
     /// Reads the low nibbles of 16 bytes.
     fn codes_low(self, from: &[u8; 16]) -> Self::V;
     /// Reads the high nibbles of 16 bytes.
     fn codes_high(self, from: &[u8; 16]) -> Self::V;
     /// Reads 16 little-endian `f16`.
     fn codes_f16(self, from: &[u8; 32]) -> Self::V;
-    /// Reads 8 little-endian `f16`, two per row like `codes_u8_pairs`.
-    fn codes_f16_pairs(self, from: &[u8; 16]) -> Self::V;
     /// Reads 16 little-endian `f32`.
     fn codes_f32(self, from: &[u8; 64]) -> Self::V;
 

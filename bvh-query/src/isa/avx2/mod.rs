@@ -251,13 +251,6 @@ impl Isa for Avx2 {
         with_features!(bytes_to_lanes(_mm_loadu_si128(from.as_ptr().cast())))
     }
     #[inline(always)]
-    fn codes_u8_pairs(self, from: &[u8; 8]) -> Y {
-        with_features!({
-            let codes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(from.as_ptr().cast()));
-            spread_pairs(_mm256_cvtepi32_ps(codes))
-        })
-    }
-    #[inline(always)]
     fn codes_low(self, from: &[u8; 16]) -> Y {
         with_features!({
             let bytes = _mm_loadu_si128(from.as_ptr().cast());
@@ -277,10 +270,6 @@ impl Isa for Avx2 {
             _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())),
             _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().add(16).cast()))
         ))
-    }
-    #[inline(always)]
-    fn codes_f16_pairs(self, from: &[u8; 16]) -> Y {
-        with_features!(spread_pairs(_mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast()))))
     }
     #[inline(always)]
     fn codes_f32(self, from: &[u8; 64]) -> Y {
@@ -357,13 +346,4 @@ fn bytes_to_lanes(bytes: __m128i) -> Y {
     let low = _mm256_cvtepu8_epi32(bytes);
     let high = _mm256_cvtepu8_epi32(_mm_srli_si128::<8>(bytes));
     Y(_mm256_cvtepi32_ps(low), _mm256_cvtepi32_ps(high))
-}
-
-/// Spreads eight values, two per row, to the first two columns of four rows.
-#[inline]
-#[target_feature(enable = "avx2")]
-fn spread_pairs(pairs: __m256) -> Y {
-    let low = _mm256_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3);
-    let high = _mm256_setr_epi32(4, 5, 4, 5, 6, 7, 6, 7);
-    Y(_mm256_permutevar8x32_ps(pairs, low), _mm256_permutevar8x32_ps(pairs, high))
 }

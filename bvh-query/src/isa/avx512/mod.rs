@@ -251,13 +251,6 @@ impl Isa for Avx512 {
         }))
     }
     #[inline(always)]
-    fn codes_u8_pairs(self, from: &[u8; 8]) -> Z {
-        Z(with_features!({
-            let codes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(from.as_ptr().cast()));
-            spread_pairs(_mm256_cvtepi32_ps(codes))
-        }))
-    }
-    #[inline(always)]
     fn codes_low(self, from: &[u8; 16]) -> Z {
         Z(with_features!({
             let bytes = _mm_loadu_si128(from.as_ptr().cast());
@@ -274,10 +267,6 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Z {
         Z(with_features!(_mm512_cvtph_ps(_mm256_loadu_si256(from.as_ptr().cast()))))
-    }
-    #[inline(always)]
-    fn codes_f16_pairs(self, from: &[u8; 16]) -> Z {
-        Z(with_features!(spread_pairs(_mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())))))
     }
     #[inline(always)]
     fn codes_f32(self, from: &[u8; 64]) -> Z {
@@ -339,12 +328,4 @@ impl Avx512 {
             (Z(_mm512_permutex2var_ps(lo.0, at, hi.0)), Z(_mm512_permutex2var_ps(hi.0, at, lo.0)))
         })
     }
-}
-
-/// Spreads eight values, two per row, to the first two columns of four rows.
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn spread_pairs(pairs: __m256) -> __m512 {
-    let places = _mm512_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3, 4, 5, 4, 5, 6, 7, 6, 7);
-    _mm512_permutexvar_ps(places, _mm512_castps256_ps512(pairs))
 }

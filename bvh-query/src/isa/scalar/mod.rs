@@ -138,10 +138,6 @@ impl Isa for Scalar {
         Array(from.map(f32::from))
     }
     #[inline(always)]
-    fn codes_u8_pairs(self, from: &[u8; 8]) -> Array<16> {
-        Array(std::array::from_fn(|i| f32::from(from[i / 4 * 2 + i % 2])))
-    }
-    #[inline(always)]
     fn codes_low(self, from: &[u8; 16]) -> Array<16> {
         Array(from.map(|byte| f32::from(byte & 15)))
     }
@@ -152,13 +148,6 @@ impl Isa for Scalar {
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Array<16> {
         Array(std::array::from_fn(|i| f16::from_le_bytes([from[2 * i], from[2 * i + 1]]).to_f32()))
-    }
-    #[inline(always)]
-    fn codes_f16_pairs(self, from: &[u8; 16]) -> Array<16> {
-        Array(std::array::from_fn(|i| {
-            let at = 2 * (i / 4 * 2 + i % 2);
-            f16::from_le_bytes([from[at], from[at + 1]]).to_f32()
-        }))
     }
     #[inline(always)]
     fn codes_f32(self, from: &[u8; 64]) -> Array<16> {
