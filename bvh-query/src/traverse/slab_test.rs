@@ -284,7 +284,8 @@ mod tests {
     use bvh_format::leaf::{Packet, TriangleEncoding};
     use bvh_format::page::{Page, PageShape, PageWriter, TightBound, WrittenPage};
     use bvh_format::profile::Profile;
-    use bvh_format::turning::{TurningDirection, TurningSlab};
+    use bvh_format::slabs::NodeSlabs;
+    use bvh_format::turning::{TurningDirection, TurningSlab, decode_turning};
 
     type Point = [f64; 3];
 
@@ -427,6 +428,76 @@ mod tests {
             }
         }
         assert!(near > found / 8, "{near} of {found}");
+    }
+
+    /// Decodes the turning slabs of a treelet whose fixed slabs are given.
+    struct Decode<'a>(&'a TurningCodes, &'a Group);
+
+    impl Task for Decode<'_> {
+        type Output = TurningGroup;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> TurningGroup {
+            let mut decoded = TurningGroup::NONE;
+            decoded.decode(isa, self.0, self.1);
+            decoded
+        }
+    }
+
+    /// Codes of any value, and boxes of any size and place.
+    #[test]
+    fn slabs_are_those_of_the_reference_decoder_to_the_last_bit() {
+        let random = &mut Random(21);
+        for round in 0..5_000 {
+            let mut treelet = [0; 128];
+            treelet.iter_mut().for_each(|byte| *byte = (random.value() * 128.0 + 128.0) as u8);
+            if round % 3 == 0 {
+                [28, 92, 56, 120].iter().for_each(|row| treelet[row + round as usize % 4] = 0);
+            }
+            let size = 2f64.powi(round % 60 - 30);
+            let mut group = Group::ZERO;
+            let mut nodes = [NodeSlabs::default(); 4];
+            for (child, node) in nodes.iter_mut().enumerate() {
+                for row in 0..3 {
+                    let (p, q) = ((random.value() * size) as f32, (random.value() * size) as f32);
+                    (node.lo[row], node.hi[row]) = (p.min(q), p.max(q));
+                    (group.lo[0][4 * row + child], group.hi[0][4 * row + child]) =
+                        (node.lo[row], node.hi[row]);
+                }
+            }
+            let codes = TurningCodes::read(&treelet);
+            for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                let decoded = backend.run(Decode(&codes, &group));
+                for (child, node) in nodes.iter().enumerate() {
+                    let slab = decode_turning(PROFILE, &treelet, child, node);
+                    let n = slab.map_or([0.0; 3], |slab| slab.direction.vector());
+                    let scale = if slab.is_some() {
+                        1.0 / (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt()
+                    } else {
+                        0.0
+                    };
+                    let centre = [0, 1, 2].map(|row| (node.lo[row] + node.hi[row]) * 0.5);
+                    let [x, y, z] = [0, 1, 2].map(|row| n[row] * scale * centre[row]);
+                    let (lo, hi) = slab.map_or((0.0, 0.0), |slab| (slab.lo, slab.hi));
+                    let middle = (lo + hi) * (scale * 0.5) - ((x + y) + z);
+                    let width = (hi - lo) * (scale * 0.5);
+                    let found = [decoded.centre.row(3)[child], decoded.half.row(3)[child]];
+                    if slab.is_some() {
+                        assert_eq!(found.map(f32::to_bits), [middle, width].map(f32::to_bits), "{backend}");
+                    } else {
+                        assert_eq!(found, [0.0; 2], "{backend}");
+                    }
+                    for row in 0..3 {
+                        assert_eq!(decoded.direction.row(row)[child], n[row] * scale, "{backend}");
+                        assert_eq!(
+                            decoded.centre.row(row)[child].to_bits(),
+                            centre[row].to_bits(),
+                            "{backend}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     /// Decodes both nodes and tests all pairs of their children.
