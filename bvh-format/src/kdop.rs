@@ -229,10 +229,10 @@ fn ends(values: &[f64; 12]) -> (f64, f64) {
 
 /// Returns the nearest `f32` at or below a value.
 #[inline(always)]
-fn round_down(value: f64) -> f32 {
+pub(crate) fn round_down(value: f64) -> f32 {
     let nearest = value as f32;
-    // The ordered integer below is that of the next number below, but for 0.0. No sum is rounded up to that: sums are
-    // multiples of the smallest `f32`. Without a branch compilers round several ends at once.
+    // The ordered integer below is that of the next number below, but for 0.0. No value is rounded up to that: negative ones
+    // that are tiny become -0.0. Without a branch compilers round several ends at once.
     from_ordered(to_ordered(nearest) - i32::from(f64::from(nearest) > value))
 }
 

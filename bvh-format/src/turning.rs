@@ -10,7 +10,7 @@
 //! 256, so that decoding rounds nothing, and it is not normalised. Its coordinates' magnitudes add up to less than 1, so that
 //! projections are no larger than coordinates.
 
-use crate::kdop::sum_of_three;
+use crate::kdop::{round_down, sum_of_three};
 use crate::leaf::{PACKET, Packet};
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, encode_max_outward, encode_min_outward, residual_unit};
@@ -120,12 +120,6 @@ impl TurningSlab {
                 })
         })
     }
-}
-
-/// The nearest `f32` at or below a value.
-fn round_down(value: f64) -> f32 {
-    let nearest = value as f32;
-    if f64::from(nearest) > value { nearest.next_down() } else { nearest }
 }
 
 /// What the box of a node reaches along a direction, below and above, rounded to nearest five times.

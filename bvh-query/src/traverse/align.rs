@@ -18,7 +18,7 @@ use bvh_format::realign::{cone, magnitudes, rows_by_cone};
 use bvh_format::slabs::{Group, row};
 
 /// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
-const U: f64 = 1.0 / (1u64 << 24) as f64;
+pub(crate) const U: f64 = 1.0 / (1u64 << 24) as f64;
 /// The error that underflow adds to an end, in mesh units: 2^-147, twice what four roundings of subnormal numbers give.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 

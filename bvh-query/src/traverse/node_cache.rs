@@ -130,7 +130,7 @@ pub(crate) struct NodeCache {
     /// One more than the number of treelets that the object can have.
     max_nodes: usize,
     /// How often the cache has started anew.
-    generation: u32,
+    generation: u64,
     /// The file and the first page of the object whose nodes these are.
     of: Option<(u64, u32)>,
 }
@@ -162,7 +162,7 @@ impl NodeCache {
             let root = &mut self.nodes[0];
             root.groups[0] = spread(isa, &slabs);
             root.turning = TurningCodes::NONE;
-            self.generation = self.generation.wrapping_add(1);
+            self.generation += 1;
             root.links = Links { kinds: 1, ..Links::default() };
             root.page = page;
             root.extents[0] = f32::INFINITY;
@@ -175,8 +175,8 @@ impl NodeCache {
         Ok(slabs)
     }
 
-    /// Changes whenever the nodes of all numbers do.
-    pub(crate) fn generation(&self) -> u32 {
+    /// Returns a number that changes whenever the cache starts anew, and numbers stand for other nodes.
+    pub(crate) fn generation(&self) -> u64 {
         self.generation
     }
 

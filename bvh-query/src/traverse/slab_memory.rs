@@ -14,13 +14,13 @@ use crate::traverse::slab_test::{Seen, SlabTest, TurningGroup};
 const ALWAYS: bool = cfg!(debug_assertions);
 /// Node tests of a walk before slab tests begin.
 const NODE_TESTS_BEFORE_SLABS: u32 = if ALWAYS { 0 } else { 24 };
-/// What keeping a pair apart saves, in slab memory.
+/// What keeping a pair apart saves, in slab tests.
 const TESTS_SAVED_PER_PAIR: i32 = 2;
-/// Slab tests are left out for a while when they have cost so many more than they saved, and this many count at most.
+/// The most that past savings count, in slab tests.
 const MAX_BALANCE: i32 = 6;
-/// Slab tests are left out for a while when they have cost so many more than they saved.
+/// When slab tests have cost this many more than they saved, they are left out for a while.
 const MAX_LOSS: i32 = 3;
-/// How many tests are left out then: at first; each time twice as many, until slabs pay again.
+/// The length of the first pause, in node tests. Each further one is twice as long, until slabs pay again.
 const FIRST_PAUSE: u32 = 24;
 
 /// The slab test of the walk under way, and what it needs of opened nodes.
@@ -30,10 +30,12 @@ pub(crate) struct SlabMemory {
     nodes_b: Vec<NodeSlabs>,
     test: Option<Box<SlabTest>>,
     /// The walk for which `test` was prepared.
-    prepared: u32,
-    /// Numbers walks.
-    walk: u32,
-    /// Node tests that are still made without.
+    prepared: u64,
+    /// Numbers walks, from 1.
+    walk: u64,
+    /// Whether the profiles of both sides have turning slabs.
+    applies: bool,
+    /// The number of node tests that are still made without.
     pause: u32,
     /// What slab tests have saved, less their number.
     balance: i32,
@@ -44,10 +46,10 @@ pub(crate) struct SlabMemory {
 impl SlabMemory {
     /// Starts a walk.
     pub(crate) fn start(&mut self, pair: &ObjectPair<'_>) {
-        self.walk = self.walk.wrapping_add(1).max(1);
-        let both = pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
-        self.pause = if both { NODE_TESTS_BEFORE_SLABS } else { u32::MAX };
-        (self.balance, self.next_pause) = (0, FIRST_PAUSE);
+        self.walk += 1;
+        self.applies =
+            pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
+        (self.pause, self.balance, self.next_pause) = (NODE_TESTS_BEFORE_SLABS, 0, FIRST_PAUSE);
     }
 
     /// Returns whether the next slab test is to be made.
@@ -55,7 +57,7 @@ impl SlabMemory {
     pub(crate) fn are_due(&mut self) -> bool {
         let due = self.pause == 0;
         self.pause = self.pause.saturating_sub(1);
-        due
+        due && self.applies
     }
 }
 
@@ -65,15 +67,15 @@ struct NodeSlabs {
     group: TurningGroup,
     seen: Seen,
     /// The generation of nodes for which `group` was computed, and the walk for which `seen` was; 0 for none.
-    generation: u32,
-    walk: u32,
+    generation: u64,
+    walk: u64,
 }
 
 impl NodeSlabs {
     const NONE: Self = Self { group: TurningGroup::NONE, seen: Seen::NONE, generation: 0, walk: 0 };
 
     #[inline(always)]
-    fn decode<I: Isa>(&mut self, isa: I, node: &CachedNode, generation: u32) {
+    fn decode<I: Isa>(&mut self, isa: I, node: &CachedNode, generation: u64) {
         if self.generation != generation {
             (self.generation, self.walk) = (generation, 0);
             self.group.decode(isa, &node.turning, &node.groups[0]);

@@ -16,7 +16,7 @@
 //! where |t| is the sum of its coordinates' magnitudes. `prepare` adds it up once a query.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::round_up;
+use crate::traverse::align::{U, round_up};
 use crate::traverse::node_test::Measure;
 use crate::traverse::placement::Placement;
 use bvh_format::quantize::STEP_U8;
@@ -228,8 +228,6 @@ impl SlabTest {
     }
 }
 
-/// The unit roundoff of `f32`.
-const U: f64 = 1.0 / (1u64 << 24) as f64;
 /// More than underflow adds to a gap, in mesh units, 2^-110: 60 products lose 2^-150 each, and along the line between
 /// centres that is divided by their distance.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 110) << 52);

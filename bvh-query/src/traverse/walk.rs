@@ -7,7 +7,7 @@
 //!     if both nodes are leaf packets: visitor.leaves(a, b)
 //!     if one is a leaf packet much larger than the other node, and its triangles are beyond the limit: skip
 //!     else open a, b or both; for each of the pairs of their children:
-//!         bound := lower bound of their distance along A's directions
+//!         bound := lower bound of their distance along A's directions, turning slabs, and B's directions
 //!         if bound <= limit: push
 //! ```
 //!
@@ -83,9 +83,9 @@ pub(crate) struct WalkMemory {
     nodes_a: NodeCache,
     nodes_b: NodeCache,
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: PerNode<[Group; 2]>,
+    aligned_a: Aligned,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: PerNode<[Group; 2]>,
+    aligned_b: Aligned,
     /// The test along turning slabs.
     slabs: SlabMemory,
     /// Depth-first: the pairs that node tests left.
@@ -101,20 +101,15 @@ pub(crate) struct WalkMemory {
 }
 
 /// The groups of opened nodes along the directions of the other side, by the number of the node.
-struct PerNode<T> {
-    items: Vec<T>,
+#[derive(Default)]
+struct Aligned {
+    groups: Vec<[Group; 2]>,
     /// The walk for which each was computed; 0 for none.
     walks: Vec<u32>,
     walk: u32,
 }
 
-impl<T> Default for PerNode<T> {
-    fn default() -> Self {
-        Self { items: Vec::new(), walks: Vec::new(), walk: 0 }
-    }
-}
-
-impl<T: Copy> PerNode<T> {
+impl Aligned {
     /// Forgets all groups, before a walk.
     fn start(&mut self) {
         self.walk = self.walk.wrapping_add(1);
@@ -126,17 +121,17 @@ impl<T: Copy> PerNode<T> {
 
     /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
     #[inline(always)]
-    fn of(&mut self, node: usize, none: T) -> (&mut T, bool) {
+    fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
         if self.walks.len() <= node {
-            self.grow(node, none);
+            self.grow(node);
         }
         let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
-        (&mut self.items[node], known)
+        (&mut self.groups[node], known)
     }
 
     #[cold]
-    fn grow(&mut self, node: usize, none: T) {
-        self.items.resize(node + 64, none);
+    fn grow(&mut self, node: usize) {
+        self.groups.resize(node + 64, [Group::ZERO; 2]);
         self.walks.resize(node + 64, 0);
     }
 }
@@ -447,7 +442,7 @@ impl WalkMemory {
         if !leaf_b && (leaf_a || !b_is_small) {
             let number = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             (sides.node_b, sides.only_b) = (number, None);
-            let (to, is_aligned) = self.aligned_b.of(number, [Group::ZERO; 2]);
+            let (to, is_aligned) = self.aligned_b.of(number);
             if !is_aligned {
                 isa.run(AlignB { node_test, node: self.nodes_b.get(number), to });
             }
@@ -470,7 +465,7 @@ impl WalkMemory {
     ) -> u64 {
         let first_frame = self.stack.len();
         let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
-        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b, [Group::ZERO; 2]);
+        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b);
         // It was when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
         debug_assert!(is_aligned, "node {} of B was not aligned in this walk", sides.node_b);
         let mut tests = 0;
@@ -491,7 +486,7 @@ impl WalkMemory {
                     mask = isa.run(TestSlabs { memory, node_test, measure, nodes, limit, tested, mask });
                 }
                 if mask != 0 && node_test.looks_along_b() {
-                    let (to, is_aligned) = self.aligned_a.of(sides.node_a, [Group::ZERO; 2]);
+                    let (to, is_aligned) = self.aligned_a.of(sides.node_a);
                     if !is_aligned {
                         isa.run(AlignA { node_test, node: side_a, to });
                     }
