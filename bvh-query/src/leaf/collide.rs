@@ -1,8 +1,14 @@
-//! Which of 16 triangle pairs may intersect: separating axes in two stages.
+//! Which of 16 triangle pairs are apart, and which intersect: separating axes in two stages.
 //!
 //! Stage one looks at the two face planes of each pair of a packet pair and settles most of them.
 //! The remaining pairs are queued, so that stage two, the nine cross products of edges, has full lanes.
-//! Axes are not normalised. The pairs that stage two cannot separate go to exact arithmetic.
+//! Axes are not normalised. What the two stages leave undecided goes to exact arithmetic.
+//!
+//! A pair is apart if its projections on one axis certainly are. It intersects if its projections on all eleven axes
+//! certainly overlap in more than a point: corners of either triangle are then strictly on both sides of the other's
+//! plane, so both have area and their planes cross, and the differences of their points form a body whose facets are
+//! perpendicular to these axes (Gottschalk, Lin, Manocha, OBBTree, SIGGRAPH 1996, for boxes; a facet comes from a face
+//! and a corner or from two edges). The origin is strictly inside all of its facets.
 //!
 //! Error. Let e bound the error of every coordinate, r the sum of the magnitudes of a coordinate of
 //! A and one of B (`Local`), and E the largest edge component. A product of two edge components is
@@ -24,40 +30,54 @@ const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
 #[inline(always)]
 pub(crate) fn drain<I: Isa>(isa: I, queue: &mut TriangleQueue) -> Survivors {
     let (a, b) = queue.corners(isa);
-    let mask = queue.filled() & !edge_axes(isa, &a, &b, queue.error(isa), queue.reach(isa));
-    Survivors { candidates: queue.take(), mask }
+    let edges = edge_axes(isa, &a, &b, queue.error(isa), queue.reach(isa));
+    let (mask, certain) = (queue.filled() & !edges.apart, queue.straddling() & edges.overlap);
+    Survivors { candidates: queue.take(), mask, certain }
 }
 
 /// Candidates left by stage two.
 pub(crate) struct Survivors {
     candidates: [Option<TrianglePair>; 16],
     mask: u16,
+    certain: u16,
 }
 
 impl Iterator for Survivors {
-    type Item = TrianglePair;
+    /// A candidate, and whether it certainly intersects.
+    type Item = (TrianglePair, bool);
 
-    fn next(&mut self) -> Option<TrianglePair> {
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
         if self.mask == 0 {
             return None;
         }
         let at = self.mask.trailing_zeros() as usize;
         self.mask &= self.mask - 1;
-        self.candidates[at]
+        let candidate = self.candidates[at & 15]?;
+        Some((candidate, self.certain >> at & 1 != 0))
     }
 }
 
-/// Stage one: the lanes of a packet pair that neither face plane separates.
+/// The lanes whose projections are certainly apart on one of several axes, and those whose projections certainly
+/// overlap in more than a point on all of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Sides {
+    pub(crate) apart: u16,
+    pub(crate) overlap: u16,
+}
+
+/// Stage one: both face planes of the pairs of two packets. Lanes that hold no pair are apart.
 #[inline(always)]
-pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: LeafPacket, b: LeafPacket) -> u16 {
+pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: LeafPacket, b: LeafPacket) -> Sides {
     let (lanes_a, lanes_b) = local.lanes(isa);
     let plane_a = Plane::new(isa, &Local::quads(isa, &local.a), local);
     let (offset, error) = (isa.repeat(&plane_a.offset), isa.repeat(&plane_a.error));
-    let apart_a = one_sided(isa, repeat(isa, &plane_a.normal), offset, error, &lanes_b);
+    let of_a = sides(isa, repeat(isa, &plane_a.normal), offset, error, &lanes_b);
     let plane_b = Plane::new(isa, &Local::quads(isa, &local.b), local);
     let (offset, error) = (isa.tile(&plane_b.offset), isa.tile(&plane_b.error));
-    let apart_b = one_sided(isa, tile(isa, &plane_b.normal), offset, error, &lanes_a);
-    valid_lanes(a.triangles, b.triangles) & !(apart_a | apart_b)
+    let of_b = sides(isa, tile(isa, &plane_b.normal), offset, error, &lanes_a);
+    let none = !valid_lanes(a.triangles, b.triangles);
+    Sides { apart: of_a.apart | of_b.apart | none, overlap: of_a.overlap & of_b.overlap }
 }
 
 /// The planes of four triangles: normal, offset and the error of a projection.
@@ -85,25 +105,27 @@ impl Plane {
     }
 }
 
-/// Lanes whose three points are all certainly on one side of the plane.
+/// Where three points are: all certainly on one side of a plane, or certainly on both.
 #[inline(always)]
-fn one_sided<I: Isa>(isa: I, normal: Vec3<I::V>, offset: I::V, error: I::V, points: &Corners<I::V>) -> u16 {
+fn sides<I: Isa>(isa: I, normal: Vec3<I::V>, offset: I::V, error: I::V, points: &Corners<I::V>) -> Sides {
     let heights = project(points, normal);
-    let above = I::V::bits(error.lt(min3(heights).sub(offset)));
-    let below = I::V::bits(max3(heights).sub(offset).lt(isa.splat(0.0).sub(error)));
-    above | below
+    let (lowest, highest) = (min3(heights).sub(offset), max3(heights).sub(offset));
+    let below_error = isa.splat(0.0).sub(error);
+    let apart = I::V::bits(error.lt(lowest)) | I::V::bits(highest.lt(below_error));
+    Sides { apart, overlap: I::V::bits(lowest.lt(below_error)) & I::V::bits(error.lt(highest)) }
 }
 
-/// The lanes that one of the nine cross products of edges separates.
+/// Stage two: the nine cross products of edges.
 #[inline(always)]
-fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, reach: I::V) -> u16 {
+fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, reach: I::V) -> Sides {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let edge = largest_of(&edges_a).max(largest_of(&edges_b));
     let relative = edge.mul_add(isa.splat(112.0 * U), error.mul(isa.splat(48.0)));
     // Two projections are compared, each with its error.
     let both = edge.mul(reach).mul(isa.splat(2.0));
     let error = both.mul_add(relative, isa.splat(2.0 * UNDERFLOW));
-    let mut apart = 0;
+    let below_error = isa.splat(0.0).sub(error);
+    let mut sides = Sides { apart: 0, overlap: u16::MAX };
     for i in 0..3 {
         for j in 0..3 {
             let axis = cross(edges_a[i], edges_b[j]);
@@ -112,8 +134,10 @@ fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, 
             let (b0, b1) = (dot(axis, b[j]), dot(axis, b[(j + 2) % 3]));
             let gap_up = b0.min(b1).sub(a0.max(a1));
             let gap_down = a0.min(a1).sub(b0.max(b1));
-            apart |= I::V::bits(error.lt(gap_up.max(gap_down)));
+            let gap = gap_up.max(gap_down);
+            sides.apart |= I::V::bits(error.lt(gap));
+            sides.overlap &= I::V::bits(gap.lt(below_error));
         }
     }
-    apart
+    sides
 }

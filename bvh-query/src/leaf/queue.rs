@@ -32,6 +32,8 @@ pub(crate) struct TriangleQueue {
     error: [f32; 16],
     reach: [f32; 16],
     candidates: [Option<TrianglePair>; 16],
+    /// The lanes of pairs of which each triangle certainly has corners strictly on both sides of the other's plane.
+    straddling: u16,
     len: usize,
 }
 
@@ -42,6 +44,7 @@ impl Default for TriangleQueue {
             error: [0.0; 16],
             reach: [0.0; 16],
             candidates: [None; 16],
+            straddling: 0,
             len: 0,
         }
     }
@@ -52,7 +55,7 @@ impl TriangleQueue {
     pub(crate) const FULL: usize = 16;
 
     pub(crate) fn clear(&mut self) {
-        self.len = 0;
+        (self.len, self.straddling) = (0, 0);
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -80,6 +83,18 @@ impl TriangleQueue {
         self.reach[at] = local.reach;
         self.candidates[at] = Some(candidate);
         self.len = at + 1;
+    }
+
+    /// Notes of the pair pushed last that each triangle certainly has corners strictly on both sides of the other's plane.
+    #[inline(always)]
+    pub(crate) fn last_straddles(&mut self, straddles: bool) {
+        self.straddling |= u16::from(straddles) << (self.len.wrapping_sub(1) & 15);
+    }
+
+    /// Returns the lanes of which `last_straddles` was told so.
+    #[inline(always)]
+    pub(crate) fn straddling(&self) -> u16 {
+        self.straddling
     }
 
     /// Returns the corners of both sides.
@@ -119,7 +134,7 @@ impl TriangleQueue {
     /// Empties the queue, and returns its pairs.
     #[inline(always)]
     pub(crate) fn take(&mut self) -> [Option<TrianglePair>; 16] {
-        self.len = 0;
+        self.clear();
         self.candidates
     }
 }

@@ -105,26 +105,32 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Co
         if self.queue.is_empty() {
             return Ok(ControlFlow::Continue(()));
         }
-        for candidate in drain(isa, self.queue) {
-            if self.decide(candidate)?.is_break() {
+        for (candidate, certain) in drain(isa, self.queue) {
+            if self.decide(candidate, certain)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
         Ok(ControlFlow::Continue(()))
     }
 
+    /// Decides a candidate, exactly if it is not certain to be in contact.
     #[inline(never)]
-    fn decide(&mut self, candidate: TrianglePair) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.exact_tests += 1;
-        let a = self.placed.triangle_a(candidate.a, candidate.lane_a)?;
-        let b = self.placed.triangle_b(candidate.b, candidate.lane_b)?;
-        if triangles_intersect(&a, &b)
+    fn decide(&mut self, candidate: TrianglePair, certain: bool) -> Result<ControlFlow<()>, QueryError> {
+        if (certain || self.intersect(candidate)?)
             && let ControlFlow::Break(found) = (self.visit)(candidate)?
         {
             self.found = Some(found);
             return Ok(ControlFlow::Break(()));
         }
         Ok(ControlFlow::Continue(()))
+    }
+
+    #[inline(never)]
+    fn intersect(&mut self, candidate: TrianglePair) -> Result<bool, QueryError> {
+        self.stats.exact_tests += 1;
+        let a = self.placed.triangle_a(candidate.a, candidate.lane_a)?;
+        let b = self.placed.triangle_b(candidate.b, candidate.lane_b)?;
+        Ok(triangles_intersect(&a, &b))
     }
 }
 
@@ -151,11 +157,13 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Vi
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.packet_tests += 1;
         let local = self.placed.local(isa, self.packets, (a, b))?;
-        let mut mask = face_planes(isa, &local, a, b);
+        let planes = face_planes(isa, &local, a, b);
+        let mut mask = !planes.apart;
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
             self.queue.push(&local, TrianglePair::in_lane(a, b, lane));
+            self.queue.last_straddles(planes.overlap >> lane & 1 != 0);
             if self.queue.len() >= self.drain_at {
                 self.drain_at = TriangleQueue::FULL;
                 if self.drain(isa)?.is_break() {
