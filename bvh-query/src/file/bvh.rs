@@ -2,7 +2,6 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::file::mapped::{self, ReadAhead};
-use crate::file::packet_cache::PacketCache;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
 use bvh_format::object::Object;
@@ -32,8 +31,10 @@ pub struct Bvh {
     identity: u64,
 }
 
-/// From this size on, a file does not fit into the caches near a processor.
-const MIN_LARGE_FILE_BYTES: usize = 8 << 20;
+/// From this size on, a file gains from large memory pages.
+const MIN_LARGE_PAGES_BYTES: usize = 8 << 20;
+/// From this size on, a file does not stay in the caches nearest to a processor.
+const MIN_PREFETCH_BYTES: usize = 1 << 20;
 
 /// Set once the bytes of the page itself have been checked.
 const PAGE_CHECKED: u8 = 1;
@@ -105,7 +106,7 @@ impl Bvh {
     /// The rule that the header or the object table breaks.
     pub fn from_bytes(bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, FormatError> {
         let slice = bytes.as_ref();
-        let copy = (slice.len() >= MIN_LARGE_FILE_BYTES).then(|| mapped::copy(slice).ok()).flatten();
+        let copy = (slice.len() >= MIN_LARGE_PAGES_BYTES).then(|| mapped::copy(slice).ok()).flatten();
         Self::new(copy.map_or_else(|| Bytes::from_owner(bytes), Bytes::from_owner))
     }
 
@@ -136,10 +137,10 @@ impl Bvh {
         &self.bytes
     }
 
-    /// Returns whether queries will mostly read bytes that no cache holds.
+    /// Returns whether queries will mostly read bytes that the nearest caches do not hold.
     #[inline(always)]
-    pub(crate) fn is_large(&self) -> bool {
-        self.bytes.len() >= MIN_LARGE_FILE_BYTES
+    pub(crate) fn is_worth_prefetching(&self) -> bool {
+        self.bytes.len() >= MIN_PREFETCH_BYTES
     }
 
     /// Returns a number that no other `Bvh` of this process has or had.
@@ -261,28 +262,20 @@ impl Bvh {
         Ok(self.layout.id_block(self.bytes(), page.header()))
     }
 
-    /// Returns a leaf packet for a walk that meets it several times: in place if the file holds plain `f32`, otherwise
-    /// decoded in `cache`.
+    /// Returns a leaf packet: in place or, if it is encoded, decoded into `room`.
     #[inline(always)]
-    pub(crate) fn cached_packet<'a>(
+    pub(crate) fn packet<'a>(
         &'a self,
         object: &Object,
         leaf: LeafPacket,
-        cache: &'a mut PacketCache,
+        room: &'a mut Packet,
     ) -> Result<&'a Packet, QueryError> {
-        if object.triangle_encoding() == TriangleEncoding::F32 {
-            let page = self.page(object, leaf.page)?;
-            let block = self.leaf_block(object, &page)?;
-            if let Some(packet) = plain_packet(object, block, leaf.packet) {
-                return Ok(packet);
-            }
+        let page = self.page(object, leaf.page)?;
+        let block = self.leaf_block(object, &page)?;
+        if let Some(packet) = plain_packet(object, block, leaf.packet) {
+            return Ok(packet);
         }
-        let (known, room) = cache.place(leaf.page, leaf.packet);
-        if !known {
-            let page = self.page(object, leaf.page)?;
-            let block = self.leaf_block(object, &page)?;
-            *room = decode_packet(object.triangle_encoding(), block, usize::from(leaf.packet));
-        }
+        *room = decode_packet(object.triangle_encoding(), block, usize::from(leaf.packet));
         Ok(room)
     }
 

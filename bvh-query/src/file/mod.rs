@@ -3,6 +3,5 @@
 pub(crate) mod bvh;
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) mod mapped;
-pub(crate) mod packet_cache;
 pub(crate) mod place;
 pub(crate) mod shape;

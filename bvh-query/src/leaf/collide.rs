@@ -14,13 +14,16 @@
 //! A and one of B (`Local`), and E the largest edge component. A product of two edge components is
 //! off by 4 E e + 4u E^2, a component of the axis by twice that and u of itself; a projection sums
 //! three products of an axis component (at most 2 E^2) and a coordinate or difference (at most r).
+//! The height of a corner over a face of B is such a projection, too: its three parts, along the corner, the offset and
+//! the corner of the face, are at most r together, and their two sums lose 12u E^2 r more.
 //! Together that stays below `E r (48 e + 112 u E)`. Squares of numbers below 2^-75 vanish; the frame's
 //! unit makes 2^-120 far less than any projection that matters, and it is added.
 
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
-use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, largest_of, max3, min3, project, sub};
+use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest_of, max3, min3, project};
+use crate::leaf::placed_packet::{PlacedPacket, load4};
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 
 /// A bound of all underflows of a projection together: 2^-120, in cubes of the frame's unit.
@@ -68,41 +71,28 @@ pub(crate) struct Sides {
 
 /// Stage one: both face planes of the pairs of two packets. Lanes that hold no pair are apart.
 #[inline(always)]
-pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local, a: LeafPacket, b: LeafPacket) -> Sides {
+pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local<'_>, a: LeafPacket, b: LeafPacket) -> Sides {
     let (lanes_a, lanes_b) = local.lanes(isa);
-    let plane_a = Plane::new(isa, &Local::quads(isa, &local.a), local);
-    let (offset, error) = (isa.repeat(&plane_a.offset), isa.repeat(&plane_a.error));
-    let of_a = sides(isa, repeat(isa, &plane_a.normal), offset, error, &lanes_b);
-    let plane_b = Plane::new(isa, &Local::quads(isa, &local.b), local);
-    let (offset, error) = (isa.tile(&plane_b.offset), isa.tile(&plane_b.error));
-    let of_b = sides(isa, tile(isa, &plane_b.normal), offset, error, &lanes_a);
+    let (mut error_a, mut error_b, mut offset_b) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    isa.store4(error(isa, local, local.a), &mut error_a);
+    isa.store4(error(isa, local, local.b), &mut error_b);
+    let along = local.offset_along(isa, load4(isa, &local.b.normal));
+    isa.store4(isa.load4(&local.b.lo).add(along), &mut offset_b);
+    // All corners of a face have the same projection on its normal, but for the error.
+    let (offset, error) = (isa.repeat(&local.a.lo), isa.repeat(&error_a));
+    let of_a = sides(isa, repeat(isa, &local.a.normal), offset, error, &lanes_b);
+    let (offset, error) = (isa.tile(&offset_b), isa.tile(&error_b));
+    let of_b = sides(isa, tile(isa, &local.b.normal), offset, error, &lanes_a);
     let none = !valid_lanes(a.triangles, b.triangles);
     Sides { apart: of_a.apart | of_b.apart | none, overlap: of_a.overlap & of_b.overlap }
 }
 
-/// The planes of four triangles: normal, offset and the error of a projection.
-struct Plane {
-    normal: [[f32; 4]; 3],
-    offset: [f32; 4],
-    error: [f32; 4],
-}
-
-impl Plane {
-    #[inline(always)]
-    fn new<I: Isa>(isa: I, corners: &Corners<I::H>, local: &Local) -> Self {
-        let (edge_1, edge_2) = (sub(corners[1], corners[0]), sub(corners[2], corners[0]));
-        let normal = cross(edge_1, edge_2);
-        let edge = largest(edge_1).max(largest(edge_2));
-        let relative = edge.mul_add(isa.splat4(112.0 * U), isa.splat4(48.0 * local.error));
-        let error = edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(UNDERFLOW));
-        let mut plane = Self { normal: [[0.0; 4]; 3], offset: [0.0; 4], error: [0.0; 4] };
-        for axis in 0..3 {
-            isa.store4(normal[axis], &mut plane.normal[axis]);
-        }
-        isa.store4(dot(normal, corners[0]), &mut plane.offset);
-        isa.store4(error, &mut plane.error);
-        plane
-    }
+/// The errors of projections on the normals of four faces.
+#[inline(always)]
+fn error<I: Isa>(isa: I, local: &Local<'_>, packet: &PlacedPacket) -> I::H {
+    let edge = isa.load4(&packet.edge);
+    let relative = edge.mul_add(isa.splat4(112.0 * U), isa.splat4(48.0 * local.error));
+    edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(UNDERFLOW))
 }
 
 /// Where three points are: all certainly on one side of a plane, or certainly on both.

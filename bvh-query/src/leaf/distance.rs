@@ -16,7 +16,8 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, splat4, tile};
-use crate::leaf::math::{Corners, Vec3, along, cross, dot, edges, max3, min3, project, sub};
+use crate::leaf::math::{Corners, Vec3, along, dot, edges, max3, min3, project, sub};
+use crate::leaf::placed_packet::load4;
 use crate::leaf::queue::TriangleQueue;
 
 /// Bounds on 16 distances, in units of the local frame.
@@ -32,18 +33,19 @@ const MIN_CERTIFIED_SQUARE: f32 = f32::from_bits((127 - 100) << 23);
 
 /// The error of a bound: see above. `Local` charges 2^-140 to every coordinate.
 #[inline(always)]
-fn slack(local: &Local) -> f32 {
+fn slack(local: &Local<'_>) -> f32 {
     4.0 * local.error + 16.0 * U * local.reach
 }
 
 /// Lanes whose triangles may be closer than `limit`, looking along `direction` (at most of length 1)
 /// alone.
 #[inline(always)]
-pub(crate) fn near_along<I: Isa>(isa: I, local: &Local, direction: [f32; 3], limit: f32) -> u16 {
+pub(crate) fn near_along<I: Isa>(isa: I, local: &Local<'_>, direction: [f32; 3], limit: f32) -> u16 {
     let axis = splat4(isa, direction);
     let (mut upper_a, mut lower_b) = ([0.0; 4], [0.0; 4]);
-    isa.store4(max3(project(&Local::quads(isa, &local.a), axis)), &mut upper_a);
-    isa.store4(min3(project(&Local::quads(isa, &local.b), axis)), &mut lower_b);
+    isa.store4(max3(project(&local.a.quads(isa), axis)), &mut upper_a);
+    let lower = min3(project(&local.b.quads(isa), axis));
+    isa.store4(lower.add(local.offset_along(isa, axis)), &mut lower_b);
     let gap = isa.tile(&lower_b).sub(isa.repeat(&upper_a));
     I::V::bits(gap.le(isa.splat(limit + slack(local))))
 }
@@ -52,50 +54,28 @@ pub(crate) fn near_along<I: Isa>(isa: I, local: &Local, direction: [f32; 3], lim
 /// centroid, and the normals of both faces. Whatever a direction is, the gap of the projections on it is at most
 /// its length times the distance.
 #[inline(always)]
-pub(crate) fn near<I: Isa>(isa: I, local: &Local, limit: f32) -> u16 {
+pub(crate) fn near<I: Isa>(isa: I, local: &Local<'_>, limit: f32) -> u16 {
     let (a, b) = local.lanes(isa);
     let limit = (limit + slack(local)) * (1.0 + 64.0 * U);
     let limit = isa.splat(limit * limit);
-    let (face_a, face_b) = (Face::new(isa, &local.a), Face::new(isa, &local.b));
+    let (face_a, face_b) = (local.a, local.b);
     let normal = repeat(isa, &face_a.normal);
     let ends = [isa.repeat(&face_a.lo), isa.repeat(&face_a.hi)];
     let mut far = far_along(isa, gap(ends, ends_of(&b, normal)), isa.repeat(&face_a.squared), limit);
-    let normal = tile(isa, &face_b.normal);
-    let ends = [isa.tile(&face_b.lo), isa.tile(&face_b.hi)];
+    let normal = load4(isa, &face_b.normal);
+    let shift = local.offset_along(isa, normal);
+    let (mut lo, mut hi, mut sum) = ([0.0; 4], [0.0; 4], [[0.0; 4]; 3]);
+    isa.store4(isa.load4(&face_b.lo).add(shift), &mut lo);
+    isa.store4(isa.load4(&face_b.hi).add(shift), &mut hi);
+    for axis in 0..3 {
+        let shift = isa.splat4(3.0 * local.offset[axis]);
+        isa.store4(isa.load4(&face_b.sum[axis]).add(shift), &mut sum[axis]);
+    }
+    let (normal, ends) = (tile(isa, &face_b.normal), [isa.tile(&lo), isa.tile(&hi)]);
     far |= far_along(isa, gap(ends, ends_of(&a, normal)), isa.tile(&face_b.squared), limit);
-    let between = sub(tile(isa, &face_b.sum), repeat(isa, &face_a.sum));
+    let between = sub(tile(isa, &sum), repeat(isa, &face_a.sum));
     far |= far_along(isa, gap(ends_of(&a, between), ends_of(&b, between)), dot(between, between), limit);
     !far
-}
-
-/// Four triangles: normals, their squared lengths, where the corners are along them, and the sums of the corners.
-struct Face {
-    normal: [[f32; 4]; 3],
-    squared: [f32; 4],
-    lo: [f32; 4],
-    hi: [f32; 4],
-    sum: [[f32; 4]; 3],
-}
-
-impl Face {
-    #[inline(always)]
-    fn new<I: Isa>(isa: I, side: &[[[f32; 4]; 3]; 3]) -> Self {
-        let mut face =
-            Self { normal: [[0.0; 4]; 3], squared: [0.0; 4], lo: [0.0; 4], hi: [0.0; 4], sum: [[0.0; 4]; 3] };
-        let corners = Local::quads(isa, side);
-        let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
-        let [lo, hi] = ends_of(&corners, normal);
-        isa.store4(dot(normal, normal), &mut face.squared);
-        isa.store4(lo, &mut face.lo);
-        isa.store4(hi, &mut face.hi);
-        let (one, third) = (isa.splat4(1.0), corners[2]);
-        for axis in 0..3 {
-            isa.store4(normal[axis], &mut face.normal[axis]);
-            let sum = corners[0][axis].mul_add(one, corners[1][axis].mul_add(one, third[axis]));
-            isa.store4(sum, &mut face.sum[axis]);
-        }
-        face
-    }
 }
 
 /// The least and the greatest of the corners' projections.

@@ -16,6 +16,11 @@ pub(crate) fn sub<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
 }
 
+#[inline(always)]
+pub(crate) fn add<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    [a[0].add(b[0]), a[1].add(b[1]), a[2].add(b[2])]
+}
+
 /// The edges of a triangle: from each corner to the next.
 #[inline(always)]
 pub(crate) fn edges<T: Lanes>(t: &Corners<T>) -> Corners<T> {

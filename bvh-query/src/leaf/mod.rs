@@ -7,4 +7,5 @@ pub(crate) mod collide;
 pub(crate) mod distance;
 pub(crate) mod local;
 pub(crate) mod math;
+pub(crate) mod placed_packet;
 pub(crate) mod queue;

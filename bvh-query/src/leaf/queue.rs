@@ -70,13 +70,14 @@ impl TriangleQueue {
         self.len
     }
 
-    pub(crate) fn push(&mut self, local: &Local, candidate: TrianglePair) {
+    pub(crate) fn push(&mut self, local: &Local<'_>, candidate: TrianglePair) {
         let at = self.len & 15;
         let (lane_a, lane_b) = (usize::from(candidate.lane_a & 3), usize::from(candidate.lane_b & 3));
         for corner in 0..3 {
             for axis in 0..3 {
-                self.corners[0][corner][axis][at] = local.a[corner][axis][lane_a];
-                self.corners[1][corner][axis][at] = local.b[corner][axis][lane_b];
+                self.corners[0][corner][axis][at] = local.a.corners[corner][axis][lane_a];
+                self.corners[1][corner][axis][at] =
+                    local.b.corners[corner][axis][lane_b] + local.offset[axis];
             }
         }
         self.error[at] = local.error;

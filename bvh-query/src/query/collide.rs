@@ -1,11 +1,11 @@
 //! Decides whether the meshes touch, and finds the first contact that a walk meets.
 
 use crate::error::QueryError;
-use crate::file::packet_cache::PacketCache;
 use crate::file::place::LeafPacket;
 use crate::file::shape::Shape;
 use crate::isa::Isa;
 use crate::leaf::collide::{drain, face_planes};
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
@@ -65,32 +65,39 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
-        self.packets.iter_mut().for_each(PacketCache::start);
+        self.packets.iter_mut().for_each(PlacedPackets::start);
         let mut visitor = ContactVisitor {
-            placed,
-            queue: &mut self.queue,
             packets: &mut self.packets,
             order: Order::Nearest,
-            drain_at: FIRST_DRAIN,
-            stats: QueryStats::default(),
-            visit: |candidate| Ok(ControlFlow::Break(candidate)),
-            found: None,
+            candidates: Candidates {
+                placed,
+                queue: &mut self.queue,
+                drain_at: FIRST_DRAIN,
+                stats: QueryStats::default(),
+                visit: |candidate| Ok(ControlFlow::Break(candidate)),
+                found: None,
+            },
         };
         let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
-        let (found, stats) = (visitor.found, visitor.stats);
+        let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
         Ok(found)
     }
 }
 
-/// Decides pairs of triangles exactly and passes those in contact to `visit`, until it breaks.
+/// Collects pairs of triangles that may be in contact.
 pub(super) struct ContactVisitor<'a, F> {
+    /// Of A and of B.
+    pub(super) packets: &'a mut [PlacedPackets; 2],
+    pub(super) order: Order,
+    pub(super) candidates: Candidates<'a, F>,
+}
+
+/// Decides pairs of triangles and passes those in contact to `visit`, until it breaks.
+pub(super) struct Candidates<'a, F> {
     pub(super) placed: &'a PlacedPair<'a>,
     pub(super) queue: &'a mut TriangleQueue,
-    /// Of A and of B.
-    pub(super) packets: &'a mut [PacketCache; 2],
-    pub(super) order: Order,
     /// The number of candidates that are decided together next; after that, a full queue.
     pub(super) drain_at: usize,
     pub(super) stats: QueryStats,
@@ -99,7 +106,7 @@ pub(super) struct ContactVisitor<'a, F> {
     pub(super) found: Option<TrianglePair>,
 }
 
-impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> ContactVisitor<'_, F> {
+impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Candidates<'_, F> {
     #[inline(always)]
     fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         if self.queue.is_empty() {
@@ -155,18 +162,19 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Vi
         (a, b): (LeafPacket, LeafPacket),
         _at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.packet_tests += 1;
-        let local = self.placed.local(isa, self.packets, (a, b))?;
+        let candidates = &mut self.candidates;
+        candidates.stats.packet_tests += 1;
+        let local = candidates.placed.local(isa, self.packets, (a, b))?;
         let planes = face_planes(isa, &local, a, b);
         let mut mask = !planes.apart;
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            self.queue.push(&local, TrianglePair::in_lane(a, b, lane));
-            self.queue.last_straddles(planes.overlap >> lane & 1 != 0);
-            if self.queue.len() >= self.drain_at {
-                self.drain_at = TriangleQueue::FULL;
-                if self.drain(isa)?.is_break() {
+            candidates.queue.push(&local, TrianglePair::in_lane(a, b, lane));
+            candidates.queue.last_straddles(planes.overlap >> lane & 1 != 0);
+            if candidates.queue.len() >= candidates.drain_at {
+                candidates.drain_at = TriangleQueue::FULL;
+                if candidates.drain(isa)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
             }
@@ -176,6 +184,6 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Vi
 
     #[inline(always)]
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
-        self.drain(isa).map(|_| ())
+        self.candidates.drain(isa).map(|_| ())
     }
 }

@@ -2,14 +2,14 @@
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::file::packet_cache::PacketCache;
 use crate::file::place::TrianglePlace;
 use crate::file::shape::Shape;
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
 use crate::query::bounding_volumes::surely_apart;
-use crate::query::collide::ContactVisitor;
+use crate::query::collide::{Candidates, ContactVisitor};
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::walk::Order;
@@ -83,20 +83,22 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
-        self.packets.iter_mut().for_each(PacketCache::start);
+        self.packets.iter_mut().for_each(PlacedPackets::start);
         let mut visitor = ContactVisitor {
-            placed,
-            queue: &mut self.queue,
             packets: &mut self.packets,
             order: Order::Any,
-            drain_at: TriangleQueue::FULL,
-            stats: QueryStats::default(),
-            visit: |candidate| report(placed, candidate, visit),
-            found: None,
+            candidates: Candidates {
+                placed,
+                queue: &mut self.queue,
+                drain_at: TriangleQueue::FULL,
+                stats: QueryStats::default(),
+                visit: |candidate| report(placed, candidate, visit),
+                found: None,
+            },
         };
         let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
-        let (found, stats) = (visitor.found, visitor.stats);
+        let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
         Ok(found)
     }

@@ -4,8 +4,8 @@
 //! meets.
 
 use crate::error::QueryError;
-use crate::file::packet_cache::PacketCache;
 use crate::file::shape::Shape;
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::query::answers::{Distance, QueryStats};
@@ -14,7 +14,7 @@ use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
-use crate::query::search::{Best, Nearest, Search, ids};
+use crate::query::search::{Best, Finalists, Nearest, Search, ids};
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their
@@ -120,20 +120,20 @@ impl Querier {
                 return Ok(None);
             }
             self.queue.clear();
-            self.packets.iter_mut().for_each(PacketCache::start);
+            self.packets.iter_mut().for_each(PlacedPackets::start);
             self.bounded.clear();
-            let mut visitor = Nearest {
+            let finalists = Finalists {
                 placed,
                 direction: search.direction(),
                 search,
                 queue: &mut self.queue,
-                packets: &mut self.packets,
                 bounded: &mut self.bounded,
                 stats: QueryStats::default(),
             };
+            let mut visitor = Nearest { packets: &mut self.packets, finalists };
             let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
             let tests = self.backend.run(task)?;
-            let stats = visitor.stats;
+            let stats = visitor.finalists.stats;
             self.stats.add(tests, stats);
             Ok(search.done.then_some(()))
         })?;

@@ -1,15 +1,16 @@
 //! Two objects in place: what every query of a pair of shapes walks.
 
 use crate::error::QueryError;
-use crate::file::packet_cache::PacketCache;
 use crate::file::place::LeafPacket;
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
 use crate::leaf::local::{Local, LocalFrame};
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
 use crate::traverse::walk::{Visitor, WalkMemory, traverse};
+use bvh_format::leaf::Packet;
 use std::cell::OnceCell;
 
 /// Two objects in place, with everything that leaf tests need.
@@ -32,16 +33,23 @@ impl PlacedPair<'_> {
 
     /// Fetches two leaf packets and brings them into their local frame.
     #[inline(always)]
-    pub(crate) fn local<I: Isa>(
+    pub(crate) fn local<'a, I: Isa>(
         &self,
         isa: I,
-        [packets_a, packets_b]: &mut [PacketCache; 2],
+        [packets_a, packets_b]: &'a mut [PlacedPackets; 2],
         (a, b): (LeafPacket, LeafPacket),
-    ) -> Result<Local, QueryError> {
+    ) -> Result<Local<'a>, QueryError> {
         let ObjectPair { bvh_a, object_a, bvh_b, object_b, .. } = self.pair;
-        let packet_a = bvh_a.cached_packet(object_a, a, packets_a)?;
-        let packet_b = bvh_b.cached_packet(object_b, b, packets_b)?;
-        Ok(Local::new(isa, self.frame(), packet_a, packet_b))
+        let frame = self.frame();
+        let (known, placed_a) = packets_a.place(a.page, a.packet);
+        if !known {
+            placed_a.place_a(isa, frame, bvh_a.packet(object_a, a, &mut Packet::default())?);
+        }
+        let (known, placed_b) = packets_b.place(b.page, b.packet);
+        if !known {
+            placed_b.place_b(isa, frame, bvh_b.packet(object_b, b, &mut Packet::default())?);
+        }
+        Ok(Local::new(frame, placed_a, placed_b))
     }
 }
 

@@ -1,8 +1,8 @@
 //! The querier: the backend and the memory that every query works with.
 
 use crate::error::QueryError;
-use crate::file::packet_cache::PacketCache;
 use crate::isa::Backend;
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
 use crate::query::search::BoundedPair;
@@ -33,7 +33,7 @@ pub struct Querier {
     pub(super) memory: WalkMemory,
     pub(super) queue: TriangleQueue,
     /// Of A and of B.
-    pub(super) packets: [PacketCache; 2],
+    pub(super) packets: [PlacedPackets; 2],
     pub(super) bounded: Vec<BoundedPair>,
     budget: u64,
     pub(super) stats: QueryStats,

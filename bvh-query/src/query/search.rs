@@ -6,11 +6,11 @@
 //! with the smallest triangle numbers.
 
 use crate::error::QueryError;
-use crate::file::packet_cache::PacketCache;
 use crate::file::place::LeafPacket;
 use crate::isa::Isa;
 use crate::leaf::distance::{bounds, near, near_along};
 use crate::leaf::local::valid_lanes;
+use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_intersect, triangles_within};
 use crate::query::answers::{Distance, QueryStats};
@@ -203,20 +203,25 @@ fn within_unit(direction: [f64; 3]) -> Option<[f32; 3]> {
     (length > 0.0 && unit.iter().all(|d| d.is_finite())).then_some(unit)
 }
 
-/// Visits pairs of leaf packets to find the closest pair of triangles.
+/// Collects pairs of triangles that may be the closest.
 pub(super) struct Nearest<'a> {
+    /// Of A and of B.
+    pub(super) packets: &'a mut [PlacedPackets; 2],
+    pub(super) finalists: Finalists<'a>,
+}
+
+/// Bounds pairs of triangles and measures those that still may be the closest.
+pub(super) struct Finalists<'a> {
     pub(super) placed: &'a PlacedPair<'a>,
     pub(super) search: &'a mut Search,
     pub(super) queue: &'a mut TriangleQueue,
-    /// Of A and of B.
-    pub(super) packets: &'a mut [PacketCache; 2],
     pub(super) bounded: &'a mut Vec<BoundedPair>,
     /// The direction of the closest pair so far, at most of length 1.
     pub(super) direction: Option<[f32; 3]>,
     pub(super) stats: QueryStats,
 }
 
-impl Nearest<'_> {
+impl Finalists<'_> {
     /// Bounds the distances of the pairs in the queue, and keeps those that may be the closest.
     #[inline(always)]
     fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
@@ -290,17 +295,17 @@ impl Visitor for Nearest<'_> {
     const MEASURE: Measure = Measure::Distance;
 
     fn order(&self) -> Order {
-        self.search.order
+        self.finalists.search.order
     }
 
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.search.limit
+        self.finalists.search.limit
     }
 
     #[inline(always)]
     fn witness(&self) -> Option<[f32; 3]> {
-        self.direction
+        self.finalists.direction
     }
 
     #[inline(always)]
@@ -310,11 +315,12 @@ impl Visitor for Nearest<'_> {
         (a, b): (LeafPacket, LeafPacket),
         at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.packet_tests += 1;
-        let local = self.placed.local(isa, self.packets, (a, b))?;
-        let limit = self.search.limit * self.placed.frame().scale;
+        let finalists = &mut self.finalists;
+        finalists.stats.packet_tests += 1;
+        let local = finalists.placed.local(isa, self.packets, (a, b))?;
+        let limit = finalists.search.limit * finalists.placed.frame().scale;
         let mut mask = valid_lanes(a.triangles, b.triangles);
-        if let Some(direction) = self.direction {
+        if let Some(direction) = finalists.direction {
             mask &= near_along(isa, &local, direction, limit);
         }
         if mask != 0 {
@@ -323,18 +329,18 @@ impl Visitor for Nearest<'_> {
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            self.queue.push(&local, TrianglePair::in_lane(a, b, lane));
-            if self.queue.is_full() && self.drain(isa)?.is_break() {
+            finalists.queue.push(&local, TrianglePair::in_lane(a, b, lane));
+            if finalists.queue.is_full() && finalists.drain(isa)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
-        if at_once { self.drain(isa) } else { Ok(ControlFlow::Continue(())) }
+        if at_once { finalists.drain(isa) } else { Ok(ControlFlow::Continue(())) }
     }
 
     #[inline(always)]
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
-        if self.drain(isa)?.is_continue() {
-            let _ = self.settle_bounded(isa)?;
+        if self.finalists.drain(isa)?.is_continue() {
+            let _ = self.finalists.settle_bounded(isa)?;
         }
         Ok(())
     }

@@ -278,7 +278,7 @@ fn decode_node<I: Isa>(
     };
     to.links = Links::read(treelet);
     isa.prefetch(bvh.packets_to_prefetch(object, &page, &to.links));
-    if bvh.is_large() {
+    if bvh.is_worth_prefetching() {
         isa.prefetch(page.treelets_ahead(&to.links));
     }
     to.page = page.header().page_number.get();
