@@ -61,6 +61,8 @@ pub struct Options {
     pub split_objects: bool,
     /// Whether the original triangle numbers are kept.
     pub ids: bool,
+    /// Whether children get turning slabs, where the profile has room for them. Answers are the same, and files as large.
+    pub turning_slabs: bool,
 }
 
 impl Default for Options {
@@ -72,6 +74,7 @@ impl Default for Options {
             effort: Effort::Default,
             split_objects: false,
             ids: true,
+            turning_slabs: true,
         }
     }
 }
@@ -113,16 +116,23 @@ impl Options {
         Self { ids, ..self }
     }
 
+    /// Sets whether children get turning slabs, where the profile has room for them.
+    #[must_use]
+    pub fn turning_slabs(self, turning_slabs: bool) -> Self {
+        Self { turning_slabs, ..self }
+    }
+
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
             self.effort.name(),
             self.split_objects,
-            self.ids
+            self.ids,
+            if self.turning_slabs { "" } else { " turning_slabs=false" }
         )
     }
 }

@@ -5,10 +5,8 @@ mod common;
 
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_query::{Bvh, Pose, Querier};
 use cbvh_testkit::ball::ball;
-use cbvh_testkit::seal::{seal, section};
 use common::shapes::{dirty, moved, plate, sphere, torus};
 use common::truth::Truth;
 use common::{Random, Triangle, bake, mesh, options, queriers, random_pose, stored};
@@ -17,26 +15,8 @@ const PROFILE: Profile = Profile::Dop26U8Wide;
 
 /// A file and the same without turning slabs.
 fn with_and_without(triangles: &[Triangle]) -> [Bvh; 2] {
-    let with = bake(&mesh(triangles), &options(PROFILE, TriangleEncoding::F32));
-    let mut bytes = with.bytes().to_vec();
-    let nodes = section(&bytes, 2);
-    let mut removed = 0;
-    for page in nodes.step_by(4096) {
-        let (line, treelets) = (usize::from(bytes[page + 61]), usize::from(bytes[page + 59]));
-        for treelet in 0..treelets {
-            let treelet = &mut bytes[page + 64 * line + treelet * PROFILE.treelet_bytes()..];
-            for row in [END_ROW, DIRECTION_ROW, 16 + END_ROW, 16 + DIRECTION_ROW] {
-                let codes = &mut treelet[4 * row..4 * row + 4];
-                removed += codes.iter().filter(|&&code| code != 0).count();
-                codes.fill(0);
-            }
-        }
-    }
-    seal(&mut bytes);
-    // All but the plate, which lies along two axes, are curved.
-    let is_flat = with.objects()[0].record().box_lo[2] == with.objects()[0].record().box_hi[2];
-    assert!(is_flat || removed > triangles.len() / 8, "{removed} bytes of turning slabs");
-    [with, Bvh::from_bytes(bytes).unwrap()]
+    let options = options(PROFILE, TriangleEncoding::F32);
+    [true, false].map(|slabs| bake(&mesh(triangles), &options.clone().turning_slabs(slabs)))
 }
 
 fn bumpy(triangles: u64) -> Vec<Triangle> {

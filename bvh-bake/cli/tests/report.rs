@@ -11,7 +11,7 @@ use std::process::Command;
 
 const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
-/// Runs the report, which may take longer than other commands because it bakes and measures 21 layouts.
+/// Runs the report, which may take longer than other commands because it bakes and measures 24 layouts.
 fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
     command.arg("report").args(arguments).current_dir(directory).env_remove("CBVH_ISA").output().unwrap()
@@ -44,8 +44,8 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();
-    // There are two pairs, 21 layouts and 5 questions.
-    assert_eq!(rows.len(), 2 * 21 * 5);
+    // There are two pairs, 24 layouts and 5 questions.
+    assert_eq!(rows.len(), 2 * 24 * 5);
     same_figures(&csv, rows);
     for row in rows {
         check(row);
@@ -73,16 +73,16 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
             shown += 1;
         }
     }
-    // Per pair, 14 lossless layouts are in tables of 5, 8 and 11 columns, and 7 others in a table of 8.
-    assert!(shown > 2 * (14 * (5 + 8 + 8) + 7 * 6), "{shown}");
+    // Per pair, 16 lossless layouts are in tables of 5, 8 and 11 columns, and 8 others in a table of 8.
+    assert!(shown > 2 * (16 * (5 + 8 + 8) + 8 * 6), "{shown}");
     // Each table begins with the fastest layout.
     let ranked = |at: &&(String, _)| at.0 == "tr";
-    assert!(in_page.iter().filter(ranked).count() > 2 * 49);
+    assert!(in_page.iter().filter(ranked).count() > 2 * 56);
     for document in [&in_page, &elements(&svg)] {
-        // A mark is a polygon. There are 21 layouts in two plots by bytes, and with 4 allowed errors in a plot by
+        // A mark is a polygon. There are 24 layouts in two plots by bytes, and with 4 allowed errors in a plot by
         // error.
         let marks = document.iter().filter(|(name, _)| name == "polygon").count();
-        assert!(marks >= 2 * (2 * 21 + 4 * 21), "{marks}");
+        assert!(marks >= 2 * (2 * 24 + 4 * 24), "{marks}");
     }
     // The page fetches nothing from elsewhere.
     let outside = ["src", "xlink:href"];
@@ -95,6 +95,13 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     for pair in ["fcl", "tori"] {
         let tests = |layout| number(find(pair, layout, "distance", 0.0), "node_tests").unwrap();
         assert!(tests("dop26-u8-wide f32") < tests("dop6-u8 f32"), "{pair}");
+        let row = |layout: &str| find(pair, layout, "distance", 0.0);
+        let (with, without) = (row("dop26-u8-wide f32"), row("dop26-u8-wide f32 without turning slabs"));
+        assert_eq!(
+            (&with["turning_slabs"], &without["turning_slabs"]),
+            (&Value::from(true), &Value::from(false))
+        );
+        assert_eq!(with["node_bytes_per_tri"], without["node_bytes_per_tri"], "{pair}");
     }
     let pairs = &json["pairs"];
     assert!(pairs[0]["poses_from"].as_str().unwrap().starts_with("made"));

@@ -156,7 +156,16 @@ impl<'a> Baker<'a> {
         let style = |tree: &_, of_brick: &_| {
             let choice = layout_choice::choose(triangles, tree, of_brick, options);
             let (profile, encoding) = (choice.profile, choice.encoding);
-            (Style { profile, encoding, f16_scale: 2f32.powi(f16_exponent), ids: options.ids }, choice.reason)
+            (
+                Style {
+                    profile,
+                    encoding,
+                    f16_scale: 2f32.powi(f16_exponent),
+                    ids: options.ids,
+                    turning_slabs: options.turning_slabs && profile.has_turning_slabs(),
+                },
+                choice.reason,
+            )
         };
         let encoded = encode_object(bricks, style, resources)?;
         let EncodedObject { style, reason, pages, packets, treelets, children } = encoded;

@@ -112,7 +112,7 @@ fn encode_brick(
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut arena = cut_brick(&tree, triangles, width, slabs);
-    if style.profile.has_turning_slabs() {
+    if style.turning_slabs {
         turning::fit(&mut arena, triangles);
     }
     drop(tree);

@@ -19,6 +19,7 @@ pub(crate) struct Style {
     pub(crate) encoding: TriangleEncoding,
     pub(crate) f16_scale: f32,
     pub(crate) ids: bool,
+    pub(crate) turning_slabs: bool,
 }
 
 /// Pages that are encoded together.
@@ -85,7 +86,7 @@ impl Encoder<'_> {
     }
 
     fn page(&self, plan: &PagePlan, number: usize, parents: &[Option<(u32, u8)>]) -> WrittenPage {
-        let Style { profile, f16_scale, encoding, ids } = self.style;
+        let Style { profile, f16_scale, encoding, ids, .. } = self.style;
         let slabs = profile.directions().slabs();
         let shape = PageShape { roots: plan.roots, remotes: plan.remotes.len(), treelets: plan.slots.len() };
         let mut writer = PageWriter::new(profile, f16_scale, shape);

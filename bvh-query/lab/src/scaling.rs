@@ -38,9 +38,12 @@ pub(crate) fn run(arguments: &ScalingArguments) -> Result<String, Failure> {
     let middle = targets.iter().rposition(|&target| target <= MAX_BATCH_TRIANGLES).unwrap_or(0);
     let bake = |&target| {
         output::tell(&format!("baking {target} triangles"));
-        Size::new(target, backend, settings.poses)
+        Size::both(target, backend, settings.poses)
     };
-    let sizes = targets.iter().map(bake).collect::<Result<Vec<_>, _>>()?;
+    let both = targets.iter().map(bake).collect::<Result<Vec<_>, _>>()?;
+    let (with, without): (Vec<_>, Vec<_>) = both.into_iter().map(|[with, without]| (with, without)).unzip();
+    // Those with turning slabs come first, so that `middle` is one of them.
+    let sizes: Vec<Size> = with.into_iter().chain(without).collect();
     output::tell("measuring");
     // Batches go on using several processors.
     let (pinned, results) = pinned(|| {

@@ -38,12 +38,12 @@ fn figures_agree_and_work_grows_where_the_meshes_are_near() {
     }
 
     let of = |part: &str| rows.iter().filter(|row| row["part"] == part).collect::<Vec<_>>();
-    // Two questions with three gaps; on two numbers of threads; on twelve paths in two ways.
-    assert_eq!(["size", "growth", "batch", "path"].map(|part| of(part).len()), [12, 6, 4, 48]);
+    // Two questions with three gaps, with and without slabs; on two numbers of threads; on twelve paths in two ways.
+    assert_eq!(["size", "growth", "batch", "path"].map(|part| of(part).len()), [24, 12, 4, 48]);
     for growth in of("growth") {
         let line: Vec<_> = of("size")
             .into_iter()
-            .filter(|row| row["question"] == growth["question"] && row["gap"] == growth["gap"])
+            .filter(|row| ["question", "gap", "turning_slabs"].iter().all(|same| row[same] == growth[same]))
             .collect();
         let figures = |name: &str| [0, 1].map(|size| number(line[size], name).unwrap());
         let [fewer, more] = figures("triangles");
@@ -76,7 +76,11 @@ fn figures_agree_and_work_grows_where_the_meshes_are_near() {
 
     // A mark is a polygon: in two plots, for each size with a figure.
     let marks = svg.matches("<polygon").count();
-    assert!(marks >= of("size").len() && svg.contains("square root") && svg.contains("logarithm"), "{marks}");
+    let marked = of("size").into_iter().filter(|row| row["turning_slabs"] == true).count();
+    assert!(
+        marked == 12 && marks >= marked && svg.contains("square root") && svg.contains("logarithm"),
+        "{marks}"
+    );
 }
 
 /// Checks what holds for every row.

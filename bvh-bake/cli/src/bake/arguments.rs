@@ -99,6 +99,9 @@ pub(crate) struct BakeArguments {
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,
+    /// Leave out turning slabs, which dop26-u8-wide has; answers and sizes stay the same
+    #[arg(long)]
+    pub(crate) no_turning_slabs: bool,
     /// Bake even if the output is up to date
     #[arg(long)]
     pub(crate) force: bool,

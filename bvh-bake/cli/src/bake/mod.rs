@@ -87,7 +87,8 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         .max_error(arguments.max_error)
         .effort(arguments.effort)
         .split_objects(arguments.split_objects)
-        .ids(!arguments.no_ids);
+        .ids(!arguments.no_ids)
+        .turning_slabs(!arguments.no_turning_slabs);
     let file_options = FileOptions {
         force: arguments.force,
         max_memory: arguments.max_memory,

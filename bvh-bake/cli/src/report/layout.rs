@@ -1,4 +1,5 @@
-//! The layouts that are compared: each profile with each encoding of triangles.
+//! The layouts that are compared: each profile with each encoding of triangles and, where it has them, without turning
+//! slabs.
 
 use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
@@ -9,23 +10,36 @@ use bvh_format::profile::Profile;
 pub(super) struct Layout {
     pub(super) profile: Profile,
     pub(super) triangles: TriangleEncoding,
+    /// Whether turning slabs are left out of a profile that has them.
+    pub(super) without_turning_slabs: bool,
 }
 
 impl Layout {
     /// Returns all layouts.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let encodings = |profile| TriangleEncoding::ALL.map(|triangles| Self { profile, triangles });
-        Profile::ALL.into_iter().flat_map(encodings)
+        let encodings = |(profile, without_turning_slabs)| {
+            TriangleEncoding::ALL.map(|triangles| Self { profile, triangles, without_turning_slabs })
+        };
+        let without = Profile::ALL.into_iter().filter(|profile| profile.has_turning_slabs());
+        let with = Profile::ALL.map(|profile| (profile, false)).into_iter();
+        with.chain(without.map(|profile| (profile, true))).flat_map(encodings)
     }
 
     /// The name in tables.
     pub(super) fn name(self) -> String {
-        format!("{} {}", self.profile.name(), self.triangles.name())
+        let without = if self.without_turning_slabs { " without turning slabs" } else { "" };
+        format!("{} {}{without}", self.profile.name(), self.triangles.name())
+    }
+
+    /// Returns whether it has turning slabs; `None` if its profile has no room for any.
+    pub(super) fn has_turning_slabs(self) -> Option<bool> {
+        self.profile.has_turning_slabs().then_some(!self.without_turning_slabs)
     }
 
     /// Returns the options that bake it.
     pub(super) fn options(self) -> Options {
-        Options::default().profile(self.profile).triangles(self.triangles)
+        let options = Options::default().profile(self.profile).triangles(self.triangles);
+        options.turning_slabs(!self.without_turning_slabs)
     }
 
     /// True for the layout whose answers all layouts with these triangles must give: bounds in plain floats.

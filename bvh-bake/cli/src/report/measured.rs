@@ -98,7 +98,8 @@ impl Subject<'_> {
     /// Returns the layout that the baker chooses by itself.
     fn chosen(&self, path: &Path, mesh: &Mesh) -> Result<Layout, Failure> {
         let (_, report) = bake(path, mesh, &Options::default())?;
-        Ok(Layout { profile: report.file.profile, triangles: report.file.triangle_encoding })
+        let (profile, triangles) = (report.file.profile, report.file.triangle_encoding);
+        Ok(Layout { profile, triangles, without_turning_slabs: false })
     }
 }
 

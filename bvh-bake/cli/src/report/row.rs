@@ -69,6 +69,7 @@ impl Cells for Row {
             ("layout", Cell::Text(self.layout.name())),
             ("profile", Cell::text(self.layout.profile.name())),
             ("triangles", Cell::text(self.layout.triangles.name())),
+            ("turning_slabs", Cell::flag(self.layout.has_turning_slabs())),
             ("question", Cell::text(self.question.name())),
             ("rel_err", Cell::number(self.question.rel_err())),
             ("poses", Cell::Count(self.poses)),

@@ -1,4 +1,5 @@
-//! The plots: times and node tests against triangles, with dashed lines to compare growth with.
+//! The plots: times and node tests against triangles, with dashed lines for distances without turning slabs and to
+//! compare growth with.
 
 use super::row::{Part, Row, gap_name};
 use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
@@ -12,7 +13,7 @@ pub(super) fn figure(rows: &[Row]) -> Figure {
     let mut legend: Vec<(Look, String)> = Vec::new();
     for line in &lines {
         let (look, gap) = (look(rows, line[0]), line[0].gap.unwrap_or_default());
-        if look.is_filled {
+        if look.is_filled && !line[0].without_slabs {
             legend.push((look, format!("gap {} of the diagonal", gap_name(gap))));
         }
     }
@@ -70,6 +71,14 @@ fn panel(
         starts.push(first.1);
         let look = look(rows, line[0]);
         let gap = gap_name(line[0].gap.unwrap_or_default());
+        if line[0].without_slabs {
+            // Most lines for contact would lie on those with slabs.
+            if look.is_filled {
+                panel.labels.push((last, format!("without slabs, {gap}")));
+                panel.lines.push(Line { points, look: None });
+            }
+            continue;
+        }
         panel.labels.push((last, format!("{}, {gap}", line[0].question)));
         panel.marks.extend(points.iter().map(|&at| Mark { at, look }));
         panel.lines.push(Line { points, look: Some(look) });

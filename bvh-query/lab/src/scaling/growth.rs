@@ -18,13 +18,15 @@ pub(super) fn with_slopes(mut measured: Measured) -> Measured {
     }
     let mut over_all: Vec<Row> = Vec::new();
     for row in &measured.rows {
-        if over_all.iter().any(|other| (other.question, other.gap) == (row.question, row.gap)) {
+        let line = |row: &Row| (row.without_slabs, row.question, row.gap);
+        if over_all.iter().any(|other| line(other) == line(row)) {
             continue;
         }
         let line: Vec<&Row> = measured.rows.iter().filter(|other| other.is_beside(row)).collect();
         let [growth, node_growth] = slopes(&line);
-        let gap = row.gap;
-        over_all.push(Row { gap, growth, node_growth, ..Row::new(Part::Growth, None, row.question) });
+        let (gap, without_slabs) = (row.gap, row.without_slabs);
+        let new = Row::new(Part::Growth, None, row.question);
+        over_all.push(Row { gap, without_slabs, growth, node_growth, ..new });
     }
     measured.rows.extend(over_all);
     measured

@@ -8,16 +8,18 @@ use cbvh_measure::table::{self, Cell, Cells, micro, whole};
 /// A column: its head, the cell of a row, and how that is shown.
 type Column = (&'static str, &'static str, fn(f64) -> String);
 
-const GROWTH: [Column; 3] = [
+const GROWTH: [Column; 4] = [
     ("gap", "gap", gap_name),
+    ("turning slabs", "turning_slabs", yes),
     ("slope of time", "growth", thousandths),
     ("slope of node tests", "node_growth", thousandths),
 ];
 
-const SIZES: [Column; 11] = [
+const SIZES: [Column; 12] = [
     ("triangles", "triangles", whole),
     ("profile", "profile", whole),
     ("encoding", "triangle_encoding", whole),
+    ("turning slabs", "turning_slabs", yes),
     ("gap", "gap", gap_name),
     ("median, \u{b5}s", "warm_ns_median", micro),
     ("90 %, \u{b5}s", "warm_ns_p90", micro),

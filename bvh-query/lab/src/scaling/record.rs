@@ -60,12 +60,14 @@ impl Record {
     /// Says how each line grows from its first to its last size.
     pub(super) fn findings(&self) -> Vec<String> {
         let line = |row: &Row| {
-            let sizes = || self.of(Part::Size).filter(|s| (s.question, s.gap) == (row.question, row.gap));
+            let line = |row: &Row| (row.without_slabs, row.question, row.gap);
+            let sizes = || self.of(Part::Size).filter(|size| line(size) == line(row));
             let (first, last) = (sizes().next()?, sizes().last()?);
             Some(format!(
-                "{}, {}: {} \u{b5}s at {} triangles, {} \u{b5}s at {}; slope {:.3}, of node tests {:.3}",
+                "{}, {}{}: {} \u{b5}s at {} triangles, {} \u{b5}s at {}; slope {:.3}, of node tests {:.3}",
                 row.question,
                 row.gap.map_or(String::new(), gap_name),
+                if row.without_slabs { ", without turning slabs" } else { "" },
                 micro(first.time()?),
                 first.mesh.as_ref()?.triangles,
                 micro(last.time()?),

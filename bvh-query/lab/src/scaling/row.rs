@@ -35,6 +35,8 @@ pub(super) struct Facts {
     pub(super) triangles: u64,
     pub(super) profile: &'static str,
     pub(super) encoding: &'static str,
+    /// `None` if the profile has no room for any.
+    pub(super) turning_slabs: Option<bool>,
     /// Bytes of the whole file, with ids.
     pub(super) file_bytes_per_tri: f64,
     /// From the mesh in memory to the proved bytes, on all processors.
@@ -47,6 +49,8 @@ pub(super) struct Row {
     pub(super) part: Part,
     /// `None` where the row is about all sizes.
     pub(super) mesh: Option<Facts>,
+    /// True if turning slabs were left out.
+    pub(super) without_slabs: bool,
     pub(super) question: &'static str,
     /// A fraction of the diagonal; 0 for a path in and out of contact, `None` for all gaps together.
     pub(super) gap: Option<f64>,
@@ -75,6 +79,7 @@ impl Row {
         Self {
             part,
             mesh,
+            without_slabs: false,
             question,
             gap: None,
             step: None,
@@ -96,6 +101,11 @@ impl Row {
         self.mesh.as_ref().map(|mesh| mesh.triangles as f64)
     }
 
+    /// Whether the trees have turning slabs; `None` where their profile has no room for any.
+    fn turning_slabs(&self) -> Option<bool> {
+        self.mesh.as_ref().map_or(Some(!self.without_slabs), |mesh| mesh.turning_slabs)
+    }
+
     /// The median time in nanoseconds.
     pub(super) fn time(&self) -> Option<f64> {
         self.warm.map(|warm| warm.median)
@@ -103,7 +113,8 @@ impl Row {
 
     /// Returns true for rows that are joined by one line of a plot.
     pub(super) fn is_beside(&self, other: &Self) -> bool {
-        (self.part, self.question, self.gap) == (other.part, other.question, other.gap)
+        let line = |row: &Self| (row.part, row.without_slabs, row.question, row.gap);
+        line(self) == line(other)
     }
 }
 
@@ -118,6 +129,7 @@ impl Cells for Row {
             ("triangles", Cell::count(mesh.map(|mesh| mesh.triangles))),
             ("profile", name(|mesh| mesh.profile)),
             ("triangle_encoding", name(|mesh| mesh.encoding)),
+            ("turning_slabs", Cell::flag(self.turning_slabs())),
             ("file_bytes_per_tri", Cell::number(mesh.map(|mesh| mesh.file_bytes_per_tri))),
             ("bake_seconds", Cell::number(mesh.map(|mesh| mesh.bake_seconds))),
             ("question", Cell::text(self.question)),

@@ -1,6 +1,6 @@
 //! Bakes the ball in all sizes and times single queries of each against itself.
 //!
-//! Turns and directions of the poses are the same in all sizes. How near B comes is found for each size by itself.
+//! Each size is baked with and without turning slabs. Turns and directions of the poses are the same in all sizes. How near B comes is found for each size by itself.
 
 use super::Measured;
 use super::row::{Facts, Part, Row};
@@ -30,28 +30,40 @@ pub(super) struct Size {
     pub(super) bvh: Bvh,
     pub(super) facts: Facts,
     pub(super) poses: Vec<Vec<Pose>>,
+    without_slabs: bool,
 }
 
 impl Size {
-    /// Bakes a ball in the layout that the baker chooses, and finds `count` poses for each gap.
-    pub(super) fn new(target: u64, backend: Backend, count: usize) -> Result<Self, Failure> {
+    /// Bakes a ball in the layout that the baker chooses, with and without turning slabs, and finds `count` poses for each
+    /// gap.
+    pub(super) fn both(target: u64, backend: Backend, count: usize) -> Result<[Self; 2], Failure> {
         let (positions, triangles) = ball(target);
-        let (bytes, report) = to_bytes(&Mesh::from_triangles(positions, triangles), &Options::default())?;
+        let mesh = Mesh::from_triangles(positions, triangles);
+        let mut with = Self::new(&mesh, false)?;
+        let mut without = Self::new(&mesh, true)?;
+        let mut querier = Querier::with_backend(backend);
+        let poses = GAPS.map(|gap| apart(&mut querier, &with.bvh, &with.bvh, gap, count));
+        with.poses = poses.into_iter().collect::<Result<Vec<_>, QueryError>>()?;
+        without.poses.clone_from(&with.poses);
+        Ok([with, without])
+    }
+
+    /// Bakes a ball; it has no poses yet.
+    fn new(mesh: &Mesh, without_slabs: bool) -> Result<Self, Failure> {
+        let (bytes, report) = to_bytes(mesh, &Options::default().turning_slabs(!without_slabs))?;
         let bvh = Bvh::from_bytes(bytes)?;
         // No timed query pays for the first touch of a page.
         bvh.check_all()?;
-        let mut querier = Querier::with_backend(backend);
-        let poses = GAPS.map(|gap| apart(&mut querier, &bvh, &bvh, gap, count));
-        let poses = poses.into_iter().collect::<Result<Vec<_>, QueryError>>()?;
         let file = &report.file;
         let facts = Facts {
             triangles: file.triangles,
             profile: file.profile.name(),
             encoding: file.triangle_encoding.name(),
+            turning_slabs: file.profile.has_turning_slabs().then_some(!without_slabs),
             file_bytes_per_tri: file.file_bytes as f64 / file.triangles as f64,
             bake_seconds: report.seconds,
         };
-        Ok(Self { bvh, facts, poses })
+        Ok(Self { bvh, facts, poses: Vec::new(), without_slabs })
     }
 
     /// Returns all poses, gap by gap.
@@ -96,6 +108,7 @@ pub(super) fn measure(sizes: &[Size], backend: Backend, count: usize) -> Result<
 fn row(size: &Size, question: Question, gap: usize, asked: &Asked) -> Row {
     let mut row = Row::new(Part::Size, Some(size.facts.clone()), question.name());
     row.gap = Some(GAPS[gap]);
+    row.without_slabs = size.without_slabs;
     row.poses = asked.answers.len() as u64;
     row.touching = question.touching(&asked.answers);
     if question != Question::Collide {
@@ -132,7 +145,8 @@ mod tests {
     fn poses_have_their_gaps_and_distances_are_those_of_the_vertices() {
         let backend = Backend::detect().unwrap();
         let (positions, triangles) = ball(1000);
-        let size = Size::new(1000, backend, 4).unwrap();
+        let sizes = Size::both(1000, backend, 4).unwrap();
+        let size = &sizes[0];
         let apart = |p: [f64; 3], q: [f64; 3]| (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt();
         let corner = |vertex: u32| positions[vertex as usize];
         let edges = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
@@ -156,7 +170,9 @@ mod tests {
                 assert!(!querier.collide(bvh, bvh, pose).unwrap());
             }
         }
-        let measured = measure(&[size], backend, 1).unwrap();
-        assert_eq!((measured.rows.len(), measured.wrong.len()), (6, 0));
+        let measured = measure(&sizes, backend, 1).unwrap();
+        assert_eq!((measured.rows.len(), measured.wrong.len()), (12, 0));
+        let reached: Vec<_> = measured.rows.iter().map(|row| row.reached).collect();
+        assert!(reached.chunks(2).all(|pair| pair[0] == pair[1]), "{reached:?}");
     }
 }
