@@ -8,6 +8,7 @@ use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::decode_group;
+use crate::traverse::node_test::Reach;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing};
 use bvh_format::slabs::{Group, NodeSlabs};
@@ -133,6 +134,8 @@ pub(crate) struct NodeCache {
     generation: u64,
     /// The file and the first page of the object whose nodes these are.
     of: Option<(u64, u32)>,
+    /// Bounds on all nodes of the object.
+    reach: Reach,
 }
 
 /// The most treelets of a page by rule 17: its header and one anchor take two of its 64 lines.
@@ -143,18 +146,14 @@ const MAX_NODES: usize = 1 << 29;
 const MAX_KEPT_NODES: usize = 256;
 
 impl NodeCache {
-    /// Starts a walk of an object. Nodes of the same object stay from the walk before, unless there are many. Returns the
-    /// slabs of the root.
+    /// Starts a walk of an object. Nodes of the same object stay from the walk before, unless there are many. Returns
+    /// bounds on all nodes.
     #[inline(always)]
-    pub(crate) fn start<I: Isa>(
-        &mut self,
-        isa: I,
-        bvh: &Bvh,
-        object: &Object,
-    ) -> Result<NodeSlabs, QueryError> {
+    pub(crate) fn start<I: Isa>(&mut self, isa: I, bvh: &Bvh, object: &Object) -> Result<Reach, QueryError> {
         let page = object.record().first_page.get();
-        let slabs = bvh.page(object, page)?.anchor_slabs(0);
         if self.of != Some((bvh.identity(), page)) || self.used > MAX_KEPT_NODES {
+            let slabs = bvh.page(object, page)?.anchor_slabs(0);
+            self.reach = Reach::of(&slabs);
             self.of = Some((bvh.identity(), page));
             if self.nodes.is_empty() {
                 self.nodes.resize(64, CachedNode::EMPTY);
@@ -172,7 +171,7 @@ impl NodeCache {
             let pages = object.record().pages.get() as usize;
             self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
         }
-        Ok(slabs)
+        Ok(self.reach)
     }
 
     /// Returns a number that changes whenever the cache starts anew, and numbers stand for other nodes.
@@ -319,7 +318,7 @@ mod tests {
     struct Start<'a>(&'a Bvh, &'a mut NodeCache);
 
     impl Task for Start<'_> {
-        type Output = Result<NodeSlabs, QueryError>;
+        type Output = Result<Reach, QueryError>;
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {

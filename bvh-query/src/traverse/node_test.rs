@@ -23,31 +23,22 @@ const INVERSE_LENGTHS: [f32; 13] = {
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
 };
 
-/// Returns a bound on the slab ends of all nodes, from those of the root. Rows without a slab are zero.
-#[inline(always)]
-fn reach(root: &NodeSlabs) -> f32 {
-    let mut reach = [0.0f32; 16];
-    for row in 0..16 {
-        let (lo, hi) = (root.lo[row].abs(), root.hi[row].abs());
-        reach[row] = if lo < hi { hi } else { lo };
-    }
-    for half in [8, 4, 2, 1] {
-        for row in 0..half {
-            reach[row] = if reach[row] < reach[row + half] { reach[row + half] } else { reach[row] };
-        }
-    }
-    reach[0]
+/// Bounds on the magnitudes of all nodes of an object, from those of its root.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Reach {
+    /// Of slab ends.
+    pub(crate) ends: f32,
+    /// Of coordinates.
+    pub(crate) coordinates: f32,
 }
 
-/// Returns a bound on the coordinates of all nodes, from those of the root.
-#[inline(always)]
-fn magnitude(root: &NodeSlabs) -> f32 {
-    let mut magnitude = 0.0f32;
-    for end in [root.lo[0], root.lo[1], root.lo[2], root.hi[0], root.hi[1], root.hi[2]] {
-        let end = end.abs();
-        magnitude = if magnitude < end { end } else { magnitude };
+impl Reach {
+    /// Rows of the root without a slab are zero.
+    pub(crate) fn of(root: &NodeSlabs) -> Self {
+        let larger = |largest: f32, end: &f32| if largest < end.abs() { end.abs() } else { largest };
+        let ends = root.lo.iter().chain(&root.hi).fold(0.0, larger);
+        Self { ends, coordinates: root.lo[..3].iter().chain(&root.hi[..3]).fold(0.0, larger) }
     }
-    magnitude
 }
 
 /// A direction in A's frame along which one more pair of slab ends is compared.
@@ -71,10 +62,8 @@ pub(crate) struct NodeTest {
     placement: Placement,
     set_a: DirectionSet,
     set_b: DirectionSet,
-    reach_a: f32,
-    reach_b: f32,
-    /// Bounds on the coordinates of A's nodes and of B's.
-    magnitudes: (f32, f32),
+    reach_a: Reach,
+    reach_b: Reach,
 }
 
 impl NodeTest {
@@ -86,9 +75,8 @@ impl NodeTest {
         placement: Placement::NONE,
         set_a: DirectionSet::Dop6,
         set_b: DirectionSet::Dop6,
-        reach_a: 0.0,
-        reach_b: 0.0,
-        magnitudes: (0.0, 0.0),
+        reach_a: Reach { ends: 0.0, coordinates: 0.0 },
+        reach_b: Reach { ends: 0.0, coordinates: 0.0 },
     };
 
     /// Prepares a pose.
@@ -97,16 +85,14 @@ impl NodeTest {
         &mut self,
         isa: I,
         pair: &ObjectPair<'_>,
-        root_a: &NodeSlabs,
-        root_b: &NodeSlabs,
+        (reach_a, reach_b): (Reach, Reach),
     ) {
         self.looks_along_b = false;
         self.placement = *pair.placement;
         (self.set_a, self.set_b) =
             (pair.object_a.profile().directions(), pair.object_b.profile().directions());
-        (self.reach_a, self.reach_b) = (reach(root_a), reach(root_b));
-        self.magnitudes = (magnitude(root_a), magnitude(root_b));
-        self.alignment.prepare(isa, pair.placement, self.set_b, self.reach_b);
+        (self.reach_a, self.reach_b) = (reach_a, reach_b);
+        self.alignment.prepare(isa, pair.placement, self.set_b, reach_b.ends);
     }
 
     /// Adopts a new witness direction.
@@ -126,8 +112,8 @@ impl NodeTest {
         let form_b = upper_form(self.placement.seen_from_b(d), self.set_b).mirrored();
         let t = self.placement.translation;
         let offset = d[0] * t[0] + d[1] * t[1] + d[2] * t[2];
-        let error = form_error(form_a.coefficients, self.reach_a, 0.0)
-            + form_error(form_b.coefficients, self.reach_b, offset)
+        let error = form_error(form_a.coefficients, self.reach_a.ends, 0.0)
+            + form_error(form_b.coefficients, self.reach_b.ends, offset)
             + 3.0 * self.placement.error;
         Witness { direction, form_a, form_b, offset: (offset - error) as f32 }
     }
@@ -135,21 +121,21 @@ impl NodeTest {
     /// Returns bounds on the slab ends of A's nodes and of B's.
     #[inline(always)]
     pub(crate) fn reaches(&self) -> (f32, f32) {
-        (self.reach_a, self.reach_b)
+        (self.reach_a.ends, self.reach_b.ends)
     }
 
     /// Prepares the test along B's directions, too.
     #[inline(always)]
     pub(crate) fn look_along_b<I: Isa>(&mut self, isa: I) {
         let placement = self.placement.inverse();
-        let (alignment, set, reach) = (&mut self.inverse, self.set_a, self.reach_a);
+        let (alignment, set, reach) = (&mut self.inverse, self.set_a, self.reach_a.ends);
         isa.run(Prepare { alignment, placement: &placement, set, reach });
         self.looks_along_b = true;
     }
 
     /// Returns bounds on the coordinates of A's nodes and of B's.
     pub(crate) fn magnitudes(&self) -> (f32, f32) {
-        self.magnitudes
+        (self.reach_a.coordinates, self.reach_b.coordinates)
     }
 
     /// Returns where B is.

@@ -198,10 +198,10 @@ fn walk<I: Isa, W: Visitor>(
     memory.large_leaves.start();
     memory.aligned_a.start();
     memory.aligned_b.start();
-    let root_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
-    let root_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+    let reach_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
+    let reach_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
     memory.slabs.start(&pair);
-    node_test.prepare(isa, &pair, &root_a, &root_b);
+    node_test.prepare(isa, &pair, (reach_a, reach_b));
     let mut witness: Option<Witness> = None;
     node_test.update_witness(&mut witness, visitor.witness());
     let (mut tests, mut leaves) = (0, 0);
