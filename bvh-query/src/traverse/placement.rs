@@ -2,6 +2,7 @@
 
 use crate::file::bvh::Bvh;
 use crate::pose::Pose;
+use crate::pose::frames::inverse;
 use bvh_format::object::Object;
 
 /// The relative error of all computations of a pose in `f64`: 32 roundings, three times the most that occur.
@@ -52,13 +53,7 @@ impl Placement {
     /// coordinates and 64v of the translation's, together less than 2^-45 of the magnitudes that `error`
     /// is 2^-48 of. Alignment charges three times the error; four times as much here covers all.
     pub(crate) fn inverse(&self) -> Self {
-        let [x, y, z] = self.rotation;
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        };
-        let columns = [cross(y, z), cross(z, x), cross(x, y)];
-        let scale = 1.0 / (x[0] * columns[0][0] + x[1] * columns[0][1] + x[2] * columns[0][2]);
-        let rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i] * scale));
+        let rotation = inverse(&self.rotation);
         let t = self.translation;
         let translation = rotation.map(|row: [f64; 3]| -(row[0] * t[0] + row[1] * t[1] + row[2] * t[2]));
         Self { rotation, translation, error: 4.0 * self.error }

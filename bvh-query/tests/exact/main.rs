@@ -14,6 +14,7 @@ mod boundary;
 mod decide;
 mod dyadic;
 mod features;
+mod frames;
 mod hard_cases;
 mod kinds;
 mod lattice;

@@ -1,6 +1,17 @@
-//! Rigid placements of B in A's frame.
+//! Rigid placements: of B in A's frame, or of a body in the world.
 
-/// A rigid transform: a point `x` of B is at `R x + t` in A's frame.
+mod error;
+pub(crate) mod frames;
+mod from;
+#[cfg(feature = "mint")]
+mod from_mint;
+
+pub use error::PoseError;
+
+/// A rigid transform, from a body to the world or from B to A: a point `x` of the body is at `R x + t` in the world.
+///
+/// Conventions: points are columns, matrices are given row by row, rotations are right-handed, quaternions are
+/// `[x, y, z, w]` with the real part last, lengths are mesh units.
 ///
 /// A placed vertex is, coordinate by coordinate, the f64 value `((R0 * x + R1 * y) + R2 * z) + t` with
 /// each product and sum rounded to nearest, never fused; queries are about these points exactly.
@@ -45,22 +56,10 @@ impl Pose {
         if let Some(&far) = translation.iter().find(|v| v.abs() > MAX_TRANSLATION) {
             return Err(PoseError::TooFar(far));
         }
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        // How far R R^T is from a multiple of I.
-        let departure = |multiple: f64| {
-            let mut worst = 0.0f64;
-            for i in 0..3 {
-                for j in 0..3 {
-                    let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
-                    worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
-                }
-            }
-            worst
-        };
-        let worst = departure(1.0);
+        let worst = departure(&rotation, 1.0);
         if worst.is_nan() || worst > MAX_RIGID_ERROR {
             let squared = dot(rotation[0], rotation[0]);
-            let is_multiple = squared > 0.0 && departure(squared) <= MAX_RIGID_ERROR * squared;
+            let is_multiple = squared > 0.0 && departure(&rotation, squared) <= MAX_RIGID_ERROR * squared;
             let is_scaled = worst > MIN_SCALED_ERROR && is_multiple;
             return Err(if is_scaled {
                 PoseError::Scaled(squared.sqrt())
@@ -110,101 +109,20 @@ impl Pose {
     }
 }
 
-/// Why a matrix is not a rigid placement.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PoseError {
-    /// An entry is NaN or infinite.
-    #[error("row {row}, column {column}: expected a finite number, found {}", name(*.found))]
-    NotFinite {
-        /// The row of the 3x4 matrix, from 1 on.
-        row: usize,
-        /// The column of the 3x4 matrix, from 1 on; the fourth is the translation.
-        column: usize,
-        /// The entry.
-        found: f64,
-    },
-    /// The translation exceeds the format's range.
-    #[error(
-        "expected a translation of at most 2^120 along each axis, found {0:e}; move both meshes near the origin"
-    )]
-    TooFar(f64),
-    /// The matrix is a rotation, or a reflection, times this factor.
-    #[error("expected a rotation, found a matrix scaled by {}; bake the mesh at its size", *.0 as f32)]
-    Scaled(f64),
-    /// The rows are not orthonormal; the number is the largest entry of R R^T - I.
-    #[error(
-        "expected a rotation, found a matrix {0:e} away from orthonormal (limit 2^-20); if it shears or stretches, \
-         bake the deformed mesh, if it is rounded, orthonormalise it"
-    )]
-    NotRigid(f64),
-    /// The matrix has determinant -1.
-    #[error("expected a rotation, found a reflection; bake the mirrored mesh")]
-    Reflection,
-    /// The last row of a 4x4 matrix is another one.
-    #[error("row 4: expected 0 0 0 1, found {} {} {} {}; is the matrix transposed, or a projection?", .0[0], .0[1], .0[2], .0[3])]
-    LastRow([f64; 4]),
-    /// The length of a quaternion is not 1.
-    #[error("expected a quaternion of length 1, found length {}; normalise it", *.0 as f32)]
-    Quaternion(f64),
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Names a number that is not finite.
-fn name(found: f64) -> &'static str {
-    if found.is_nan() { "NaN" } else { "infinity" }
-}
-
-#[cfg(feature = "mint")]
-mod mint_conversions {
-    use super::{Pose, PoseError};
-
-    impl TryFrom<mint::RowMatrix3x4<f64>> for Pose {
-        type Error = PoseError;
-
-        fn try_from(m: mint::RowMatrix3x4<f64>) -> Result<Self, PoseError> {
-            let row = |v: mint::Vector4<f64>| [v.x, v.y, v.z];
-            Self::new([row(m.x), row(m.y), row(m.z)], [m.x.w, m.y.w, m.z.w])
+/// Returns how far `R R^T` is from a multiple of I: its largest entry, or NaN.
+fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
+    let mut worst = 0.0f64;
+    for i in 0..3 {
+        for j in 0..3 {
+            let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
+            worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
         }
     }
-
-    impl TryFrom<mint::ColumnMatrix4<f64>> for Pose {
-        type Error = PoseError;
-
-        /// Converts a 4x4 matrix, the last row of which must be 0 0 0 1.
-        fn try_from(m: mint::ColumnMatrix4<f64>) -> Result<Self, PoseError> {
-            let last = [m.x.w, m.y.w, m.z.w, m.w.w];
-            if last != [0.0, 0.0, 0.0, 1.0] {
-                return Err(PoseError::LastRow(last));
-            }
-            Self::new(
-                [[m.x.x, m.y.x, m.z.x], [m.x.y, m.y.y, m.z.y], [m.x.z, m.y.z, m.z.z]],
-                [m.w.x, m.w.y, m.w.z],
-            )
-        }
-    }
-
-    impl TryFrom<(mint::Quaternion<f64>, mint::Vector3<f64>)> for Pose {
-        type Error = PoseError;
-
-        /// Converts a unit quaternion and a translation.
-        fn try_from((q, t): (mint::Quaternion<f64>, mint::Vector3<f64>)) -> Result<Self, PoseError> {
-            let (x, y, z, w) = (q.v.x, q.v.y, q.v.z, q.s);
-            let pose = Self::new(
-                [
-                    [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-                    [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-                    [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-                ],
-                [t.x, t.y, t.z],
-            );
-            pose.map_err(|error| match error {
-                PoseError::Scaled(_) | PoseError::NotRigid(_) | PoseError::Reflection => {
-                    PoseError::Quaternion((x * x + y * y + z * z + w * w).sqrt())
-                }
-                other => other,
-            })
-        }
-    }
+    worst
 }
 
 #[cfg(test)]

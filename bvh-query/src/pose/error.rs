@@ -1,0 +1,52 @@
+//! Why a matrix, a quaternion or a composition is no rigid pose.
+
+/// Why a matrix is not a rigid placement.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// An entry is NaN or infinite.
+    #[error("row {row}, column {column}: expected a finite number, found {}", name(*.found))]
+    NotFinite {
+        /// The row of the 3x4 matrix, from 1 on.
+        row: usize,
+        /// The column of the 3x4 matrix, from 1 on; the fourth is the translation.
+        column: usize,
+        /// The entry.
+        found: f64,
+    },
+    /// The translation exceeds the format's range.
+    #[error(
+        "expected a translation of at most 2^120 along each axis, found {0:e}; move both meshes near the origin"
+    )]
+    TooFar(f64),
+    /// The matrix is a rotation, or a reflection, times this factor.
+    #[error("expected a rotation, found a matrix scaled by {}; bake the mesh at its size", *.0 as f32)]
+    Scaled(f64),
+    /// The rows are not orthonormal; the number is the largest entry of R R^T - I. [`Pose::nearest`](super::Pose::nearest)
+    /// orthonormalises a rounded matrix.
+    #[error(
+        "expected a rotation, found a matrix {0:e} away from orthonormal (limit 2^-20); if it shears or stretches, \
+         bake the deformed mesh, if it is rounded, orthonormalise it"
+    )]
+    NotRigid(f64),
+    /// The rows are too far from orthonormal for [`Pose::nearest`](super::Pose::nearest).
+    #[error(
+        "expected nearly a rotation, found a matrix {0:e} away from orthonormal (limit 2^-6); if it shears or stretches, \
+         bake the deformed mesh"
+    )]
+    NotNearlyRigid(f64),
+    /// The matrix has determinant -1.
+    #[error("expected a rotation, found a reflection; bake the mirrored mesh")]
+    Reflection,
+    /// The last row of a 4x4 matrix is another one.
+    #[error("row 4: expected 0 0 0 1, found {} {} {} {}; is the matrix transposed, or a projection?", .0[0], .0[1], .0[2], .0[3])]
+    LastRow([f64; 4]),
+    /// The length of a quaternion is not 1.
+    #[error("expected a quaternion of length 1, found length {}; normalise it", *.0 as f32)]
+    Quaternion(f64),
+}
+
+/// Names a number that is not finite.
+fn name(found: f64) -> &'static str {
+    if found.is_nan() { "NaN" } else { "infinity" }
+}
