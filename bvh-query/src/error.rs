@@ -1,6 +1,7 @@
 //! What can go wrong when a file is opened and when a question is asked.
 
 use crate::isa::BackendError;
+use crate::pose::PoseError;
 use bvh_format::FormatError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -61,6 +62,9 @@ pub enum QueryError {
         /// The number given.
         found: f64,
     },
+    /// Two poses have no relative pose.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
     /// The backend asked for is not available.
     #[error(transparent)]
     Backend(#[from] BackendError),

@@ -10,6 +10,7 @@
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //!
+//! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
 //! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
 //! all cores. `Batch` needs the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
 //! `mint` converts matrices and quaternions of other crates to a [`Pose`].
@@ -54,11 +55,13 @@ mod leaf;
 mod narrow;
 mod pose;
 mod query;
+mod scene;
 mod traverse;
 
 pub use error::{OpenError, QueryError};
 pub use file::bvh::Bvh;
 pub use file::mapped::ReadAhead;
+pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
 pub use pose::{Pose, PoseError};
@@ -68,6 +71,7 @@ pub use query::batch::Batch;
 pub use query::options::DistanceOptions;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
+pub use scene::{Groups, InstanceId, Scene, SceneContact, SceneDistance, SceneError, ScenePair};
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///

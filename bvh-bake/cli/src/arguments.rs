@@ -6,6 +6,7 @@ use crate::console::{self, Failure};
 use crate::dump::DumpArguments;
 use crate::query::QueryArguments;
 use crate::report::ReportArguments;
+use crate::scene::SceneArguments;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
@@ -34,6 +35,8 @@ pub(crate) enum Command {
     Verify(VerifyArguments),
     /// Ask whether two meshes touch, where, and how far apart they are
     Query(QueryArguments),
+    /// Ask a scene of many placed meshes which of them touch, or how far apart they are
+    Scene(SceneArguments),
     /// Measure which layout suits some meshes: the speed, size and error of each
     Report(ReportArguments),
 }
@@ -56,7 +59,8 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query or report (see cbvh --help)".into(),
+            "expected a command: bake, dump, validate, verify, query, scene or report (see cbvh --help)"
+                .into(),
         );
     }
     // The usage that follows takes several lines.

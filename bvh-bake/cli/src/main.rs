@@ -1,7 +1,7 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
-//! `report`. They stand on `options` (what several commands accept), `process` (memory and signals) and `console` (what
+//! `scene`; `report`. They stand on `options` (what several commands accept), `process` (memory and signals) and `console` (what
 //! is printed, and how a command ends). Imports lead from the former to the latter only. What scripts may rely on is in
 //! `cbvh --help` and in the help of each command.
 
@@ -15,6 +15,7 @@ mod options;
 mod process;
 mod query;
 mod report;
+mod scene;
 
 use arguments::{Arguments, Command};
 use std::process::ExitCode;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Validate(arguments) => check::validate(&arguments),
         Command::Verify(arguments) => check::verify(&arguments),
         Command::Query(arguments) => query::run(&arguments),
+        Command::Scene(arguments) => scene::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     });
     match result {

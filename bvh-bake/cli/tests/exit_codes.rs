@@ -18,7 +18,7 @@ fn help_and_version_are_no_errors() {
     let here = Path::new(".");
     assert!(cbvh_in(here, &["--version"]).done().out.starts_with("cbvh "));
     let help = cbvh_in(here, &["--help"]).done().out;
-    for command in ["bake", "dump", "validate", "verify", "query", "report"] {
+    for command in ["bake", "dump", "validate", "verify", "query", "scene", "report"] {
         assert!(help.contains(command));
         assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
     }

@@ -3,5 +3,6 @@
 pub(crate) mod bvh;
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) mod mapped;
+pub(crate) mod owned_shape;
 pub(crate) mod place;
 pub(crate) mod shape;

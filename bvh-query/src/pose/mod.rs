@@ -114,7 +114,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Returns how far `R R^T` is from a multiple of I: its largest entry, or NaN.
-fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
+pub(crate) fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
     let mut worst = 0.0f64;
     for i in 0..3 {
         for j in 0..3 {

@@ -52,7 +52,7 @@ pub struct QueryStats {
 
 impl QueryStats {
     /// Adds what a traversal did.
-    pub(super) fn add(&mut self, node_tests: u64, other: Self) {
+    pub(crate) fn add(&mut self, node_tests: u64, other: Self) {
         self.node_tests += node_tests;
         self.packet_tests += other.packet_tests;
         self.exact_tests += other.exact_tests;

@@ -57,6 +57,22 @@ impl Querier {
         Ok(best.distance(search.proved()))
     }
 
+    /// Returns the answer of [`Querier::distance`] if the distance is at most `limit`; if it is not, perhaps `None`.
+    pub(crate) fn distance_below<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        limit: f64,
+    ) -> Result<Option<Distance>, QueryError> {
+        let (a, b) = (a.into(), b.into());
+        self.start();
+        let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
+        search.limit_to(limit);
+        let best = self.nearest(a, b, pose, &mut search)?;
+        Ok(best.map(|best| best.distance(search.proved())))
+    }
+
     /// Returns the closest pair of triangles within the limit of `search`; of touching meshes, the first contact.
     pub(super) fn nearest(
         &mut self,

@@ -47,7 +47,7 @@ impl DistanceOptions {
 }
 
 /// Refuses a distance to compare with that is NaN, infinite or negative.
-pub(super) fn check_distance(d: f64) -> Result<(), QueryError> {
+pub(crate) fn check_distance(d: f64) -> Result<(), QueryError> {
     check("d", "a finite distance of at least 0", d)
 }
 

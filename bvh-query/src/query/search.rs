@@ -118,6 +118,11 @@ impl Search {
         self.lower_upper(with_slack(*upper));
     }
 
+    /// Leaves out pairs of triangles that are certainly farther apart than this.
+    pub(super) fn limit_to(&mut self, distance: f64) {
+        self.lower_upper(with_slack(distance));
+    }
+
     /// Returns the limit: pairs whose lower bound exceeds it do not matter.
     pub(super) fn limit(&self) -> f32 {
         self.limit

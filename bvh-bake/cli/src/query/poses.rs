@@ -38,7 +38,7 @@ pub(crate) fn parse_one(text: &str) -> Result<Pose, Failure> {
 }
 
 /// Parses a pose. Returns `None` if the text is blank.
-fn parse(text: &str) -> Result<Option<Pose>, String> {
+pub(crate) fn parse(text: &str) -> Result<Option<Pose>, String> {
     let mut numbers = [0.0; NUMBERS];
     let mut words = text.split_whitespace();
     for (number, word) in numbers.iter_mut().zip(&mut words) {

@@ -1,0 +1,136 @@
+//! Asks about each frame and times it: first the moving instances get their poses, then the question.
+
+use super::arguments::{Mode, SceneArguments};
+use super::file::LoadedScene;
+use crate::console::Failure;
+use bvh_query::{Pose, QueryError, QueryStats, SceneError, ScenePair};
+use cbvh_measure::rounds::add;
+use std::time::Instant;
+
+/// A question with its parameter.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Question {
+    pub(super) mode: Mode,
+    /// The distance of `Mode::Within`, in mesh units.
+    pub(super) within: f64,
+}
+
+/// An answer about a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Answer {
+    /// Whether any pair touches.
+    Flag(bool),
+    /// The pairs that touch, or that are near enough.
+    Pairs(Vec<ScenePair>),
+    /// The nearest pair and its distance; `None` if there are no pairs.
+    Nearest(Option<(ScenePair, f64)>),
+}
+
+impl Answer {
+    /// Returns the answer as a number: the distance of no pairs is infinite.
+    pub(super) fn value(&self) -> f64 {
+        match self {
+            Self::Flag(flag) => f64::from(u8::from(*flag)),
+            Self::Pairs(pairs) => pairs.len() as f64,
+            Self::Nearest(nearest) => nearest.map_or(f64::INFINITY, |(_, distance)| distance),
+        }
+    }
+
+    /// Returns true if a pair touches or is near enough.
+    pub(super) fn is_positive(&self) -> bool {
+        match self {
+            Self::Nearest(_) => self.value() <= 0.0,
+            _ => self.value() > 0.0,
+        }
+    }
+}
+
+impl Question {
+    /// Takes the question from the command line.
+    pub(super) fn new(arguments: &SceneArguments) -> Result<Self, Failure> {
+        match (arguments.mode, arguments.within) {
+            (Mode::Within, None) => {
+                Err(Failure::Usage("--mode within requires --within D (see --help)".into()))
+            }
+            (mode, Some(_)) if mode != Mode::Within => {
+                Err(Failure::Usage("--within requires --mode within (see --help)".into()))
+            }
+            (mode, within) => Ok(Self { mode, within: within.unwrap_or(0.0) }),
+        }
+    }
+
+    fn ask(&self, loaded: &mut LoadedScene, frame: &[Pose]) -> Result<Answer, SceneError> {
+        let LoadedScene { scene, moving, .. } = loaded;
+        scene.set_poses(moving.iter().copied().zip(frame.iter().copied()))?;
+        Ok(match self.mode {
+            Mode::Collide => Answer::Flag(scene.collide()?),
+            Mode::Pairs => Answer::Pairs(scene.pairs_in_contact()?),
+            Mode::Within => Answer::Pairs(scene.pairs_within(self.within)?),
+            Mode::Distance => {
+                Answer::Nearest(scene.distance()?.map(|found| (found.pair, found.distance.distance)))
+            }
+        })
+    }
+}
+
+/// The results of a run.
+pub(super) struct Run {
+    /// The answers and their nanoseconds, in the order of the frames. There are fewer than frames if the budget ended.
+    pub(super) answers: Vec<(Answer, u64)>,
+    pub(super) requested: usize,
+    pub(super) total_seconds: f64,
+    pub(super) stats: QueryStats,
+    /// The number of pairs that were asked about.
+    pub(super) pairs_asked: u64,
+}
+
+impl Run {
+    pub(super) fn new(
+        scene: &mut LoadedScene,
+        frames: &[Vec<Pose>],
+        question: &Question,
+        arguments: &SceneArguments,
+    ) -> Result<Self, Failure> {
+        let budget = arguments.budget.unwrap_or(f64::INFINITY);
+        let start = Instant::now();
+        for frame in frames.iter().rev().take(arguments.warm) {
+            if start.elapsed().as_secs_f64() >= budget / 4.0 {
+                break;
+            }
+            // The timed part meets the same error again, with its frame.
+            let _ = question.ask(scene, frame);
+        }
+        let mut run = Self {
+            answers: Vec::with_capacity(frames.len()),
+            requested: frames.len(),
+            total_seconds: 0.0,
+            stats: QueryStats::default(),
+            pairs_asked: 0,
+        };
+        let start = Instant::now();
+        for (number, frame) in (1..).zip(frames) {
+            let before = Instant::now();
+            let answer = question.ask(scene, frame);
+            let nanoseconds = before.elapsed().as_nanos() as u64;
+            let answer =
+                answer.map_err(|error| blame(&error, &format!("frame {number}: {error}"), arguments))?;
+            run.answers.push((answer, nanoseconds));
+            add(&mut run.stats, scene.scene.stats());
+            run.pairs_asked += scene.scene.pairs_asked();
+            if start.elapsed().as_secs_f64() > budget {
+                break;
+            }
+        }
+        run.total_seconds = start.elapsed().as_secs_f64();
+        Ok(run)
+    }
+}
+
+/// Turns an error into one of the file that caused it.
+fn blame(error: &SceneError, said: &str, arguments: &SceneArguments) -> Failure {
+    match error {
+        SceneError::Pair { source: QueryError::Damaged(_), .. } => Failure::invalid(&arguments.scene, said),
+        SceneError::Pair { source: QueryError::Budget { .. }, .. } => Failure::Limit(said.to_owned()),
+        _ => Failure::invalid(&arguments.frames, said),
+    }
+}

@@ -1,0 +1,159 @@
+//! Reads scene files: meshes, instances, what moves and what may touch.
+
+use crate::console::Failure;
+use crate::options::LayoutArguments;
+use crate::query::poses;
+use crate::query::side::{How, Side};
+use bvh_query::{Backend, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// The groups of what frames move, and of what stands still.
+const MOVING: u32 = 1;
+const STILL: u32 = 2;
+
+/// A scene file, each item with the number of its line.
+#[derive(Default)]
+pub(super) struct SceneText {
+    meshes: Vec<(usize, String, PathBuf)>,
+    instances: Vec<(usize, String, usize, Pose)>,
+    pub(super) moving: Vec<String>,
+    /// Places in `instances`.
+    moving_instances: Vec<usize>,
+    allowed: Vec<(usize, usize)>,
+}
+
+/// A scene that is ready to be asked.
+pub(super) struct LoadedScene {
+    pub(super) scene: Scene,
+    pub(super) moving: Vec<InstanceId>,
+    /// The triangles of each mesh once, exact duplicates included.
+    pub(super) triangles: u64,
+    /// The seconds of baking meshes and opening files.
+    pub(super) build_seconds: f64,
+}
+
+/// Reads a scene file without opening its meshes.
+pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
+    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut scene = SceneText::default();
+    let (mut meshes, mut instances) = (HashMap::new(), HashMap::new());
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.split('#').next().unwrap_or("");
+        let words: Vec<&str> = line.split_whitespace().collect();
+        scene
+            .add(number, &words, path, &mut meshes, &mut instances)
+            .map_err(|text| Failure::invalid(path, format_args!("line {number}: {text}")))?;
+    }
+    if scene.instances.is_empty() {
+        return Err(Failure::invalid(
+            path,
+            "expected at least one line: instance NAME MESH POSE, found none",
+        ));
+    }
+    Ok(scene)
+}
+
+impl SceneText {
+    fn add<'a>(
+        &mut self,
+        number: usize,
+        words: &[&'a str],
+        path: &Path,
+        meshes: &mut HashMap<&'a str, usize>,
+        instances: &mut HashMap<&'a str, usize>,
+    ) -> Result<(), String> {
+        let find = |names: &HashMap<&str, usize>, what: &str, name: &str| {
+            names
+                .get(name)
+                .copied()
+                .ok_or_else(|| format!("expected {what} of an earlier line, found {name:?}"))
+        };
+        match *words {
+            [] => {}
+            ["mesh", name, file] => {
+                if meshes.insert(name, self.meshes.len()).is_some() {
+                    return Err(format!("expected a name of its own, found a second mesh {name:?}"));
+                }
+                let folder = path.parent().unwrap_or_else(|| Path::new(""));
+                self.meshes.push((number, name.to_owned(), folder.join(file)));
+            }
+            ["instance", name, mesh, ..] => {
+                let mesh = find(meshes, "a mesh", mesh)?;
+                let pose = poses::parse(&words[3..].join(" "))?;
+                let pose = pose.ok_or("expected 12 numbers after the mesh, found none")?;
+                if instances.insert(name, self.instances.len()).is_some() {
+                    return Err(format!("expected a name of its own, found a second instance {name:?}"));
+                }
+                self.instances.push((number, name.to_owned(), mesh, pose));
+            }
+            ["moving", ref names @ ..] => {
+                for name in names {
+                    let instance = find(instances, "an instance", name)?;
+                    if self.moving_instances.contains(&instance) {
+                        return Err(format!("expected each instance once, found {name:?} again"));
+                    }
+                    self.moving_instances.push(instance);
+                    self.moving.push((*name).to_owned());
+                }
+            }
+            ["allow", a, b] => {
+                let pair = (find(instances, "an instance", a)?, find(instances, "an instance", b)?);
+                self.allowed.push(pair);
+            }
+            _ => {
+                return Err(format!(
+                    "expected mesh NAME FILE, instance NAME MESH POSE, moving NAME... or allow NAME NAME, found {:?}",
+                    words.join(" ").chars().take(60).collect::<String>()
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Opens or bakes the meshes and adds the instances.
+pub(super) fn load(
+    path: &Path,
+    text: &SceneText,
+    layout: &LayoutArguments,
+    backend: Backend,
+) -> Result<LoadedScene, Failure> {
+    let how = How { layout, object: None, read_ahead: ReadAhead::Usual };
+    let mut loaded = LoadedScene {
+        scene: Scene::with_backend(backend),
+        moving: Vec::new(),
+        triangles: 0,
+        build_seconds: 0.0,
+    };
+    let mut shapes = Vec::new();
+    for (_, _, file) in &text.meshes {
+        let mut side = Side::load(file, &how)?;
+        side.check()?;
+        loaded.triangles = loaded.triangles.saturating_add(side.triangles());
+        loaded.build_seconds += side.build_seconds;
+        shapes.push(OwnedShape::from(side.bvh));
+    }
+    let mut ids = Vec::new();
+    for (number, name, mesh, pose) in &text.instances {
+        let id = loaded.scene.add_named(name.clone(), shapes[*mesh].clone(), *pose);
+        ids.push(id.map_err(|error| Failure::invalid(path, format_args!("line {number}: {error}")))?);
+    }
+    // These are instances of the scene.
+    let refused = |error| Failure::invalid(path, error);
+    if !text.moving_instances.is_empty() {
+        for &id in &ids {
+            loaded.scene.set_groups(id, Groups { member: STILL, meets: MOVING }).map_err(refused)?;
+        }
+        for &place in &text.moving_instances {
+            let groups = Groups { member: MOVING, meets: MOVING | STILL };
+            loaded.scene.set_groups(ids[place], groups).map_err(refused)?;
+            loaded.moving.push(ids[place]);
+        }
+    }
+    for &(a, b) in &text.allowed {
+        loaded.scene.allow(ids[a], ids[b], true).map_err(refused)?;
+    }
+    Ok(loaded)
+}

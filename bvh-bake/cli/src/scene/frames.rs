@@ -1,0 +1,46 @@
+//! Reads frames: a line has the pose of each moving instance.
+
+use super::file::SceneText;
+use crate::console::Failure;
+use crate::query::poses;
+use bvh_query::Pose;
+use std::path::Path;
+
+/// The number of numbers of a pose.
+const NUMBERS: usize = 12;
+
+/// Reads the frames of a scene, each with the poses of its moving instances. A scene in which nothing moves has one frame.
+pub(super) fn read(path: &Path, scene: &SceneText) -> Result<Vec<Vec<Pose>>, Failure> {
+    if scene.moving.is_empty() {
+        return Ok(vec![Vec::new()]);
+    }
+    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut frames = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
+        if words.is_empty() {
+            continue;
+        }
+        let wrong = |text: String| Failure::invalid(path, format_args!("line {number}: {text}"));
+        if words.len() != NUMBERS * scene.moving.len() {
+            return Err(wrong(format!(
+                "expected {} numbers, 12 for each of {} moving instances, found {}",
+                NUMBERS * scene.moving.len(),
+                scene.moving.len(),
+                words.len()
+            )));
+        }
+        let mut frame = Vec::with_capacity(scene.moving.len());
+        for (name, words) in scene.moving.iter().zip(words.chunks(NUMBERS)) {
+            let pose =
+                poses::parse(&words.join(" ")).map_err(|text| wrong(format!("instance {name}: {text}")))?;
+            frame.extend(pose);
+        }
+        frames.push(frame);
+    }
+    if frames.is_empty() {
+        return Err(Failure::invalid(path, "expected at least one line of poses, found none"));
+    }
+    Ok(frames)
+}

@@ -1,0 +1,186 @@
+//! The results of a run as data: the JSON line, the raw lines, the list of pairs and the hash of the answers.
+
+use super::arguments::{Mode, SceneArguments};
+use super::asked::{Answer, Question, Run};
+use super::file::LoadedScene;
+use crate::console::{hex, plural};
+use crate::process::resident;
+use crate::query::number::significant;
+use crate::query::stem;
+use bvh_format::checksum::Hasher;
+use bvh_query::{Backend, InstanceId};
+use cbvh_measure::spread::quantile;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// The JSON line: the fields that programs of this protocol share, and further ones.
+#[derive(Serialize)]
+pub(super) struct Record {
+    peer: &'static str,
+    version: &'static str,
+    mode: &'static str,
+    scene: String,
+    frames: String,
+    instances: usize,
+    moving: usize,
+    triangles: u64,
+    build_s: f64,
+    queries: usize,
+    requested: usize,
+    total_s: f64,
+    query_sum_s: f64,
+    ns_median: u64,
+    ns_mean: f64,
+    ns_p10: u64,
+    ns_p90: u64,
+    ns_max: u64,
+    positives: u64,
+    sum: f64,
+    mesh_pair_tests: u64,
+    peak_rss_mb: Option<f64>,
+    isa: &'static str,
+    answers_xxh3: Option<String>,
+    node_tests: u64,
+    triangle_tests: u64,
+    exact_tests: u64,
+    jobs: u16,
+}
+
+impl Record {
+    pub(super) fn new(
+        arguments: &SceneArguments,
+        scene: &LoadedScene,
+        backend: Backend,
+        question: &Question,
+        run: &Run,
+    ) -> Self {
+        let mut times: Vec<u64> = run.answers.iter().map(|&(_, nanoseconds)| nanoseconds).collect();
+        times.sort_unstable();
+        let (nanoseconds, count) = (times.iter().sum::<u64>(), times.len());
+        let complete = count == run.requested;
+        // Without pairs there is no distance to add.
+        let values = run.answers.iter().map(|(answer, _)| answer.value()).filter(|value| value.is_finite());
+        Self {
+            peer: "cbvh",
+            version: env!("CARGO_PKG_VERSION"),
+            mode: question.mode.name(),
+            scene: stem(&arguments.scene),
+            frames: stem(&arguments.frames),
+            instances: scene.scene.len(),
+            moving: scene.moving.len(),
+            triangles: scene.triangles,
+            build_s: scene.build_seconds,
+            queries: count,
+            requested: run.requested,
+            total_s: run.total_seconds,
+            query_sum_s: nanoseconds as f64 * 1e-9,
+            ns_median: quantile(&times, 0.5),
+            ns_mean: if count == 0 { 0.0 } else { nanoseconds as f64 / count as f64 },
+            ns_p10: quantile(&times, 0.1),
+            ns_p90: quantile(&times, 0.9),
+            ns_max: times.last().copied().unwrap_or(0),
+            positives: run.answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
+            sum: values.sum(),
+            mesh_pair_tests: run.pairs_asked,
+            peak_rss_mb: resident::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),
+            isa: backend.name(),
+            answers_xxh3: complete.then(|| hex(hash(scene, run))),
+            node_tests: run.stats.node_tests,
+            triangle_tests: run.stats.packet_tests,
+            exact_tests: run.stats.exact_tests,
+            jobs: arguments.jobs,
+        }
+    }
+
+    /// Returns a few lines for a person.
+    pub(super) fn summary(&self) -> String {
+        let micro = |nanoseconds: u64| format!("{:.1} \u{b5}s", nanoseconds as f64 / 1e3);
+        let what = if self.mode == Mode::Within.name() { "with a pair near enough" } else { "with contact" };
+        format!(
+            "{}: {} {}, {} of them moving; {}: answered {} of {} {}, {} {what}\nper frame, poses included: median {}, \
+             90 % below {}, slowest {} ({}, {} {})\n",
+            self.scene,
+            self.instances,
+            plural(self.instances as u64, "instance"),
+            self.moving,
+            self.mode,
+            self.queries,
+            self.requested,
+            plural(self.requested as u64, "frame"),
+            self.positives,
+            micro(self.ns_median),
+            micro(self.ns_p90),
+            micro(self.ns_max),
+            self.isa,
+            self.jobs,
+            plural(u64::from(self.jobs), "thread"),
+        )
+    }
+}
+
+/// Returns the name of an instance of the scene.
+fn name(scene: &LoadedScene, id: InstanceId) -> String {
+    scene.scene.name(id).ok().flatten().map_or_else(|| id.to_string(), str::to_owned)
+}
+
+/// Returns XXH3-64 of names and values in order, without times.
+fn hash(scene: &LoadedScene, run: &Run) -> u64 {
+    let mut hasher = Hasher::default();
+    for (answer, _) in &run.answers {
+        let mut pair = |a: InstanceId, b: InstanceId| {
+            for id in [a, b] {
+                hasher.update(name(scene, id).as_bytes());
+                hasher.update(&[0]);
+            }
+        };
+        match answer {
+            Answer::Flag(flag) => hasher.update(&[u8::from(*flag)]),
+            Answer::Pairs(pairs) => {
+                pairs.iter().for_each(|of| pair(of.a, of.b));
+                hasher.update(&(pairs.len() as u64).to_le_bytes());
+            }
+            Answer::Nearest(nearest) => {
+                if let Some((of, _)) = nearest {
+                    pair(of.a, of.b);
+                }
+                hasher.update(&answer.value().to_bits().to_le_bytes());
+            }
+        }
+    }
+    hasher.finish()
+}
+
+/// Returns the raw lines: value, space, nanoseconds.
+pub(super) fn raw(run: &Run) -> String {
+    run.answers.iter().map(|(answer, ns)| format!("{} {ns}\n", significant(answer.value()))).collect()
+}
+
+/// Returns the pairs of each frame: one line per frame, one line per pair.
+pub(super) fn list(scene: &LoadedScene, question: &Question, run: &Run) -> String {
+    let mut text = String::new();
+    for (number, (answer, _)) in (1..).zip(&run.answers) {
+        // Writing to text in memory cannot fail.
+        let _ = match answer {
+            Answer::Flag(flag) => {
+                writeln!(text, "frame {number}: {}", if *flag { "touching" } else { "not touching" })
+            }
+            Answer::Pairs(pairs) => {
+                let count = pairs.len() as u64;
+                let what = if question.mode == Mode::Within { "near enough" } else { "touching" };
+                let _ = writeln!(text, "frame {number}: {count} {} {what}", plural(count, "pair"));
+                pairs
+                    .iter()
+                    .try_for_each(|of| writeln!(text, "  {} {}", name(scene, of.a), name(scene, of.b)))
+            }
+            Answer::Nearest(None) => writeln!(text, "frame {number}: no pairs"),
+            Answer::Nearest(Some((of, distance))) => writeln!(
+                text,
+                "frame {number}: {} {} {} mesh units apart",
+                name(scene, of.a),
+                name(scene, of.b),
+                significant(*distance)
+            ),
+        };
+    }
+    text
+}

@@ -1,0 +1,198 @@
+//! Tests `cbvh scene`: answers are those of `cbvh query` pair by pair, however they are found, and bad files are named.
+
+mod common;
+
+use common::{backends, cbvh_in, cbvh_with_isa, cube, names, poses, torus};
+use std::fs;
+use std::path::Path;
+
+/// Three instances, of which two move in 40 frames.
+fn world() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
+    cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "-q"]).done();
+    let scene = "\
+# a comment
+mesh ring torus.cbvh
+mesh box cube.obj # baked first
+instance a ring 1 0 0 0  0 1 0 0  0 0 1 0
+instance b box 1 0 0 0  0 1 0 0  0 0 1 0
+instance c ring 1 0 0 9  0 1 0 0  0 0 1 0
+moving b c
+";
+    fs::write(directory.join("s.scene"), scene).unwrap();
+    let lines = |poses: &str| -> Vec<String> {
+        let lines = poses.lines().map(|line| line.split('#').next().unwrap().trim().to_owned());
+        lines.filter(|line| !line.is_empty()).collect()
+    };
+    let (b, c) = (lines(&poses(40, 0.0, 6.0)), lines(&poses(40, 2.0, 12.0)));
+    let frames: String = b.iter().zip(c).map(|(b, c)| format!("{b} {c}\n")).collect();
+    fs::write(directory.join("f.txt"), format!("# frames\n{frames}")).unwrap();
+    folder
+}
+
+fn ask(directory: &Path, more: &[&str]) -> common::Ended {
+    cbvh_in(directory, &[&["scene", "s.scene", "f.txt"], more].concat())
+}
+
+/// Poses of the moving instances, frame by frame.
+fn frames(directory: &Path) -> Vec<(String, String)> {
+    let text = fs::read_to_string(directory.join("f.txt")).unwrap();
+    let halves = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        (words[..12].join(" "), words[12..].join(" "))
+    };
+    text.lines().filter(|line| !line.starts_with('#')).map(halves).collect()
+}
+
+/// The values of the raw lines that a query about poses of a torus and a cube writes.
+fn query(directory: &Path, meshes: [&str; 2], poses: &str, mode: &[&str]) -> Vec<f64> {
+    fs::write(directory.join("q.txt"), poses).unwrap();
+    let query =
+        [&["query", meshes[0], meshes[1], "q.txt", "--out", "raw.txt", "--json", "--mode"], mode].concat();
+    cbvh_in(directory, &query).done();
+    values(&fs::read_to_string(directory.join("raw.txt")).unwrap())
+}
+
+fn values(raw: &str) -> Vec<f64> {
+    raw.lines().map(|line| line.split(' ').next().unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn answers_are_those_about_each_pair() {
+    let folder = world();
+    let directory = folder.path();
+    let frames = frames(directory);
+    let [b, c] = [0, 1].map(|side| {
+        let line = |frame: &(String, String)| format!("{}\n", if side == 0 { &frame.0 } else { &frame.1 });
+        frames.iter().map(line).collect::<String>()
+    });
+    // `a` is at the origin, so that a pose in the world is one in its frame. The pair of `b` and `c` is allowed to touch.
+    let scene = fs::read_to_string(directory.join("s.scene")).unwrap();
+    fs::write(directory.join("s.scene"), format!("{scene}allow c b\n")).unwrap();
+    for mode in [&["collide"][..], &["distance"], &["within", "--within", "1.5"]] {
+        let of_b = query(directory, ["torus.cbvh", "cube.obj"], &b, mode);
+        let of_c = query(directory, ["torus.cbvh", "torus.cbvh"], &c, mode);
+        let expected: Vec<f64> = of_b
+            .iter()
+            .zip(&of_c)
+            .map(|(b, c)| match mode[0] {
+                "distance" => b.min(*c),
+                "within" => b + c,
+                _ => b.max(*c),
+            })
+            .collect();
+        let more = [&["--out", "scene.txt", "--json", "--mode"], mode].concat();
+        let json = ask(directory, &more).done().json();
+        assert_eq!(values(&fs::read_to_string(directory.join("scene.txt")).unwrap()), expected, "{mode:?}");
+        assert_eq!(
+            (&json["mode"], &json["instances"], &json["moving"]),
+            (&mode[0].into(), &3.into(), &2.into())
+        );
+        assert_eq!((&json["queries"], &json["requested"]), (&40.into(), &40.into()));
+        assert_eq!(json["triangles"], 2304 + 12);
+        let positives = expected.iter().filter(|&&value| (mode[0] == "distance") == (value == 0.0)).count();
+        assert!(json["positives"] == positives && positives > 0 && positives < 40, "{mode:?}: {json}");
+        // Of all three pairs, with names.
+        let list = ask(directory, &[&["--list", "--mode"], mode].concat()).done().out;
+        assert_eq!(list.lines().filter(|line| line.starts_with("frame ")).count(), 40, "{list}");
+        if mode[0] == "within" {
+            assert_eq!(list.matches("  a b\n").count() as f64, of_b.iter().sum::<f64>(), "{list}");
+            assert!(!list.contains("b c"), "{list}");
+        }
+    }
+    assert_eq!(names(directory).len(), 8);
+}
+
+#[test]
+fn answers_depend_neither_on_the_backend_nor_on_threads() {
+    let folder = world();
+    let directory = folder.path();
+    for mode in ["collide", "pairs", "distance"] {
+        let mut hashes = Vec::new();
+        for isa in backends(directory) {
+            for jobs in ["1", "2"] {
+                let arguments = ["scene", "s.scene", "f.txt", "--mode", mode, "--json", "--jobs", jobs];
+                let json = cbvh_with_isa(directory, isa, &arguments).done().json();
+                assert_eq!(json["isa"], isa);
+                hashes.push(json["answers_xxh3"].as_str().unwrap().to_owned());
+            }
+        }
+        assert!(hashes.iter().all(|hash| *hash == hashes[0] && hash.len() == 16), "{mode}: {hashes:?}");
+    }
+    let cut = ask(directory, &["--budget", "0", "--json"]).done().json();
+    assert!(cut["answers_xxh3"].is_null() && cut["queries"] == 1 && cut["requested"] == 40, "{cut}");
+    let few = ask(directory, &["--limit", "7", "--warm", "0", "--json"]).done().json();
+    assert_eq!((&few["queries"], &few["requested"]), (&7.into(), &7.into()));
+}
+
+#[test]
+fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
+    let folder = world();
+    let directory = folder.path();
+    let scene = fs::read_to_string(directory.join("s.scene")).unwrap().replace("moving b c\n", "");
+    fs::write(directory.join("s.scene"), scene).unwrap();
+    let list = cbvh_in(directory, &["scene", "s.scene", "no.txt", "--mode", "distance", "--list"]).done().out;
+    // The cube of side 2 at the middle of a ring reaches its inner side.
+    assert!(list.starts_with("frame 1: a b ") && list.lines().count() == 1, "{list}");
+}
+
+#[test]
+fn bad_files_are_named_with_line_and_remedy() {
+    let folder = world();
+    let directory = folder.path();
+    let good = fs::read_to_string(directory.join("s.scene")).unwrap();
+    let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
+    for (line, code, words) in [
+        ("mesh ring cube.obj", 3, "line 8: expected a name of its own, found a second mesh \"ring\""),
+        ("mesh new no.obj", 2, "no.obj: expected a readable file"),
+        (&format!("instance a ring {pose}"), 3, "found a second instance \"a\""),
+        (&format!("instance d sphere {pose}"), 3, "expected a mesh of an earlier line, found \"sphere\""),
+        ("instance d ring 1 2 3", 3, "line 8: expected 12 numbers"),
+        ("instance d ring", 3, "expected 12 numbers after the mesh, found none"),
+        ("instance d ring 2 0 0 0 0 2 0 0 0 0 2 0", 3, "scaled by 2; bake the mesh at its size"),
+        ("instance d ring 1 3e-7 0 0 0 1 0 0 0 0 1 0", 3, "instance d: expected a rotation within 2^-23"),
+        ("moving b", 3, "expected each instance once, found \"b\" again"),
+        ("moving d", 3, "expected an instance of an earlier line, found \"d\""),
+        ("allow a d", 3, "expected an instance of an earlier line, found \"d\""),
+        ("allow a", 3, "line 8: expected mesh NAME FILE, instance NAME MESH POSE"),
+        ("robot x", 3, "found \"robot x\""),
+    ] {
+        fs::write(directory.join("s.scene"), format!("{good}{line}\n")).unwrap();
+        let ended = ask(directory, &[]);
+        assert_eq!(ended.code, code, "{line}: {}", ended.err);
+        assert!(ended.err.contains(words) && ended.err.lines().count() == 1, "{line}: {}", ended.err);
+        assert!(ended.out.is_empty());
+    }
+    fs::write(directory.join("s.scene"), "# nothing\n").unwrap();
+    assert!(ask(directory, &[]).err.contains("s.scene: expected at least one line: instance NAME MESH POSE"));
+    fs::write(directory.join("s.scene"), &good).unwrap();
+    for (frames, words) in [
+        (pose.to_owned(), "line 1: expected 24 numbers, 12 for each of 2 moving instances, found 12"),
+        (format!("{pose} {pose}\n{pose} {}", pose.replace("1 0 0 0 0", "1 0 0 x 0")), "line 2: instance c: "),
+        (format!("{pose} {}", pose.replacen('1', "-1", 1)), "line 1: instance c: expected a rotation"),
+        (String::new(), "expected at least one line of poses, found none"),
+        (
+            format!("{pose} 1 3e-7 0 0 0 1 0 0 0 0 1 0"),
+            "frame 1: instance c: expected a rotation within 2^-23 of orthonormal",
+        ),
+    ] {
+        fs::write(directory.join("f.txt"), frames).unwrap();
+        let ended = ask(directory, &["--out", "raw.txt"]);
+        assert_eq!(ended.code, 3, "{}", ended.err);
+        assert!(ended.err.starts_with("cbvh: f.txt: ") && ended.err.contains(words), "{}", ended.err);
+    }
+    for (arguments, words) in [
+        (&["--mode", "within"][..], "--mode within requires --within D"),
+        (&["--within", "1"], "--within requires --mode within"),
+        (&["--mode", "within", "--within", "-1"], "--within"),
+        (&["--jobs", "0"], "--jobs"),
+        (&["--list", "--json"], "--list"),
+    ] {
+        let ended = ask(directory, arguments);
+        assert!(ended.code == 1 && ended.err.contains(words), "{arguments:?}: {}", ended.err);
+    }
+    assert!(!directory.join("raw.txt").exists());
+}

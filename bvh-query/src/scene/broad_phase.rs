@@ -1,0 +1,298 @@
+//! The broad phase: binary trees of boxes over the instances, one for those that stand still and one for those that move.
+//!
+//! An instance counts as standing still until it moves. Then its leaf in the first tree becomes empty, and the second tree
+//! has it from the next question on. Of an instance that moves again, the boxes above it are computed again; when moves have
+//! made the boxes of the second tree half as large again as after its build, the next question builds that tree anew. So the
+//! first tree stays as tight as it was built, however far a few instances travel. Adding and removing builds both anew.
+//!
+//! A tree is split at the median along the longest side. Each node also has the union of the groups below it, so that parts
+//! of the scene that are not asked about each other are left out at once.
+
+use crate::scene::instance::Groups;
+use crate::scene::world_box::WorldBox;
+
+/// A number of no node.
+const NONE: u32 = u32::MAX;
+/// A tree is built anew when the girths of its inner nodes have grown by this factor.
+const MAX_GROWTH: f64 = 1.5;
+
+/// An instance that the broad phase is over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Item {
+    pub(super) place: u32,
+    pub(super) bounds: WorldBox,
+    pub(super) groups: Groups,
+}
+
+/// Both trees.
+#[derive(Default, Debug)]
+pub(super) struct BroadPhase {
+    still: Tree,
+    moving: Tree,
+    /// Whether the instance in each place has moved since it was added.
+    has_moved: Vec<bool>,
+    /// Whether both trees are to be built by the next question, or the second one.
+    is_stale: bool,
+    is_moving_stale: bool,
+}
+
+impl BroadPhase {
+    /// Takes over that an instance was added to a place, or removed from it.
+    pub(super) fn replace(&mut self, place: u32) {
+        self.is_stale = true;
+        if let Some(has_moved) = self.has_moved.get_mut(place as usize) {
+            *has_moved = false;
+        }
+    }
+
+    /// Takes over that an instance has moved, or changed its groups.
+    pub(super) fn update(&mut self, Item { place, bounds, groups }: Item) {
+        if self.is_stale {
+            // The next build takes it as it is then.
+        } else if self.has_moved.get(place as usize) == Some(&true) {
+            self.moving.set(place, bounds, groups);
+        } else {
+            self.still.set(place, WorldBox::EMPTY, Groups::NONE);
+            self.is_moving_stale = true;
+        }
+        if self.has_moved.len() <= place as usize {
+            self.has_moved.resize(place as usize + 1, false);
+        }
+        self.has_moved[place as usize] = true;
+    }
+
+    /// Builds what does not show the instances as they are. `items` lists them; places are below `places`.
+    pub(super) fn refresh(&mut self, items: impl Iterator<Item = Item>, places: usize) {
+        if !self.is_stale && !self.is_moving_stale && !self.moving.has_grown() {
+            return;
+        }
+        self.has_moved.resize(places, false);
+        let (moving, still): (Vec<Item>, Vec<Item>) =
+            items.partition(|item| self.has_moved.get(item.place as usize) == Some(&true));
+        if self.is_stale {
+            self.still.build(still, places);
+        }
+        self.moving.build(moving, places);
+        (self.is_stale, self.is_moving_stale) = (false, false);
+    }
+
+    /// Calls `visit` with each pair of places whose groups meet and whose boxes are at most `limit` apart, and with the square
+    /// of their gap.
+    pub(super) fn pairs(&self, limit: f64, mut visit: impl FnMut(u32, u32, f64)) {
+        pairs((&self.still, &self.still), limit, &mut visit);
+        pairs((&self.moving, &self.still), limit, &mut visit);
+        pairs((&self.moving, &self.moving), limit, &mut visit);
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: WorldBox,
+    groups: Groups,
+    parent: u32,
+    /// Both children of an inner node, or `NONE` and the place of an instance.
+    children: [u32; 2],
+}
+
+impl Node {
+    fn is_leaf(&self) -> bool {
+        self.children[0] == NONE
+    }
+}
+
+/// A tree. Node 0 is the root, and children follow their parents.
+#[derive(Default, Debug)]
+struct Tree {
+    nodes: Vec<Node>,
+    /// The leaf of each place, or `NONE`.
+    leaves: Vec<u32>,
+    /// The sum of the girths of the inner nodes, now and after the build.
+    girth: f64,
+    built_girth: f64,
+}
+
+impl Tree {
+    /// Returns whether its boxes have grown so much that it is worth building anew.
+    fn has_grown(&self) -> bool {
+        self.girth > MAX_GROWTH * self.built_girth
+    }
+
+    /// Builds the tree. Places are below `places`.
+    fn build(&mut self, mut items: Vec<Item>, places: usize) {
+        self.nodes.clear();
+        self.leaves.clear();
+        self.leaves.resize(places, NONE);
+        self.girth = 0.0;
+        let mut open = vec![(0, items.len(), NONE, 0)];
+        open.retain(|(start, end, ..)| start < end);
+        while let Some((start, end, parent, side)) = open.pop() {
+            let number = self.nodes.len() as u32;
+            if let Some(above) = self.nodes.get_mut(parent as usize) {
+                above.children[side] = number;
+            }
+            let part = &mut items[start..end];
+            if let [item] = part {
+                self.leaves[item.place as usize] = number;
+                let children = [NONE, item.place];
+                self.nodes.push(Node { bounds: item.bounds, groups: item.groups, parent, children });
+                continue;
+            }
+            let middle = split(part);
+            let (bounds, groups) = (WorldBox::EMPTY, Groups::NONE);
+            self.nodes.push(Node { bounds, groups, parent, children: [0, 0] });
+            open.push((start + middle, end, number, 1));
+            open.push((start, start + middle, number, 0));
+        }
+        for number in (0..self.nodes.len()).rev() {
+            if !self.nodes[number].is_leaf() {
+                self.recompute(number);
+            }
+        }
+        self.built_girth = self.girth;
+    }
+
+    /// Sets the box and the groups of a leaf, and computes those above it.
+    fn set(&mut self, place: u32, bounds: WorldBox, groups: Groups) {
+        let Some(&leaf) = self.leaves.get(place as usize).filter(|&&leaf| leaf != NONE) else { return };
+        let node = &mut self.nodes[leaf as usize];
+        (node.bounds, node.groups) = (bounds, groups);
+        let mut above = node.parent;
+        while above != NONE && self.recompute(above as usize) {
+            above = self.nodes[above as usize].parent;
+        }
+    }
+
+    /// Computes an inner node from its children. Returns whether it has changed.
+    fn recompute(&mut self, number: usize) -> bool {
+        let Node { bounds, groups, children, .. } = self.nodes[number];
+        let [first, second] = children.map(|child| &self.nodes[child as usize]);
+        let (new_bounds, new_groups) =
+            (first.bounds.union(&second.bounds), first.groups.union(second.groups));
+        if (new_bounds, new_groups) == (bounds, groups) {
+            return false;
+        }
+        self.girth += new_bounds.girth() - bounds.girth();
+        (self.nodes[number].bounds, self.nodes[number].groups) = (new_bounds, new_groups);
+        true
+    }
+}
+
+/// Visits the near pairs of two trees, or of one tree with itself.
+fn pairs((a, b): (&Tree, &Tree), limit: f64, visit: &mut impl FnMut(u32, u32, f64)) {
+    if a.nodes.is_empty() || b.nodes.is_empty() {
+        return;
+    }
+    let is_one = std::ptr::eq(a, b);
+    let squared_limit = limit * limit;
+    let mut open: Vec<(u32, u32)> = vec![(0, 0)];
+    while let Some((first, second)) = open.pop() {
+        let (node_a, node_b) = (&a.nodes[first as usize], &b.nodes[second as usize]);
+        if !node_a.groups.meet(node_b.groups) {
+            continue;
+        }
+        if is_one && first == second {
+            if !node_a.is_leaf() {
+                let [left, right] = node_a.children;
+                open.extend([(left, right), (right, right), (left, left)]);
+            }
+            continue;
+        }
+        let squared_gap = node_a.bounds.squared_gap(&node_b.bounds);
+        if squared_gap > squared_limit {
+            continue;
+        }
+        match (node_a.is_leaf(), node_b.is_leaf()) {
+            (true, true) => visit(node_a.children[1], node_b.children[1], squared_gap),
+            (false, is_leaf) if is_leaf || node_a.bounds.girth() >= node_b.bounds.girth() => {
+                open.extend(node_a.children.map(|child| (child, second)));
+            }
+            _ => open.extend(node_b.children.map(|child| (first, child))),
+        }
+    }
+}
+
+/// Orders items so that those before the returned number are on one side of the longest side of their centres' box.
+fn split(items: &mut [Item]) -> usize {
+    let centre = |item: &Item, k: usize| item.bounds.lo[k] + item.bounds.hi[k];
+    let extent = |k: usize| {
+        let ends = items.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), item| {
+            (lo.min(centre(item, k)), hi.max(centre(item, k)))
+        });
+        ends.1 - ends.0
+    };
+    let extents = [extent(0), extent(1), extent(2)];
+    let axis = (0..3).max_by(|&i, &j| extents[i].total_cmp(&extents[j])).unwrap_or(0);
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by(middle, |x, y| {
+        centre(x, axis).total_cmp(&centre(y, axis)).then(x.place.cmp(&y.place))
+    });
+    middle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cbvh_testkit::Random;
+
+    fn item(random: &mut Random, place: u32) -> Item {
+        let lo = [(); 3].map(|()| 10.0 * random.signed());
+        let bounds = WorldBox { lo, hi: lo.map(|end| end + 1.0 + random.signed()) };
+        Item { place, bounds, groups: Groups { member: 1 << random.below(3), meets: 1 << random.below(3) } }
+    }
+
+    /// Checks the boxes, groups and the sum of girths of a tree.
+    fn check(tree: &Tree) {
+        let mut girth = 0.0;
+        for node in tree.nodes.iter().filter(|node| !node.is_leaf()) {
+            let [first, second] = node.children.map(|child| &tree.nodes[child as usize]);
+            assert_eq!(node.bounds, first.bounds.union(&second.bounds));
+            assert_eq!(node.groups, first.groups.union(second.groups));
+            girth += node.bounds.girth();
+        }
+        assert!((girth - tree.girth).abs() <= 1e-9 * (girth + 1.0), "{girth} {}", tree.girth);
+    }
+
+    #[test]
+    fn all_near_pairs_are_visited_once_after_any_moves() {
+        let random = &mut Random::new(5);
+        let (mut seen, mut grown) = (0, 0);
+        for count in [0, 1, 2, 3, 4, 7, 40] {
+            // Places in between are empty.
+            let mut items: Vec<Item> = (0..count).map(|number| item(random, 2 * number)).collect();
+            let mut broad = BroadPhase::default();
+            items.iter().for_each(|item| broad.replace(item.place));
+            for step in 0..200 {
+                if count > 0 {
+                    let number = random.below(count as usize);
+                    let place = 2 * number as u32;
+                    items[number] = item(random, place);
+                    if step % 40 == 39 {
+                        broad.replace(place);
+                    } else {
+                        broad.update(items[number]);
+                    }
+                }
+                grown += usize::from(broad.moving.has_grown());
+                broad.refresh(items.iter().copied(), 2 * count as usize);
+                check(&broad.still);
+                check(&broad.moving);
+                let limit = [0.0, 1.5, f64::INFINITY][step % 3];
+                let mut found = Vec::new();
+                broad.pairs(limit, |a, b, _| found.push((a.min(b), a.max(b))));
+                found.sort_unstable();
+                let mut expected = Vec::new();
+                for (number, a) in items.iter().enumerate() {
+                    for b in &items[number + 1..] {
+                        let gap = a.bounds.squared_gap(&b.bounds);
+                        if a.groups.meet(b.groups) && gap <= limit * limit {
+                            expected.push((a.place, b.place));
+                        }
+                    }
+                }
+                seen += expected.len();
+                assert_eq!(found, expected, "{count} {step}");
+            }
+        }
+        assert!(seen > 1000 && grown > 0, "{seen} {grown}");
+    }
+}

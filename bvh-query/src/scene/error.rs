@@ -1,0 +1,41 @@
+//! Why a scene refuses an instance, or a question over it has no answer.
+
+use crate::error::QueryError;
+use crate::scene::instance::InstanceId;
+
+/// Why a scene refuses an instance, or a question has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The scene never had this instance, or it has been removed.
+    #[error("instance {0}: expected an instance of the scene, found none; was it removed?")]
+    NoInstance(InstanceId),
+    /// Another instance has this name.
+    #[error("instance {0:?}: expected a name of its own, found it taken")]
+    NameTaken(String),
+    /// A pose with which a pair of instances may have no relative pose.
+    #[error(
+        "instance {instance}: expected {what}, found {found:e}; Pose::nearest orthonormalises a rotation"
+    )]
+    Pose {
+        /// The name or the identifier of the instance.
+        instance: String,
+        /// What was expected.
+        what: &'static str,
+        /// The entry of `R R^T - I`, or the translation.
+        found: f64,
+    },
+    /// The question about a pair has no answer.
+    #[error("instances {a} and {b}: {source}")]
+    Pair {
+        /// The name or the identifier of A.
+        a: String,
+        /// The name or the identifier of B.
+        b: String,
+        /// Why.
+        source: QueryError,
+    },
+    /// The question as a whole has no answer.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+}

@@ -1,0 +1,101 @@
+//! Instances: shapes placed in the world, and which of them are asked about.
+
+use crate::file::owned_shape::OwnedShape;
+use crate::pose::Pose;
+use crate::scene::broad_phase::Item;
+use crate::scene::world_box::WorldBox;
+use std::fmt;
+
+/// Names an instance of a scene. An identifier is never given twice by one scene, so that a removed instance is not
+/// mistaken for a later one. Identifiers are ordered by the places of their instances, and of a pair of instances the
+/// lower one is A.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct InstanceId {
+    pub(super) place: u32,
+    /// How often the place was taken before.
+    pub(super) generation: u32,
+}
+
+impl fmt::Display for InstanceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.generation == 0 {
+            write!(f, "{}", self.place)
+        } else {
+            write!(f, "{}.{}", self.place, self.generation)
+        }
+    }
+}
+
+/// Which groups an instance is in, and which groups it is asked about with, one bit per group. Two instances are asked
+/// about if each is in a group that the other meets. By default an instance is in all groups and meets all.
+///
+/// ```
+/// use bvh_query::Groups;
+///
+/// // What stands still is asked about with what moves, and not with what stands still.
+/// const STILL: u32 = 1;
+/// const MOVING: u32 = 2;
+/// let wall = Groups { member: STILL, meets: MOVING };
+/// let robot = Groups { member: MOVING, meets: STILL | MOVING };
+/// assert!(wall.meet(robot) && robot.meet(robot) && !wall.meet(wall));
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Groups {
+    /// The groups that the instance is in.
+    pub member: u32,
+    /// The groups that it meets.
+    pub meets: u32,
+}
+
+impl Groups {
+    /// In all groups, meets all.
+    pub const ALL: Self = Self { member: u32::MAX, meets: u32::MAX };
+    /// In no group.
+    pub(super) const NONE: Self = Self { member: 0, meets: 0 };
+
+    /// Returns whether instances of these groups are asked about.
+    pub fn meet(self, other: Self) -> bool {
+        self.member & other.meets != 0 && other.member & self.meets != 0
+    }
+
+    /// Returns groups that meet whatever one of both meets.
+    pub(super) fn union(self, other: Self) -> Self {
+        Self { member: self.member | other.member, meets: self.meets | other.meets }
+    }
+}
+
+impl Default for Groups {
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+/// A placed shape.
+#[derive(Clone, Debug)]
+pub(super) struct Instance {
+    pub(super) generation: u32,
+    pub(super) name: Option<String>,
+    pub(super) shape: OwnedShape,
+    pub(super) world: Pose,
+    pub(super) bounds: WorldBox,
+    pub(super) groups: Groups,
+    /// The places of the instances that it may touch, in ascending order.
+    pub(super) allowed: Vec<u32>,
+}
+
+impl Instance {
+    /// Returns its identifier, given its place.
+    pub(super) fn id(&self, place: u32) -> InstanceId {
+        InstanceId { place, generation: self.generation }
+    }
+
+    /// Returns what the broad phase knows of it, given its place.
+    pub(super) fn item(&self, place: u32) -> Item {
+        Item { place, bounds: self.bounds, groups: self.groups }
+    }
+
+    /// Returns whether it may touch the instance in another place.
+    pub(super) fn allows(&self, place: u32) -> bool {
+        !self.allowed.is_empty() && self.allowed.binary_search(&place).is_ok()
+    }
+}

@@ -1,0 +1,357 @@
+//! Scenes: many placed shapes, and questions over all pairs of them that matter.
+//!
+//! ```text
+//! set_pose ──> box in the world ──> tree of boxes (broad phase)
+//! question ──> pairs whose boxes are near, groups meet, contact is not allowed
+//!          ──> Pose::relative, Querier: one pair at a time, on one thread or on all ──> answers in the order of the pairs
+//! ```
+
+mod broad_phase;
+mod error;
+mod instance;
+mod question;
+mod workers;
+mod world_box;
+
+pub use error::SceneError;
+pub use instance::{Groups, InstanceId};
+pub use question::{SceneContact, SceneDistance, ScenePair};
+
+use crate::file::owned_shape::OwnedShape;
+use crate::isa::Backend;
+use crate::pose::{Pose, departure};
+use crate::query::answers::QueryStats;
+use broad_phase::BroadPhase;
+use instance::Instance;
+use std::collections::HashMap;
+use workers::Workers;
+use world_box::WorldBox;
+
+/// How far from orthonormal the rotation of an instance may be, measured as for a pose: eight times less than a pose, so
+/// that every pair of instances has a relative pose.
+const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 23) as f64;
+/// The largest translation of an instance along an axis, 2^118 mesh units, for the same reason.
+const MAX_TRANSLATION: f64 = (1u128 << 118) as f64;
+
+/// Many placed shapes, and questions over all pairs that are asked about.
+///
+/// An instance is a shape with its pose in the world. A question is over each pair of instances whose [`Groups`] meet and
+/// whose contact is not allowed ([`Scene::allow`]). Of a pair, the lower [`InstanceId`] is A, and the answer about it is
+/// that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers come in ascending order
+/// of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of threads, nor on what was
+/// asked before.
+///
+/// Cost: a moved instance takes about a microsecond. A question reads of each file the object table, and pages only of
+/// instances that are near something.
+///
+/// ```
+/// use bvh_query::{Bvh, OwnedShape, Pose, Scene};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+/// # let bvh = Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?.0)?;
+/// let shape = OwnedShape::from(bvh);
+/// let at = |height: f64| Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, height]);
+/// let mut scene = Scene::new()?;
+/// let floor = scene.add(shape.clone(), at(0.0)?)?;
+/// let part = scene.add(shape, at(2.0)?)?;
+/// assert!(!scene.collide()?);
+/// assert_eq!(scene.distance()?.map(|nearest| nearest.distance.distance), Some(2.0));
+/// scene.set_pose(part, at(0.0)?)?;
+/// assert_eq!(scene.pairs_in_contact()?.len(), 1);
+/// scene.allow(floor, part, true)?;
+/// assert!(!scene.collide()?);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Scene {
+    /// By place; `None` where an instance was removed.
+    instances: Vec<Option<Instance>>,
+    /// Places of removed instances with the generation of the next one.
+    free: Vec<(u32, u32)>,
+    names: HashMap<String, u32>,
+    broad: BroadPhase,
+    workers: Workers,
+    /// The pair that was nearest, or in contact, in the last question: a likely answer of the next.
+    likely: Option<(u32, u32)>,
+    stats: QueryStats,
+    pairs_asked: u64,
+}
+
+impl Scene {
+    /// Creates an empty scene with the fastest backend of this CPU, or with the one that the environment variable
+    /// `CBVH_ISA` names.
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new() -> Result<Self, SceneError> {
+        Ok(Self::with_backend(Backend::detect().map_err(|error| SceneError::Query(error.into()))?))
+    }
+
+    /// Creates an empty scene with a backend. The portable backend replaces one that the CPU lacks.
+    pub fn with_backend(backend: Backend) -> Self {
+        Self {
+            instances: Vec::new(),
+            free: Vec::new(),
+            names: HashMap::new(),
+            broad: BroadPhase::default(),
+            workers: Workers::new(backend),
+            likely: None,
+            stats: QueryStats::default(),
+            pairs_asked: 0,
+        }
+    }
+
+    /// Lets questions use all threads of the rayon pool that they are called in. Without it they use one.
+    #[cfg(feature = "parallel")]
+    pub fn set_parallel(&mut self, parallel: bool) {
+        self.workers.parallel = parallel;
+    }
+
+    /// Lets the question about each pair visit at most this many pairs of nodes, as
+    /// [`Querier::set_budget`](crate::Querier::set_budget) does.
+    pub fn set_budget(&mut self, visits: u64) {
+        self.workers.budget = visits;
+    }
+
+    /// Adds an instance. It is in all groups, and nothing is allowed to touch it.
+    ///
+    /// # Errors
+    /// [`SceneError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an axis:
+    /// within these limits every pair of instances has a relative pose. [`Pose::nearest`] orthonormalises a rotation.
+    pub fn add(&mut self, shape: impl Into<OwnedShape>, world: Pose) -> Result<InstanceId, SceneError> {
+        self.insert(None, shape.into(), world)
+    }
+
+    /// Adds an instance with a name of its own.
+    ///
+    /// # Errors
+    /// [`SceneError::NameTaken`] if another instance has the name, and the errors of [`Scene::add`].
+    pub fn add_named(
+        &mut self,
+        name: impl Into<String>,
+        shape: impl Into<OwnedShape>,
+        world: Pose,
+    ) -> Result<InstanceId, SceneError> {
+        self.insert(Some(name.into()), shape.into(), world)
+    }
+
+    fn insert(
+        &mut self,
+        name: Option<String>,
+        shape: OwnedShape,
+        world: Pose,
+    ) -> Result<InstanceId, SceneError> {
+        let (place, generation) = self.free.last().copied().unwrap_or((self.instances.len() as u32, 0));
+        let id = InstanceId { place, generation };
+        check_world(&world).map_err(|(what, found)| SceneError::Pose {
+            instance: name.clone().unwrap_or_else(|| id.to_string()),
+            what,
+            found,
+        })?;
+        if let Some(name) = &name {
+            if self.names.contains_key(name) {
+                return Err(SceneError::NameTaken(name.clone()));
+            }
+            self.names.insert(name.clone(), place);
+        }
+        let bounds = WorldBox::of(shape.shape(), &world);
+        let (groups, allowed) = (Groups::ALL, Vec::new());
+        let instance = Instance { generation, name, shape, world, bounds, groups, allowed };
+        if self.free.pop().is_some() {
+            self.instances[place as usize] = Some(instance);
+        } else {
+            self.instances.push(Some(instance));
+        }
+        self.broad.replace(place);
+        Ok(id)
+    }
+
+    /// Removes an instance, and what was allowed to touch it.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`] if the scene has no such instance, or no longer.
+    pub fn remove(&mut self, id: InstanceId) -> Result<(), SceneError> {
+        let place = self.place(id)?;
+        if let Some(instance) = self.instances[place].take() {
+            for other in instance.allowed {
+                if let Some(other) = &mut self.instances[other as usize] {
+                    other.allowed.retain(|&place| place != id.place);
+                }
+            }
+            if let Some(name) = instance.name {
+                self.names.remove(&name);
+            }
+            // After 2^32 instances in one place, the place is given up.
+            if let Some(next) = instance.generation.checked_add(1) {
+                self.free.push((id.place, next));
+            }
+        }
+        self.likely = None;
+        self.broad.replace(id.place);
+        Ok(())
+    }
+
+    /// Moves an instance.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`], or [`SceneError::Pose`] as for [`Scene::add`]. Then nothing has moved.
+    pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), SceneError> {
+        self.set_poses([(id, world)])
+    }
+
+    /// Moves many instances. Of an instance that is named twice, the last pose counts.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::set_pose`]. Then none has moved.
+    pub fn set_poses(
+        &mut self,
+        poses: impl IntoIterator<Item = (InstanceId, Pose), IntoIter: Clone>,
+    ) -> Result<(), SceneError> {
+        let poses = poses.into_iter();
+        for (id, world) in poses.clone() {
+            self.place(id)?;
+            check_world(&world).map_err(|(what, found)| SceneError::Pose {
+                instance: self.describe(id),
+                what,
+                found,
+            })?;
+        }
+        for (id, world) in poses {
+            if let Some(instance) = &mut self.instances[id.place as usize] {
+                instance.world = world;
+                instance.bounds = WorldBox::of(instance.shape.shape(), &world);
+                self.broad.update(instance.item(id.place));
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts an instance into groups.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn set_groups(&mut self, id: InstanceId, groups: Groups) -> Result<(), SceneError> {
+        let place = self.place(id)?;
+        if let Some(instance) = &mut self.instances[place] {
+            instance.groups = groups;
+            self.broad.update(instance.item(id.place));
+        }
+        Ok(())
+    }
+
+    /// Allows two instances to touch, or forbids it again. An allowed pair takes part in no question: neighbours on a robot,
+    /// or a part and its gripper.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn allow(&mut self, a: InstanceId, b: InstanceId, may_touch: bool) -> Result<(), SceneError> {
+        for (own, other) in [(self.place(a)?, self.place(b)? as u32), (self.place(b)?, a.place)] {
+            let Some(instance) = &mut self.instances[own] else { continue };
+            match (instance.allowed.binary_search(&other), may_touch) {
+                (Err(at), true) => instance.allowed.insert(at, other),
+                (Ok(at), false) => {
+                    instance.allowed.remove(at);
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the instance with a name.
+    pub fn find(&self, name: &str) -> Option<InstanceId> {
+        let &place = self.names.get(name)?;
+        let generation = self.instances[place as usize].as_ref()?.generation;
+        Some(InstanceId { place, generation })
+    }
+
+    /// Returns the name of an instance, if it has one.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn name(&self, id: InstanceId) -> Result<Option<&str>, SceneError> {
+        Ok(self.instance(id)?.name.as_deref())
+    }
+
+    /// Returns the shape of an instance.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn shape(&self, id: InstanceId) -> Result<&OwnedShape, SceneError> {
+        Ok(&self.instance(id)?.shape)
+    }
+
+    /// Returns the pose of an instance in the world.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn pose(&self, id: InstanceId) -> Result<&Pose, SceneError> {
+        Ok(&self.instance(id)?.world)
+    }
+
+    /// Returns all instances in ascending order.
+    pub fn instances(&self) -> impl Iterator<Item = InstanceId> {
+        let id = |(place, instance): (u32, &Option<Instance>)| {
+            Some(InstanceId { place, generation: instance.as_ref()?.generation })
+        };
+        (0..).zip(&self.instances).filter_map(id)
+    }
+
+    /// Returns the number of instances.
+    pub fn len(&self) -> usize {
+        self.instances.iter().flatten().count()
+    }
+
+    /// Returns whether there are no instances.
+    pub fn is_empty(&self) -> bool {
+        self.instances.iter().all(Option::is_none)
+    }
+
+    /// Returns how much work the last question was, over all its pairs.
+    pub fn stats(&self) -> QueryStats {
+        self.stats
+    }
+
+    /// Returns how many pairs the last question asked about: those whose boxes were near enough.
+    pub fn pairs_asked(&self) -> u64 {
+        self.pairs_asked
+    }
+
+    fn instance(&self, id: InstanceId) -> Result<&Instance, SceneError> {
+        let instance = self.instances.get(id.place as usize).and_then(Option::as_ref);
+        instance.filter(|instance| instance.generation == id.generation).ok_or(SceneError::NoInstance(id))
+    }
+
+    fn place(&self, id: InstanceId) -> Result<usize, SceneError> {
+        self.instance(id).map(|_| id.place as usize)
+    }
+
+    /// Names an instance for a person.
+    fn describe(&self, id: InstanceId) -> String {
+        match self.instance(id) {
+            Ok(Instance { name: Some(name), .. }) => name.clone(),
+            _ => id.to_string(),
+        }
+    }
+
+    /// Starts a question: builds the broad phase, if it does not show all instances as they are.
+    fn start(&mut self) {
+        (self.stats, self.pairs_asked) = (QueryStats::default(), 0);
+        let item = |(place, instance): (u32, &Option<Instance>)| Some(instance.as_ref()?.item(place));
+        self.broad.refresh((0..).zip(&self.instances).filter_map(item), self.instances.len());
+    }
+}
+
+/// Refuses a pose with which a pair may have no relative pose. Returns what is wrong with it and by how much.
+fn check_world(world: &Pose) -> Result<(), (&'static str, f64)> {
+    let far = world.translation().into_iter().find(|t| t.abs() > MAX_TRANSLATION);
+    let error = departure(world.rotation(), 1.0);
+    match far {
+        Some(far) => Err(("a translation of at most 2^118 along each axis", far)),
+        None if error > MAX_RIGID_ERROR => Err(("a rotation within 2^-23 of orthonormal", error)),
+        None => Ok(()),
+    }
+}

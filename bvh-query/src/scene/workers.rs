@@ -1,0 +1,97 @@
+//! Queriers for the pairs of a question: one, or one for each thread that takes part.
+
+use crate::error::QueryError;
+use crate::isa::Backend;
+use crate::query::answers::QueryStats;
+use crate::query::querier::Querier;
+use std::fmt;
+use std::sync::{Mutex, PoisonError};
+
+/// Queriers that keep their memory from question to question.
+pub(super) struct Workers {
+    backend: Backend,
+    pub(super) budget: u64,
+    #[cfg(feature = "parallel")]
+    pub(super) parallel: bool,
+    idle: Mutex<Vec<Querier>>,
+}
+
+impl fmt::Debug for Workers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Workers").field("backend", &self.backend).field("budget", &self.budget).finish()
+    }
+}
+
+impl Workers {
+    pub(super) fn new(backend: Backend) -> Self {
+        Self {
+            backend,
+            budget: u64::MAX,
+            #[cfg(feature = "parallel")]
+            parallel: false,
+            idle: Mutex::default(),
+        }
+    }
+
+    /// Returns the number of threads that questions use.
+    pub(super) fn threads(&self) -> usize {
+        #[cfg(feature = "parallel")]
+        if self.parallel {
+            return rayon::current_num_threads();
+        }
+        1
+    }
+
+    /// Lends a querier to `work`.
+    fn lend<R>(&self, work: impl FnOnce(&mut Querier) -> R) -> R {
+        // A panic elsewhere leaves the list of queriers whole.
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut querier = idle().pop().unwrap_or_else(|| Querier::with_backend(self.backend));
+        querier.set_budget(self.budget);
+        let result = work(&mut querier);
+        idle().push(querier);
+        result
+    }
+
+    /// Asks about each pair and returns the answers that are not `None`, in the order of the pairs. The error is that of the
+    /// first pair, in their order, that has one.
+    pub(super) fn each<P: Sync, R: Send>(
+        &self,
+        pairs: &[P],
+        stats: &mut QueryStats,
+        ask: impl Fn(&mut Querier, &P) -> Result<Option<R>, QueryError> + Sync,
+    ) -> Result<Vec<R>, (usize, QueryError)> {
+        if pairs.is_empty() {
+            return Ok(Vec::new());
+        }
+        let share = |first: usize, pairs: &[P]| {
+            self.lend(|querier| {
+                let (mut found, mut stats) = (Vec::new(), QueryStats::default());
+                for (number, pair) in (first..).zip(pairs) {
+                    let answer = ask(querier, pair).map_err(|error| (number, error))?;
+                    stats.add(querier.stats().node_tests, querier.stats());
+                    found.extend(answer);
+                }
+                Ok((found, stats))
+            })
+        };
+        #[cfg(feature = "parallel")]
+        if self.threads() > 1 && pairs.len() > 1 {
+            use rayon::prelude::*;
+            // A few shares for each thread, because pairs take different times.
+            let size = pairs.len().div_ceil(4 * self.threads());
+            let of_share = |(number, pairs): (usize, &[P])| share(number * size, pairs);
+            let shares: Vec<_> = pairs.par_chunks(size).enumerate().map(of_share).collect();
+            let mut all = Vec::new();
+            for part in shares {
+                let (found, part) = part?;
+                all.extend(found);
+                stats.add(part.node_tests, part);
+            }
+            return Ok(all);
+        }
+        let (found, part) = share(0, pairs)?;
+        stats.add(part.node_tests, part);
+        Ok(found)
+    }
+}

@@ -1,0 +1,80 @@
+//! Boxes of placed shapes along the axes of the world: outward of whatever a question computes.
+//!
+//! A question about two instances places B in A's frame by `Pose::relative`. Its vertices, seen from the world through A's
+//! exact pose, are where B's exact pose puts them but for roundings: with u = 2^-53, m the sum of the magnitudes of a
+//! translation and of what it places, over both instances, entries of the relative rotation are off by at most 24u and its
+//! translation by 64u m (see `pose/frames.rs`), and placing a vertex by 8u m more. Over three axes that is below 2^-45 m, and
+//! each box is larger by 2^-43 of its own share of m: computing the box itself loses less than the rest. A's frame may be stretched against the world by 2^-22, so that
+//! squares of distances between boxes count for 2^-19 less: see `squared_gap`.
+
+use crate::file::shape::Shape;
+use crate::pose::Pose;
+
+/// The share of the magnitudes that a box is larger by.
+const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
+
+/// A box along the axes of the world, in mesh units.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct WorldBox {
+    pub(super) lo: [f64; 3],
+    pub(super) hi: [f64; 3],
+}
+
+impl WorldBox {
+    /// A box that contains nothing.
+    pub(super) const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
+
+    /// Bounds a placed shape by the boxes and spheres of its objects, which are in the object table: no page is touched.
+    pub(super) fn of(shape: Shape<'_>, world: &Pose) -> Self {
+        let (rotation, translation) = (world.rotation(), world.translation());
+        let mut bounds = Self::EMPTY;
+        for object in shape.objects() {
+            let record = object.record();
+            let origin = object.origin();
+            let ends =
+                [0, 1, 2].map(|k| [record.box_lo[k], record.box_hi[k]].map(|end| f64::from(end.get())));
+            let centre = [0, 1, 2].map(|k| origin[k] + (ends[k][0] + ends[k][1]) / 2.0);
+            let half = [0, 1, 2].map(|k| (ends[k][1] - ends[k][0]) / 2.0);
+            let middle = [0, 1, 2].map(|k| origin[k] + f64::from(record.sphere_centre[k].get()));
+            // The pose may stretch by 2^-20.
+            let radius = f64::from(record.sphere_radius.get()) * (1.0 + 1.0 / (1 << 19) as f64);
+            let mut magnitude = radius;
+            for k in 0..3 {
+                magnitude += origin[k].abs() + ends[k][0].abs() + ends[k][1].abs() + translation[k].abs();
+            }
+            let error = ERROR * magnitude;
+            for k in 0..3 {
+                let r = &rotation[k];
+                let at = |p: [f64; 3]| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + translation[k];
+                let reach = r[0].abs() * half[0] + r[1].abs() * half[1] + r[2].abs() * half[2];
+                let (box_at, sphere_at) = (at(centre), at(middle));
+                bounds.lo[k] = bounds.lo[k].min((box_at - reach).max(sphere_at - radius) - error);
+                bounds.hi[k] = bounds.hi[k].max((box_at + reach).min(sphere_at + radius) + error);
+            }
+        }
+        bounds
+    }
+
+    /// Returns the smallest box around both.
+    pub(super) fn union(&self, other: &Self) -> Self {
+        let (lo, hi) = (|k: usize| self.lo[k].min(other.lo[k]), |k: usize| self.hi[k].max(other.hi[k]));
+        Self { lo: [lo(0), lo(1), lo(2)], hi: [hi(0), hi(1), hi(2)] }
+    }
+
+    /// Returns the sum of the sides: how often a box is met grows with it. That of the empty box is 0.
+    pub(super) fn girth(&self) -> f64 {
+        (0..3).map(|k| (self.hi[k] - self.lo[k]).max(0.0)).sum()
+    }
+
+    /// Returns the square of a lower bound of the distance that a question may find between what is in the boxes; 0 if they
+    /// meet. Coordinates are 0 or between 2^-300 and 2^120, so that squares neither underflow nor overflow.
+    #[inline]
+    pub(super) fn squared_gap(&self, other: &Self) -> f64 {
+        let mut squared = 0.0;
+        for k in 0..3 {
+            let apart = (self.lo[k] - other.hi[k]).max(other.lo[k] - self.hi[k]).max(0.0);
+            squared += apart * apart;
+        }
+        squared * (1.0 - 1.0 / (1 << 19) as f64)
+    }
+}

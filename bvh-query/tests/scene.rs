@@ -1,0 +1,472 @@
+//! Scenes against brute force over all pairs, to the bit: every question, every frame, all backends, one thread and two.
+
+mod common;
+
+use bvh_query::{
+    Backend, Contact, Distance, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError, Scene, SceneError,
+};
+use cbvh_testkit::depth::rounds;
+use common::shapes::{cube, moved, plate, sphere, torus};
+use common::{Random, Triangle, bake, mesh, random_pose, shared};
+use std::sync::Arc;
+
+fn shape(triangles: &[Triangle]) -> OwnedShape {
+    bake(&mesh(triangles), &bvh_bake::Options::default()).into()
+}
+
+/// Shapes of different sizes, one of them far from its own origin, and one object of a file of two.
+fn shapes() -> Vec<OwnedShape> {
+    let mut two = mesh(&sphere(1));
+    two.objects.extend(mesh(&moved(&torus(8, 6), 0.5, [3.0, 0.0, 0.0])).objects);
+    let two = Arc::new(bake(&two, &bvh_bake::Options::default().split_objects(true)));
+    vec![
+        shape(&sphere(2)),
+        shape(&torus(12, 8)),
+        shape(&plate(4)),
+        shape(&moved(&sphere(1), 0.4, [100.0, -50.0, 7.0])),
+        OwnedShape::object(two.clone(), 1).unwrap(),
+        two.into(),
+    ]
+}
+
+/// What a scene should hold.
+#[derive(Clone)]
+struct Placed {
+    id: InstanceId,
+    shape: OwnedShape,
+    world: Pose,
+    groups: Groups,
+    allowed: Vec<InstanceId>,
+}
+
+/// A pose near others, for a shape whose middle may be anywhere.
+fn place(random: &mut Random, shape: &OwnedShape, spread: f64) -> Pose {
+    let turned = random_pose(random, 1.0);
+    let record = shape.shape().objects()[0].record();
+    let origin = shape.shape().objects()[0].origin();
+    let centre = [0, 1, 2].map(|k| origin[k] + f64::from(record.sphere_centre[k].get()));
+    let at = [(); 3].map(|()| spread * random.signed());
+    let there = turned.rotation().map(|row| row[0] * centre[0] + row[1] * centre[1] + row[2] * centre[2]);
+    Pose::new(*turned.rotation(), [0, 1, 2].map(|k| at[k] - there[k])).unwrap()
+}
+
+/// The answers about one frame.
+#[derive(Debug, PartialEq, Default)]
+struct Answers {
+    in_contact: Vec<(InstanceId, InstanceId)>,
+    within: Vec<(InstanceId, InstanceId)>,
+    contacts: Vec<(InstanceId, InstanceId, Contact)>,
+    distance: Option<(InstanceId, InstanceId, Distance)>,
+}
+
+const D: f64 = 0.3;
+
+/// Asks about every pair by itself.
+fn brute_force(placed: &[Placed], querier: &mut Querier) -> Answers {
+    let (mut answers, mut distances) = (Answers::default(), Vec::new());
+    for (number, a) in placed.iter().enumerate() {
+        for b in &placed[number + 1..] {
+            let (a, b) = if a.id < b.id { (a, b) } else { (b, a) };
+            let groups = [a, b].map(|side| side.groups);
+            let meet = groups[0].member & groups[1].meets != 0 && groups[1].member & groups[0].meets != 0;
+            if !meet || a.allowed.contains(&b.id) {
+                continue;
+            }
+            let pose = Pose::relative(&a.world, &b.world).unwrap();
+            let ids = (a.id, b.id);
+            if querier.collide(&a.shape, &b.shape, &pose).unwrap() {
+                answers.in_contact.push(ids);
+            }
+            if querier.within(&a.shape, &b.shape, &pose, D).unwrap() {
+                answers.within.push(ids);
+            }
+            let contacts = querier.contacts(&a.shape, &b.shape, &pose).unwrap();
+            answers.contacts.extend(contacts.into_iter().map(|contact| (a.id, b.id, contact)));
+            let distance = querier.distance(&a.shape, &b.shape, &pose).unwrap();
+            distances.push((a.id, b.id, distance));
+        }
+    }
+    answers.in_contact.sort_unstable();
+    answers.within.sort_unstable();
+    answers.contacts.sort_unstable();
+    distances.sort_by(|x, y| (x.2.distance, x.0, x.1).partial_cmp(&(y.2.distance, y.0, y.1)).unwrap());
+    answers.distance = distances.first().copied();
+    answers
+}
+
+fn ask(scene: &mut Scene) -> Answers {
+    let pairs = |pairs: Vec<bvh_query::ScenePair>| pairs.into_iter().map(|pair| (pair.a, pair.b)).collect();
+    let contacts: Vec<_> = scene.contacts().unwrap();
+    let mut visited = Vec::new();
+    scene
+        .visit_contacts(|pair, contacts| {
+            visited.extend(contacts.iter().map(|&contact| (pair, contact)));
+            true
+        })
+        .unwrap();
+    assert_eq!(visited, contacts.iter().map(|of| (of.pair, of.contact)).collect::<Vec<_>>());
+    let answers = Answers {
+        in_contact: pairs(scene.pairs_in_contact().unwrap()),
+        within: pairs(scene.pairs_within(D).unwrap()),
+        contacts: contacts.into_iter().map(|of| (of.pair.a, of.pair.b, of.contact)).collect(),
+        distance: scene.distance().unwrap().map(|of| (of.pair.a, of.pair.b, of.distance)),
+    };
+    assert_eq!(scene.collide().unwrap(), !answers.in_contact.is_empty());
+    assert_eq!(scene.within(D).unwrap(), !answers.within.is_empty());
+    assert_eq!(scene.pairs_within(0.0).unwrap(), scene.pairs_in_contact().unwrap());
+    answers
+}
+
+/// Scenes with one thread and two on each backend.
+fn scenes() -> Vec<Scene> {
+    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+    backends
+        .flat_map(|backend| {
+            [false, true].map(|parallel| {
+                let mut scene = Scene::with_backend(backend);
+                scene.set_parallel(parallel);
+                scene
+            })
+        })
+        .collect()
+}
+
+#[test]
+fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let random = &mut Random::new(7);
+    let shapes = shapes();
+    let mut querier = Querier::new().unwrap();
+    let (mut touching, mut apart) = (0, 0);
+    for round in 0..rounds(3) {
+        let mut scenes = scenes();
+        let mut placed: Vec<Placed> = Vec::new();
+        let spread = [2.0, 4.0, 9.0][round as usize % 3];
+        for frame in 0..8 {
+            // Some come, some go, most move; some change their groups and what they may touch.
+            for _ in 0..if frame == 0 { 8 } else { random.below(3) } {
+                let shape = shapes[random.below(shapes.len())].clone();
+                let world = place(random, &shape, spread);
+                let ids: Vec<_> =
+                    scenes.iter_mut().map(|scene| scene.add(shape.clone(), world).unwrap()).collect();
+                assert!(ids.iter().all(|id| *id == ids[0]));
+                placed.push(Placed { id: ids[0], shape, world, groups: Groups::ALL, allowed: Vec::new() });
+            }
+            if frame > 2 && random.below(2) == 0 {
+                let gone = placed.swap_remove(random.below(placed.len()));
+                placed.iter_mut().for_each(|other| other.allowed.retain(|id| *id != gone.id));
+                for scene in &mut scenes {
+                    scene.remove(gone.id).unwrap();
+                    assert_eq!(scene.pose(gone.id), Err(SceneError::NoInstance(gone.id)));
+                }
+            }
+            let mut moves = Vec::new();
+            for instance in &mut placed {
+                if random.below(3) > 0 {
+                    instance.world = place(random, &instance.shape, spread);
+                    moves.push((instance.id, instance.world));
+                }
+                if random.below(4) == 0 {
+                    let bits = |random: &mut Random| 1 + random.below(7) as u32;
+                    instance.groups = Groups { member: bits(random), meets: bits(random) };
+                    for scene in &mut scenes {
+                        scene.set_groups(instance.id, instance.groups).unwrap();
+                    }
+                }
+            }
+            let (first, second) = (random.below(placed.len()), random.below(placed.len()));
+            if first != second {
+                let (a, b) = (placed[first].id, placed[second].id);
+                let allows = random.below(3) > 0;
+                for (own, other) in [(first, b), (second, a)] {
+                    placed[own].allowed.retain(|id| *id != other);
+                    if allows {
+                        placed[own].allowed.push(other);
+                    }
+                }
+                scenes.iter_mut().for_each(|scene| scene.allow(a, b, allows).unwrap());
+            }
+            let expected = brute_force(&placed, &mut querier);
+            touching += expected.in_contact.len();
+            apart += usize::from(expected.distance.is_some_and(|(_, _, found)| found.distance > 0.0));
+            for (number, scene) in scenes.iter_mut().enumerate() {
+                scene.set_poses(moves.iter().copied()).unwrap();
+                assert_eq!(scene.len(), placed.len());
+                assert_eq!(pool.install(|| ask(scene)), expected, "scene {number}, frame {frame}");
+                // Asked again, with what the scene remembers.
+                assert_eq!(pool.install(|| ask(scene)), expected, "scene {number}, frame {frame}");
+            }
+        }
+    }
+    assert!(touching > 20 && apart > 3, "{touching} {apart}");
+}
+
+/// Many instances of which few are near each other: what the tree of boxes is for.
+#[test]
+fn a_tree_of_boxes_misses_no_pair_wherever_instances_move() {
+    let random = &mut Random::new(9);
+    let shape = shape(&sphere(1));
+    let mut scene = Scene::new().unwrap();
+    let count = 300;
+    let grid = |number: usize| [number % 10, number / 10 % 10, number / 100].map(|k| 2.5 * k as f64);
+    let at = |p: [f64; 3]| Pose::new(*Pose::IDENTITY.rotation(), p).unwrap();
+    let mut places: Vec<[f64; 3]> = (0..count).map(grid).collect();
+    let ids: Vec<_> = places.iter().map(|&p| scene.add(shape.clone(), at(p)).unwrap()).collect();
+    let mut querier = Querier::new().unwrap();
+    for _ in 0..rounds(20) {
+        // Far more than once through the tree, so that it is built anew.
+        for _ in 0..60 {
+            let number = random.below(count);
+            places[number] = [(); 3].map(|()| 12.5 + 14.0 * random.signed());
+            scene.set_pose(ids[number], at(places[number])).unwrap();
+        }
+        let mut expected = Vec::new();
+        for i in 0..count {
+            for j in i + 1..count {
+                let apart: f64 = (0..3).map(|k| (places[i][k] - places[j][k]).powi(2)).sum();
+                if apart <= 4.1 {
+                    let pose = Pose::relative(&at(places[i]), &at(places[j])).unwrap();
+                    if querier.collide(&shape, &shape, &pose).unwrap() {
+                        expected.push((ids[i], ids[j]));
+                    }
+                }
+            }
+        }
+        let found: Vec<_> =
+            scene.pairs_in_contact().unwrap().into_iter().map(|pair| (pair.a, pair.b)).collect();
+        assert_eq!(found, expected);
+        assert!(!expected.is_empty());
+    }
+}
+
+/// Cubes face to face, where the boxes round and the pose of one in the frame of the other does not.
+#[test]
+fn cubes_that_touch_far_from_the_origin_are_found() {
+    let random = &mut Random::new(11);
+    let cube = shape(&cube());
+    let mut querier = Querier::new().unwrap();
+    let (mut touching, mut apart) = (0, 0);
+    for _ in 0..rounds(3000) {
+        let far = 2f64.powi(random.below(60) as i32);
+        let from = [(); 3].map(|()| far * random.signed());
+        let (axis, turn) = (random.below(3), random.below(4));
+        let (sin, cos) = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)][turn];
+        let rotation = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
+        // One unit in the last place more or less, or none.
+        let mut to = from;
+        to[axis] += 2.0;
+        to[axis] = [to[axis].next_down(), to[axis], to[axis].next_up()][random.below(3)];
+        let (a, b) = (Pose::new(rotation, from).unwrap(), Pose::new(*Pose::IDENTITY.rotation(), to).unwrap());
+        let expected = querier.collide(&cube, &cube, &Pose::relative(&a, &b).unwrap()).unwrap();
+        let mut scene = Scene::new().unwrap();
+        scene.add(cube.clone(), a).unwrap();
+        scene.add(cube.clone(), b).unwrap();
+        assert_eq!(scene.pairs_in_contact().unwrap().len(), usize::from(expected), "{a:?} {b:?}");
+        *(if expected { &mut touching } else { &mut apart }) += 1;
+    }
+    assert!(touching > 500 && apart > 100, "{touching} {apart}");
+}
+
+#[test]
+fn an_empty_scene_and_one_instance_have_no_pairs() {
+    let mut scene = Scene::new().unwrap();
+    assert_eq!(ask(&mut scene), Answers::default());
+    assert!(scene.is_empty());
+    let id = scene.add(shape(&sphere(1)), Pose::IDENTITY).unwrap();
+    assert_eq!(ask(&mut scene), Answers::default());
+    scene.remove(id).unwrap();
+    assert_eq!(ask(&mut scene), Answers::default());
+    // The place is taken again, under another identifier.
+    let next = scene.add(shape(&sphere(1)), Pose::IDENTITY).unwrap();
+    assert!(next != id && scene.remove(id) == Err(SceneError::NoInstance(id)));
+    assert_eq!(scene.instances().collect::<Vec<_>>(), [next]);
+}
+
+#[test]
+fn bad_instances_are_refused_and_change_nothing() {
+    let shape = shape(&sphere(1));
+    let mut scene = Scene::new().unwrap();
+    let other = Scene::new().unwrap().add(shape.clone(), Pose::IDENTITY).unwrap();
+    let base = scene.add_named("base", shape.clone(), Pose::IDENTITY).unwrap();
+    assert_eq!((scene.find("base"), scene.find("tip")), (Some(base), None));
+    assert_eq!(scene.name(base), Ok(Some("base")));
+    let again = scene.add_named("base", shape.clone(), Pose::IDENTITY);
+    assert_eq!(again, Err(SceneError::NameTaken("base".into())));
+    assert_eq!(scene.len(), 1);
+    let sheared = Pose::new([[1.0, 1.5e-7, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
+    let far = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 2f64.powi(118).next_up(), 0.0]).unwrap();
+    for (pose, words) in [(sheared, "a rotation within 2^-23"), (far, "at most 2^118")] {
+        let said = scene.add_named("arm", shape.clone(), pose).unwrap_err().to_string();
+        assert!(said.starts_with("instance arm: expected ") && said.contains(words), "{said}");
+        assert_eq!(scene.find("arm"), None);
+        let near = Pose::new(*Pose::IDENTITY.rotation(), [5.0, 0.0, 0.0]).unwrap();
+        let said = scene.set_poses([(base, near), (base, pose)]).unwrap_err().to_string();
+        assert!(said.starts_with("instance base: expected ") && said.contains(words), "{said}");
+        assert_eq!(scene.pose(base), Ok(&Pose::IDENTITY));
+    }
+    let tip = scene.add_named("tip", shape.clone(), Pose::IDENTITY).unwrap();
+    scene.remove(tip).unwrap();
+    for refused in [
+        scene.set_pose(tip, Pose::IDENTITY),
+        scene.set_groups(tip, Groups::ALL),
+        scene.allow(base, tip, true),
+        scene.allow(tip, base, true),
+        scene.remove(tip),
+    ] {
+        assert_eq!(refused, Err(SceneError::NoInstance(tip)));
+    }
+    assert_eq!(scene.find("tip"), None);
+    // An identifier of another scene may by chance be one of this scene.
+    assert!(scene.pose(other).is_ok());
+    for d in [f64::NAN, -1.0, f64::INFINITY] {
+        assert!(matches!(scene.within(d), Err(SceneError::Query(QueryError::Number { .. }))));
+        assert!(matches!(scene.pairs_within(d), Err(SceneError::Query(QueryError::Number { .. }))));
+    }
+    scene.add_named("tip", shape, Pose::IDENTITY).unwrap();
+    scene.set_budget(1);
+    let said = scene.pairs_in_contact().unwrap_err().to_string();
+    assert!(said.starts_with("instances base and tip: expected an answer within 1 visits"), "{said}");
+    scene.set_budget(u64::MAX);
+    assert_eq!(scene.pairs_in_contact().unwrap().len(), 1);
+}
+
+/// A scene of `shared/scenes`: instances with their meshes and poses, what moves, what may touch, and the frames.
+struct SharedScene {
+    instances: Vec<(String, OwnedShape, Pose)>,
+    moving: Vec<usize>,
+    allowed: Vec<(usize, usize)>,
+    frames: Vec<Vec<Pose>>,
+}
+
+fn numbers(words: &[&str]) -> Pose {
+    let numbers: Vec<f64> = words.iter().map(|word| word.parse().unwrap()).collect();
+    Pose::from_rows(numbers[..].try_into().unwrap()).unwrap()
+}
+
+impl SharedScene {
+    fn read(name: &str) -> Option<Self> {
+        let path = shared(&format!("scenes/{name}.scene"))?;
+        let frames = std::fs::read_to_string(shared(&format!("scenes/{name}_frames.txt"))?).unwrap();
+        let lines = |text: &str| -> Vec<Vec<String>> {
+            let words = |line: &str| {
+                line.split('#').next().unwrap().split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+            };
+            text.lines().map(words).filter(|words| !words.is_empty()).collect()
+        };
+        let mut meshes = std::collections::HashMap::new();
+        let (mut instances, mut moving, mut allowed) = (Vec::new(), Vec::new(), Vec::new());
+        let place = |instances: &[(String, OwnedShape, Pose)], name: &str| {
+            instances.iter().position(|(held, ..)| held == name).unwrap()
+        };
+        for line in lines(&std::fs::read_to_string(&path).unwrap()) {
+            let words: Vec<&str> = line.iter().map(String::as_str).collect();
+            match words[..] {
+                ["mesh", name, file] => {
+                    let mesh = bvh_bake::input::read(&path.with_file_name(file)).unwrap().merged();
+                    let shape = OwnedShape::from(bake(&mesh, &bvh_bake::Options::default()));
+                    meshes.insert(name.to_owned(), shape);
+                }
+                ["instance", name, mesh, ..] => {
+                    instances.push((name.to_owned(), meshes[mesh].clone(), numbers(&words[3..])));
+                }
+                ["moving", ref names @ ..] => {
+                    moving.extend(names.iter().map(|name| place(&instances, name)));
+                }
+                ["allow", a, b] => allowed.push((place(&instances, a), place(&instances, b))),
+                _ => panic!("{line:?}"),
+            }
+        }
+        let frame = |line: &Vec<String>| {
+            let words: Vec<&str> = line.iter().map(String::as_str).collect();
+            words.chunks(12).map(numbers).collect()
+        };
+        Some(Self { instances, moving, allowed, frames: lines(&frames).iter().map(frame).collect() })
+    }
+}
+
+#[test]
+fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    // Least distances of all pairs take brute force long: one frame in so many.
+    for (name, frames, every) in
+        [("clutter60", 200, 20), ("clutter300", 200, 50), ("arm", 500, 50), ("many5k", 500, 250)]
+    {
+        let Some(shared) = SharedScene::read(name) else { return };
+        let mut scenes = scenes();
+        let mut ids = Vec::new();
+        for scene in &mut scenes {
+            ids = shared
+                .instances
+                .iter()
+                .map(|(name, shape, world)| scene.add_named(name.clone(), shape.clone(), *world).unwrap())
+                .collect::<Vec<_>>();
+            for (number, &id) in ids.iter().enumerate() {
+                let moves = shared.moving.contains(&number);
+                let (member, meets) = if moves { (1, 3) } else { (2, 1) };
+                scene.set_groups(id, Groups { member, meets }).unwrap();
+            }
+            shared.allowed.iter().for_each(|&(a, b)| scene.allow(ids[a], ids[b], true).unwrap());
+        }
+        let mut worlds: Vec<Pose> = shared.instances.iter().map(|(_, _, world)| *world).collect();
+        let mut querier = Querier::new().unwrap();
+        let step = cbvh_testkit::depth::step(4);
+        for (number, frame) in shared.frames.iter().enumerate().take(frames).step_by(step) {
+            shared.moving.iter().zip(frame).for_each(|(&instance, pose)| worlds[instance] = *pose);
+            let mut expected = Answers::default();
+            let mut nearest: Option<(f64, InstanceId, InstanceId)> = None;
+            let is_moving = |number: usize| shared.moving.contains(&number);
+            let asks_distance = number % every == 0;
+            for a in 0..ids.len() {
+                // Of two that stand still, nothing is asked.
+                let others: Vec<usize> = if is_moving(a) {
+                    (a + 1..ids.len()).collect()
+                } else {
+                    shared.moving.iter().copied().filter(|&b| b > a).collect()
+                };
+                for b in others {
+                    if shared.allowed.contains(&(a, b)) || shared.allowed.contains(&(b, a)) {
+                        continue;
+                    }
+                    let pose = Pose::relative(&worlds[a], &worlds[b]).unwrap();
+                    let shapes = [a, b].map(|number| &shared.instances[number].1);
+                    if querier.collide(shapes[0], shapes[1], &pose).unwrap() {
+                        expected.in_contact.push((ids[a], ids[b]));
+                    }
+                    if querier.within(shapes[0], shapes[1], &pose, 0.02).unwrap() {
+                        expected.within.push((ids[a], ids[b]));
+                    }
+                    if asks_distance {
+                        let distance = querier.distance(shapes[0], shapes[1], &pose).unwrap().distance;
+                        if nearest.is_none_or(|held| (distance, ids[a], ids[b]) < held) {
+                            nearest = Some((distance, ids[a], ids[b]));
+                        }
+                    }
+                }
+            }
+            expected.in_contact.sort_unstable();
+            expected.within.sort_unstable();
+            let poses = shared.moving.iter().zip(frame).map(|(&instance, pose)| (ids[instance], *pose));
+            for scene in &mut scenes {
+                scene.set_poses(poses.clone()).unwrap();
+                let pairs = |pairs: Vec<bvh_query::ScenePair>| -> Vec<_> {
+                    pairs.into_iter().map(|pair| (pair.a, pair.b)).collect()
+                };
+                pool.install(|| {
+                    assert_eq!(
+                        pairs(scene.pairs_in_contact().unwrap()),
+                        expected.in_contact,
+                        "{name} {number}"
+                    );
+                    assert_eq!(pairs(scene.pairs_within(0.02).unwrap()), expected.within, "{name} {number}");
+                    assert_eq!(scene.collide().unwrap(), !expected.in_contact.is_empty());
+                    let found = scene.distance().unwrap().unwrap();
+                    assert_eq!(found.distance.distance == 0.0, !expected.in_contact.is_empty());
+                    if asks_distance {
+                        let found = (found.distance.distance, found.pair.a, found.pair.b);
+                        assert_eq!(Some(found), nearest, "{name} {number}");
+                    }
+                });
+            }
+        }
+    }
+}
