@@ -25,6 +25,7 @@
 //!
 //! - `cargo run --release --example collide`: two meshes in one pose, touching or how far apart.
 //! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
+//! - `cargo run --release --example robot`: a robot of a URDF file among obstacles, in a [`Scene`].
 //! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
 //!
 //! In short:

@@ -1,0 +1,158 @@
+//! Moves a robot among obstacles, and tells what touches and how much room is left.
+//!
+//! ```text
+//! cargo run --release --example robot -- [URDF]
+//! ```
+//!
+//! The robot is a URDF file whose collision meshes are beside it; by default, a small arm from the folder `testdata` of the
+//! workspace. Links that a joint connects may touch. All joints that turn or slide follow a wave within their limits.
+#![allow(clippy::print_stdout, reason = "a program prints its answers")]
+
+use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, PoseError, Scene};
+use std::collections::HashMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use urdf_rs::{Geometry, Joint, JointType};
+
+/// What stands still is asked about with what moves only, and the robot with everything.
+const STILL: Groups = Groups { member: 1, meets: 2 };
+const MOVING: Groups = Groups { member: 2, meets: 1 | 2 };
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "testdata/robot/robot.urdf".into()));
+    let mut scene = Scene::new()?;
+    let robot = Robot::load(&path, &mut scene)?;
+
+    // Obstacles: two pillars, one of them in the way.
+    let pillar = bake(Path::new("testdata/robot/base.obj"), [0.6, 0.6, 5.0])?;
+    for (name, [x, y]) in [("pillar", [0.3, 0.2]), ("other pillar", [-0.4, -0.1])] {
+        let id = scene.add_named(
+            name,
+            pillar.clone(),
+            Pose::from_quaternion([0.0, 0.0, 0.0, 1.0], [x, y, 0.0])?,
+        )?;
+        scene.set_groups(id, STILL)?;
+    }
+
+    for step in 0..24 {
+        let time = f64::from(step) / 24.0;
+        // The poses of all links at once: either all move or none.
+        scene.set_poses(robot.poses(time)?)?;
+        let touching = scene.pairs_in_contact()?;
+        if touching.is_empty() {
+            let Some(nearest) = scene.distance()? else { continue };
+            let (a, b) = (scene.name(nearest.pair.a)?, scene.name(nearest.pair.b)?);
+            let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
+            println!("{time:.2}: free; {a} and {b} are {:.4} m apart", nearest.distance.distance);
+        }
+        for pair in touching {
+            let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
+            println!("{time:.2}: {} touches {}", a.unwrap_or_default(), b.unwrap_or_default());
+        }
+    }
+    Ok(())
+}
+
+/// A robot in a scene.
+struct Robot {
+    /// Joints, each after the joint that moves its parent.
+    joints: Vec<Joint>,
+    /// Each collision mesh: its link, where it is in the link, and its instance.
+    parts: Vec<(String, Pose, InstanceId)>,
+}
+
+impl Robot {
+    /// Reads a URDF file, bakes its collision meshes and adds them to a scene.
+    fn load(path: &Path, scene: &mut Scene) -> Result<Self, Box<dyn Error>> {
+        let urdf = urdf_rs::read_file(path)?;
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let mut parts = Vec::new();
+        for link in &urdf.links {
+            for (number, collision) in link.collision.iter().enumerate() {
+                let Geometry::Mesh { filename, scale } = &collision.geometry else {
+                    return Err(format!("link {}: expected a mesh, found another shape", link.name).into());
+                };
+                let shape = bake(&folder.join(filename), scale.map_or([1.0; 3], |scale| *scale))?;
+                let name = if number == 0 { link.name.clone() } else { format!("{} {number}", link.name) };
+                let id = scene.add_named(name, shape, Pose::IDENTITY)?;
+                scene.set_groups(id, MOVING)?;
+                parts.push((link.name.clone(), origin(&collision.origin)?, id));
+            }
+        }
+        // What a joint connects overlaps there, in any position.
+        for joint in &urdf.joints {
+            for (link, _, a) in &parts {
+                for (other, _, b) in &parts {
+                    if *link == joint.parent.link && *other == joint.child.link {
+                        scene.allow(*a, *b, true)?;
+                    }
+                }
+            }
+        }
+        Ok(Self { joints: in_order(urdf.joints), parts })
+    }
+
+    /// Returns the poses of all parts in the world at a time from 0 to 1: forward kinematics, from the base outward.
+    fn poses(&self, time: f64) -> Result<Vec<(InstanceId, Pose)>, PoseError> {
+        let mut links: HashMap<&str, Pose> = HashMap::new();
+        for (number, joint) in self.joints.iter().enumerate() {
+            let parent = links.get(joint.parent.link.as_str()).copied().unwrap_or(Pose::IDENTITY);
+            let middle = (joint.limit.lower + joint.limit.upper) / 2.0;
+            let wave = ((1.0 + number as f64) * std::f64::consts::TAU * time).sin();
+            let value = middle + 0.4 * (joint.limit.upper - joint.limit.lower) * wave;
+            let pose = moved(joint, value)?.then(&origin(&joint.origin)?)?.then(&parent)?;
+            links.insert(&joint.child.link, pose);
+        }
+        let part = |(link, origin, id): &(String, Pose, InstanceId)| {
+            let link = links.get(link.as_str()).copied().unwrap_or(Pose::IDENTITY);
+            Ok((*id, origin.then(&link)?))
+        };
+        self.parts.iter().map(part).collect()
+    }
+}
+
+/// Orders joints so that each follows the joint that moves its parent.
+fn in_order(mut joints: Vec<Joint>) -> Vec<Joint> {
+    let mut ordered: Vec<Joint> = Vec::new();
+    loop {
+        let waits = |joint: &Joint| joints.iter().any(|other| other.child.link == joint.parent.link);
+        let Some(next) = joints.iter().position(|joint| !waits(joint)) else { return ordered };
+        ordered.push(joints.swap_remove(next));
+    }
+}
+
+/// Returns what a joint does to its child at a value: an angle in radians or a length in metres.
+fn moved(joint: &Joint, value: f64) -> Result<Pose, PoseError> {
+    let axis = *joint.axis.xyz;
+    match joint.joint_type {
+        JointType::Revolute | JointType::Continuous => Pose::from_quaternion(turn(axis, value), [0.0; 3]),
+        JointType::Prismatic => Pose::from_quaternion([0.0, 0.0, 0.0, 1.0], axis.map(|a| a * value)),
+        _ => Ok(Pose::IDENTITY),
+    }
+}
+
+/// Returns an origin of URDF: turns about the fixed axes x, y and z, then a translation.
+fn origin(origin: &urdf_rs::Pose) -> Result<Pose, PoseError> {
+    let [roll, pitch, yaw] = *origin.rpy;
+    let about = |axis, angle| Pose::from_quaternion(turn(axis, angle), [0.0; 3]);
+    let turned = about([1.0, 0.0, 0.0], roll)?.then(&about([0.0, 1.0, 0.0], pitch)?)?;
+    turned.then(&Pose::from_quaternion(turn([0.0, 0.0, 1.0], yaw), *origin.xyz)?)
+}
+
+/// Returns the quaternion of a turn about an axis of length 1.
+fn turn([x, y, z]: [f64; 3], angle: f64) -> [f64; 4] {
+    let (sin, cos) = (angle / 2.0).sin_cos();
+    [x * sin, y * sin, z * sin, cos]
+}
+
+/// Bakes a mesh at its scale. An application would rather bake when it is built, and open files.
+fn bake(path: &Path, scale: [f64; 3]) -> Result<OwnedShape, Box<dyn Error>> {
+    let mut mesh = bvh_bake::read_meshes(&[path.to_owned()])?.merged();
+    for object in &mut mesh.objects {
+        for position in &mut object.positions {
+            *position = [0, 1, 2].map(|axis| position[axis] * scale[axis]);
+        }
+    }
+    let (bytes, _) = bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?;
+    Ok(Bvh::from_bytes(bytes)?.into())
+}
