@@ -12,7 +12,7 @@
 //!
 //! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
 //! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
-//! all cores. `Batch` needs the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
+//! all cores. `Batch`, and scenes on all cores, need the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
 //! `mint` converts matrices and quaternions of other crates to a [`Pose`].
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or

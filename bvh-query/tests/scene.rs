@@ -1,13 +1,18 @@
 //! Scenes against brute force over all pairs, to the bit: every question, every frame, all backends, one thread and two.
 
+#![cfg(feature = "parallel")]
+
 mod common;
 
 use bvh_query::{
-    Backend, Contact, Distance, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError, Scene, SceneError,
+    Backend, Bvh, Contact, Distance, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError, QueryStats,
+    Scene, SceneError, ScenePair,
 };
 use cbvh_testkit::depth::rounds;
+use cbvh_testkit::seal::section;
 use common::shapes::{cube, moved, plate, sphere, torus};
 use common::{Random, Triangle, bake, mesh, random_pose, shared};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 fn shape(triangles: &[Triangle]) -> OwnedShape {
@@ -95,16 +100,32 @@ fn brute_force(placed: &[Placed], querier: &mut Querier) -> Answers {
 }
 
 fn ask(scene: &mut Scene) -> Answers {
-    let pairs = |pairs: Vec<bvh_query::ScenePair>| pairs.into_iter().map(|pair| (pair.a, pair.b)).collect();
+    let pairs = |pairs: Vec<ScenePair>| pairs.into_iter().map(|pair| (pair.a, pair.b)).collect();
     let contacts: Vec<_> = scene.contacts().unwrap();
     let mut visited = Vec::new();
     scene
         .visit_contacts(|pair, contacts| {
             visited.extend(contacts.iter().map(|&contact| (pair, contact)));
-            true
+            ControlFlow::Continue(())
         })
         .unwrap();
     assert_eq!(visited, contacts.iter().map(|of| (of.pair, of.contact)).collect::<Vec<_>>());
+    let mut some = Vec::new();
+    scene
+        .visit_pairs_within(D, |pair| {
+            some.push(pair);
+            if some.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .unwrap();
+    assert_eq!(some, scene.pairs_within(D).unwrap().into_iter().take(2).collect::<Vec<_>>());
+    let mut first = None;
+    scene
+        .visit_contacts(|pair, contacts| {
+            assert!(first.replace((pair, contacts[0])).is_none());
+            ControlFlow::Break(())
+        })
+        .unwrap();
+    assert_eq!(first, visited.first().copied());
     let answers = Answers {
         in_contact: pairs(scene.pairs_in_contact().unwrap()),
         within: pairs(scene.pairs_within(D).unwrap()),
@@ -239,6 +260,61 @@ fn a_tree_of_boxes_misses_no_pair_wherever_instances_move() {
     }
 }
 
+/// Three in a row at equal distances: the first pair is the answer, whichever was nearest before. A question about pairs that
+/// need no asking costs nothing.
+#[test]
+fn of_equally_near_pairs_the_first_is_the_answer() {
+    let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
+    for mut scene in scenes() {
+        let cube = shape(&cube());
+        let ids: Vec<_> = (0..3).map(|k| scene.add(cube.clone(), at(3.0 * f64::from(k))).unwrap()).collect();
+        let first = ScenePair { a: ids[0], b: ids[1] };
+        assert_eq!(scene.distance().unwrap().unwrap().pair, first);
+        // Now the later pair is nearer.
+        scene.set_pose(ids[2], at(5.5)).unwrap();
+        assert_eq!(scene.distance().unwrap().unwrap().pair, ScenePair { a: ids[1], b: ids[2] });
+        scene.set_pose(ids[2], at(6.0)).unwrap();
+        let found = scene.clone().distance().unwrap().unwrap();
+        assert_eq!((found.pair, found.distance.distance), (first, 1.0));
+        assert_eq!(scene.distance().unwrap(), Some(found));
+        // Of the pair that was nearest in the last question, the answer is kept; the other one is asked about.
+        assert_eq!((scene.distance().unwrap(), scene.pairs_asked()), (Some(found), 2));
+        scene.remove(ids[2]).unwrap();
+        assert_eq!((scene.distance().unwrap(), scene.pairs_asked()), (Some(found), 1));
+        let mut querier = Querier::new().unwrap();
+        querier.distance(&cube, &cube, &at(3.0)).unwrap();
+        assert_eq!(scene.stats(), querier.stats());
+    }
+}
+
+/// Cubes whose corners meet far from the origin, turned at random: what the boxes round, and the relative pose too.
+#[test]
+fn turned_cubes_that_touch_far_from_the_origin_are_found() {
+    let random = &mut Random::new(12);
+    let cube = shape(&cube());
+    let mut querier = Querier::new().unwrap();
+    let (mut touching, mut apart) = (0, 0);
+    for _ in 0..rounds(3000) {
+        let far = 2f64.powi(random.below(50) as i32);
+        let [r, s] = [(); 2].map(|()| *random_pose(random, 1.0).rotation());
+        let turned =
+            |r: &[[f64; 3]; 3], p: [f64; 3]| r.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+        // The corner of A that is farthest along x, and that of B that is farthest against it.
+        let corner = |r: &[[f64; 3]; 3], sign: f64| turned(r, r[0].map(|entry| sign * entry.signum()));
+        let from = [(); 3].map(|()| far * random.signed());
+        let (end_a, end_b) = (corner(&r, 1.0), corner(&s, -1.0));
+        let to = [0, 1, 2].map(|k| from[k] + end_a[k] - end_b[k]);
+        let (a, b) = (Pose::new(r, from).unwrap(), Pose::new(s, to).unwrap());
+        let expected = querier.collide(&cube, &cube, &Pose::relative(&a, &b).unwrap()).unwrap();
+        let mut scene = Scene::new().unwrap();
+        scene.add(cube.clone(), a).unwrap();
+        scene.add(cube.clone(), b).unwrap();
+        assert_eq!(scene.pairs_in_contact().unwrap().len(), usize::from(expected), "{a:?} {b:?}");
+        *(if expected { &mut touching } else { &mut apart }) += 1;
+    }
+    assert!(touching > 300 && apart > 300, "{touching} {apart}");
+}
+
 /// Cubes face to face, where the boxes round and the pose of one in the frame of the other does not.
 #[test]
 fn cubes_that_touch_far_from_the_origin_are_found() {
@@ -265,6 +341,47 @@ fn cubes_that_touch_far_from_the_origin_are_found() {
         *(if expected { &mut touching } else { &mut apart }) += 1;
     }
     assert!(touching > 500 && apart > 100, "{touching} {apart}");
+}
+
+/// Pages are read, and checked, when an instance is near another one: before that, damage goes unnoticed.
+#[test]
+fn only_what_is_near_is_touched() {
+    let whole = shape(&sphere(3));
+    let mut bytes = whole.bvh().bytes().to_vec();
+    // The header and the object table stay whole.
+    for kind in [2, 3] {
+        let at = section(&bytes, kind).start + 100;
+        bytes[at] ^= 1;
+    }
+    let damaged = OwnedShape::from(Bvh::from_bytes(bytes).unwrap());
+    let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
+    for parallel in [false, true] {
+        let mut scene = Scene::new().unwrap();
+        scene.set_parallel(parallel);
+        let ids: Vec<_> = (0..50)
+            .map(|number| {
+                let shape = if number < 25 { &whole } else { &damaged };
+                scene.add_named(format!("i{number}"), shape.clone(), at(3.0 * f64::from(number))).unwrap()
+            })
+            .collect();
+        // All are three apart, and have a radius of one.
+        assert!(!scene.collide().unwrap());
+        assert_eq!(scene.pairs_in_contact().unwrap(), []);
+        assert_eq!(scene.contacts().unwrap(), []);
+        assert_eq!((scene.pairs_asked(), scene.stats()), (0, QueryStats::default()));
+        assert_eq!(scene.pairs_within(0.9).unwrap(), []);
+        scene.set_pose(ids[0], at(3.5)).unwrap();
+        assert_eq!(scene.pairs_in_contact().unwrap(), [ScenePair { a: ids[0], b: ids[1] }]);
+        // The error is that of the first pair that has one, on any number of threads.
+        for (moved, beside) in [(1, 40), (2, 30), (3, 45)] {
+            scene.set_pose(ids[moved], at(3.0 * f64::from(beside) + 0.5)).unwrap();
+        }
+        let said = scene.pairs_in_contact().unwrap_err();
+        assert!(
+            matches!(&said, SceneError::Pair { a, b, source: QueryError::Damaged(_) } if a == "i1" && b == "i40"),
+            "{said}"
+        );
+    }
 }
 
 #[test]
@@ -448,7 +565,7 @@ fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
             let poses = shared.moving.iter().zip(frame).map(|(&instance, pose)| (ids[instance], *pose));
             for scene in &mut scenes {
                 scene.set_poses(poses.clone()).unwrap();
-                let pairs = |pairs: Vec<bvh_query::ScenePair>| -> Vec<_> {
+                let pairs = |pairs: Vec<ScenePair>| -> Vec<_> {
                     pairs.into_iter().map(|pair| (pair.a, pair.b)).collect()
                 };
                 pool.install(|| {

@@ -134,9 +134,10 @@ fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
     let directory = folder.path();
     let scene = fs::read_to_string(directory.join("s.scene")).unwrap().replace("moving b c\n", "");
     fs::write(directory.join("s.scene"), scene).unwrap();
-    let list = cbvh_in(directory, &["scene", "s.scene", "no.txt", "--mode", "distance", "--list"]).done().out;
+    let list = cbvh_in(directory, &["scene", "s.scene", "--mode", "distance", "--list"]).done().out;
     // The cube of side 2 at the middle of a ring reaches its inner side.
     assert!(list.starts_with("frame 1: a b ") && list.lines().count() == 1, "{list}");
+    cbvh_in(directory, &["scene", "s.scene", "f.txt"]).failed(1, &["expected no FRAMES"]);
 }
 
 #[test]
@@ -157,6 +158,8 @@ fn bad_files_are_named_with_line_and_remedy() {
         ("moving b", 3, "expected each instance once, found \"b\" again"),
         ("moving d", 3, "expected an instance of an earlier line, found \"d\""),
         ("allow a d", 3, "expected an instance of an earlier line, found \"d\""),
+        ("allow a a", 3, "line 8: expected two instances, found \"a\" twice"),
+        ("moving", 3, "line 8: expected the names of instances after moving, found none"),
         ("allow a", 3, "line 8: expected mesh NAME FILE, instance NAME MESH POSE"),
         ("robot x", 3, "found \"robot x\""),
     ] {
@@ -194,5 +197,6 @@ fn bad_files_are_named_with_line_and_remedy() {
         let ended = ask(directory, arguments);
         assert!(ended.code == 1 && ended.err.contains(words), "{arguments:?}: {}", ended.err);
     }
+    cbvh_in(directory, &["scene", "s.scene"]).failed(1, &["expected FRAMES"]);
     assert!(!directory.join("raw.txt").exists());
 }

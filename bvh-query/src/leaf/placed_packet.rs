@@ -8,7 +8,7 @@ use crate::leaf::local::{LocalFrame, splat4};
 use crate::leaf::math::{Corners, Vec3, add, cross, dot, largest, max3, min3, project, sub};
 use bvh_format::leaf::Packet;
 
-/// Packets kept for each side: some KiB, so that they stay in the nearest caches beside the memory of the walk.
+/// Packets kept for each side: 24 KiB, so that they stay in the second-level cache beside the memory of the walk.
 const PACKETS_PER_SIDE: usize = 64;
 
 /// Four triangles of A or of B, and what filters need of their faces.

@@ -86,7 +86,7 @@ impl TriangleQueue {
         self.len = at + 1;
     }
 
-    /// Notes of the pair pushed last that each triangle certainly has corners strictly on both sides of the other's plane.
+    /// Records of the last pair that each triangle certainly has corners strictly on both sides of the other's plane.
     #[inline(always)]
     pub(crate) fn last_straddles(&mut self, straddles: bool) {
         self.straddling |= u16::from(straddles) << (self.len.wrapping_sub(1) & 15);

@@ -37,6 +37,7 @@ pub struct Querier {
     pub(super) bounded: Vec<BoundedPair>,
     budget: u64,
     pub(super) stats: QueryStats,
+    questions: u64,
 }
 
 impl Querier {
@@ -60,6 +61,7 @@ impl Querier {
             bounded: Vec::new(),
             budget: u64::MAX,
             stats: QueryStats::default(),
+            questions: 0,
         }
     }
 
@@ -82,9 +84,15 @@ impl Querier {
         self.stats
     }
 
+    /// Returns how many questions it was asked.
+    pub(crate) fn questions(&self) -> u64 {
+        self.questions
+    }
+
     /// Resets what belongs to one query.
     pub(super) fn start(&mut self) {
         self.stats = QueryStats::default();
+        self.questions += 1;
         self.memory.start(self.budget);
     }
 }

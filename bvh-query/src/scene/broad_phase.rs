@@ -10,13 +10,15 @@
 
 use crate::scene::instance::Groups;
 use crate::scene::world_box::WorldBox;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
-/// A number of no node.
+/// Stands for no node.
 const NONE: u32 = u32::MAX;
 /// A tree is built anew when the girths of its inner nodes have grown by this factor.
 const MAX_GROWTH: f64 = 1.5;
 
-/// An instance that the broad phase is over.
+/// An instance, as the broad phase knows it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
     pub(super) place: u32,
@@ -25,7 +27,7 @@ pub(super) struct Item {
 }
 
 /// Both trees.
-#[derive(Default, Debug)]
+#[derive(Default, Clone, Debug)]
 pub(super) struct BroadPhase {
     still: Tree,
     moving: Tree,
@@ -37,7 +39,7 @@ pub(super) struct BroadPhase {
 }
 
 impl BroadPhase {
-    /// Takes over that an instance was added to a place, or removed from it.
+    /// Records that an instance was added to a place, or removed from it.
     pub(super) fn replace(&mut self, place: u32) {
         self.is_stale = true;
         if let Some(has_moved) = self.has_moved.get_mut(place as usize) {
@@ -45,23 +47,30 @@ impl BroadPhase {
         }
     }
 
-    /// Takes over that an instance has moved, or changed its groups.
-    pub(super) fn update(&mut self, Item { place, bounds, groups }: Item) {
-        if self.is_stale {
-            // The next build takes it as it is then.
-        } else if self.has_moved.get(place as usize) == Some(&true) {
-            self.moving.set(place, bounds, groups);
+    /// Records that an instance has moved.
+    pub(super) fn set_box(&mut self, item: Item) {
+        // A build takes all instances as they are then: poses set before it say nothing about which ones move.
+        let Some(has_moved) = self.has_moved.get_mut(item.place as usize).filter(|_| !self.is_stale) else {
+            return;
+        };
+        if std::mem::replace(has_moved, true) {
+            self.moving.set(item);
         } else {
-            self.still.set(place, WorldBox::EMPTY, Groups::NONE);
+            self.still.set(Item { bounds: WorldBox::EMPTY, groups: Groups::NONE, ..item });
             self.is_moving_stale = true;
         }
-        if self.has_moved.len() <= place as usize {
-            self.has_moved.resize(place as usize + 1, false);
-        }
-        self.has_moved[place as usize] = true;
     }
 
-    /// Builds what does not show the instances as they are. `items` lists them; places are below `places`.
+    /// Records that an instance has changed its groups.
+    pub(super) fn set_groups(&mut self, item: Item) {
+        match self.has_moved.get(item.place as usize) {
+            _ if self.is_stale => {}
+            Some(true) => self.moving.set(item),
+            _ => self.still.set(item),
+        }
+    }
+
+    /// Builds the trees that are out of date. `items` lists them; places are below `places`.
     pub(super) fn refresh(&mut self, items: impl Iterator<Item = Item>, places: usize) {
         if !self.is_stale && !self.is_moving_stale && !self.moving.has_grown() {
             return;
@@ -83,6 +92,13 @@ impl BroadPhase {
         pairs((&self.moving, &self.still), limit, &mut visit);
         pairs((&self.moving, &self.moving), limit, &mut visit);
     }
+
+    fn tree(&self, which: Which) -> &Tree {
+        match which {
+            Which::Still => &self.still,
+            Which::Moving => &self.moving,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +117,7 @@ impl Node {
 }
 
 /// A tree. Node 0 is the root, and children follow their parents.
-#[derive(Default, Debug)]
+#[derive(Default, Clone, Debug)]
 struct Tree {
     nodes: Vec<Node>,
     /// The leaf of each place, or `NONE`.
@@ -152,7 +168,7 @@ impl Tree {
     }
 
     /// Sets the box and the groups of a leaf, and computes those above it.
-    fn set(&mut self, place: u32, bounds: WorldBox, groups: Groups) {
+    fn set(&mut self, Item { place, bounds, groups }: Item) {
         let Some(&leaf) = self.leaves.get(place as usize).filter(|&&leaf| leaf != NONE) else { return };
         let node = &mut self.nodes[leaf as usize];
         (node.bounds, node.groups) = (bounds, groups);
@@ -211,6 +227,98 @@ fn pairs((a, b): (&Tree, &Tree), limit: f64, visit: &mut impl FnMut(u32, u32, f6
     }
 }
 
+/// The pairs of places whose groups meet, those with the nearest boxes first: a search of the trees by the least gap.
+pub(super) struct NearestFirst {
+    open: BinaryHeap<Open>,
+}
+
+/// Two nodes of two trees, and the square of their gap.
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    squared_gap: f64,
+    trees: [Which; 2],
+    nodes: [u32; 2],
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Which {
+    Still,
+    Moving,
+}
+
+impl Ord for Open {
+    /// The greatest is the nearest. Of equally near pairs the order is any, but always the same.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let rest = |open: &Self| (open.trees, open.nodes);
+        other.squared_gap.total_cmp(&self.squared_gap).then_with(|| rest(self).cmp(&rest(other)))
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+impl NearestFirst {
+    pub(super) fn new(broad: &BroadPhase) -> Self {
+        let mut open = BinaryHeap::new();
+        for trees in
+            [[Which::Still, Which::Still], [Which::Moving, Which::Still], [Which::Moving, Which::Moving]]
+        {
+            let [a, b] = trees.map(|which| broad.tree(which).nodes.first());
+            if let Some((a, b)) = a.zip(b).filter(|(a, b)| a.groups.meet(b.groups)) {
+                let squared_gap = if trees[0] == trees[1] { 0.0 } else { a.bounds.squared_gap(&b.bounds) };
+                open.push(Open { squared_gap, trees, nodes: [0, 0] });
+            }
+        }
+        Self { open }
+    }
+
+    /// Returns the next pair of places and the square of the gap of their boxes.
+    pub(super) fn next(&mut self, broad: &BroadPhase) -> Option<(u32, u32, f64)> {
+        while let Some(Open { squared_gap, trees, nodes }) = self.open.pop() {
+            let (a, b) = (broad.tree(trees[0]), broad.tree(trees[1]));
+            let (node_a, node_b) = (&a.nodes[nodes[0] as usize], &b.nodes[nodes[1] as usize]);
+            let is_one = trees[0] == trees[1] && nodes[0] == nodes[1];
+            if node_a.is_leaf() && node_b.is_leaf() {
+                if !is_one {
+                    return Some((node_a.children[1], node_b.children[1], squared_gap));
+                }
+                continue;
+            }
+            let mut add = |first: u32, second: u32| {
+                let (x, y) = (&a.nodes[first as usize], &b.nodes[second as usize]);
+                let is_one = trees[0] == trees[1] && first == second;
+                let squared_gap = if is_one { 0.0 } else { x.bounds.squared_gap(&y.bounds) };
+                if x.groups.meet(y.groups) {
+                    self.open.push(Open { squared_gap, trees, nodes: [first, second] });
+                }
+            };
+            if is_one {
+                let [left, right] = node_a.children;
+                add(left, right);
+                add(left, left);
+                add(right, right);
+            } else if node_b.is_leaf() || !node_a.is_leaf() && node_a.bounds.girth() >= node_b.bounds.girth()
+            {
+                node_a.children.into_iter().for_each(|child| add(child, nodes[1]));
+            } else {
+                node_b.children.into_iter().for_each(|child| add(nodes[0], child));
+            }
+        }
+        None
+    }
+}
+
 /// Orders items so that those before the returned number are on one side of the longest side of their centres' box.
 fn split(items: &mut [Item]) -> usize {
     let centre = |item: &Item, k: usize| item.bounds.lo[k] + item.bounds.hi[k];
@@ -265,11 +373,17 @@ mod tests {
                 if count > 0 {
                     let number = random.below(count as usize);
                     let place = 2 * number as u32;
+                    let (bounds, has_moved) =
+                        (items[number].bounds, broad.has_moved.get(place as usize).copied());
                     items[number] = item(random, place);
                     if step % 40 == 39 {
                         broad.replace(place);
+                    } else if step % 8 == 3 {
+                        items[number].bounds = bounds;
+                        broad.set_groups(items[number]);
+                        assert_eq!(broad.has_moved.get(place as usize).copied(), has_moved);
                     } else {
-                        broad.update(items[number]);
+                        broad.set_box(items[number]);
                     }
                 }
                 grown += usize::from(broad.moving.has_grown());
@@ -290,6 +404,17 @@ mod tests {
                     }
                 }
                 seen += expected.len();
+                assert_eq!(found, expected, "{count} {step}");
+                let (mut found, mut last) = (Vec::new(), 0.0);
+                let mut nearest = NearestFirst::new(&broad);
+                while let Some((a, b, squared_gap)) = nearest.next(&broad) {
+                    assert!(squared_gap >= last);
+                    last = squared_gap;
+                    if squared_gap <= limit * limit {
+                        found.push((a.min(b), a.max(b)));
+                    }
+                }
+                found.sort_unstable();
                 assert_eq!(found, expected, "{count} {step}");
             }
         }

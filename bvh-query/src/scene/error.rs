@@ -13,10 +13,9 @@ pub enum SceneError {
     /// Another instance has this name.
     #[error("instance {0:?}: expected a name of its own, found it taken")]
     NameTaken(String),
-    /// A pose with which a pair of instances may have no relative pose.
-    #[error(
-        "instance {instance}: expected {what}, found {found:e}; Pose::nearest orthonormalises a rotation"
-    )]
+    /// A pose with which a pair of instances may have no relative pose. [`Pose::nearest`](crate::Pose::nearest)
+    /// orthonormalises a rounded rotation.
+    #[error("instance {instance}: expected {what}, found {found:e}")]
     Pose {
         /// The name or the identifier of the instance.
         instance: String,

@@ -39,10 +39,12 @@ const MAX_TRANSLATION: f64 = (1u128 << 118) as f64;
 /// whose contact is not allowed ([`Scene::allow`]). Of a pair, the lower [`InstanceId`] is A, and the answer about it is
 /// that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers come in ascending order
 /// of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of threads, nor on what was
-/// asked before.
+/// asked before. Which error a question ends with, if a page is damaged or the budget does not suffice, may depend on the
+/// latter two where the answer can do without some pairs: [`Scene::collide`], [`Scene::within`] and [`Scene::distance`].
 ///
-/// Cost: a moved instance takes about a microsecond. A question reads of each file the object table, and pages only of
-/// instances that are near something.
+/// Cost: a moved instance takes some 0.2 us and a question with nothing near some 2 us for 8 of 100 instances that move (AMD
+/// EPYC, family 26). A question reads of each file the object table, and pages only of instances that are near something.
+/// Clone a scene to ask it on several threads: shapes are shared.
 ///
 /// ```
 /// use bvh_query::{Bvh, OwnedShape, Pose, Scene};
@@ -65,7 +67,7 @@ const MAX_TRANSLATION: f64 = (1u128 << 118) as f64;
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Scene {
     /// By place; `None` where an instance was removed.
     instances: Vec<Option<Instance>>,
@@ -169,7 +171,7 @@ impl Scene {
         Ok(id)
     }
 
-    /// Removes an instance, and what was allowed to touch it.
+    /// Removes an instance, and its permissions to touch others.
     ///
     /// # Errors
     /// [`SceneError::NoInstance`] if the scene has no such instance, or no longer.
@@ -189,7 +191,7 @@ impl Scene {
                 self.free.push((id.place, next));
             }
         }
-        self.likely = None;
+        self.likely = self.likely.filter(|&(a, b)| a != id.place && b != id.place);
         self.broad.replace(id.place);
         Ok(())
     }
@@ -208,12 +210,12 @@ impl Scene {
     /// The errors of [`Scene::set_pose`]. Then none has moved.
     pub fn set_poses(
         &mut self,
-        poses: impl IntoIterator<Item = (InstanceId, Pose), IntoIter: Clone>,
+        poses: impl IntoIterator<Item = (InstanceId, Pose)>,
     ) -> Result<(), SceneError> {
-        let poses = poses.into_iter();
-        for (id, world) in poses.clone() {
+        let poses: Vec<(InstanceId, Pose)> = poses.into_iter().collect();
+        for &(id, ref world) in &poses {
             self.place(id)?;
-            check_world(&world).map_err(|(what, found)| SceneError::Pose {
+            check_world(world).map_err(|(what, found)| SceneError::Pose {
                 instance: self.describe(id),
                 what,
                 found,
@@ -223,7 +225,7 @@ impl Scene {
             if let Some(instance) = &mut self.instances[id.place as usize] {
                 instance.world = world;
                 instance.bounds = WorldBox::of(instance.shape.shape(), &world);
-                self.broad.update(instance.item(id.place));
+                self.broad.set_box(instance.item(id.place));
             }
         }
         Ok(())
@@ -237,7 +239,7 @@ impl Scene {
         let place = self.place(id)?;
         if let Some(instance) = &mut self.instances[place] {
             instance.groups = groups;
-            self.broad.update(instance.item(id.place));
+            self.broad.set_groups(instance.item(id.place));
         }
         Ok(())
     }
@@ -248,7 +250,8 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoInstance`].
     pub fn allow(&mut self, a: InstanceId, b: InstanceId, may_touch: bool) -> Result<(), SceneError> {
-        for (own, other) in [(self.place(a)?, self.place(b)? as u32), (self.place(b)?, a.place)] {
+        let places = [(self.place(a)?, b.place), (self.place(b)?, a.place)];
+        for (own, other) in places {
             let Some(instance) = &mut self.instances[own] else { continue };
             match (instance.allowed.binary_search(&other), may_touch) {
                 (Err(at), true) => instance.allowed.insert(at, other),
@@ -315,7 +318,7 @@ impl Scene {
         self.stats
     }
 
-    /// Returns how many pairs the last question asked about: those whose boxes were near enough.
+    /// Returns how many times the last question asked about a pair of instances.
     pub fn pairs_asked(&self) -> u64 {
         self.pairs_asked
     }
@@ -350,8 +353,10 @@ fn check_world(world: &Pose) -> Result<(), (&'static str, f64)> {
     let far = world.translation().into_iter().find(|t| t.abs() > MAX_TRANSLATION);
     let error = departure(world.rotation(), 1.0);
     match far {
-        Some(far) => Err(("a translation of at most 2^118 along each axis", far)),
-        None if error > MAX_RIGID_ERROR => Err(("a rotation within 2^-23 of orthonormal", error)),
+        Some(far) => Err(("a translation of at most 2^118 along each axis, nearer to the origin", far)),
+        None if error > MAX_RIGID_ERROR => {
+            Err(("a rotation within 2^-23 of orthonormal, with more digits or orthonormalised", error))
+        }
         None => Ok(()),
     }
 }

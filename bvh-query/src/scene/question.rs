@@ -6,8 +6,11 @@ use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
+use crate::scene::broad_phase::NearestFirst;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::{Scene, SceneError};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// A pair of instances; A is the lower one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -20,6 +23,7 @@ pub struct ScenePair {
 
 /// Two triangles in contact, and the instances that they are of.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[non_exhaustive]
 pub struct SceneContact {
     /// The instances.
     pub pair: ScenePair,
@@ -27,12 +31,14 @@ pub struct SceneContact {
     pub contact: Contact,
 }
 
-/// The nearest pair of instances, and how far apart they are.
+/// The nearest pair of instances, and how far apart they are. Points are in A's frame: `scene.pose(pair.a)?.place(point)`
+/// is where a point is in the world.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
 pub struct SceneDistance {
     /// The instances. Of pairs that are equally near, the first.
     pub pair: ScenePair,
-    /// The answer of [`Querier::distance`]; points are in A's frame.
+    /// The answer of [`Querier::distance`].
     pub distance: Distance,
 }
 
@@ -53,12 +59,19 @@ struct PlacedPair<'a> {
     pose: Pose,
 }
 
+impl Candidate {
+    /// Returns whether both are of the same instances.
+    fn is_of(&self, other: &Self) -> bool {
+        (self.a, self.b) == (other.a, other.b)
+    }
+}
+
 impl Scene {
     /// Returns whether any pair touches.
     ///
     /// # Errors
-    /// [`SceneError::Pair`] with the pair whose question has no answer, because a page is damaged or the budget does not
-    /// suffice. Where one pair touches, others may not be looked at.
+    /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
+    /// suffice, unless another pair is found to touch.
     pub fn collide(&mut self) -> Result<bool, SceneError> {
         self.any(0.0, |querier, pair| querier.collide(pair.a, pair.b, &pair.pose))
     }
@@ -105,24 +118,43 @@ impl Scene {
         Ok(of_pairs.into_iter().flat_map(with_pair).collect())
     }
 
+    /// Calls `visit` with each pair that is at most `d` apart, in ascending order, until it breaks. Pairs after that are not
+    /// looked at. It uses one thread.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::pairs_within`], for pairs up to that one.
+    pub fn visit_pairs_within(
+        &mut self,
+        d: f64,
+        mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
+    ) -> Result<(), SceneError> {
+        check_distance(d)?;
+        for candidate in self.near(d) {
+            let found = self.each(&[candidate], |querier, pair| {
+                Ok(querier.within(pair.a, pair.b, &pair.pose, d)?.then_some(pair.ids))
+            })?;
+            if found.into_iter().any(|pair| visit(pair).is_break()) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// Calls `visit` with each pair of instances that touch and its pairs of triangles in contact, in ascending order of the
-    /// pairs, until it returns false. At any time it holds the contacts of one pair, not of all.
+    /// pairs, until it breaks. At any time it holds the contacts of one pair, not of all. It uses one thread.
     ///
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`].
     pub fn visit_contacts(
         &mut self,
-        mut visit: impl FnMut(ScenePair, &[Contact]) -> bool,
+        mut visit: impl FnMut(ScenePair, &[Contact]) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
-        let mut goes_on = true;
         for candidate in self.near(0.0) {
             let found = self.each(&[candidate], |querier, pair| {
                 Ok(Some((pair.ids, querier.contacts(pair.a, pair.b, &pair.pose)?)))
             })?;
-            for (pair, contacts) in found.iter().filter(|(_, contacts)| !contacts.is_empty()) {
-                goes_on = visit(*pair, contacts);
-            }
-            if !goes_on {
+            let mut touching = found.iter().filter(|(_, contacts)| !contacts.is_empty());
+            if touching.any(|(pair, contacts)| visit(*pair, contacts).is_break()) {
                 break;
             }
         }
@@ -136,17 +168,18 @@ impl Scene {
     /// one are not looked at.
     pub fn distance(&mut self) -> Result<Option<SceneDistance>, SceneError> {
         self.start();
-        let mut nearest: Option<SceneDistance> = None;
-        if let Some(likely) = self.likely_candidate() {
-            self.improve(&mut nearest, &[likely])?;
+        let mut nearest = None;
+        // The pair that was nearest in the last question is likely to be near. Else the one with the nearest boxes is, and a
+        // distance says how near other boxes have to be.
+        if let Some(first) = self.likely_candidate().or_else(|| self.nearest_boxes()) {
+            self.improve(&mut nearest, &[first])?;
         }
-        // Pairs near enough, the nearest boxes first: they soon tell how near is near enough.
-        let mut candidates = self.collect(nearest.map_or(f64::INFINITY, |held| held.distance.distance));
+        let mut candidates = nearest.map_or(Vec::new(), |held| self.collect(held.distance.upper));
         candidates.sort_unstable_by(|x, y| {
             x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b)))
         });
         for run in candidates.chunks(self.workers.threads()) {
-            if nearest.is_some_and(|held| run[0].squared_gap > held.distance.distance.powi(2)) {
+            if nearest.is_some_and(|held| run[0].squared_gap > held.distance.upper.powi(2)) {
                 break;
             }
             self.improve(&mut nearest, run)?;
@@ -155,16 +188,28 @@ impl Scene {
         Ok(nearest)
     }
 
+    /// Returns the pair asked about whose boxes are nearest.
+    fn nearest_boxes(&self) -> Option<Candidate> {
+        let mut order = NearestFirst::new(&self.broad);
+        while let Some((x, y, squared_gap)) = order.next(&self.broad) {
+            if let Some(candidate) = self.candidate(x, y, squared_gap) {
+                return Some(candidate);
+            }
+        }
+        None
+    }
+
     /// Adopts the least distance of candidates, if it is less than the one held, or as little and of an earlier pair.
     fn improve(
         &mut self,
         nearest: &mut Option<SceneDistance>,
         candidates: &[Candidate],
     ) -> Result<(), SceneError> {
-        let limit = nearest.map_or(f64::INFINITY, |held| held.distance.distance);
+        let limit = nearest.map_or(f64::INFINITY, |held| held.distance.upper);
         let held = nearest.map(|held| held.pair);
         let found = self.each(candidates, |querier, pair| {
-            if held == Some(pair.ids) {
+            // Of touching meshes only an earlier pair can be nearer, and itself a pair is not.
+            if held.is_some_and(|held| held == pair.ids || limit == 0.0 && held < pair.ids) {
                 return Ok(None);
             }
             let found = querier.distance_below(pair.a, pair.b, &pair.pose, limit)?;
@@ -186,25 +231,46 @@ impl Scene {
         ask: impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<bool, SceneError> {
         self.start();
-        let ask = |querier: &mut Querier, pair: &PlacedPair<'_>| Ok(ask(querier, pair)?.then_some(pair.ids));
-        let mut candidates: Vec<Candidate> = self.likely_candidate().into_iter().collect();
-        if !self.each(&candidates, ask)?.is_empty() {
+        let likely = self.likely_candidate();
+        if let Some(likely) = likely
+            && self.any_of(&[likely], &ask)?
+        {
             return Ok(true);
         }
-        candidates = self.collect(limit);
-        // The nearest boxes are the likeliest. Runs grow, so that all threads have work and little of it is in vain.
-        candidates.sort_by(|x, y| x.squared_gap.total_cmp(&y.squared_gap));
-        let mut rest = &candidates[..];
-        let mut size = self.workers.threads();
-        while !rest.is_empty() {
-            let (run, after) = rest.split_at(size.min(rest.len()));
-            if let Some(found) = self.each(run, ask)?.first() {
-                self.likely = Some((found.a.place, found.b.place));
-                return Ok(true);
+        // The nearest boxes are the likeliest.
+        let mut candidates = self.collect(limit);
+        candidates.retain(|candidate| likely.is_none_or(|likely| !candidate.is_of(&likely)));
+        candidates.sort_unstable_by(|x, y| {
+            x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b)))
+        });
+        self.any_of(&candidates, &ask)
+    }
+
+    /// Asks candidates until one says yes. Where one says yes, an error about another does not matter.
+    fn any_of(
+        &mut self,
+        candidates: &[Candidate],
+        ask: &(impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
+    ) -> Result<bool, SceneError> {
+        let is_found = AtomicBool::new(false);
+        let answers = self.each(candidates, |querier, pair| {
+            if is_found.load(Ordering::Relaxed) {
+                return Ok(None);
             }
-            (rest, size) = (after, 2 * size);
+            let answer = ask(querier, pair);
+            if answer == Ok(true) {
+                is_found.store(true, Ordering::Relaxed);
+            }
+            Ok((answer != Ok(false)).then_some((pair.ids, answer)))
+        })?;
+        if let Some((pair, _)) = answers.iter().find(|(_, answer)| answer.is_ok()) {
+            self.likely = Some((pair.a.place, pair.b.place));
+            return Ok(true);
         }
-        Ok(false)
+        match answers.into_iter().next() {
+            Some((pair, Err(source))) => Err(self.pair_error(pair, source)),
+            _ => Ok(false),
+        }
     }
 
     /// Asks all pairs at most `limit` apart.
@@ -228,13 +294,15 @@ impl Scene {
     /// Returns the pairs asked about whose boxes are at most `limit` apart.
     fn collect(&self, limit: f64) -> Vec<Candidate> {
         let mut candidates = Vec::new();
-        self.broad.pairs(limit, |x, y, squared_gap| {
-            let (a, b) = (x.min(y), x.max(y));
-            if self.instances[a as usize].as_ref().is_some_and(|instance| !instance.allows(b)) {
-                candidates.push(Candidate { a, b, squared_gap });
-            }
-        });
+        self.broad.pairs(limit, |x, y, squared_gap| candidates.extend(self.candidate(x, y, squared_gap)));
         candidates
+    }
+
+    /// Returns a pair of places in order, unless it may touch.
+    fn candidate(&self, x: u32, y: u32, squared_gap: f64) -> Option<Candidate> {
+        let (a, b) = (x.min(y), x.max(y));
+        let is_asked = self.instances.get(a as usize)?.as_ref().is_some_and(|instance| !instance.allows(b));
+        is_asked.then_some(Candidate { a, b, squared_gap })
     }
 
     /// Returns the pair of the last answer, if it is still asked about.
@@ -251,24 +319,31 @@ impl Scene {
         candidates: &[Candidate],
         ask: impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
-        self.pairs_asked += candidates.len() as u64;
         let mut stats = self.stats;
+        let asked = AtomicU64::new(self.pairs_asked);
         let scene = &*self;
         let found = scene.workers.each(candidates, &mut stats, |querier, candidate| {
             let Some((a, b)) = scene.both(candidate) else { return Ok(None) };
             let pose = Pose::relative(&a.world, &b.world)?;
             let ids = ScenePair { a: a.id(candidate.a), b: b.id(candidate.b) };
-            ask(querier, &PlacedPair { ids, a: &a.shape, b: &b.shape, pose })
+            let before = querier.questions();
+            let answer = ask(querier, &PlacedPair { ids, a: &a.shape, b: &b.shape, pose });
+            asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
+            answer
         });
-        let found = found.map_err(|(number, source)| {
-            let name = |place: u32| {
-                let instance = scene.instances.get(place as usize).and_then(Option::as_ref);
-                instance.map_or(String::new(), |instance| scene.describe(instance.id(place)))
-            };
-            SceneError::Pair { a: name(candidates[number].a), b: name(candidates[number].b), source }
-        });
-        self.stats = stats;
-        found
+        (self.stats, self.pairs_asked) = (stats, asked.into_inner());
+        found.map_err(|(number, source)| match self.both(&candidates[number]) {
+            Some((a, b)) => {
+                let Candidate { a: place_a, b: place_b, .. } = candidates[number];
+                self.pair_error(ScenePair { a: a.id(place_a), b: b.id(place_b) }, source)
+            }
+            None => source.into(),
+        })
+    }
+
+    /// Names the pair whose question has no answer.
+    fn pair_error(&self, pair: ScenePair, source: QueryError) -> SceneError {
+        SceneError::Pair { a: self.describe(pair.a), b: self.describe(pair.b), source }
     }
 
     /// Returns both instances of a candidate.

@@ -16,6 +16,19 @@ pub(super) struct Workers {
     idle: Mutex<Vec<Querier>>,
 }
 
+impl Clone for Workers {
+    /// Copies the settings; queriers are made when they are needed.
+    fn clone(&self) -> Self {
+        Self {
+            backend: self.backend,
+            budget: self.budget,
+            #[cfg(feature = "parallel")]
+            parallel: self.parallel,
+            idle: Mutex::default(),
+        }
+    }
+}
+
 impl fmt::Debug for Workers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Workers").field("backend", &self.backend).field("budget", &self.budget).finish()
@@ -68,8 +81,11 @@ impl Workers {
             self.lend(|querier| {
                 let (mut found, mut stats) = (Vec::new(), QueryStats::default());
                 for (number, pair) in (first..).zip(pairs) {
+                    let before = querier.questions();
                     let answer = ask(querier, pair).map_err(|error| (number, error))?;
-                    stats.add(querier.stats().node_tests, querier.stats());
+                    if querier.questions() != before {
+                        stats.add(querier.stats().node_tests, querier.stats());
+                    }
                     found.extend(answer);
                 }
                 Ok((found, stats))

@@ -1,17 +1,22 @@
-//! Boxes of placed shapes along the axes of the world: outward of whatever a question computes.
+//! Boxes in the world that contain every vertex as a question places it.
 //!
 //! A question about two instances places B in A's frame by `Pose::relative`. Its vertices, seen from the world through A's
-//! exact pose, are where B's exact pose puts them but for roundings: with u = 2^-53, m the sum of the magnitudes of a
-//! translation and of what it places, over both instances, entries of the relative rotation are off by at most 24u and its
-//! translation by 64u m (see `pose/frames.rs`), and placing a vertex by 8u m more. Over three axes that is below 2^-45 m, and
-//! each box is larger by 2^-43 of its own share of m: computing the box itself loses less than the rest. A's frame may be stretched against the world by 2^-22, so that
-//! squares of distances between boxes count for 2^-19 less: see `squared_gap`.
+//! exact pose, are where B's exact pose puts them but for roundings. With u = 2^-53 and m the sum of the magnitudes of a
+//! translation and of what it places, over both instances, entries of the relative rotation are off by at most 32u (three
+//! products with entries of an inverse, 16u each, and 4u: see `pose/frames.rs`), its translation by 64u m, and a placed vertex
+//! by 8u m more. Over three axes that is below 2^-45 m. Each box is larger by 2^-43 of its own share of m, because computing
+//! the box itself loses less than the rest. A's frame may be stretched against the world by 2^-22, so that squared gaps between
+//! boxes are reduced by 2^-19 of themselves: see `squared_gap`. A relative translation below 2^-213 counts as 0, for which each
+//! box is larger by 2^-211.
 
 use crate::file::shape::Shape;
 use crate::pose::Pose;
 
 /// The share of the magnitudes that a box is larger by.
 const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
+
+/// More than a relative translation that counts as 0, 2^-211 mesh units.
+const FLUSHED: f64 = f64::from_bits((1023 - 211) << 52);
 
 /// A box along the axes of the world, in mesh units.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -42,7 +47,7 @@ impl WorldBox {
             for k in 0..3 {
                 magnitude += origin[k].abs() + ends[k][0].abs() + ends[k][1].abs() + translation[k].abs();
             }
-            let error = ERROR * magnitude;
+            let error = ERROR * magnitude + FLUSHED;
             for k in 0..3 {
                 let r = &rotation[k];
                 let at = |p: [f64; 3]| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + translation[k];
@@ -67,7 +72,7 @@ impl WorldBox {
     }
 
     /// Returns the square of a lower bound of the distance that a question may find between what is in the boxes; 0 if they
-    /// meet. Coordinates are 0 or between 2^-300 and 2^120, so that squares neither underflow nor overflow.
+    /// meet. Gaps are 0 or at least 2^-264, and coordinates are below 2^122, so that squares neither underflow nor overflow.
     #[inline]
     pub(super) fn squared_gap(&self, other: &Self) -> f64 {
         let mut squared = 0.0;

@@ -5,7 +5,7 @@ use bvh_query::Pose;
 use std::path::Path;
 
 /// The number of numbers of a pose: the entries of a 3 by 4 matrix.
-const NUMBERS: usize = 12;
+pub(crate) const NUMBERS: usize = 12;
 /// The form of a pose, as messages state it.
 const EXPECTED: &str = "expected 12 numbers, the rows of the 3 by 4 matrix [R | t]";
 /// The message for a file without poses.

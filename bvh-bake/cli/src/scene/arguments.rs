@@ -17,8 +17,8 @@ SCENE is a text file, one item per line; # starts a comment. File names are rela
   moving NAME...              the instances that frames move, in the order of their poses
   allow NAME NAME             two instances that may touch, and are never asked about
 
-Each line of FRAMES has 12 numbers for each moving instance. Asked are all pairs of instances of which at least one moves; \
-without a line of moving instances, all pairs, and FRAMES is not read.
+Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked about. \
+In a scene without moving instances there is one frame, without FRAMES, and all pairs are asked about.
 
 On a terminal, a summary is printed. Otherwise, and with --json, one JSON object. --list prints the pairs of each frame. \
 --out writes one line per frame: 0 or 1 (collide), a number of pairs (pairs, within) or a distance, then nanoseconds, \
@@ -32,7 +32,7 @@ pub(crate) struct SceneArguments {
     /// The meshes, where they are, and what moves
     pub(super) scene: PathBuf,
     /// The poses of the moving instances, one frame per line
-    pub(super) frames: PathBuf,
+    pub(super) frames: Option<PathBuf>,
     /// The question
     #[arg(long, value_enum, default_value = "collide")]
     pub(super) mode: Mode,

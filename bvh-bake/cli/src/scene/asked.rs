@@ -131,6 +131,6 @@ fn blame(error: &SceneError, said: &str, arguments: &SceneArguments) -> Failure 
     match error {
         SceneError::Pair { source: QueryError::Damaged(_), .. } => Failure::invalid(&arguments.scene, said),
         SceneError::Pair { source: QueryError::Budget { .. }, .. } => Failure::Limit(said.to_owned()),
-        _ => Failure::invalid(&arguments.frames, said),
+        _ => Failure::invalid(arguments.frames.as_ref().unwrap_or(&arguments.scene), said),
     }
 }

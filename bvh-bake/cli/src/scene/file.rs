@@ -88,6 +88,7 @@ impl SceneText {
                 }
                 self.instances.push((number, name.to_owned(), mesh, pose));
             }
+            ["moving"] => return Err("expected the names of instances after moving, found none".into()),
             ["moving", ref names @ ..] => {
                 for name in names {
                     let instance = find(instances, "an instance", name)?;
@@ -100,6 +101,9 @@ impl SceneText {
             }
             ["allow", a, b] => {
                 let pair = (find(instances, "an instance", a)?, find(instances, "an instance", b)?);
+                if a == b {
+                    return Err(format!("expected two instances, found {a:?} twice"));
+                }
                 self.allowed.push(pair);
             }
             _ => {

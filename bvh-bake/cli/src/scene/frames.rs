@@ -2,18 +2,26 @@
 
 use super::file::SceneText;
 use crate::console::Failure;
-use crate::query::poses;
+use crate::query::poses::{self, NUMBERS};
 use bvh_query::Pose;
 use std::path::Path;
 
-/// The number of numbers of a pose.
-const NUMBERS: usize = 12;
-
 /// Reads the frames of a scene, each with the poses of its moving instances. A scene in which nothing moves has one frame.
-pub(super) fn read(path: &Path, scene: &SceneText) -> Result<Vec<Vec<Pose>>, Failure> {
-    if scene.moving.is_empty() {
-        return Ok(vec![Vec::new()]);
-    }
+pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Vec<Pose>>, Failure> {
+    let path = match (path, scene.moving.is_empty()) {
+        (Some(path), false) => path,
+        (None, true) => return Ok(vec![Vec::new()]),
+        (None, false) => {
+            return Err(Failure::Usage(
+                "expected FRAMES, because instances of the scene move (see --help)".into(),
+            ));
+        }
+        (Some(_), true) => {
+            return Err(Failure::Usage(
+                "expected no FRAMES, because nothing moves in the scene (see --help)".into(),
+            ));
+        }
+    };
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let text = String::from_utf8_lossy(&bytes);
     let mut frames = Vec::new();

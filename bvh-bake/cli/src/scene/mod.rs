@@ -19,7 +19,7 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = query::backend(&arguments.isa)?;
     let question = Question::new(arguments)?;
     let text = file::read(&arguments.scene)?;
-    let mut frames = frames::read(&arguments.frames, &text)?;
+    let mut frames = frames::read(arguments.frames.as_deref(), &text)?;
     if arguments.limit > 0 {
         frames.truncate(arguments.limit);
     }

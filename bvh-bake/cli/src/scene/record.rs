@@ -65,7 +65,7 @@ impl Record {
             version: env!("CARGO_PKG_VERSION"),
             mode: question.mode.name(),
             scene: stem(&arguments.scene),
-            frames: stem(&arguments.frames),
+            frames: arguments.frames.as_deref().map_or(String::new(), stem),
             instances: scene.scene.len(),
             moving: scene.moving.len(),
             triangles: scene.triangles,
