@@ -206,10 +206,12 @@ impl Scene {
         candidates: &[Candidate],
     ) -> Result<(), SceneError> {
         let limit = nearest.map_or(f64::INFINITY, |held| held.distance.upper);
-        let held = nearest.map(|held| held.pair);
+        // Where the pair held touches, only an earlier one can take its place.
+        let is_beaten = |pair: ScenePair| {
+            nearest.is_some_and(|held| held.pair == pair || held.distance.distance == 0.0 && held.pair < pair)
+        };
         let found = self.each(candidates, |querier, pair| {
-            // Of touching meshes only an earlier pair can be nearer, and itself a pair is not.
-            if held.is_some_and(|held| held == pair.ids || limit == 0.0 && held < pair.ids) {
+            if is_beaten(pair.ids) {
                 return Ok(None);
             }
             let found = querier.distance_below(pair.a, pair.b, &pair.pose, limit)?;
