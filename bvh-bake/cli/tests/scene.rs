@@ -179,7 +179,7 @@ fn bad_files_are_named_with_line_and_remedy() {
         (String::new(), "expected at least one line of poses, found none"),
         (
             format!("{pose} 1 3e-7 0 0 0 1 0 0 0 0 1 0"),
-            "frame 1: instance c: expected a rotation within 2^-23 of orthonormal",
+            "line 1: instance c: expected a rotation within 2^-23 of orthonormal",
         ),
     ] {
         fs::write(directory.join("f.txt"), frames).unwrap();

@@ -2,6 +2,7 @@
 
 use super::arguments::{Mode, SceneArguments};
 use super::file::LoadedScene;
+use super::frames::Frame;
 use crate::console::Failure;
 use bvh_query::{Pose, QueryError, QueryStats, SceneError, ScenePair};
 use cbvh_measure::rounds::add;
@@ -87,7 +88,7 @@ pub(super) struct Run {
 impl Run {
     pub(super) fn new(
         scene: &mut LoadedScene,
-        frames: &[Vec<Pose>],
+        frames: &[Frame],
         question: &Question,
         arguments: &SceneArguments,
     ) -> Result<Self, Failure> {
@@ -98,7 +99,7 @@ impl Run {
                 break;
             }
             // The timed part meets the same error again, with its frame.
-            let _ = question.ask(scene, frame);
+            let _ = question.ask(scene, &frame.poses);
         }
         let mut run = Self {
             answers: Vec::with_capacity(frames.len()),
@@ -110,10 +111,9 @@ impl Run {
         let start = Instant::now();
         for (number, frame) in (1..).zip(frames) {
             let before = Instant::now();
-            let answer = question.ask(scene, frame);
+            let answer = question.ask(scene, &frame.poses);
             let nanoseconds = before.elapsed().as_nanos() as u64;
-            let answer =
-                answer.map_err(|error| blame(&error, &format!("frame {number}: {error}"), arguments))?;
+            let answer = answer.map_err(|error| blame(&error, number, frame.line, arguments))?;
             run.answers.push((answer, nanoseconds));
             add(&mut run.stats, scene.scene.stats());
             run.pairs_asked += scene.scene.pairs_asked();
@@ -126,11 +126,16 @@ impl Run {
     }
 }
 
-/// Turns an error into one of the file that caused it.
-fn blame(error: &SceneError, said: &str, arguments: &SceneArguments) -> Failure {
+/// Turns an error about a frame into one of the file that caused it.
+fn blame(error: &SceneError, number: usize, line: usize, arguments: &SceneArguments) -> Failure {
     match error {
-        SceneError::Pair { source: QueryError::Damaged(_), .. } => Failure::invalid(&arguments.scene, said),
-        SceneError::Pair { source: QueryError::Budget { .. }, .. } => Failure::Limit(said.to_owned()),
-        _ => Failure::invalid(arguments.frames.as_ref().unwrap_or(&arguments.scene), said),
+        SceneError::Pair { source: QueryError::Budget { .. }, .. } => {
+            Failure::Limit(format!("frame {number}: {error}"))
+        }
+        SceneError::Pose { .. } => {
+            let frames = arguments.frames.as_ref().unwrap_or(&arguments.scene);
+            Failure::invalid(frames, format_args!("line {line}: {error}"))
+        }
+        _ => Failure::invalid(&arguments.scene, format_args!("frame {number}: {error}")),
     }
 }

@@ -6,11 +6,17 @@ use crate::query::poses::{self, NUMBERS};
 use bvh_query::Pose;
 use std::path::Path;
 
+/// The poses of the moving instances, and the line that they stand in.
+pub(super) struct Frame {
+    pub(super) line: usize,
+    pub(super) poses: Vec<Pose>,
+}
+
 /// Reads the frames of a scene, each with the poses of its moving instances. A scene in which nothing moves has one frame.
-pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Vec<Pose>>, Failure> {
+pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Frame>, Failure> {
     let path = match (path, scene.moving.is_empty()) {
         (Some(path), false) => path,
-        (None, true) => return Ok(vec![Vec::new()]),
+        (None, true) => return Ok(vec![Frame { line: 0, poses: Vec::new() }]),
         (None, false) => {
             return Err(Failure::Usage(
                 "expected FRAMES, because instances of the scene move (see --help)".into(),
@@ -25,12 +31,12 @@ pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Vec<Pos
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let text = String::from_utf8_lossy(&bytes);
     let mut frames = Vec::new();
-    for (number, line) in (1..).zip(text.lines()) {
-        let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
+    for (line, text) in (1..).zip(text.lines()) {
+        let words: Vec<&str> = text.split('#').next().unwrap_or("").split_whitespace().collect();
         if words.is_empty() {
             continue;
         }
-        let wrong = |text: String| Failure::invalid(path, format_args!("line {number}: {text}"));
+        let wrong = |text: String| Failure::invalid(path, format_args!("line {line}: {text}"));
         if words.len() != NUMBERS * scene.moving.len() {
             return Err(wrong(format!(
                 "expected {} numbers, 12 for each of {} moving instances, found {}",
@@ -39,11 +45,11 @@ pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Vec<Pos
                 words.len()
             )));
         }
-        let mut frame = Vec::with_capacity(scene.moving.len());
+        let mut frame = Frame { line, poses: Vec::with_capacity(scene.moving.len()) };
         for (name, words) in scene.moving.iter().zip(words.chunks(NUMBERS)) {
             let pose =
                 poses::parse(&words.join(" ")).map_err(|text| wrong(format!("instance {name}: {text}")))?;
-            frame.extend(pose);
+            frame.poses.extend(pose);
         }
         frames.push(frame);
     }
