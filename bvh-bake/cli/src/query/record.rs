@@ -12,6 +12,40 @@ use bvh_query::Backend;
 use cbvh_measure::spread::quantile;
 use serde::Serialize;
 
+/// How many questions were asked, and how long they took.
+#[derive(Serialize)]
+pub(crate) struct Times {
+    pub(crate) queries: usize,
+    pub(crate) requested: usize,
+    total_s: f64,
+    query_sum_s: f64,
+    pub(crate) ns_median: u64,
+    ns_mean: f64,
+    ns_p10: u64,
+    pub(crate) ns_p90: u64,
+    pub(crate) ns_max: u64,
+}
+
+impl Times {
+    /// Sums up the nanoseconds of questions.
+    pub(crate) fn new(nanoseconds: impl Iterator<Item = u64>, requested: usize, total_s: f64) -> Self {
+        let mut times: Vec<u64> = nanoseconds.collect();
+        times.sort_unstable();
+        let (sum, queries) = (times.iter().sum::<u64>(), times.len());
+        Self {
+            queries,
+            requested,
+            total_s,
+            query_sum_s: sum as f64 * 1e-9,
+            ns_median: quantile(&times, 0.5),
+            ns_mean: if queries == 0 { 0.0 } else { sum as f64 / queries as f64 },
+            ns_p10: quantile(&times, 0.1),
+            ns_p90: quantile(&times, 0.9),
+            ns_max: times.last().copied().unwrap_or(0),
+        }
+    }
+}
+
 /// The JSON line of a pose file: the fields that programs of this protocol share, and further ones.
 #[derive(Serialize)]
 pub(super) struct Record {
@@ -23,15 +57,8 @@ pub(super) struct Record {
     tris_b: u64,
     build_a_s: f64,
     build_b_s: f64,
-    queries: usize,
-    requested: usize,
-    total_s: f64,
-    query_sum_s: f64,
-    ns_median: u64,
-    ns_mean: f64,
-    ns_p10: u64,
-    ns_p90: u64,
-    ns_max: u64,
+    #[serde(flatten)]
+    times: Times,
     positives: u64,
     sum: f64,
     peak_rss_mb: Option<f64>,
@@ -62,9 +89,6 @@ impl Record {
         cold: Option<Means>,
     ) -> Self {
         let answers = &run.answers;
-        let mut times: Vec<u64> = answers.iter().map(|&(_, nanoseconds)| nanoseconds).collect();
-        times.sort_unstable();
-        let nanoseconds: u64 = times.iter().sum();
         let count = answers.len();
         let (bytes_a, stored_a) = sides.a.bytes_and_stored();
         let (bytes_b, stored_b) = sides.b.bytes_and_stored();
@@ -78,15 +102,7 @@ impl Record {
             tris_b: sides.b.triangles(),
             build_a_s: sides.a.build_seconds,
             build_b_s: sides.b.build_seconds,
-            queries: count,
-            requested: run.requested,
-            total_s: run.total_seconds,
-            query_sum_s: nanoseconds as f64 * 1e-9,
-            ns_median: quantile(&times, 0.5),
-            ns_mean: if count == 0 { 0.0 } else { nanoseconds as f64 / count as f64 },
-            ns_p10: quantile(&times, 0.1),
-            ns_p90: quantile(&times, 0.9),
-            ns_max: times.last().copied().unwrap_or(0),
+            times: Times::new(answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds),
             positives: answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
             sum: answers.iter().map(|(answer, _)| answer.value()).sum(),
             peak_rss_mb: resident::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),

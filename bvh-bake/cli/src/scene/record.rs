@@ -6,10 +6,10 @@ use super::file::LoadedScene;
 use crate::console::{hex, plural};
 use crate::process::resident;
 use crate::query::number::significant;
+use crate::query::record::Times;
 use crate::query::stem;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, InstanceId};
-use cbvh_measure::spread::quantile;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -25,15 +25,8 @@ pub(super) struct Record {
     moving: usize,
     triangles: u64,
     build_s: f64,
-    queries: usize,
-    requested: usize,
-    total_s: f64,
-    query_sum_s: f64,
-    ns_median: u64,
-    ns_mean: f64,
-    ns_p10: u64,
-    ns_p90: u64,
-    ns_max: u64,
+    #[serde(flatten)]
+    times: Times,
     positives: u64,
     sum: f64,
     mesh_pair_tests: u64,
@@ -54,10 +47,7 @@ impl Record {
         question: &Question,
         run: &Run,
     ) -> Self {
-        let mut times: Vec<u64> = run.answers.iter().map(|&(_, nanoseconds)| nanoseconds).collect();
-        times.sort_unstable();
-        let (nanoseconds, count) = (times.iter().sum::<u64>(), times.len());
-        let complete = count == run.requested;
+        let complete = run.answers.len() == run.requested;
         // Without pairs there is no distance to add.
         let values = run.answers.iter().map(|(answer, _)| answer.value()).filter(|value| value.is_finite());
         Self {
@@ -70,15 +60,7 @@ impl Record {
             moving: scene.moving.len(),
             triangles: scene.triangles,
             build_s: scene.build_seconds,
-            queries: count,
-            requested: run.requested,
-            total_s: run.total_seconds,
-            query_sum_s: nanoseconds as f64 * 1e-9,
-            ns_median: quantile(&times, 0.5),
-            ns_mean: if count == 0 { 0.0 } else { nanoseconds as f64 / count as f64 },
-            ns_p10: quantile(&times, 0.1),
-            ns_p90: quantile(&times, 0.9),
-            ns_max: times.last().copied().unwrap_or(0),
+            times: Times::new(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds),
             positives: run.answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
             sum: values.sum(),
             mesh_pair_tests: run.pairs_asked,
@@ -104,13 +86,13 @@ impl Record {
             plural(self.instances as u64, "instance"),
             self.moving,
             self.mode,
-            self.queries,
-            self.requested,
-            plural(self.requested as u64, "frame"),
+            self.times.queries,
+            self.times.requested,
+            plural(self.times.requested as u64, "frame"),
             self.positives,
-            micro(self.ns_median),
-            micro(self.ns_p90),
-            micro(self.ns_max),
+            micro(self.times.ns_median),
+            micro(self.times.ns_p90),
+            micro(self.times.ns_max),
             self.isa,
             self.jobs,
             plural(u64::from(self.jobs), "thread"),
