@@ -57,7 +57,7 @@ pub struct SectionEntry {
 
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
 
-/// The sections of version 1. Later minor versions of the format may add kinds.
+/// The sections of version 2. Later minor versions of the format may add kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[repr(u32)]
@@ -74,12 +74,21 @@ pub enum SectionKind {
     Duplicates = 5,
     /// Where the mesh came from and how it was baked. Optional, and not part of the content.
     Provenance = 6,
+    /// Where the objects stand in the world. Optional.
+    Instances = 7,
 }
 
 impl SectionKind {
     /// All kinds in the order of their numbers on disk, which start at 1.
-    pub const ALL: [Self; 6] =
-        [Self::Objects, Self::Nodes, Self::Leaves, Self::Ids, Self::Duplicates, Self::Provenance];
+    pub const ALL: [Self; 7] = [
+        Self::Objects,
+        Self::Nodes,
+        Self::Leaves,
+        Self::Ids,
+        Self::Duplicates,
+        Self::Provenance,
+        Self::Instances,
+    ];
 
     /// Returns the kind of a number on disk.
     pub(crate) fn from_number(number: u32) -> Option<Self> {
@@ -105,6 +114,7 @@ impl SectionKind {
             Self::Ids => "ids",
             Self::Duplicates => "duplicates",
             Self::Provenance => "provenance",
+            Self::Instances => "instances",
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
 use crate::header::{Header, Section, SectionKind, read_header};
 use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
+use crate::instances::{Instance, read_instances};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
 use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
@@ -29,6 +30,7 @@ pub struct Layout {
     leaves: Range<usize>,
     ids: Option<Range<usize>>,
     duplicates: Option<Range<usize>>,
+    instances: Option<Section>,
 }
 
 impl Layout {
@@ -88,6 +90,7 @@ impl Layout {
             leaves: needed(SectionKind::Leaves),
             ids: find(SectionKind::Ids),
             duplicates: find(SectionKind::Duplicates),
+            instances: sections.iter().find(|section| section.kind == SectionKind::Instances).cloned(),
             sections,
         })
     }
@@ -193,6 +196,22 @@ impl Layout {
         let section = self.duplicates.clone().and_then(|range| bytes.get(range)).unwrap_or(&[]);
         let whole = section.len() / 8 * 8;
         <[[U32; 2]]>::ref_from_bytes(&section[..whole]).unwrap_or(&[])
+    }
+
+    /// Returns true if the file is a scene, which says where its objects stand in the world.
+    pub fn has_instances(&self) -> bool {
+        self.instances.is_some()
+    }
+
+    /// Reads and checks the instances section. There are no instances without one. The cost grows with the section.
+    ///
+    /// # Errors
+    /// Rule 10 for this section, and rules 40 to 43; and the errors of the source.
+    pub fn read_instances<S: Source + ?Sized>(&self, source: &S) -> Result<Vec<Instance>, S::Error> {
+        let Some(section) = &self.instances else { return Ok(Vec::new()) };
+        let (bytes, at) = (source.read(section.range.clone())?, section.range.start as u64);
+        require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(&bytes)))?;
+        Ok(read_instances(&bytes, at, self.objects.len())?)
     }
 
     /// Checks the section of duplicate ids: its checksum and its order.

@@ -57,6 +57,7 @@ pub mod decode;
 mod error;
 pub mod header;
 pub mod ids;
+pub mod instances;
 pub mod kdop;
 pub mod layout;
 pub mod leaf;

@@ -231,7 +231,7 @@ fn read_object(
     *names_left -= name.len();
     let unknown = |at, what, found| FormatError::new(Rule::ObjectProfile, at, what, found);
     let profile = Profile::from_number(record.profile)
-        .ok_or_else(|| unknown(at + 132, "a profile from 0 to 9", record.profile))?;
+        .ok_or_else(|| unknown(at + 132, "a profile from 0 to 6", record.profile))?;
     let triangle_encoding = TriangleEncoding::from_number(record.triangle_encoding)
         .ok_or_else(|| unknown(at + 133, "a triangle encoding from 0 to 2", record.triangle_encoding))?;
     let f16_scale = f32::from_bits(((record.f16_exponent.get() + 127) as u32) << 23);

@@ -62,6 +62,10 @@ rules! {
     VertexOnGrid = 37, "the origin plus a vertex is exact in 64-bit floating point";
     Codes = 38, "codes that are floats are finite, and f16 codes not negative";
     TurningTriangles = 39, "a child with a turning slab has at most 1024 triangles below";
+    InstanceTable = 40, "the instances section has one record of 128 bytes per instance and names within its bytes";
+    InstanceObject = 41, "an instance is of an object of the file";
+    InstancePose = 42, "an instance's pose is rigid and within the limits";
+    InstanceName = 43, "no two instances have the same name";
 }
 
 impl Rule {

@@ -78,7 +78,7 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
 /// [`crate::bounds::check_bounds`].
 ///
 /// The check takes two passes over all bytes, and one over the pages for their links, with one more page read per link.
-/// It needs twice the memory of the object table, some 300 KiB for counts, and a page with its blocks for each worker:
+/// It needs twice the memory of the object table and of the instances, some 300 KiB for counts, and a page with its blocks for each worker:
 /// at most 1 MiB, and 64 KiB in files of `bvh-bake`.
 ///
 /// # Errors
@@ -92,10 +92,10 @@ pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> 
     Ok(layout)
 }
 
-/// Checks the checksums of whole sections and of the content, and the order of duplicate ids.
+/// Checks the checksums of whole sections and of the content, the order of duplicate ids, and the instances.
 ///
 /// # Errors
-/// The first of rules 10 and 36 that does not hold, or an error of the source.
+/// The first of rules 10, 36 and 40 to 43 that does not hold, or an error of the source.
 pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(), S::Error> {
     let mut content = ContentHasher::default();
     let mut pairs = PairsInOrder::default();
@@ -119,7 +119,9 @@ pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result
     }
     require(Rule::SectionChecksum, 24, hex(layout.content_checksum), hex(content.finish()))?;
     let duplicates = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
-    Ok(duplicates.map_or(Ok(()), |section| pairs.check(section))?)
+    duplicates.map_or(Ok(()), |section| pairs.check(section))?;
+    layout.read_instances(source)?;
+    Ok(())
 }
 
 fn check_object<S: Source + ?Sized>(

@@ -6,6 +6,7 @@
 //! keep the files small, they omit the sections that the rule does not need.
 
 use bvh_format::checksum::checksum;
+use bvh_format::instances::{Instance, write_instances};
 use bvh_format::validate::validate;
 use bvh_format::{FormatError, Layout, Rule};
 use cbvh_testkit::seal::{
@@ -25,6 +26,28 @@ fn frozen(start: &str) -> Vec<(String, Vec<u8>)> {
     names.sort();
     let read = |name: String| (std::fs::read(testdata().join(&name)).unwrap(), name);
     names.into_iter().map(read).map(|(bytes, name)| (name, bytes)).collect()
+}
+
+/// The cube of `ok-everything.cbvh` three times in the world: as it is, moved and turned, and without a name.
+fn scene() -> Vec<u8> {
+    let mut sections = take_apart(&std::fs::read(testdata().join("ok-everything.cbvh")).unwrap());
+    let mut turned = Instance { name: "turned".to_owned(), ..Instance::of_object(0) };
+    turned.rotation = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    turned.translation = [1.5, 0.0, -2.5];
+    (turned.member, turned.meets) = (6, 1);
+    let first = Instance { name: "cube".to_owned(), ..Instance::of_object(0) };
+    let instances = [first, turned, Instance::of_object(0)];
+    sections.push((7, 0, write_instances(&instances)));
+    put_together(&sections)
+}
+
+/// Makes a file of a cube and one or two instances of it, of which the last is changed.
+fn instances(count: usize, edit: impl FnOnce(&mut Instance)) -> Vec<u8> {
+    let mut sections = take_apart(&change(&LEAVES, |_| ()));
+    let mut instances = vec![Instance { name: "cube".to_owned(), ..Instance::of_object(0) }; count];
+    instances.last_mut().map(edit);
+    sections.push((7, 0, write_instances(&instances)));
+    put_together(&sections)
 }
 
 /// A file of some sections of `ok-everything.cbvh`, under change.
@@ -280,12 +303,43 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
     ]
 }
 
+/// Changes to the instances.
+fn bad_instances() -> Vec<(u32, &'static str, Vec<u8>)> {
+    let none = |instance: &mut Instance| instance.name.clear();
+    let cut = {
+        let mut sections = take_apart(&instances(1, |_| ()));
+        sections.last_mut().unwrap().2.pop();
+        put_together(&sections)
+    };
+    let unsealed = {
+        let mut bytes = instances(1, |_| ());
+        let start = section(&bytes, 7).start;
+        bytes[start + 16 + 12] ^= 1;
+        bytes
+    };
+    vec![
+        (10, "instances", unsealed),
+        (40, "no-instances", instances(0, none)),
+        (40, "cut", cut),
+        (41, "object-1", instances(1, |instance| instance.object = 1)),
+        (42, "scaled", instances(1, |instance| instance.rotation[0][0] = 2.0)),
+        (42, "mirrored", instances(2, |instance| instance.rotation[2][2] = -1.0)),
+        (42, "nan", instances(1, |instance| instance.translation[2] = f64::NAN)),
+        (43, "twice", instances(2, |_| ())),
+    ]
+}
+
 fn number_of(error: Result<Layout, FormatError>) -> u32 {
     error.err().map_or(0, |error| error.rule.number())
 }
 
 #[test]
 fn good_files_are_valid() {
+    let path = testdata().join("ok-scene.cbvh");
+    if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
+        std::fs::write(&path, scene()).unwrap();
+    }
+    assert!(std::fs::read(&path).unwrap() == scene(), "ok-scene.cbvh is not what was frozen");
     let files = frozen("ok-");
     assert!(files.len() >= 3);
     for (name, bytes) in files {
@@ -295,7 +349,7 @@ fn good_files_are_valid() {
 
 #[test]
 fn bad_files_break_the_rule_in_their_name() {
-    let bad = [bad_at_open(), bad_pages(), bad_blocks()].concat();
+    let bad = [bad_at_open(), bad_pages(), bad_blocks(), bad_instances()].concat();
     for (rule, what, bytes) in &bad {
         let found = validate(bytes);
         assert_eq!(number_of(found.clone()), *rule, "{what}: {:?}", found.err());
@@ -326,8 +380,8 @@ fn bad_files_break_the_rule_in_their_name() {
 
 #[test]
 fn every_flipped_bit_that_means_something_is_found() {
-    let (_, bytes) = frozen("ok-everything").remove(0);
-    let sections: Vec<_> = (1..=6).map(|kind| section(&bytes, kind)).collect();
+    let bytes = scene();
+    let sections: Vec<_> = (1..=7).map(|kind| section(&bytes, kind)).collect();
     for at in (0..bytes.len()).step_by(7) {
         let mut changed = bytes.clone();
         changed[at] ^= 1 << (at % 8);

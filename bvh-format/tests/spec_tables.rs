@@ -8,6 +8,7 @@ use bvh_format::checksum::checksum;
 use bvh_format::decode::decode_child;
 use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind};
 use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
+use bvh_format::instances::{Instance, InstanceRecord, MAX_RIGID_ERROR, MAX_WORLD, write_instances};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::leaf::{F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PackedHead, TriangleEncoding};
 use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
@@ -97,6 +98,7 @@ fn structures() {
         first_page, pages, max_vertex_rounding, max_quantization_error, input_triangles, degenerate,
         duplicates, f16_exponent, profile, triangle_encoding, reserved, sphere_centre, sphere_radius,
         reserved_end);
+    compare!(InstanceRecord: name_offset, name_length, object, member, meets, reserved, rotation, translation);
     compare!(PageHeader: checksum, leaf_checksum, id_checksum, leaf_line, id_word, first_packet,
         page_number, leaf_lines, id_words, packets, roots, treelets, remotes, treelet_line, profile,
         reserved);
@@ -111,6 +113,10 @@ fn heads_of_blocks() {
     let rows = byte_table("object-head", write_objects(&[]).len());
     let section = write_objects(&[("name".into(), ObjectRecord::new_zeroed())]);
     assert_eq!([section[offset(&rows, "objects")], section[offset(&rows, "names_length")]], [1, 4]);
+
+    let rows = byte_table("instance-head", write_instances(&[]).len());
+    let section = write_instances(&[Instance { name: "name".into(), ..Instance::of_object(0) }]);
+    assert_eq!([section[offset(&rows, "instances")], section[offset(&rows, "names_length")]], [1, 4]);
 
     // All bytes differ, so that each value is known by its first byte.
     let bytes: Vec<u8> = (1..=PACKED_HEAD_BYTES as u8).collect();
@@ -217,7 +223,10 @@ macro_rules! named {
 fn constants() {
     const LOG2_MAX_COORDINATE: i32 = 120;
     const TURNING_TRIANGLES: usize = MAX_TRIANGLES;
+    const LOG2_MAX_WORLD: i32 = 118;
+    const RIGID_BITS: i32 = 23;
     assert_eq!(2f64.powi(LOG2_MAX_COORDINATE), MAX_COORDINATE);
+    assert_eq!((2f64.powi(LOG2_MAX_WORLD), 2f64.powi(-RIGID_BITS)), (MAX_WORLD, MAX_RIGID_ERROR));
     let mut expected = named![
         PAGE,
         LINE,
@@ -232,7 +241,9 @@ fn constants() {
         PACKED_HEAD_BYTES,
         ID_HEAD_BYTES,
         LOG2_MAX_COORDINATE,
-        TURNING_TRIANGLES
+        TURNING_TRIANGLES,
+        LOG2_MAX_WORLD,
+        RIGID_BITS
     ]
     .to_vec();
     let steps = [("STEP_U8", STEP_U8), ("STEP_U4", STEP_U4)];

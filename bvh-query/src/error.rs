@@ -2,6 +2,7 @@
 
 use crate::isa::BackendError;
 use crate::pose::PoseError;
+use crate::scene::SceneError;
 use bvh_format::FormatError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,14 @@ pub enum OpenError {
         path: PathBuf,
         /// The rule that is broken, and where.
         source: FormatError,
+    },
+    /// The file is valid, but it is no scene that can be asked.
+    #[error("{}: {source}", path.display())]
+    Scene {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<SceneError>,
     },
 }
 
@@ -65,6 +74,14 @@ pub enum QueryError {
     /// Two poses have no relative pose.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// A file that is opened at first need is not there, or has changed since its header was read.
+    #[error("{}: expected the file as it was when it was added, found {found}; add it again", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What became of it.
+        found: String,
+    },
     /// The backend asked for is not available.
     #[error(transparent)]
     Backend(#[from] BackendError),

@@ -61,6 +61,7 @@ mod traverse;
 
 pub use error::{OpenError, QueryError};
 pub use file::bvh::Bvh;
+pub use file::files::{Files, StoredShape};
 pub use file::mapped::ReadAhead;
 pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
@@ -72,7 +73,7 @@ pub use query::batch::Batch;
 pub use query::options::DistanceOptions;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
-pub use scene::{Groups, InstanceId, Scene, SceneContact, SceneDistance, SceneError, ScenePair};
+pub use scene::{Groups, InstanceId, Scene, SceneContact, SceneDistance, SceneError, ScenePair, SceneShape};
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///

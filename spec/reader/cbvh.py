@@ -21,6 +21,7 @@ F32_PACKET_BYTES = 144
 PACKED_HEAD_BYTES = 32
 ID_HEAD_BYTES = 8
 TURNING_TRIANGLES = 1024
+LOG2_MAX_WORLD, RIGID_BITS = 118, 23
 STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
 
 MAGIC = bytes.fromhex("89636276680d0a1a")
@@ -68,6 +69,19 @@ OBJECT_RECORD = np.dtype(
         ("reserved_end", "u1", 40),
     ]
 )
+INSTANCE_HEAD = np.dtype([("instances", "<u4"), ("names_length", "<u4"), ("reserved", "u1", 8)])
+INSTANCE_RECORD = np.dtype(
+    [
+        ("name_offset", "<u4"),
+        ("name_length", "<u4"),
+        ("object", "<u4"),
+        ("member", "<u4"),
+        ("meets", "<u4"),
+        ("reserved", "u1", 12),
+        ("rotation", "<f8", 9),
+        ("translation", "<f8", 3),
+    ]
+)
 PAGE_HEADER = np.dtype(
     [
         ("checksum", "<u8"),
@@ -106,9 +120,12 @@ ID_HEAD = np.dtype([("base", "<u4"), ("bits", "u1"), ("reserved", "u1", 3)])
 LINKS = np.dtype([("first_treelet", "u1"), ("first_remote", "u1"), ("first_leaf", "<u2")])
 
 # 2.1
-OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE = range(1, 7)
+OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE, INSTANCES = KINDS = range(1, 8)
 NEEDED = (OBJECTS, NODES, LEAVES)
-CONTENT = (OBJECTS, NODES, LEAVES, IDS, DUPLICATES)
+CONTENT = (OBJECTS, NODES, LEAVES, IDS, DUPLICATES, INSTANCES)
+
+# 3: the head and the records of sections with named records
+TABLES = {OBJECTS: (OBJECT_HEAD, OBJECT_RECORD), INSTANCES: (INSTANCE_HEAD, INSTANCE_RECORD)}
 
 # 4
 DIRECTIONS = np.array(
@@ -154,6 +171,11 @@ def ceil_div(a, b):
     return -(-a // b)
 
 
+def records_of(head):
+    """The number of records that the head of a section with named records states, in its first field."""
+    return getattr(head, head.dtype.names[0])
+
+
 def row_of(slab):
     return slab if slab < 7 else slab + 1
 
@@ -196,6 +218,7 @@ class File:
         self.data = data
         self.sections = {}  # entries of known kinds
         self.objects = []
+        self.instances = []
 
     def read_header(self):
         self.header = Record(HEADER, self.data, 0)
@@ -230,16 +253,24 @@ class File:
         return dict(line.split("=", 1) for line in lines if "=" in line)
 
 
-class Object(Record):
+class NamedRecord(Record):
+    """A record of a section that consists of a head, records and their names (3, 3.1)."""
+
+    def __init__(self, file, kind, number):
+        head, dtype = TABLES[kind]
+        start = file.sections[kind].offset
+        super().__init__(dtype, file.data, start + head.itemsize + dtype.itemsize * number)
+        self.file, self.number = file, number
+        count = records_of(Record(head, file.data, start))
+        self.name_at = start + head.itemsize + dtype.itemsize * count + self.name_offset
+        self.name_bytes = file.data[self.name_at : self.name_at + self.name_length]
+
+
+class Object(NamedRecord):
     """One mesh and its tree (3)."""
 
     def __init__(self, file, number):
-        head = file.sections[OBJECTS].offset
-        super().__init__(OBJECT_RECORD, file.data, head + OBJECT_HEAD.itemsize + OBJECT_RECORD.itemsize * number)
-        self.file, self.number = file, number
-        count = Record(OBJECT_HEAD, file.data, head).objects
-        self.name_at = head + OBJECT_HEAD.itemsize + OBJECT_RECORD.itemsize * count + self.name_offset
-        self.name_bytes = file.data[self.name_at : self.name_at + self.name_length]
+        super().__init__(file, OBJECTS, number)
         self.pages_read = []
 
     @property
@@ -260,6 +291,17 @@ class Object(Record):
 
     def ids(self):
         return self.lanes_of(Page.ids)
+
+
+class Instance(NamedRecord):
+    """An object with a pose, groups and a name (3.1)."""
+
+    def __init__(self, file, number):
+        super().__init__(file, INSTANCES, number)
+
+    def rows(self):
+        """The three rows of the rotation."""
+        return self.rotation.reshape(3, 3).tolist()
 
 
 class Page(Record):

@@ -40,6 +40,8 @@ def summary(file):
 
     layouts = sorted({f"{one.layout.name} {rules.cbvh.ENCODINGS[one.triangle_encoding]}" for one in file.objects})
     counts = [f"{len(file.objects)} objects", *(f"{total(what)} {what}" for what in ("triangles", "pages", "treelets"))]
+    if file.instances:
+        counts.append(f"{len(file.instances)} instances")
     return ", ".join(counts + layouts)
 
 

@@ -17,6 +17,7 @@ def violations(file):
     yield from of_header_page(file)
     yield from of_sections(file)
     yield from of_object_table(file)
+    yield from of_instances(file)
     lines = words = 0
     for one in file.objects:
         yield from of_object(one)
@@ -59,16 +60,34 @@ def of_sections(file):
 
 
 def of_object_table(file):
-    head = cbvh.Record(cbvh.OBJECT_HEAD, file.data, file.sections[cbvh.OBJECTS].offset)
-    end = 0
+    yield from of_names(file, cbvh.OBJECTS, file.objects, "(3) object")
     for one in file.objects:
-        if one.name_offset != end:
-            yield f"(3) object {one.number}: name at {one.name_offset}, expected at {end}"
-        end += one.name_length
         if one.reserved.any() or one.reserved_end.any():
             yield f"(1.2) object {one.number}: nonzero reserved bytes"
+
+
+def of_instances(file):
+    if cbvh.INSTANCES not in file.sections:
+        return
+    yield from of_names(file, cbvh.INSTANCES, file.instances, "(3.1) instance")
+    for one in file.instances:
+        if one.reserved.any():
+            yield f"(1.2) instance {one.number}: nonzero reserved bytes"
+        numbers = np.concatenate([one.rotation, one.translation])
+        if ((numbers == 0) & np.signbit(numbers)).any():
+            yield f"(3.1) instance {one.number}: -0"
+
+
+def of_names(file, kind, records, where):
+    """Names are in the order of the records, without gaps, and reserved bytes of the head are zero."""
+    head = cbvh.Record(cbvh.TABLES[kind][0], file.data, file.sections[kind].offset)
+    end = 0
+    for one in records:
+        if one.name_offset != end:
+            yield f"{where} {one.number}: name at {one.name_offset}, expected at {end}"
+        end += one.name_length
     if end != head.names_length or head.reserved.any():
-        yield "(3) bytes after the names, or nonzero reserved bytes in the head"
+        yield f"{where}s: bytes after the names, or nonzero reserved bytes in the head"
 
 
 def of_object(one):

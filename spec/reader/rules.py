@@ -1,4 +1,4 @@
-"""Checks the rules R01 to R39 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R43 of spec/format.md, section 16, in the order in which a reader reports them.
 
 Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
 exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
@@ -9,11 +9,13 @@ from collections import namedtuple
 import numpy as np
 
 import cbvh
-from cbvh import DUPLICATES, IDS, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TREELET
+from cbvh import DUPLICATES, IDS, INSTANCES, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TREELET
 from xxh3 import xxh3_64
 
 MAX_COORDINATE = 2.0**120  # R12, R30
 MAX_SLAB = 2.0**122  # R19, R38
+MAX_WORLD = 2.0**cbvh.LOG2_MAX_WORLD  # R42
+MAX_RIGID_ERROR = 2.0**-cbvh.RIGID_BITS  # R42
 LARGEST_F16 = 0x7BFF
 
 
@@ -87,7 +89,7 @@ def check_entries(file):
         )
         end = entry.offset + entry.length
         need(end <= file.header.file_length, 7, entry.place("length"), "an end within the file", end)
-        if OBJECTS <= entry.kind <= cbvh.PROVENANCE:
+        if entry.kind in cbvh.KINDS:
             need(entry.kind not in file.sections, 9, entry.place("kind"), "each kind once", f"a second {entry.kind}")
             file.sections[entry.kind] = entry
         else:
@@ -100,13 +102,33 @@ def check_section_checksum(file, entry):
     need_checksum(10, entry.place("checksum"), entry.checksum, file.bytes_of(entry.kind))
 
 
+def check_head(file, kind, rule):
+    """Checks the head and the length of a section with named records (R11, R40), and returns the head."""
+    entry, (dtype, record) = file.sections[kind], cbvh.TABLES[kind]
+    need(entry.length >= dtype.itemsize, rule, entry.place("length"), "a head", f"{entry.length} bytes")
+    head = cbvh.Record(dtype, file.data, entry.offset)
+    count = cbvh.records_of(head)
+    need(count >= 1, rule, head.place(dtype.names[0]), "at least 1", 0)
+    length = dtype.itemsize + record.itemsize * count + head.names_length
+    need(entry.length == length, rule, entry.place("length"), length, entry.length)
+    return head
+
+
+def check_name(one, rule, head, named):
+    """Checks the name of a record (R11, R40). Earlier names have `named` bytes; returns the bytes with this name."""
+    end = one.name_offset + one.name_length
+    need(end <= head.names_length, rule, one.place("name_offset"), f"an end up to {head.names_length}", end)
+    try:
+        one.name = one.name_bytes.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise Broken(rule, one.name_at + error.start, "UTF-8", one.name_bytes.hex(" ")) from None
+    named += one.name_length
+    need(named <= head.names_length, rule, one.place("name_length"), f"a sum up to {head.names_length}", named)
+    return named
+
+
 def check_objects(file):
-    entry = file.sections[OBJECTS]
-    need(entry.length >= cbvh.OBJECT_HEAD.itemsize, 11, entry.place("length"), "a head", f"{entry.length} bytes")
-    head = cbvh.Record(cbvh.OBJECT_HEAD, file.data, entry.offset)
-    need(head.objects >= 1, 11, head.place("objects"), "at least 1", 0)
-    length = cbvh.OBJECT_HEAD.itemsize + cbvh.OBJECT_RECORD.itemsize * head.objects + head.names_length
-    need(entry.length == length, 11, entry.place("length"), length, entry.length)
+    head = check_head(file, OBJECTS, 11)
     first_page = named = 0
     for number in range(head.objects):
         one = cbvh.Object(file, number)
@@ -114,15 +136,8 @@ def check_objects(file):
         need(one.first_page == first_page, 13, one.place("first_page"), first_page, one.first_page)
         need(one.pages >= 1, 13, one.place("pages"), "at least 1", 0)
         first_page += one.pages
-        end = one.name_offset + one.name_length
-        need(end <= head.names_length, 11, one.place("name_offset"), f"an end up to {head.names_length}", end)
-        try:
-            one.name = one.name_bytes.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise Broken(11, one.name_at + error.start, "UTF-8", one.name_bytes.hex(" ")) from None
-        named += one.name_length
-        need(named <= head.names_length, 11, one.place("name_length"), f"a sum up to {head.names_length}", named)
-        need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 9", one.profile)
+        named = check_name(one, 11, head, named)
+        need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 6", one.profile)
         need(
             one.triangle_encoding < len(cbvh.ENCODINGS),
             14,
@@ -290,6 +305,46 @@ def check_id_block(page):
     need_checksum(32, page.place("id_checksum"), page.id_checksum, page.data[at : at + cbvh.WORD * words])
 
 
+# Scene
+
+
+def check_scene(file):
+    """Checks the instances section, if there is one."""
+    if INSTANCES not in file.sections:
+        return
+    check_section_checksum(file, file.sections[INSTANCES])
+    head = check_head(file, INSTANCES, 40)
+    named, names = 0, set()
+    for number in range(head.instances):
+        one = cbvh.Instance(file, number)
+        named = check_name(one, 40, head, named)
+        need(one.object < len(file.objects), 41, one.place("object"), f"below {len(file.objects)}", one.object)
+        check_pose(one)
+        need(one.name not in names, 43, one.place("name_offset"), "no name twice", repr(one.name))
+        if one.name:
+            names.add(one.name)
+        file.instances.append(one)
+
+
+def check_pose(one):
+    """Checks R42 for an instance. Each operation on Python's numbers is one of f64."""
+
+    def dot(a, b):
+        return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+
+    def need_field(field, holds, expected):
+        need(holds, 42, one.place(field), expected, getattr(one, field))
+
+    need_field("rotation", bool(np.isfinite(one.rotation).all()), "finite numbers")
+    need_field("translation", is_within(one.translation, MAX_WORLD), "at most 2^118 in magnitude")
+    rows = one.rows()
+    errors = [dot(rows[i], rows[j]) - (i == j) for i in range(3) for j in range(3)]
+    need_field("rotation", is_within(errors, MAX_RIGID_ERROR), "rows that are orthonormal to within 2^-23")
+    x, y, z = rows
+    cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    need_field("rotation", dot(cross, z) >= 0, "no reflection")
+
+
 # Validate
 
 
@@ -302,6 +357,7 @@ def validate(data):
     stated, actual = file.header.content_checksum, file.content_checksum()
     need(stated == actual, 10, file.header.place("content_checksum"), f"content {stated:016x}", f"{actual:016x}")
     check_duplicates(file)
+    check_scene(file)
     for one in file.objects:
         validate_object(one)
     return file

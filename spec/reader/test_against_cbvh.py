@@ -24,6 +24,7 @@ import musts
 import mutate
 import query
 import rules
+from test_reader import instances, with_instances
 
 COMMAND = os.environ.get("CBVH")
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
@@ -160,6 +161,12 @@ class AgainstCbvh(unittest.TestCase):
                 *("pages", "max_vertex_rounding", "max_quantization_error"),
             ):
                 self.assertEqual(facts[field], getattr(one, field), field)
+        instances = [
+            {field: getattr(one, field) for field in ("number", "name", "object", "member", "meets")}
+            | {"rotation": one.rows(), "translation": one.translation.tolist()}
+            for one in file.instances
+        ]
+        self.assertEqual(dumped["instances"], instances)
 
     def check_decoding(self, file, path):
         """Compares the bits of decoded slabs, and links, of a few treelets drawn at random."""
@@ -239,6 +246,46 @@ class AgainstCbvh(unittest.TestCase):
         self.assertEqual(list(musts.violations(file)), [])
         self.assertNotIn(cbvh.IDS, file.sections)
         self.check_facts(file, path)
+
+    def written(self, name, data):
+        path = os.path.join(self.folder, name)
+        with open(path, "wb") as stream:
+            stream.write(data)
+        return path
+
+    def test_instances(self):
+        scene = os.path.join(TESTDATA, "ok-scene.cbvh")
+        self.check_facts(load(scene), scene)
+        data = load(os.path.join(TESTDATA, "ok-profiles.cbvh")).data
+        changes = [
+            {
+                "text": self.chance.choice(("", f"Tür {number}", f"{number}\n\"")).encode(),
+                "object": self.chance.randrange(len(cbvh.PROFILES)),
+                "member": self.chance.getrandbits(32),
+                "meets": self.chance.getrandbits(32),
+                "rotation": random_rotation(self.chance),
+                "translation": [self.chance.uniform(-1, 1) * 2.0 ** self.chance.choice((118, 0, -99)) for _ in "xyz"],
+            }
+            for number in range(50)
+        ]
+        path = self.written("scene.cbvh", with_instances(data, instances(*changes)))
+        file = load(path)
+        self.assertEqual(list(musts.violations(file)), [])
+        self.check_facts(file, path)
+
+    def test_rotations_near_the_limit(self):
+        """Rotations of instances that are scaled and sheared, so that rounding decides about some of them."""
+        data, verdicts = load(os.path.join(TESTDATA, "ok-plain.cbvh")).data, set()
+        for _ in range(60):
+            # Squares of 1 + these are about 1 + 2^-23 and 1 - 2^-23, as far as f64 can tell.
+            scales = [self.chance.choice((2.0**-24, -(2.0**-24), 0)) - 2.0**-49 for _ in range(3)]
+            change = np.diag(scales) + self.chance.choice((0, 0, 1e-12, 2.0**-25)) * random_rotation(self.chance)
+            rotation = (np.eye(3) + change) @ random_rotation(self.chance)
+            scene = with_instances(data, instances({"rotation": rotation}))
+            ours = mutate.verdict(scene)
+            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, self.written("near.cbvh", scene)), rotation)
+            verdicts.add(ours)
+        self.assertEqual(verdicts, {0, 42})
 
     def test_bounds_of_coordinates_that_cancel(self):
         """The sum is 1 + 2^-60 - 1, so the upper end along (1, 1, 1) must not be 0."""
@@ -375,7 +422,8 @@ class AgainstCbvh(unittest.TestCase):
                 self.check_queries(*paths, query.read_poses(stream.read())[:8])
 
     def test_damaged_files(self):
-        meshes = [os.path.join(TESTDATA, name) for name in ("ok-everything.cbvh", "ok-plain.cbvh", "ok-profiles.cbvh")]
+        names = "ok-everything.cbvh", "ok-plain.cbvh", "ok-profiles.cbvh", "ok-scene.cbvh"
+        meshes = [os.path.join(TESTDATA, name) for name in names]
         for profile, triangles in (
             ("dop14-u8", "f32"),
             ("dop6-f16", "packed"),

@@ -7,6 +7,7 @@ runs these tests and those of test_against_cbvh.py.
 """
 
 import glob
+import itertools
 import os
 import random
 import re
@@ -93,6 +94,52 @@ def turning_slab(codes, lo, hi):
     return nearest_f32(least + nearest_f32(codes[0] * unit)), nearest_f32(greatest - nearest_f32(codes[1] * unit))
 
 
+def instances(*changes, count=None, names=None, **head):
+    """Returns the bytes of an instances section with one record per dictionary of fields.
+
+    Fields that a dictionary leaves out are those of object 0 where it is, without a name and in all groups. `text` is a
+    name, stored after those of earlier records. `count` and `names` replace the number of instances and the names.
+    """
+    records, texts = np.zeros(len(changes), cbvh.INSTANCE_RECORD), b""
+    records["member"] = records["meets"] = 0xFFFFFFFF
+    records["rotation"] = np.eye(3).ravel()
+    for record, fields in zip(records, changes):
+        text = fields.get("text", b"")
+        record["name_offset"], record["name_length"] = len(texts), len(text)
+        texts += text
+        for field in fields.keys() - {"text"}:
+            record[field] = np.ravel(fields[field]) if field == "rotation" else fields[field]
+    texts = texts if names is None else names
+    first = np.zeros((), cbvh.INSTANCE_HEAD)
+    first["instances"], first["names_length"] = len(changes) if count is None else count, len(texts)
+    for field, value in head.items():
+        first[field] = value
+    return first.tobytes() + records.tobytes() + texts
+
+
+def with_instances(data, section, required=0, before=0):
+    """Returns a file with an instances section of these bytes, behind all sections but the last `before` ones."""
+    file, last = rules.open_file(data), len(data)
+    entries = [tuple(getattr(entry, field) for field in cbvh.SECTION_ENTRY.names) for entry in file.entries]
+    later, entries = entries[len(entries) - before :], entries[: len(entries) - before]
+    start = later[0][2] if later else last
+    room = cbvh.PAGE * cbvh.ceil_div(len(section), cbvh.PAGE)
+    entries.append((cbvh.INSTANCES, required, start, len(section), 0))
+    entries += [(kind, need, at + room, length, 0) for kind, need, at, length, _ in later]
+    data = bytearray(data[:start] + section.ljust(room, b"\0") + data[start:])
+    data[12:16] = len(entries).to_bytes(4, "little")
+    data[16:24] = len(data).to_bytes(8, "little")
+    table = np.array(entries, cbvh.SECTION_ENTRY).tobytes()
+    data[cbvh.LINE : cbvh.LINE + len(table)] = table
+    mutate.seal(data)
+    return bytes(data)
+
+
+def after(number, towards=np.inf):
+    """The f64 next to a number, in the direction of another."""
+    return float(np.nextafter(number, towards))
+
+
 class Tables(unittest.TestCase):
     def test_structures(self):
         structures = {
@@ -100,6 +147,8 @@ class Tables(unittest.TestCase):
             "SectionEntry": cbvh.SECTION_ENTRY,
             "object-head": cbvh.OBJECT_HEAD,
             "ObjectRecord": cbvh.OBJECT_RECORD,
+            "instance-head": cbvh.INSTANCE_HEAD,
+            "InstanceRecord": cbvh.INSTANCE_RECORD,
             "PageHeader": cbvh.PAGE_HEADER,
             "PackedHead": cbvh.PACKED_HEAD,
             "id-head": cbvh.ID_HEAD,
@@ -121,11 +170,13 @@ class Tables(unittest.TestCase):
         self.assertEqual(table("turning"), [[row[0], *(f"{first} + c" for first in row[1:])] for row in turning])
         self.assertEqual([row[1] for row in table("triangle-encodings")], cbvh.ENCODINGS)
         kinds = {int(row[0]): (row[2] == "yes", row[3] == "yes") for row in table("sections")}
-        self.assertEqual(kinds, {kind: (kind in cbvh.NEEDED, kind in cbvh.CONTENT) for kind in range(1, 7)})
+        self.assertEqual(kinds, {kind: (kind in cbvh.NEEDED, kind in cbvh.CONTENT) for kind in cbvh.KINDS})
 
     def test_constants(self):
         stated = {row[0]: int(row[1], 0) for row in table("constants")}
         self.assertEqual(rules.MAX_COORDINATE, 2.0 ** stated.pop("LOG2_MAX_COORDINATE"))
+        self.assertEqual(rules.MAX_WORLD, 2.0 ** stated["LOG2_MAX_WORLD"])
+        self.assertEqual(rules.MAX_RIGID_ERROR, 2.0 ** -stated["RIGID_BITS"])
         self.assertEqual((stated.pop("MINOR"), stated.pop("PAGE_HEADER_BYTES")), (0, cbvh.PAGE_HEADER.itemsize))
         for name, parts in (("STEP_U8", 255), ("STEP_U4", 15)):
             self.assertEqual(getattr(cbvh, name).view(np.uint32), stated.pop(name))
@@ -286,6 +337,233 @@ class Arithmetic(unittest.TestCase):
             self.assertAlmostEqual(found, expected, delta=1e-15 * expected)
 
 
+class Instances(unittest.TestCase):
+    def setUp(self):
+        ((_, self.everything),) = golden("ok-everything.cbvh")
+        ((_, self.profiles),) = golden("ok-profiles.cbvh")
+
+    def verdict(self, *changes, data=None, **head):
+        """The rule that a file breaks to which these instances are added, or 0."""
+        return mutate.verdict(with_instances(data or self.everything, instances(*changes, **head)))
+
+    def assert_rotations(self, rule, *rotations):
+        for rotation in rotations:
+            self.assertEqual(self.verdict({"rotation": rotation}), rule, rotation)
+
+    def test_what_is_in_a_scene(self):
+        turn, names = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], ["Tür", "", "x", "", "tür", "x "]
+        changes = [{"text": name.encode()} for name in names]
+        changes[1] |= {"object": 6, "member": 1, "meets": 1 << 31, "rotation": turn, "translation": [1.5, -2, 3]}
+        changes[2] |= {"object": 6, "member": 0, "meets": 0}
+        file = rules.validate(with_instances(self.profiles, instances(*changes)))
+        rules.verify(file)
+        self.assertEqual(list(musts.violations(file)), [])
+        self.assertEqual([one.name for one in file.instances], names)
+        self.assertEqual([one.number for one in file.instances], list(range(6)))
+        self.assertEqual([one.object for one in file.instances], [0, 6, 6, 0, 0, 0])
+        first, second = file.instances[:2]
+        self.assertEqual((first.member, first.meets), (0xFFFFFFFF, 0xFFFFFFFF))
+        self.assertEqual((first.rows(), first.translation.tolist()), (np.eye(3).tolist(), [0, 0, 0]))
+        self.assertEqual((second.member, second.meets), (1, 1 << 31))
+        self.assertEqual((second.rows(), second.translation.tolist()), (turn, [1.5, -2, 3]))
+        self.assertEqual(rules.validate(self.profiles).instances, [])
+
+    def test_checksums(self):
+        """The section is content. R10 comes before the rules of the section, and also holds for its bytes."""
+        scene = with_instances(self.everything, instances({}))
+        file = rules.validate(scene)
+        moved = rules.validate(with_instances(self.everything, instances({"translation": [0, 0, 1]})))
+        contents = {one.header.content_checksum for one in (file, moved, rules.validate(self.everything))}
+        self.assertEqual(len(contents), 3)
+        at = file.sections[cbvh.INSTANCES].offset
+        damaged = bytearray(scene)
+        damaged[at] = 0
+        self.assertEqual(mutate.verdict(damaged), 10)
+        mutate.seal(damaged)
+        self.assertEqual(mutate.verdict(damaged), 40)
+
+    def test_lengths(self):
+        two = {"text": b"ab"}, {"text": b"c"}
+        self.assertEqual(self.verdict(*two), 0)
+        self.assertEqual(self.verdict(), 40)
+        self.assertEqual(self.verdict(count=1), 40)
+        self.assertEqual(self.verdict({}, count=0), 40)
+        self.assertEqual(self.verdict({}, count=0, names=bytes(128)), 40)
+        for count in (1, 3, 1 << 25, (1 << 32) - 1):
+            self.assertEqual(self.verdict(*two, count=count), 40, count)
+        for names_length in (0, 2, 4, (1 << 32) - 1):
+            self.assertEqual(self.verdict(*two, names_length=names_length), 40, names_length)
+        self.assertEqual(self.verdict(*two, names_length=3 + 128, count=1), 0)  # the second record counts as names
+        section = instances({})
+        for length in (0, 1, 15, 16, len(section) - 1):
+            self.assertEqual(mutate.verdict(with_instances(self.everything, section[:length])), 40, length)
+        self.assertEqual(mutate.verdict(with_instances(self.everything, section + b"\0")), 40)
+
+    def test_names(self):
+        def verdict(names, *spans):
+            changes = [{"name_offset": first, "name_length": length} for first, length in spans]
+            return self.verdict(*changes, names=names)
+
+        for rule, names, *spans in (
+            (0, b"abcd", (0, 4)),
+            (0, b"abcd", (4, 0)),
+            (40, b"abcd", (5, 0)),
+            (40, b"abcd", (0, 5)),
+            (40, b"abcd", (3, 2)),
+            (40, b"abcd", ((1 << 32) - 1, 1)),
+            (40, b"abcd", (1, (1 << 32) - 1)),
+            (40, b"", (0, 1)),
+            (0, "ü€".encode(), (0, 2), (2, 3)),
+            (40, "ü€".encode(), (0, 1), (2, 3)),  # ends within a character
+            (40, "ü€".encode(), (0, 2), (3, 2)),  # starts within one
+            (40, b"a\xff", (0, 2)),
+            (40, b"\xc0\x80", (0, 2)),  # longer than needed
+            (40, b"\xed\xa0\x80", (0, 3)),  # half of a pair of UTF-16
+            (0, b"a\xff", (0, 1)),  # no name has that byte
+            (0, b"a\0b", (0, 3)),
+            (0, b"abcd", (0, 2), (1, 2)),  # overlap, and are short enough
+            (0, b"abcd", (2, 2), (0, 2)),
+            (40, b"abcd", (0, 3), (1, 2)),
+            (40, b"abcd", (0, 4), (4, 0), (3, 1)),
+        ):
+            self.assertEqual(verdict(names, *spans), rule, (names, spans))
+
+    def test_same_names(self):
+        for rule, *texts in (
+            (0, b"", b"", b""),
+            (0, b"a", b"", b"A", b"", b"aa", b"a ", b"a\0"),
+            (0, "é".encode(), "e\u0301".encode()),  # they look the same, and are different bytes
+            (43, b"a", b"a"),
+            (43, b"", b"a", b"", b"b", b"a"),
+            (43, "é".encode(), "é".encode()),
+        ):
+            self.assertEqual(self.verdict(*({"text": text} for text in texts)), rule, texts)
+        twice = {"name_offset": 1, "name_length": 1}
+        self.assertEqual(self.verdict(twice, twice, names=b"abc"), 43)
+        self.assertEqual(self.verdict({}, {"object": 0, "translation": [0, 0, 0]}), 0)  # the same in all but number
+
+    def test_objects(self):
+        for data, count in ((self.everything, 1), (self.profiles, 7)):
+            self.assertEqual(self.verdict({"object": count - 1}, data=data), 0)
+            for number in (count, (1 << 32) - 1):
+                self.assertEqual(self.verdict({"object": number}, data=data), 41, number)
+                self.assertEqual(self.verdict({}, {}, {"object": number}, data=data), 41, number)
+
+    def test_translations(self):
+        for axis in range(3):
+            for value, rule in (
+                (2.0**118, 0),
+                (-(2.0**118), 0),
+                (-0.0, 0),
+                (2.0**-1074, 0),
+                (after(2.0**118), 42),
+                (-after(2.0**118), 42),
+                (np.inf, 42),
+                (-np.inf, 42),
+                (np.nan, 42),
+            ):
+                translation = np.zeros(3)
+                translation[axis] = value
+                self.assertEqual(self.verdict({"translation": translation}), rule, translation)
+        self.assertEqual(self.verdict({"translation": [2.0**118, -(2.0**118), 2.0**118]}), 0)
+
+    def test_rotations(self):
+        for place in range(9):
+            for value in (np.nan, np.inf, -np.inf, 1e200, -1e200, 0.5):
+                rotation = np.eye(3)
+                rotation.flat[place] = value
+                self.assert_rotations(42, rotation)
+        self.assert_rotations(42, np.zeros((3, 3)), 2 * np.eye(3), 0.5 * np.eye(3), np.full((3, 3), 1e200))
+        angle = 0.3
+        sin, cos = np.sin(angle), np.cos(angle)
+        rounded = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]).astype(np.float32).astype(np.float64)
+        self.assert_rotations(0, [[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]], rounded)
+
+    def test_reflections(self):
+        for order, signs in itertools.product(itertools.permutations(range(3)), itertools.product((1, -1), repeat=3)):
+            rotation = np.eye(3)[list(order)] * signs
+            self.assert_rotations(0 if np.linalg.det(rotation) > 0 else 42, rotation)
+
+    def test_rotations_at_the_limit(self):
+        limit = 2.0**-23
+        for row, column in itertools.permutations(range(3), 2):
+            for sign in (1, -1):
+                rotation = np.eye(3)
+                rotation[row, column] = sign * limit
+                self.assert_rotations(0, rotation)
+                rotation[row, column] = sign * after(limit)
+                self.assert_rotations(42, rotation)
+        # Squares of these, rounded, are 1 + 2^-23 and 1 - 2^-23; those of their neighbours are beyond.
+        most, least = 1 + 2.0**-24 - 2.0**-49, 1 - 2.0**-24 - 2.0**-49
+        self.assertEqual((most * most, least * least), (1 + limit, 1 - limit))
+        for row in range(3):
+            for scale, rule in ((most, 0), (after(most), 42), (least, 0), (after(least, 0), 42)):
+                rotation = np.eye(3)
+                rotation[row, row] = scale
+                self.assert_rotations(rule, rotation)
+
+    def test_rotations_that_depend_on_rounding(self):
+        """The sum is beyond the limit, but two squares below 2^-53 are lost one by one after 1, and not before it."""
+        large, small = 1 + 2.0**-24 - 2.0**-49, 1e-8
+        for row, rule in (([large, small, small], 0), ([small, large, small], 0), ([small, small, large], 42)):
+            self.assertGreater(sum(Fraction(value) ** 2 for value in row), 1 + Fraction(1, 1 << 23))
+            rotation = np.eye(3)
+            rotation[row.index(large)] = row
+            self.assert_rotations(rule, rotation)
+
+    def test_order_of_rules(self):
+        name, one = {"name_length": 9}, {"object": 1}
+        pose, same = {"translation": [np.nan] * 3}, {"name_offset": 0, "name_length": 1}
+        for rule, *changes in (
+            (40, {}, name | one | pose),
+            (41, same, same | one | pose),
+            (42, same, same | pose),
+            (43, same, same, one),
+            (42, pose, one, name),
+            (41, one, name),
+        ):
+            self.assertEqual(self.verdict(*changes, names=b"abc"), rule, changes)
+        # R36 comes before the scene, and the pages of objects after it.
+        file = rules.validate(self.everything)
+        for kind, offset, alone, with_scene in ((cbvh.DUPLICATES, 3, 36, 36), (cbvh.NODES, 44, 16, 41)):
+            data = bytearray(self.everything)
+            data[file.sections[kind].offset + offset] = 0xFF
+            mutate.seal(data)
+            self.assertEqual(mutate.verdict(data), alone)
+            self.assertEqual(self.verdict(one, data=bytes(data)), with_scene)
+
+    def test_opening(self):
+        """A file with a broken scene can be opened, and the section is known: `required` and R09 are as for others."""
+        broken = instances({"object": 1})
+        self.assertEqual(rules.open_file(with_instances(self.everything, broken)).instances, [])
+        scene = with_instances(self.everything, instances({}), required=1)
+        self.assertEqual(len(rules.validate(scene).instances), 1)
+        self.assertEqual(mutate.verdict(with_instances(scene, instances({}))), 9)
+
+    def test_what_binds_writers(self):
+        good = {"text": b"ab"}, {"text": b"c"}
+
+        def count(*changes, required=0, before=0, **head):
+            file = rules.validate(with_instances(self.everything, instances(*changes, **head), required, before))
+            return len(list(musts.violations(file)))
+
+        self.assertEqual(count(*good), 0)
+        self.assertEqual(count(*good, required=1), 1)
+        self.assertEqual(count(*good, before=1), 1)
+        for byte in range(8):
+            self.assertEqual(count(*good, reserved=np.arange(8) == byte), 1)
+        for byte in range(12):
+            self.assertEqual(count(good[0], good[1] | {"reserved": np.arange(12) == byte}), 1)
+        self.assertEqual(count(*good, names=b"abcd"), 1)  # a byte after the names
+        self.assertEqual(count(good[0], good[1] | {"name_offset": 3}, names=b"ab-c"), 2)  # one between them
+        self.assertEqual(count(good[0] | {"name_offset": 1}, good[1] | {"name_offset": 0}, names=b"cab"), 2)
+        self.assertEqual(count(good[0], good[1] | {"name_offset": 1}, names=b"abc"), 1)  # overlap
+        self.assertEqual(count(good[0], {"name_offset": 0}), 1)  # an empty name has a place, too
+        self.assertEqual(count(good[0], {"translation": [1, -0.0, 2]}), 1)
+        self.assertEqual(count({"rotation": [[1, 0, 0], [0, 1, 0], [0, -0.0, 1]]}, good[1]), 1)
+        self.assertEqual(count({"member": 0, "meets": 7, "rotation": [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]}), 0)
+
+
 class Golden(unittest.TestCase):
     def test_valid_files(self):
         count = 0
@@ -306,8 +584,8 @@ class Golden(unittest.TestCase):
                 with self.assertRaises(rules.Broken) as broken:
                     rules.validate(data)
                 self.assertEqual(broken.exception.rule, rule)
-        self.assertEqual([row[0] for row in table("rules")], [f"R{rule:02}" for rule in range(1, 40)])
-        self.assertEqual(seen, set(range(1, 40)) - {35, 39})
+        self.assertEqual([row[0] for row in table("rules")], [f"R{rule:02}" for rule in range(1, 44)])
+        self.assertEqual(seen, set(range(1, 44)) - {35, 39})
 
     def test_bounds_that_cut(self):
         """R35 has no golden file. Here, codes of ok-plain are raised so that bounds cut, without new checksums."""
@@ -406,6 +684,7 @@ class Golden(unittest.TestCase):
                 self.assertTrue((np.abs(cube) == 1).all(), name)  # corners of a cube of side 2
         everything = files["ok-everything.cbvh"]
         self.assertEqual(sorted(everything.sections), list(range(1, 7)))
+        self.assertEqual([name for name, file in files.items() if file.instances], ["ok-scene.cbvh"])
         self.assertEqual(everything.provenance(), {"generator": "a test", "input": "a cube"})
         self.assertEqual(query.weights(everything).sum(), everything.objects[0].input_triangles)
         names = [one.name for one in files["ok-profiles.cbvh"].objects]

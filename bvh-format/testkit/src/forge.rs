@@ -6,6 +6,7 @@
 
 use crate::seal::{put, put_together};
 use bvh_format::ids::encode_ids;
+use bvh_format::instances::{Instance, write_instances};
 use bvh_format::leaf::{LINE, Packet, TriangleEncoding, encode_block};
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PageHeader, PageShape};
@@ -110,7 +111,10 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
         let pairs = pairs.flat_map(u32::to_le_bytes).collect();
         sections.extend([(4, 0, ids), (5, 0, pairs)]);
     }
-    // Finally, a few bytes change anywhere in sections 1 to 5.
+    if input.below(2) == 1 {
+        sections.push((7, 0, write_instances(&instances(input))));
+    }
+    // Finally, a few bytes change anywhere in the sections.
     for _ in 0..input.below(4) {
         let (section, high) = (input.below(sections.len()), input.byte());
         let at = usize::from(high) << 8 | usize::from(input.byte());
@@ -121,6 +125,21 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
         }
     }
     put_together(&sections)
+}
+
+/// Returns one to four instances, whose poses may be anything.
+fn instances(input: &mut Input) -> Vec<Instance> {
+    let instance = |input: &mut Input| {
+        let mut instance = Instance::of_object(0);
+        instance.name = String::from_utf8_lossy(&[input.byte()]).into_owned();
+        instance.translation = [0; 3].map(|_| f64::from(input.value()));
+        (instance.member, instance.meets) = (u32::from(input.byte()), u32::from(input.byte()));
+        if input.below(8) == 1 {
+            instance.rotation[input.below(3)][0] = f64::from(input.value());
+        }
+        instance
+    };
+    (0..1 + input.below(4)).map(|_| instance(input)).collect()
 }
 
 /// Returns the pages with the kinds and numbers of the children of all treelets, breadth-first as in the format.

@@ -106,7 +106,8 @@ pub fn seal_sections(bytes: &mut [u8]) {
         let Some(range) = range else { continue };
         let sum = checksum(&bytes[range.clone()]);
         put(bytes, at + 24, &sum.to_le_bytes());
-        if (1..=5).contains(&kind) {
+        // All kinds of content; 6 is the provenance.
+        if matches!(kind, 1..=5 | 7) {
             content.extend(kind.to_le_bytes());
             content.extend((range.len() as u64).to_le_bytes());
             content.extend_from_slice(&bytes[range]);

@@ -1,7 +1,7 @@
-//! Asks two forged files every query in any pose, on every backend. Answers may be wrong, but each query must end.
+//! Asks two forged files every query in any pose, on every backend, and a forged scene the questions over its pairs. Answers may be wrong, but each query must end.
 #![no_main]
 
-use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier};
+use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, Scene};
 use cbvh_testkit::forge::{Input, forge};
 use libfuzzer_sys::fuzz_target;
 use std::ops::ControlFlow;
@@ -19,6 +19,11 @@ fuzz_target!(|bytes: &[u8]| {
     let turn = TURNS[input.below(TURNS.len())];
     let Ok(pose) = Pose::new(turn, [(); 3].map(|()| f64::from(input.value()))) else { return };
     let (near, allowed) = (f64::from(input.value()), f64::from(input.value()).abs());
+    let forged = Bvh::from_bytes(forge(&mut Input(input.0))).ok();
+    if let Some(mut scene) = forged.and_then(|bvh| Scene::of_file(bvh).ok()) {
+        scene.set_budget(1 << 16);
+        let _ = (scene.pairs_in_contact(), scene.distance(), scene.pairs_within(near));
+    }
     let (Ok(a), Ok(b)) = (Bvh::from_bytes(forge(&mut input)), Bvh::from_bytes(forge(&mut input))) else {
         return;
     };

@@ -8,6 +8,8 @@ mod from_mint;
 
 pub use error::PoseError;
 
+use bvh_format::instances::{departure, handedness};
+
 /// A rigid transform, from a body to the world or from B to A: a point `x` of the body is at `R x + t` in the world.
 ///
 /// Conventions: points are columns, matrices are given row by row, rotations are right-handed, quaternions are
@@ -67,9 +69,7 @@ impl Pose {
                 PoseError::NotRigid(worst)
             });
         }
-        let [x, y, z] = rotation;
-        let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
-        if dot(cross, z) < 0.0 {
+        if handedness(&rotation) < 0.0 {
             return Err(PoseError::Reflection);
         }
         let flush = |tiny: f64| move |v: f64| if v.abs() < tiny { 0.0 } else { v };
@@ -111,18 +111,6 @@ impl Pose {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Returns how far `R R^T` is from a multiple of I: its largest entry, or NaN.
-pub(crate) fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
-    let mut worst = 0.0f64;
-    for i in 0..3 {
-        for j in 0..3 {
-            let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
-            worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
-        }
-    }
-    worst
 }
 
 #[cfg(test)]

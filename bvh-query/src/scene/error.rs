@@ -24,6 +24,11 @@ pub enum SceneError {
         /// The entry of `R R^T - I`, or the translation.
         found: f64,
     },
+    /// A file without instances: it says nothing of a world.
+    #[error(
+        "expected a scene, a file with instances, found none; bake it with --scene, or add its objects to a scene"
+    )]
+    NoInstances,
     /// The question about a pair has no answer.
     #[error("instances {a} and {b}: {source}")]
     Pair {

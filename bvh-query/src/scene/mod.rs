@@ -14,24 +14,24 @@ mod workers;
 mod world_box;
 
 pub use error::SceneError;
-pub use instance::{Groups, InstanceId};
+pub use instance::{Groups, InstanceId, SceneShape};
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
+use crate::error::OpenError;
+use crate::file::bvh::Bvh;
 use crate::file::owned_shape::OwnedShape;
 use crate::isa::Backend;
-use crate::pose::{Pose, departure};
+use crate::pose::Pose;
 use crate::query::answers::QueryStats;
 use broad_phase::BroadPhase;
+use bvh_format::FormatError;
+use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
 use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
 use workers::Workers;
 use world_box::WorldBox;
-
-/// How far from orthonormal the rotation of an instance may be, measured as for a pose: eight times less than a pose, so
-/// that every pair of instances has a relative pose.
-const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 23) as f64;
-/// The largest translation of an instance along an axis, 2^118 mesh units, for the same reason.
-const MAX_TRANSLATION: f64 = (1u128 << 118) as f64;
 
 /// Many placed shapes, and questions over all pairs that are asked about.
 ///
@@ -106,6 +106,49 @@ impl Scene {
         }
     }
 
+    /// Opens a scene file: maps it and makes a scene of its instances, in their order. `cbvh bake --scene` makes such files.
+    ///
+    /// Cost: that of reading the object table and the instances, and some 0.2 us per instance. Nothing else of the file is
+    /// read until a question needs it. [`Bvh::open`] documents what a mapped file asks for.
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::open`], and [`OpenError::Scene`] with those of [`Scene::of_file`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        let scene = Self::of_file(Bvh::open(path)?);
+        scene.map_err(|source| OpenError::Scene { path: path.to_owned(), source: Box::new(source) })
+    }
+
+    /// Makes a scene of the instances of a file, in their order.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstances`] if the file says nothing of a world; [`SceneError::Query`] if its instances break a rule
+    /// of the format, or as for [`Scene::new`].
+    pub fn of_file(bvh: impl Into<Arc<Bvh>>) -> Result<Self, SceneError> {
+        let bvh = bvh.into();
+        let damaged = |error: FormatError| SceneError::Query(error.into());
+        let instances = bvh.layout().read_instances(bvh.bytes()).map_err(damaged)?;
+        if instances.is_empty() {
+            return Err(SceneError::NoInstances);
+        }
+        let mut scene = Self::new()?;
+        for instance in instances {
+            // The instance is of an object of the file by rule 41, and rigid by rule 42.
+            let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
+            let world = Pose::new(instance.rotation, instance.translation);
+            let world = world.map_err(|error| SceneError::Query(error.into()))?;
+            let name = Some(instance.name).filter(|name| !name.is_empty());
+            let groups = Groups { member: instance.member, meets: instance.meets };
+            scene.insert(name, shape.unwrap_or_else(|| bvh.clone().into()).into(), world, groups)?;
+        }
+        Ok(scene)
+    }
+
+    /// Changes the backend, which changes no answer. The portable backend replaces one that the CPU lacks.
+    pub fn set_backend(&mut self, backend: Backend) {
+        self.workers.set_backend(backend);
+    }
+
     /// Lets questions use all threads of the rayon pool that they are called in. Without it they use one.
     #[cfg(feature = "parallel")]
     pub fn set_parallel(&mut self, parallel: bool) {
@@ -123,8 +166,8 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an axis:
     /// within these limits every pair of instances has a relative pose. [`Pose::nearest`] orthonormalises a rotation.
-    pub fn add(&mut self, shape: impl Into<OwnedShape>, world: Pose) -> Result<InstanceId, SceneError> {
-        self.insert(None, shape.into(), world)
+    pub fn add(&mut self, shape: impl Into<SceneShape>, world: Pose) -> Result<InstanceId, SceneError> {
+        self.insert(None, shape.into(), world, Groups::ALL)
     }
 
     /// Adds an instance with a name of its own.
@@ -134,17 +177,18 @@ impl Scene {
     pub fn add_named(
         &mut self,
         name: impl Into<String>,
-        shape: impl Into<OwnedShape>,
+        shape: impl Into<SceneShape>,
         world: Pose,
     ) -> Result<InstanceId, SceneError> {
-        self.insert(Some(name.into()), shape.into(), world)
+        self.insert(Some(name.into()), shape.into(), world, Groups::ALL)
     }
 
     fn insert(
         &mut self,
         name: Option<String>,
-        shape: OwnedShape,
+        shape: SceneShape,
         world: Pose,
+        groups: Groups,
     ) -> Result<InstanceId, SceneError> {
         let (place, generation) = self.free.last().copied().unwrap_or((self.instances.len() as u32, 0));
         let id = InstanceId { place, generation };
@@ -159,9 +203,8 @@ impl Scene {
             }
             self.names.insert(name.clone(), place);
         }
-        let bounds = WorldBox::of(shape.shape(), &world);
-        let (groups, allowed) = (Groups::ALL, Vec::new());
-        let instance = Instance { generation, name, shape, world, bounds, groups, allowed };
+        let bounds = WorldBox::of(shape.objects(), &world);
+        let instance = Instance { generation, name, shape, world, bounds, groups, allowed: Vec::new() };
         if self.free.pop().is_some() {
             self.instances[place as usize] = Some(instance);
         } else {
@@ -224,7 +267,7 @@ impl Scene {
         for (id, world) in poses {
             if let Some(instance) = &mut self.instances[id.place as usize] {
                 instance.world = world;
-                instance.bounds = WorldBox::of(instance.shape.shape(), &world);
+                instance.bounds = WorldBox::of(instance.shape.objects(), &world);
                 self.broad.set_box(instance.item(id.place));
             }
         }
@@ -283,7 +326,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::NoInstance`].
-    pub fn shape(&self, id: InstanceId) -> Result<&OwnedShape, SceneError> {
+    pub fn shape(&self, id: InstanceId) -> Result<&SceneShape, SceneError> {
         Ok(&self.instance(id)?.shape)
     }
 
@@ -350,7 +393,7 @@ impl Scene {
 
 /// Refuses a pose with which a pair may have no relative pose. Returns what is wrong with it and by how much.
 fn check_world(world: &Pose) -> Result<(), (&'static str, f64)> {
-    let far = world.translation().into_iter().find(|t| t.abs() > MAX_TRANSLATION);
+    let far = world.translation().into_iter().find(|t| t.abs() > MAX_WORLD);
     let error = departure(world.rotation(), 1.0);
     match far {
         Some(far) => Err(("a translation of at most 2^118 along each axis, nearer to the origin", far)),

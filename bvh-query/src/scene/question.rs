@@ -329,7 +329,8 @@ impl Scene {
             let pose = Pose::relative(&a.world, &b.world)?;
             let ids = ScenePair { a: a.id(candidate.a), b: b.id(candidate.b) };
             let before = querier.questions();
-            let answer = ask(querier, &PlacedPair { ids, a: &a.shape, b: &b.shape, pose });
+            let (a, b) = (a.shape.opened()?, b.shape.opened()?);
+            let answer = ask(querier, &PlacedPair { ids, a: &a, b: &b, pose });
             asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
             answer
         });

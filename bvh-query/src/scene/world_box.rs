@@ -9,8 +9,8 @@
 //! boxes are reduced by 2^-19 of themselves: see `squared_gap`. A relative translation below 2^-213 counts as 0, for which each
 //! box is larger by 2^-211.
 
-use crate::file::shape::Shape;
 use crate::pose::Pose;
+use bvh_format::object::Object;
 
 /// The share of the magnitudes that a box is larger by.
 const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
@@ -29,11 +29,11 @@ impl WorldBox {
     /// A box that contains nothing.
     pub(super) const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
 
-    /// Bounds a placed shape by the boxes and spheres of its objects, which are in the object table: no page is touched.
-    pub(super) fn of(shape: Shape<'_>, world: &Pose) -> Self {
+    /// Bounds placed objects by their boxes and spheres, which are in the object table: no page is touched.
+    pub(super) fn of(objects: &[Object], world: &Pose) -> Self {
         let (rotation, translation) = (world.rotation(), world.translation());
         let mut bounds = Self::EMPTY;
-        for object in shape.objects() {
+        for object in objects {
             let record = object.record();
             let origin = object.origin();
             let ends =

@@ -2,9 +2,10 @@
 
 use super::Contents;
 use super::statistics::{Level, Statistics};
-use crate::console::{hex, length};
+use crate::console::{hex, length, plural};
 use bvh_bake::FileError;
 use bvh_format::header::SectionKind;
+use bvh_format::instances::Instance;
 use bvh_format::object::Object;
 use bvh_format::source::Source;
 use serde::Serialize;
@@ -21,6 +22,8 @@ pub(super) struct FileDump {
     /// The lines of the provenance section.
     provenance: BTreeMap<String, String>,
     objects: Vec<ObjectDump>,
+    /// Where objects stand in the world, if the file is a scene.
+    instances: Vec<InstanceDump>,
     /// Bytes per stored triangle.
     bytes_per_tri: Split,
 }
@@ -78,6 +81,17 @@ struct ObjectDump {
 }
 
 #[derive(Serialize)]
+struct InstanceDump {
+    number: usize,
+    name: String,
+    object: u32,
+    member: u32,
+    meets: u32,
+    rotation: [[f64; 3]; 3],
+    translation: [f64; 3],
+}
+
+#[derive(Serialize)]
 struct LevelDump {
     level: usize,
     treelets: u64,
@@ -122,6 +136,7 @@ impl FileDump {
                 .collect(),
             provenance: provenance(contents)?,
             objects: dumps,
+            instances: InstanceDump::all(contents)?,
             bytes_per_tri: Split {
                 total: per_triangle(total),
                 nodes: per_triangle(nodes),
@@ -149,7 +164,42 @@ impl FileDump {
             "\nbytes per triangle {total:.2}: nodes {nodes:.2}, leaves {leaves:.2}, ids {ids:.2}, other {other:.2}\n"
         );
         self.objects.iter().for_each(|object| text += &object.to_text());
+        if !self.instances.is_empty() {
+            text +=
+                &format!("\n{} {}\n", self.instances.len(), plural(self.instances.len() as u64, "instance"));
+            self.instances.iter().take(MOST_SHOWN).for_each(|instance| text += &instance.to_text());
+            if self.instances.len() > MOST_SHOWN {
+                text += &format!("  and {} more: --json lists all\n", self.instances.len() - MOST_SHOWN);
+            }
+        }
         text
+    }
+}
+
+/// The number of instances that are listed for a person.
+const MOST_SHOWN: usize = 20;
+
+impl InstanceDump {
+    /// Reads the instances of a scene; none of a file without them.
+    fn all(contents: &Contents) -> Result<Vec<Self>, FileError> {
+        let instances = contents.layout.read_instances(&contents.file)?;
+        let dump = |(number, instance): (usize, Instance)| {
+            let Instance { name, object, member, meets, rotation, translation } = instance;
+            Self { number, name, object, member, meets, rotation, translation }
+        };
+        Ok(instances.into_iter().enumerate().map(dump).collect())
+    }
+
+    fn to_text(&self) -> String {
+        let Self { number, object, rotation: [x, y, z], translation: [tx, ty, tz], .. } = self;
+        let name: String = self.name.chars().take(60).collect();
+        let groups = if self.member == u32::MAX && self.meets == u32::MAX {
+            String::new()
+        } else {
+            format!(", in groups {:#x}, meets {:#x}", self.member, self.meets)
+        };
+        let rows = [(x, tx), (y, ty), (z, tz)].map(|([a, b, c], t)| format!("{a} {b} {c} {t}")).join("  ");
+        format!("  {number:>5} {name:?}, object {object}{groups}, at {rows}\n")
     }
 }
 

@@ -1,0 +1,252 @@
+//! The instances section: a head, one record per instance, and the names of the instances.
+//!
+//! An instance is an object that stands somewhere in the world. Section 3.1 of `spec/format.md` says where each byte
+//! stands.
+
+use crate::error::{FormatError, ensure};
+use crate::rule::Rule;
+use std::collections::HashSet;
+use zerocopy::byteorder::little_endian::{F64, U32};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+/// The largest translation of an instance along an axis: 2^118 mesh units.
+pub const MAX_WORLD: f64 = (1u128 << 118) as f64;
+/// How far from orthonormal the rotation of an instance may be, as [`departure`] measures it: 2^-23.
+pub const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 23) as f64;
+/// The number of bytes before the first record.
+const TABLE_HEAD: usize = 16;
+
+/// The record of an instance as stored.
+#[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct InstanceRecord {
+    /// Byte offset of the name among the names.
+    pub name_offset: U32,
+    /// Bytes of the name.
+    pub name_length: U32,
+    /// Number of the object.
+    pub object: U32,
+    /// The groups that the instance is in.
+    pub member: U32,
+    /// The groups that it is asked about with.
+    pub meets: U32,
+    /// Zero.
+    pub reserved: [u8; 12],
+    /// The rotation, row by row.
+    pub rotation: [F64; 9],
+    /// The translation in mesh units.
+    pub translation: [F64; 3],
+}
+
+const _: () = assert!(size_of::<InstanceRecord>() == 128);
+
+/// An object that stands in the world. A point `x` of the object, in mesh units, stands at `R x + t`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// The name. Several instances may have an empty one; all others differ.
+    pub name: String,
+    /// The number of the object in the object table.
+    pub object: u32,
+    /// The groups that the instance is in, one bit per group.
+    pub member: u32,
+    /// The groups that it is asked about with, one bit per group.
+    pub meets: u32,
+    /// The rows of the rotation R.
+    pub rotation: [[f64; 3]; 3],
+    /// The translation t in mesh units.
+    pub translation: [f64; 3],
+}
+
+impl Instance {
+    /// Returns an instance without a name that stands where its object is, in all groups.
+    pub fn of_object(object: u32) -> Self {
+        Self {
+            name: String::new(),
+            object,
+            member: u32::MAX,
+            meets: u32::MAX,
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            translation: [0.0; 3],
+        }
+    }
+
+    /// Returns what is wrong with the pose and the number that is, or `None` if it is rigid and within the limits.
+    pub fn pose_fault(&self) -> Option<(&'static str, f64)> {
+        let numbers = self.rotation.as_flattened().iter().chain(&self.translation);
+        if let Some(&found) = numbers.clone().find(|number| !number.is_finite()) {
+            return Some(("finite numbers in the pose", found));
+        }
+        if let Some(&far) = self.translation.iter().find(|t| t.abs() > MAX_WORLD) {
+            return Some(("a translation of at most 2^118 along each axis", far));
+        }
+        let error = departure(&self.rotation, 1.0);
+        if error.is_nan() || error > MAX_RIGID_ERROR {
+            return Some(("a rotation within 2^-23 of orthonormal", error));
+        }
+        let turn = handedness(&self.rotation);
+        (turn < 0.0).then_some(("a rotation that is no reflection", turn))
+    }
+}
+
+/// Returns how far `R R^T` is from a multiple of I: its largest entry, or NaN.
+pub fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
+    let mut worst = 0.0f64;
+    for i in 0..3 {
+        for j in 0..3 {
+            let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
+            worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
+        }
+    }
+    worst
+}
+
+/// Returns the determinant of three rows, which is negative for a reflection.
+pub fn handedness(&[x, y, z]: &[[f64; 3]; 3]) -> f64 {
+    dot([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]], z)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Writes the instances section.
+pub fn write_instances(instances: &[Instance]) -> Vec<u8> {
+    let names: usize = instances.iter().map(|instance| instance.name.len()).sum();
+    let mut section = Vec::with_capacity(TABLE_HEAD + instances.len() * size_of::<InstanceRecord>() + names);
+    section.extend_from_slice(&(instances.len() as u32).to_le_bytes());
+    section.extend_from_slice(&(names as u32).to_le_bytes());
+    section.extend_from_slice(&[0; 8]);
+    let mut offset = 0;
+    for instance in instances {
+        let name_length = instance.name.len() as u32;
+        // -0.0 + 0.0 is 0.0; every other number stays as it is.
+        let number = |value: f64| F64::from(value + 0.0);
+        let rotation = instance.rotation.as_flattened();
+        let record = InstanceRecord {
+            name_offset: offset.into(),
+            name_length: name_length.into(),
+            object: instance.object.into(),
+            member: instance.member.into(),
+            meets: instance.meets.into(),
+            reserved: [0; 12],
+            rotation: std::array::from_fn(|entry| number(rotation[entry])),
+            translation: instance.translation.map(number),
+        };
+        section.extend_from_slice(record.as_bytes());
+        offset += name_length;
+    }
+    instances.iter().for_each(|instance| section.extend_from_slice(instance.name.as_bytes()));
+    section
+}
+
+/// Reads the instances section, which starts at byte `at` of a file of so many objects.
+///
+/// # Errors
+/// The first of rules 40 to 43 that does not hold.
+pub(crate) fn read_instances(section: &[u8], at: u64, objects: usize) -> Result<Vec<Instance>, FormatError> {
+    let table =
+        |found: String| FormatError::new(Rule::InstanceTable, at, "a whole table of instances", found);
+    let (head, rest) =
+        <[U32; 4]>::ref_from_prefix(section).map_err(|_| table(format!("{} bytes", section.len())))?;
+    let count = head[0].get() as usize;
+    let (records, names) = <[InstanceRecord]>::ref_from_prefix_with_elems(rest, count)
+        .map_err(|_| table(format!("{count} instances in {} bytes", section.len())))?;
+    let whole = count >= 1 && names.len() == head[1].get() as usize;
+    ensure(whole, Rule::InstanceTable, at, || {
+        (
+            format!("at least one instance, and {} bytes of names", head[1]),
+            format!("{count} instances, {} bytes", names.len()),
+        )
+    })?;
+    // Copies of the names must not be longer than the file: records that share a name would multiply its size.
+    let mut names_left = names.len();
+    let mut taken = HashSet::new();
+    let mut instances = Vec::with_capacity(count);
+    for (index, record) in records.iter().enumerate() {
+        let at = at + (TABLE_HEAD + index * size_of::<InstanceRecord>()) as u64;
+        let start = record.name_offset.get() as usize;
+        let name = names.get(start..start.saturating_add(record.name_length.get() as usize));
+        let name = name.filter(|name| name.len() <= names_left);
+        let name = name.and_then(|name| std::str::from_utf8(name).ok()).ok_or_else(|| {
+            let expected = format!("a UTF-8 name of at most {names_left} bytes among the names");
+            FormatError::new(
+                Rule::InstanceTable,
+                at,
+                expected,
+                format!("{} from {start}", record.name_length),
+            )
+        })?;
+        names_left -= name.len();
+        let object = record.object.get();
+        ensure((object as usize) < objects, Rule::InstanceObject, at + 8, || {
+            (format!("an object below {objects} for instance {index} {name:?}"), object.to_string())
+        })?;
+        let [x, y, z] = [0, 1, 2].map(|row| [0, 1, 2].map(|column| record.rotation[3 * row + column].get()));
+        let instance = Instance {
+            name: name.to_owned(),
+            object,
+            member: record.member.get(),
+            meets: record.meets.get(),
+            rotation: [x, y, z],
+            translation: record.translation.map(|t| t.get()),
+        };
+        if let Some((what, found)) = instance.pose_fault() {
+            let expected = format!("{what} of instance {index} {name:?}");
+            return Err(FormatError::new(Rule::InstancePose, at + 32, expected, format!("{found:e}")));
+        }
+        ensure(name.is_empty() || taken.insert(name), Rule::InstanceName, at, || {
+            (format!("a name of its own for instance {index}"), format!("{name:?} again"))
+        })?;
+        instances.push(instance);
+    }
+    Ok(instances)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(name: &str, object: u32) -> Instance {
+        Instance { name: name.to_owned(), ..Instance::of_object(object) }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let mut turned = named("arm", 2);
+        turned.rotation = [[0.0, -1.0, -0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        turned.translation = [1e30, -2.5, MAX_WORLD];
+        (turned.member, turned.meets) = (5, 0);
+        let all = [named("", 0), turned, named("", 0), named("\u{e9}", 1)];
+        let read = read_instances(&write_instances(&all), 0, 3).unwrap();
+        assert_eq!(read, all);
+        assert!(read[1].rotation[0][2].is_sign_positive());
+    }
+
+    /// Names that overlap could make a file of n bytes take n^2 bytes of memory.
+    #[test]
+    fn names_that_share_bytes_are_refused() {
+        let mut section = write_instances(&[named("first", 0), named("", 0), named("third", 0)]);
+        section[TABLE_HEAD + 128 + 4] = 1;
+        let error = read_instances(&section, 100, 1).unwrap_err();
+        assert_eq!((error.rule, error.offset), (Rule::InstanceTable, 100 + TABLE_HEAD as u64 + 2 * 128));
+    }
+
+    #[test]
+    fn limits_of_poses_are_allowed_and_the_next_number_is_not() {
+        let of = |edit: fn(&mut Instance)| {
+            let mut instance = named("a", 0);
+            edit(&mut instance);
+            read_instances(&write_instances(&[instance]), 0, 1).err().map(|error| error.rule)
+        };
+        assert_eq!(of(|a| a.translation[1] = -MAX_WORLD), None);
+        assert_eq!(of(|a| a.translation[1] = -MAX_WORLD.next_up()), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.rotation[0][1] = MAX_RIGID_ERROR), None);
+        assert_eq!(of(|a| a.rotation[0][1] = MAX_RIGID_ERROR.next_up()), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.rotation[2][2] = -1.0), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.rotation[0][0] = f64::NAN), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.translation[0] = f64::INFINITY), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.rotation = [[1e200; 3]; 3]), Some(Rule::InstancePose));
+        assert_eq!(of(|a| a.object = 1), Some(Rule::InstanceObject));
+        assert_eq!(read_instances(&write_instances(&[]), 0, 1).unwrap_err().rule, Rule::InstanceTable);
+    }
+}

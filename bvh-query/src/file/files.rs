@@ -1,0 +1,158 @@
+//! Files that are opened when a scene first needs them, of which at most so many stay open.
+
+use crate::error::{OpenError, QueryError};
+use crate::file::bvh::Bvh;
+use crate::file::owned_shape::OwnedShape;
+use bvh_format::object::Object;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// Files for scenes of more files than shall be open: each is opened when an instance of it is first near another one, and
+/// at most so many stay open. Cloning it copies a pointer.
+///
+/// [`Files::shape`] reads the header and the object table of a file and closes it. A question that needs the file opens it
+/// again, and fails if it is no longer the same. Of the files that stay open, the one whose last use is the longest ago is
+/// closed for another one; files in use are not closed, so that up to two more per thread may be open while a question
+/// runs.
+///
+/// ```no_run
+/// use bvh_query::{Files, Pose, Scene};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let files = Files::new(1000);
+/// let mut scene = Scene::new()?;
+/// for part in std::fs::read_dir("parts")? {
+///     scene.add(files.shape(part?.path())?, Pose::IDENTITY)?;
+/// }
+/// println!("{} pairs touch, {} files are open", scene.pairs_in_contact()?.len(), files.open());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Files(Arc<Shelf>);
+
+#[derive(Debug)]
+struct Shelf {
+    most: usize,
+    /// How often a file was used, which tells when each was used last.
+    clock: AtomicU64,
+    open: Mutex<Vec<(Arc<Known>, Arc<Bvh>)>>,
+}
+
+/// What is known of a file while it is closed.
+#[derive(Debug)]
+struct Known {
+    path: PathBuf,
+    content_checksum: u64,
+    objects: Vec<Object>,
+    /// The file, while anybody has it open.
+    bvh: Mutex<Weak<Bvh>>,
+    last_use: AtomicU64,
+}
+
+/// One object of a file, or all of its objects, in a file that [`Files`] opens and closes.
+#[derive(Clone, Debug)]
+pub struct StoredShape {
+    files: Files,
+    known: Arc<Known>,
+    /// The number of one object; `None` for all of the file.
+    object: Option<usize>,
+}
+
+impl Files {
+    /// Makes a shelf of which at most so many files stay open, and at least one.
+    pub fn new(most: usize) -> Self {
+        Self(Arc::new(Shelf { most: most.max(1), clock: AtomicU64::new(0), open: Mutex::default() }))
+    }
+
+    /// Reads the header and the object table of a file, and returns all of its objects as one shape.
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::open`], which documents what a file that is open asks for.
+    pub fn shape(&self, path: impl AsRef<Path>) -> Result<StoredShape, OpenError> {
+        let path = path.as_ref();
+        let bvh = Bvh::open(path)?;
+        let known = Known {
+            path: path.to_owned(),
+            content_checksum: bvh.layout().content_checksum,
+            objects: bvh.objects().to_vec(),
+            bvh: Mutex::default(),
+            last_use: AtomicU64::new(0),
+        };
+        Ok(StoredShape { files: self.clone(), known: Arc::new(known), object: None })
+    }
+
+    /// Returns how many files stay open at present.
+    pub fn open(&self) -> usize {
+        locked(&self.0.open).len()
+    }
+}
+
+impl StoredShape {
+    /// Returns one object of the file as a shape, or `None` if the file has no object of this number.
+    pub fn object(&self, number: usize) -> Option<Self> {
+        (number < self.known.objects.len()).then(|| Self { object: Some(number), ..self.clone() })
+    }
+
+    /// Returns the objects of the shape as the file had them when it was first read.
+    pub fn objects(&self) -> &[Object] {
+        match self.object {
+            Some(number) => &self.known.objects[number..=number],
+            None => &self.known.objects,
+        }
+    }
+
+    /// Opens the file, if it is not open, and returns the shape. The file stays open as long as the shape lives.
+    ///
+    /// # Errors
+    /// [`QueryError::File`] if the file is not there, or is no longer the one that was first read.
+    pub fn opened(&self) -> Result<OwnedShape, QueryError> {
+        let (shelf, known) = (&self.files.0, &self.known);
+        known.last_use.store(shelf.clock.fetch_add(1, Ordering::Relaxed), Ordering::Relaxed);
+        let is_open = || locked(&known.bvh).upgrade();
+        let bvh = match is_open() {
+            Some(bvh) => bvh,
+            None => {
+                let mut open = locked(&shelf.open);
+                // Another thread may have opened it meanwhile.
+                match is_open() {
+                    Some(bvh) => bvh,
+                    None => {
+                        while open.len() >= shelf.most {
+                            let last_use = |place: &usize| open[*place].0.last_use.load(Ordering::Relaxed);
+                            let oldest = (0..open.len()).min_by_key(last_use).unwrap_or_default();
+                            open.swap_remove(oldest);
+                        }
+                        let bvh = Arc::new(known.open_again()?);
+                        *locked(&known.bvh) = Arc::downgrade(&bvh);
+                        open.push((known.clone(), bvh.clone()));
+                        bvh
+                    }
+                }
+            }
+        };
+        // The file has the objects it had, so that the number is one of them.
+        let shape = self.object.and_then(|number| OwnedShape::object(bvh.clone(), number));
+        Ok(shape.unwrap_or_else(|| bvh.into()))
+    }
+}
+
+impl Known {
+    fn open_again(&self) -> Result<Bvh, QueryError> {
+        let failed = |found: String| QueryError::File { path: self.path.clone(), found };
+        let bvh = Bvh::open(&self.path).map_err(|error| {
+            failed(match error {
+                OpenError::Io { source, .. } => source.to_string(),
+                other => other.to_string(),
+            })
+        })?;
+        let is_same = bvh.layout().content_checksum == self.content_checksum && bvh.objects() == self.objects;
+        if is_same { Ok(bvh) } else { Err(failed("other contents".to_owned())) }
+    }
+}
+
+/// Locks a mutex. A panic elsewhere leaves what these guard whole.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
