@@ -59,6 +59,9 @@ pub struct Options {
     /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
     /// their files.
     pub split_objects: bool,
+    /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF files become
+    /// instances, and so do the objects of other files. Each object then gets a tree of its own.
+    pub scene: bool,
     /// Whether the original triangle numbers are kept.
     pub ids: bool,
     /// Whether children get turning slabs, where the profile has room for them. Answers are the same, and files as large.
@@ -73,6 +76,7 @@ impl Default for Options {
             max_error: None,
             effort: Effort::Default,
             split_objects: false,
+            scene: false,
             ids: true,
             turning_slabs: true,
         }
@@ -110,6 +114,12 @@ impl Options {
         Self { split_objects, ..self }
     }
 
+    /// Sets whether files are read as scenes.
+    #[must_use]
+    pub fn scene(self, scene: bool) -> Self {
+        Self { scene, ..self }
+    }
+
     /// Sets whether the original triangle numbers are kept.
     #[must_use]
     pub fn ids(self, ids: bool) -> Self {
@@ -125,14 +135,15 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
             self.effort.name(),
             self.split_objects,
             self.ids,
-            if self.turning_slabs { "" } else { " turning_slabs=false" }
+            if self.turning_slabs { "" } else { " turning_slabs=false" },
+            if self.scene { " scene=true" } else { "" }
         )
     }
 }

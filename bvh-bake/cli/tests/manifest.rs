@@ -112,9 +112,10 @@ fn run_counts(directory: &Path, done: u64, skipped: u64) -> Vec<Value> {
 fn bytes_are_those_of_single_bakes() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
-    let options: [(Value, &[&str]); 6] = [
+    let options: [(Value, &[&str]); 7] = [
         (json!({}), &["--no-ids"]),
         (json!({"ids": true}), &[]),
+        (json!({"scene": true}), &["--no-ids", "--scene"]),
         (
             json!({"profile": "dop6-u8", "triangles": "packed"}),
             &["--no-ids", "--profile", "dop6-u8", "--triangles", "packed"],
@@ -138,7 +139,7 @@ fn bytes_are_those_of_single_bakes() {
     write_assets(directory, options.len(), line);
     for more in [&["--no-ids"][..], &["--no-ids", "--force", "--max-memory", "64MiB", "--jobs", "3"]] {
         let summary = bake(directory, "out.jsonl", more).done().json();
-        counts(&summary, 6, 6, 0, 0);
+        counts(&summary, 7, 7, 0, 0);
         for (number, (_, arguments)) in options.iter().enumerate() {
             let input = format!("meshes/{number}.obj");
             let single = [&["bake", &input, "-o", "single.cbvh", "--json", "-q"], *arguments].concat();

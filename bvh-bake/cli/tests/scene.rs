@@ -200,3 +200,100 @@ fn bad_files_are_named_with_line_and_remedy() {
     cbvh_in(directory, &["scene", "s.scene"]).failed(1, &["expected FRAMES"]);
     assert!(!directory.join("raw.txt").exists());
 }
+
+/// Writes a glTF file of three nodes: two share a box, and the third has it twice as large.
+fn boxes(directory: &Path) {
+    let mut blob = Vec::new();
+    for corner in 0..8u32 {
+        let side = |axis: u32| if corner >> axis & 1 == 1 { 1.0f32 } else { -1.0 };
+        [0, 1, 2].map(side).iter().for_each(|value| blob.extend(value.to_le_bytes()));
+    }
+    blob.extend([
+        0u8, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7,
+        1, 7, 5,
+    ]);
+    fs::write(directory.join("boxes.bin"), blob).unwrap();
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"name":"a","mesh":0},{"name":"b","mesh":0,"translation":[1.5,0,0]},
+        {"mesh":0,"scale":[2,2,2],"translation":[9,0,0]}],
+        "meshes":[{"name":"box","primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":8,"type":"VEC3"},
+        {"bufferView":1,"componentType":5121,"count":36,"type":"SCALAR"}],
+        "bufferViews":[{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":36}],
+        "buffers":[{"byteLength":132,"uri":"boxes.bin"}]}"#;
+    fs::write(directory.join("boxes.gltf"), json).unwrap();
+}
+
+/// A baked scene gives the answers of a text file that says the same, as it stands and when its instances move.
+#[test]
+fn baked_scenes_are_asked_like_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    boxes(directory);
+    let bake = ["bake", "boxes.gltf", "-o", "boxes.cbvh", "--scene", "--json", "-q"];
+    let json = cbvh_in(directory, &bake).done().json();
+    assert_eq!(
+        (&json["objects"], &json["instances"], &json["triangles"]),
+        (&2.into(), &3.into(), &24.into())
+    );
+    assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], true);
+    cbvh_in(directory, &["verify", "boxes.cbvh", "boxes.gltf"]).done();
+    let dump = cbvh_in(directory, &["dump", "boxes.cbvh", "--json"]).done().json();
+    assert_eq!(dump["instances"][1]["name"], "b");
+    assert_eq!(dump["instances"][2]["translation"], serde_json::json!([9.0, 0.0, 0.0]));
+    assert!(cbvh_in(directory, &["dump", "boxes.cbvh"]).done().out.contains("\n3 instances\n"));
+
+    let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "pairs", "--list"]).done().out;
+    assert_eq!(list, "frame 1: 1 pair touching\n  a b\n");
+    let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "within", "--within", "9", "--list"])
+        .done()
+        .out;
+    assert_eq!(list, "frame 1: 3 pairs near enough\n  a b\n  a box\n  b box\n");
+
+    let large =
+        cube().replace('1', "2").lines().filter(|line| line.starts_with('v')).collect::<Vec<_>>().join("\n");
+    let faces: String =
+        cube().lines().filter(|line| line.starts_with('f')).map(|line| format!("{line}\n")).collect();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("large.obj"), format!("{large}\n{faces}")).unwrap();
+    let identity = "1 0 0 0  0 1 0 0  0 0 1 0";
+    let text = format!(
+        "mesh m cube.obj\nmesh l large.obj\ninstance a m {identity}\ninstance b m {identity}\ninstance box l {identity}\n\
+         moving a b box\n"
+    );
+    fs::write(directory.join("s.scene"), text).unwrap();
+    let of = |from: f64, to: f64| -> Vec<String> {
+        let all = poses(30, from, to);
+        all.lines()
+            .map(|line| line.split('#').next().unwrap().trim().to_owned())
+            .filter(|l| !l.is_empty())
+            .collect()
+    };
+    let lines = of(0.0, 6.0).into_iter().zip(of(1.0, 9.0)).zip(of(3.0, 0.0));
+    let frames: String = lines.map(|((a, b), c)| format!("{a} {b} {c}\n")).collect();
+    fs::write(directory.join("f.txt"), frames).unwrap();
+    for mode in ["collide", "pairs", "distance"] {
+        let ask = |scene: &str, jobs: &str| {
+            let arguments = ["scene", scene, "f.txt", "--mode", mode, "--json", "--jobs", jobs];
+            cbvh_in(directory, &arguments).done().json()
+        };
+        let (text, baked) = (ask("s.scene", "1"), ask("boxes.cbvh", "2"));
+        for field in ["answers_xxh3", "positives", "instances", "moving", "triangles"] {
+            assert_eq!(text[field], baked[field], "{mode}, {field}");
+        }
+    }
+
+    fs::write(directory.join("f.txt"), identity).unwrap();
+    cbvh_in(directory, &["scene", "boxes.cbvh", "f.txt"]).failed(3, &["f.txt: line 1: expected 36 numbers"]);
+    fs::write(directory.join("p.txt"), identity).unwrap();
+    let query = ["query", "boxes.cbvh", "cube.obj", "p.txt"];
+    cbvh_in(directory, &query).failed(3, &["boxes.cbvh: expected a mesh, found a scene"]);
+    cbvh_in(directory, &[&query[..], &["--object", "box"]].concat()).done();
+    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh", "-q"]).done();
+    cbvh_in(directory, &["scene", "cube.cbvh"]).failed(3, &["cube.cbvh: expected a scene", "--scene"]);
+    let mut bytes = fs::read(directory.join("boxes.cbvh")).unwrap();
+    let at = bytes.windows(8).rposition(|window| window == 9f64.to_le_bytes()).unwrap();
+    bytes[at] ^= 1;
+    fs::write(directory.join("boxes.cbvh"), bytes).unwrap();
+    cbvh_in(directory, &["scene", "boxes.cbvh"]).failed(3, &["boxes.cbvh: ", "R10"]);
+    cbvh_in(directory, &["validate", "boxes.cbvh"]).failed(3, &["boxes.cbvh", "R10"]);
+}

@@ -156,7 +156,7 @@ impl<'a> FileBake<'a> {
             None => Resources::unlimited(&self.progress),
         };
         let mut start = Instant::now();
-        let mut gatherer = Gatherer::new(&resources, self.options.split_objects);
+        let mut gatherer = Gatherer::new(&resources, self.options.split_objects || self.options.scene);
         let checksums = inputs.iter().map(|input| gatherer.read(input)).collect::<Result<Vec<_>, _>>()?;
         drop(inputs);
         if self.max_memory.is_some() {
@@ -181,7 +181,7 @@ impl<'a> FileBake<'a> {
     fn find_inputs(&self) -> Result<Vec<InputFile<'_>>, BakeError> {
         let mut inputs = Vec::new();
         for path in &self.inputs {
-            let input = InputFile::find(path, &self.progress)?;
+            let input = InputFile::find(path, &self.progress)?.as_scene(self.options.scene);
             if input.format() == MeshFormat::Gltf {
                 let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
                 self.require_memory(0, Resources::least(0).saturating_add(bytes))?;

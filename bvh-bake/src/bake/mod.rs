@@ -59,7 +59,8 @@ pub fn to_bytes_with(
     let start = Instant::now();
     mesh.check()?;
     let resources = Resources::unlimited(&Progress::default());
-    let mut gatherer = Gatherer::new(&resources, options.split_objects);
+    let split = options.split_objects || !mesh.instances.is_empty();
+    let mut gatherer = Gatherer::new(&resources, split);
     // A mesh in memory has no file name.
     gatherer.add_mesh(mesh).map_err(|halt| halt.in_file(Path::new("")))?;
     let mut output = Output::Memory(Vec::new());
@@ -71,7 +72,7 @@ pub fn to_bytes_with(
 
 /// Bakes the objects that have been gathered.
 fn bake(
-    gatherer: Gatherer,
+    mut gatherer: Gatherer,
     options: &Options,
     provenance: &str,
     output: &mut Output,
@@ -79,9 +80,11 @@ fn bake(
 ) -> Result<BakeReport, BakeError> {
     let resources = gatherer.resources();
     let (triangles, id_end) = (gatherer.triangles(), gatherer.id_end());
+    let instances = gatherer.take_instances();
     let gathered = gatherer.finish(|name, diagonal| grid_error(options, name, diagonal))?;
     resources.progress.expect(triangles);
     let mut baker = Baker::new(options, id_end, resources);
+    baker.contents.instances = instances;
     for object in gathered {
         begin(Stage::Prepare);
         baker.add(object, begin)?;
@@ -113,6 +116,7 @@ impl<'a> Baker<'a> {
         let contents = Contents {
             records: Vec::new(),
             objects: Vec::new(),
+            instances: Vec::new(),
             duplicates: Sorter::of_runs(resources.sorted_at_once::<[u32; 2]>(id_count)),
             spill: resources.scratch.spill(),
         };
@@ -217,13 +221,14 @@ impl<'a> Baker<'a> {
     ) -> Result<BakeReport, BakeError> {
         let progress = &self.resources.progress;
         begin(Stage::Encode);
+        let instances = self.contents.instances.len() as u64;
         assemble(self.contents, self.options.ids, provenance, target, progress)?;
         progress.reach(Step::Bake(Stage::Encode), self.kept);
         begin(Stage::Prove);
         let (layout, inflation) = prove(&target.source(), progress)?;
         progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
-            file: FileSummary::new(&layout, target.length()),
+            file: FileSummary::new(&layout, target.length(), instances),
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             vertices: self.vertices,

@@ -38,7 +38,7 @@ impl Provenance {
         if !meshes.is_empty() {
             stamp.push(("mesh_xxh3", format!("{:016x}", joined(&meshes))));
         }
-        if options.split_objects {
+        if options.split_objects || options.scene {
             // Objects without a name are named after their files.
             let stems: Vec<String> = inputs.iter().map(|file| plain(&input::stem(file))).collect();
             stamp.push(("names", stems.join(", ")));
@@ -87,7 +87,11 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
     let text = source.read(range).ok()?;
     let same = layout.version == (MAJOR, MINOR) && provenance.matches(std::str::from_utf8(&text).ok()?);
     // A damaged file is baked again.
-    (same && check_sections(&layout, &source).is_ok()).then(|| FileSummary::new(&layout, length))
+    if !same || check_sections(&layout, &source).is_err() {
+        return None;
+    }
+    let instances = layout.read_instances(&source).ok()?.len() as u64;
+    Some(FileSummary::new(&layout, length, instances))
 }
 
 /// The most bytes of a provenance text that are read.

@@ -24,6 +24,8 @@ pub struct FileSummary {
     pub duplicates: u64,
     /// The number of objects in the file.
     pub objects: u64,
+    /// The number of instances; 0 if the file is no scene.
+    pub instances: u64,
     /// The bytes of the file.
     pub file_bytes: u64,
     /// The bytes of the treelet pages.
@@ -41,8 +43,9 @@ pub struct FileSummary {
 }
 
 impl FileSummary {
-    /// Makes the summary from the header and the object table.
-    pub fn new(layout: &Layout, file_bytes: u64) -> Self {
+    /// Makes the summary from the header and the object table, given the length of the file and the number of its
+    /// instances.
+    pub fn new(layout: &Layout, file_bytes: u64, instances: u64) -> Self {
         let records = || layout.objects.iter().map(|object| object.record());
         let bytes = |kinds: &[SectionKind]| {
             let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
@@ -58,6 +61,7 @@ impl FileSummary {
             degenerate: records().map(|record| record.degenerate.get()).fold(0, u64::saturating_add),
             duplicates: records().map(|record| record.duplicates.get()).fold(0, u64::saturating_add),
             objects: layout.objects.len() as u64,
+            instances,
             file_bytes,
             node_bytes: bytes(&[SectionKind::Nodes]),
             triangle_bytes: bytes(&[SectionKind::Leaves]),

@@ -15,6 +15,21 @@ pub enum InputError {
     /// The mesh has more vertices than there are vertex numbers.
     #[error("expected at most {MAX_VERTICES} vertices, found {0}")]
     TooManyVertices(u64),
+    /// The mesh has more instances than there are numbers for them.
+    #[error("expected at most 2^32 - 1 instances, found {0}")]
+    TooManyInstances(u64),
+    /// An instance that a scene cannot have.
+    #[error("instance {number} \"{name}\": expected {expected}, found {found}")]
+    Instance {
+        /// The instance's place in the list.
+        number: usize,
+        /// Its name, shortened.
+        name: String,
+        /// What was expected.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
     /// The ids of an object do not match its triangles.
     #[error(
         "object \"{object}\": expected an id for each of {triangles} triangles, ascending, found {found}"
@@ -61,6 +76,11 @@ pub enum InputError {
 impl InputError {
     /// Returns whether the mesh is too large, rather than malformed.
     pub fn is_limit(&self) -> bool {
-        matches!(self, InputError::TooManyTriangles(_) | InputError::TooManyVertices(_))
+        matches!(
+            self,
+            InputError::TooManyTriangles(_)
+                | InputError::TooManyVertices(_)
+                | InputError::TooManyInstances(_)
+        )
     }
 }

@@ -24,6 +24,8 @@ pub(crate) struct InputFile<'a> {
     path: Cow<'a, Path>,
     format: MeshFormat,
     length: u64,
+    /// Whether the nodes of a glTF file become instances.
+    as_scene: bool,
     /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
     bytes: Option<Cow<'a, [u8]>>,
 }
@@ -32,7 +34,17 @@ impl<'a> InputFile<'a> {
     /// Makes an input of the bytes of a file. `path` names it in errors.
     pub(crate) fn of_bytes(bytes: &'a [u8], format: MeshFormat, path: &'a Path) -> Self {
         let length = bytes.len() as u64;
-        Self { path: Cow::Borrowed(path), format, length, bytes: Some(Cow::Borrowed(bytes)) }
+        let bytes = Some(Cow::Borrowed(bytes));
+        Self { path: Cow::Borrowed(path), format, length, as_scene: false, bytes }
+    }
+
+    /// Sets whether the nodes of a glTF file become instances.
+    pub(crate) fn as_scene(self, as_scene: bool) -> Self {
+        Self { as_scene, ..self }
+    }
+
+    pub(crate) fn is_scene(&self) -> bool {
+        self.as_scene
     }
 
     /// Finds a file. The format is that of its extension or, if the extension is unknown or missing, the one that its
@@ -49,7 +61,8 @@ impl<'a> InputFile<'a> {
             (None, None) => MeshFormat::from_head(&reader.read_up_to(HEAD_BYTES).map_err(failed)?, length),
         };
         let format = format.ok_or_else(|| super::unknown_format(path))?;
-        Ok(Self { path: Cow::Borrowed(path), format, length, bytes: bytes.map(Cow::Owned) })
+        let bytes = bytes.map(Cow::Owned);
+        Ok(Self { path: Cow::Borrowed(path), format, length, as_scene: false, bytes })
     }
 
     pub(crate) fn path(&self) -> &Path {

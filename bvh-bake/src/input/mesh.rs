@@ -8,13 +8,22 @@ use crate::error::excerpt;
 use crate::limits::coordinate_fits;
 pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 use bvh_format::checksum::Hasher;
+pub use bvh_format::instances::Instance;
+use bvh_format::instances::write_instances;
 use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+
+/// The most instances of a scene: their numbers have 32 bits.
+const MAX_INSTANCES: u64 = u32::MAX as u64;
 
 /// The content of a mesh file: one object or several.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// The objects, in the order of the file.
     pub objects: Vec<Object>,
+    /// Where the objects stand in the world. With instances, each object has its own frame and gets its own tree, and the
+    /// file is a scene. Without them, a mesh says nothing about a world.
+    pub instances: Vec<Instance>,
 }
 
 /// A named set of triangles.
@@ -36,8 +45,8 @@ impl Mesh {
     /// The function checks nothing: see [`Mesh::check`]. Ids beyond 32 bits wrap, which `check` refuses.
     pub fn from_triangles(positions: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Mesh {
         let triangle_ids = (0..triangles.len()).into_par_iter().map(|id| id as u32).collect();
-        let mut mesh =
-            Mesh { objects: vec![Object { name: String::new(), positions, triangles, triangle_ids }] };
+        let object = Object { name: String::new(), positions, triangles, triangle_ids };
+        let mut mesh = Mesh { objects: vec![object], instances: Vec::new() };
         mesh.drop_negative_zeros();
         mesh
     }
@@ -70,6 +79,9 @@ impl Mesh {
             object.positions.iter().flatten().for_each(|value| hasher.update(&value.to_le_bytes()));
             object.triangles.iter().flatten().for_each(|index| hasher.update(&index.to_le_bytes()));
         }
+        if !self.instances.is_empty() {
+            hasher.update(&write_instances(&self.instances));
+        }
         hasher.finish()
     }
 
@@ -91,12 +103,31 @@ impl Mesh {
         if vertices > MAX_VERTICES {
             return Err(InputError::TooManyVertices(vertices));
         }
-        self.objects.iter().try_for_each(Object::check)
+        self.objects.iter().try_for_each(Object::check)?;
+        check_instances(&self.instances, self.objects.len())
+    }
+
+    /// Gives each object that has no instance one where it stands, with its name.
+    pub(crate) fn place_all(&mut self) {
+        let mut placed = vec![false; self.objects.len()];
+        self.instances.iter().for_each(|instance| placed[instance.object as usize] = true);
+        for (number, object) in self.objects.iter().enumerate().filter(|&(number, _)| !placed[number]) {
+            let instance = Instance { name: object.name.clone(), ..Instance::of_object(number as u32) };
+            self.instances.push(instance);
+        }
+    }
+
+    /// Leaves out objects without triangles, and their instances.
+    pub(crate) fn drop_empty_objects(&mut self) {
+        let is_full: Vec<bool> = self.objects.iter().map(|object| !object.triangles.is_empty()).collect();
+        renumber(&mut self.instances, &is_full);
+        self.objects.retain(|object| !object.triangles.is_empty());
     }
 
     /// Joins all objects into one unnamed object, with the triangles in the order of their ids. A single object keeps
-    /// its name. The vertices of the objects are appended one after the other; equal vertices are not joined.
-    pub fn merged(self) -> Mesh {
+    /// its name. Instances are left out: the objects are joined as they are, not as they stand in the world. The vertices of the objects are appended one after the other; equal vertices are not joined.
+    pub fn merged(mut self) -> Mesh {
+        self.instances.clear();
         if self.objects.len() <= 1 {
             return self;
         }
@@ -118,7 +149,7 @@ impl Mesh {
             pairs.par_sort_by_key(|&(id, _)| id);
             (whole.triangle_ids, whole.triangles) = pairs.into_iter().unzip();
         }
-        Mesh { objects: vec![whole] }
+        Mesh { objects: vec![whole], instances: Vec::new() }
     }
 }
 
@@ -161,9 +192,105 @@ impl Object {
     }
 }
 
+/// Leaves out the instances of objects that are not kept, and numbers the objects of the others anew.
+pub(crate) fn renumber(instances: &mut Vec<Instance>, is_kept: &[bool]) {
+    let mut numbers = Vec::with_capacity(is_kept.len());
+    let mut next = 0;
+    for &kept in is_kept {
+        numbers.push(next);
+        next += u32::from(kept);
+    }
+    instances.retain(|instance| is_kept[instance.object as usize]);
+    instances.iter_mut().for_each(|instance| instance.object = numbers[instance.object as usize]);
+}
+
+/// Gives instances whose name is taken another one: the name, a point, and the least number from 2 that makes it new.
+pub(crate) fn tell_apart(instances: &mut [Instance]) {
+    let mut taken: HashSet<String> = instances.iter().map(|instance| instance.name.clone()).collect();
+    let mut met: HashMap<String, u32> = HashMap::new();
+    for instance in instances.iter_mut().filter(|instance| !instance.name.is_empty()) {
+        let times = met.entry(instance.name.clone()).or_insert(0);
+        *times += 1;
+        while *times > 1 {
+            let name = format!("{}.{times}", instance.name);
+            if taken.insert(name.clone()) {
+                instance.name = name;
+                break;
+            }
+            *times += 1;
+        }
+    }
+}
+
+fn check_instances(instances: &[Instance], objects: usize) -> Result<(), InputError> {
+    if instances.len() as u64 > MAX_INSTANCES {
+        return Err(InputError::TooManyInstances(instances.len() as u64));
+    }
+    let mut names = HashSet::new();
+    for (number, instance) in instances.iter().enumerate() {
+        let wrong = |expected: &str, found: String| InputError::Instance {
+            number,
+            name: excerpt(instance.name.as_bytes()),
+            expected: expected.to_owned(),
+            found,
+        };
+        if instance.object as usize >= objects {
+            return Err(wrong(&format!("an object below {objects}"), instance.object.to_string()));
+        }
+        if let Some((expected, found)) = instance.pose_fault() {
+            return Err(wrong(expected, format!("{found:e}")));
+        }
+        if !instance.name.is_empty() && !names.insert(&instance.name) {
+            return Err(wrong("a name of its own", "a second instance of this name".to_owned()));
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn instances_are_checked() {
+        let mut mesh = one();
+        mesh.instances = vec![Instance::of_object(0); 3];
+        assert_eq!(mesh.check(), Ok(()));
+        let refused = |edit: fn(&mut Vec<Instance>)| {
+            let mut mesh = mesh.clone();
+            edit(&mut mesh.instances);
+            mesh.check().unwrap_err().to_string()
+        };
+        assert_eq!(refused(|all| all[2].object = 1), "instance 2 \"\": expected an object below 1, found 1");
+        let said = refused(|all| all[1].rotation[0][0] = 2.0);
+        assert_eq!(said, "instance 1 \"\": expected a rotation within 2^-23 of orthonormal, found 3e0");
+        let said = refused(|all| all.iter_mut().for_each(|instance| instance.name = "arm".into()));
+        assert_eq!(
+            said,
+            "instance 1 \"arm\": expected a name of its own, found a second instance of this name"
+        );
+    }
+
+    #[test]
+    fn instances_of_one_name_are_told_apart() {
+        let named = |name: &str| Instance { name: name.to_owned(), ..Instance::of_object(0) };
+        let mut all = ["arm", "", "arm", "arm.2", "", "arm", "arm.2"].map(named);
+        tell_apart(&mut all);
+        assert_eq!(all.map(|instance| instance.name), ["arm", "", "arm.3", "arm.2", "", "arm.4", "arm.2.2"]);
+    }
+
+    #[test]
+    fn instances_follow_their_objects() {
+        let mut mesh = one();
+        mesh.objects.insert(0, Object::default());
+        mesh.instances = [1, 0, 1].map(Instance::of_object).to_vec();
+        mesh.drop_empty_objects();
+        assert_eq!(mesh.instances, [0, 0].map(Instance::of_object));
+        mesh.objects.push(Object { name: "last".into(), ..mesh.objects[0].clone() });
+        mesh.place_all();
+        assert_eq!(mesh.instances.len(), 3);
+        assert_eq!((mesh.instances[2].object, mesh.instances[2].name.as_str()), (1, "last"));
+    }
 
     fn one() -> Mesh {
         Mesh::from_triangles(vec![[0.0; 3], [1.0, -0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])

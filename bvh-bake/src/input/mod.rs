@@ -110,6 +110,20 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     Ok(collect(&InputFile::find(path, &progress)?, &progress, WHOLE)?.0)
 }
 
+/// Reads a mesh file as a scene, which has instances. In a glTF file, each node with a mesh is an instance, nodes share
+/// their meshes, and a mesh is an object for each scale with which it occurs. In other files, each object is an instance
+/// where it stands. Names that occur again get a number.
+///
+/// A node whose transform is a matrix is taken as a rotation with scales, if it is one to within 2^-21, and a scale within
+/// 2^-21 of one that a node states, or of that of an earlier matrix, as the same.
+///
+/// # Errors
+/// The errors of [`read`].
+pub fn read_scene(path: &Path) -> Result<Mesh, ReadError> {
+    let progress = Progress::default();
+    Ok(collect(&InputFile::find(path, &progress)?.as_scene(true), &progress, WHOLE)?.0)
+}
+
 /// Reads a mesh from the bytes of a file. `source` names the file in errors. Other files that a glTF file names are
 /// looked up in the folder of `source`.
 ///
@@ -136,7 +150,7 @@ pub(crate) fn read_gltf(
 fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh, u64), ReadError> {
     let (mesh, checksum) = if input.format() == MeshFormat::Gltf {
         let bytes = input.read_all(progress, weight)?;
-        (gltf::read(&bytes, input.path(), progress).map_err(Halt::from), checksum(&bytes))
+        (gltf::read(&bytes, input.path(), input.is_scene(), progress).map_err(Halt::from), checksum(&bytes))
     } else {
         let file = OnceLock::new();
         let mesh = thread::scope(|scope| {
@@ -164,7 +178,11 @@ fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh,
         // This reader stores nothing outside memory.
         other => input.failed(std::io::Error::other(other.to_string())),
     })?;
-    mesh.objects.retain(|object| !object.triangles.is_empty());
+    mesh.drop_empty_objects();
+    if input.is_scene() {
+        mesh.place_all();
+        mesh::tell_apart(&mut mesh.instances);
+    }
     mesh.drop_negative_zeros();
     mesh.check().map_err(|error| ReadError::Mesh { path: input.path().to_owned(), source: error })?;
     Ok((mesh, checksum))
@@ -204,6 +222,9 @@ fn append(joined: &mut Mesh, mut mesh: Mesh) -> Result<(), BakeError> {
     }
     let ids = mesh.objects.iter_mut().flat_map(|object| &mut object.triangle_ids);
     ids.for_each(|id| *id = id.saturating_add(first as u32));
+    let objects = joined.objects.len() as u32;
+    mesh.instances.iter_mut().for_each(|instance| instance.object = instance.object.saturating_add(objects));
+    joined.instances.append(&mut mesh.instances);
     joined.objects.append(&mut mesh.objects);
     Ok(())
 }

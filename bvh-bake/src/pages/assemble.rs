@@ -8,6 +8,7 @@ use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
 use bvh_format::checksum::Hasher;
 use bvh_format::header::{Section, SectionKind, write_header};
+use bvh_format::instances::{Instance, write_instances};
 use bvh_format::layout::ContentHasher;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PagePlace};
@@ -22,6 +23,8 @@ pub(crate) struct Contents {
     pub(crate) records: Vec<(String, ObjectRecord)>,
     /// The pages of each object.
     pub(crate) objects: Vec<ObjectPages>,
+    /// Where the objects stand, if the file is a scene.
+    pub(crate) instances: Vec<Instance>,
     /// The pairs (kept id, id of an equal triangle that is left out).
     pub(crate) duplicates: Sorter<[u32; 2]>,
     /// The place for records that the sorter does not hold in memory.
@@ -43,7 +46,7 @@ pub(crate) fn assemble(
     output: &mut Output,
     progress: &Progress,
 ) -> Result<(), BakeError> {
-    let Contents { records, objects, duplicates, .. } = contents;
+    let Contents { records, objects, instances, duplicates, .. } = contents;
     let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
     let table = write_objects(&records);
     let lengths = [
@@ -52,7 +55,8 @@ pub(crate) fn assemble(
         sum(ObjectPages::leaf_bytes),
         sum(ObjectPages::id_bytes),
     ];
-    let rest = duplicates.count() as usize * 8 + provenance.len() + 7 * PAGE;
+    let instances = if instances.is_empty() { Vec::new() } else { write_instances(&instances) };
+    let rest = duplicates.count() as usize * 8 + provenance.len() + instances.len() + 8 * PAGE;
     let expected = (lengths.iter().sum::<usize>() + rest) as u64;
     output.expect(expected);
     output.append(Arc::new(vec![0; PAGE]))?;
@@ -102,6 +106,9 @@ pub(crate) fn assemble(
     if !provenance.is_empty() {
         let text = provenance.as_bytes();
         file.section(SectionKind::Provenance, text.len(), |section| section.write(text.to_vec()))?;
+    }
+    if !instances.is_empty() {
+        file.section(SectionKind::Instances, instances.len(), |section| section.write(instances))?;
     }
     let Sections { table, content, .. } = file;
     let header = write_header(output.length(), content.finish(), &table);

@@ -23,6 +23,7 @@ struct Line {
     max_error: Option<f64>,
     effort: Option<String>,
     split_objects: Option<bool>,
+    scene: Option<bool>,
     ids: Option<bool>,
 }
 
@@ -90,6 +91,7 @@ impl Line {
             None => {}
         }
         options.split_objects = self.split_objects.unwrap_or(options.split_objects);
+        options.scene = self.scene.unwrap_or(options.scene);
         options.ids = self.ids.unwrap_or(options.ids);
         Ok(options)
     }

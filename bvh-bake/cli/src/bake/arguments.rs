@@ -11,12 +11,15 @@ Examples:
   cbvh bake rock.obj -o rock.cbvh
   cbvh bake part.stl -o part.cbvh --triangles quantized --max-error 0.01
   cbvh bake arm.obj hand.ply -o robot.cbvh --split-objects --json
+  cbvh bake factory.glb -o factory.cbvh --scene
 
 Several inputs are baked as one mesh, and triangle ids run on from file to file. With --split-objects each object keeps \
 its own name; an object that its file does not name is called after the file, without the extension.
 
 The output appears whole or not at all. It is left alone if it is up to date, that is, if it is undamaged and was baked \
 from the same inputs with the same options by the same version; --force bakes it anyway.
+
+With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF file with a mesh becomes an instance; nodes share their mesh, of which there is one object for each scale. Every object of the other files becomes an instance where it stands. An instance is named after its node, and .2, .3 and so on follow a name that occurs again. cbvh scene asks about such a file.
 
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
@@ -40,7 +43,7 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, effort, split_objects and ids; the options on the command line are their defaults. Paths \
+profile, triangles, max_error, effort, split_objects, scene and ids; the options on the command line are their defaults. Paths \
 are relative to the manifest, and missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
 input: the number of its line, exit_code, and either the fields of --json or an error. Until all assets are done, the \
@@ -96,6 +99,9 @@ pub(crate) struct BakeArguments {
     /// Build one tree per object of the input, so that queries can name an object
     #[arg(long)]
     pub(crate) split_objects: bool,
+    /// Bake a scene: the nodes of glTF files become instances that share their meshes; one tree per object
+    #[arg(long)]
+    pub(crate) scene: bool,
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,

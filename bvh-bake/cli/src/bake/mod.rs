@@ -87,6 +87,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         .max_error(arguments.max_error)
         .effort(arguments.effort)
         .split_objects(arguments.split_objects)
+        .scene(arguments.scene)
         .ids(!arguments.no_ids)
         .turning_slabs(!arguments.no_turning_slabs);
     let file_options = FileOptions {

@@ -22,6 +22,7 @@ pub(crate) struct Report {
     pub(crate) duplicates: u64,
     vertices: Option<u64>,
     objects: u64,
+    instances: u64,
     pub(crate) file_bytes: u64,
     node_bytes: u64,
     triangle_bytes: u64,
@@ -84,6 +85,7 @@ impl Report {
             duplicates: file.duplicates,
             vertices: baked.map(|baked| baked.vertices),
             objects: file.objects,
+            instances: file.instances,
             file_bytes: file.file_bytes,
             node_bytes: file.node_bytes,
             triangle_bytes: file.triangle_bytes,
@@ -127,6 +129,9 @@ impl Report {
         };
         line("triangles", format!("{}{left_out}, {} of zero area", self.triangles, self.degenerate));
         line("vertices", format!("{vertices} in {} {}", self.objects, plural(self.objects, "object")));
+        if self.instances > 0 {
+            line("instances", self.instances.to_string());
+        }
         let because = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
         line("layout", format!("{}, triangles {}{because}", self.profile, self.triangle_encoding));
         let per_triangle = |bytes: u64| bytes as f64 / self.triangles as f64;

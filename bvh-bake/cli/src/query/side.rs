@@ -43,7 +43,13 @@ impl Side {
     pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
         let start = Instant::now();
         let bvh = Bvh::open_with(path, how.read_ahead)?;
-        Ok(Self::new(path, bvh, how, start.elapsed().as_secs_f64()))
+        let side = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
+        if side.bvh.layout().has_instances() && side.object.is_none() {
+            // Its objects are in frames of their own: together they are no mesh.
+            let what = "expected a mesh, found a scene; ask cbvh scene, or name an object with --object";
+            return Err(Failure::invalid(path, what));
+        }
+        Ok(side)
     }
 
     fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {

@@ -9,15 +9,17 @@ Examples:
   cbvh scene cell.scene frames.txt --mode collide
   cbvh scene cell.scene frames.txt --mode pairs --list
   cbvh scene cell.scene frames.txt --mode within --within 0.05 --jobs 4 --json
+  cbvh scene factory.cbvh --mode pairs --list
 
-SCENE is a text file, one item per line; # starts a comment. File names are relative to it:
+SCENE is a file that cbvh bake --scene made, all of whose instances move, or, without FRAMES, stand where the file says. Or it is a text file, one item per line; # starts a comment. File names are relative to it:
 
   mesh NAME FILE              a mesh file, which is baked in memory first, or a .cbvh file
   instance NAME MESH POSE     a mesh in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t]
   moving NAME...              the instances that frames move, in the order of their poses
   allow NAME NAME             two instances that may touch, and are never asked about
 
-Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked about. \
+Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked \
+about, and of a baked scene all pairs whose groups meet. \
 In a scene without moving instances there is one frame, without FRAMES, and all pairs are asked about.
 
 On a terminal, a summary is printed. Otherwise, and with --json, one JSON object. --list prints the pairs of each frame. \

@@ -1,12 +1,14 @@
-//! Reads scene files: meshes, instances, what moves and what may touch.
+//! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
 
 use crate::console::Failure;
 use crate::options::LayoutArguments;
 use crate::query::poses;
 use crate::query::side::{How, Side};
-use bvh_query::{Backend, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
+use bvh_query::{Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
 
 /// The groups of what frames move, and of what stands still.
 const MOVING: u32 = 1;
@@ -115,6 +117,35 @@ impl SceneText {
         }
         Ok(())
     }
+}
+
+impl LoadedScene {
+    /// Returns the names of the moving instances, or their numbers if they have none.
+    pub(super) fn names_of_moving(&self) -> Vec<String> {
+        let name = |&id: &InstanceId| match self.scene.name(id) {
+            Ok(Some(name)) => name.to_owned(),
+            _ => id.to_string(),
+        };
+        self.moving.iter().map(name).collect()
+    }
+}
+
+/// Opens a baked scene, all of whose instances move. All pages are checked, so that no frame pays for that.
+pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
+    let start = Instant::now();
+    let bvh = Arc::new(Bvh::open(path)?);
+    bvh.check_all().map_err(|error| Failure::invalid(path, error))?;
+    let mut scene = Scene::of_file(bvh.clone()).map_err(|error| Failure::invalid(path, error))?;
+    scene.set_backend(backend);
+    let records = bvh.objects().iter().map(|object| object.record());
+    // The counts are as the file states them, and those of a forged file may overflow.
+    let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
+    Ok(LoadedScene {
+        moving: scene.instances().collect(),
+        scene,
+        triangles: counts.fold(0, u64::saturating_add),
+        build_seconds: start.elapsed().as_secs_f64(),
+    })
 }
 
 /// Opens or bakes the meshes and adds the instances.

@@ -1,6 +1,5 @@
 //! Reads frames: a line has the pose of each moving instance.
 
-use super::file::SceneText;
 use crate::console::Failure;
 use crate::query::poses::{self, NUMBERS};
 use bvh_query::Pose;
@@ -12,11 +11,16 @@ pub(super) struct Frame {
     pub(super) poses: Vec<Pose>,
 }
 
-/// Reads the frames of a scene, each with the poses of its moving instances. A scene in which nothing moves has one frame.
-pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Frame>, Failure> {
-    let path = match (path, scene.moving.is_empty()) {
+/// The only frame of a scene as it stands.
+pub(super) fn as_it_stands() -> Vec<Frame> {
+    vec![Frame { line: 0, poses: Vec::new() }]
+}
+
+/// Reads the frames of a scene, each with the poses of the moving instances. A scene in which nothing moves has one frame.
+pub(super) fn read(path: Option<&Path>, moving: &[String]) -> Result<Vec<Frame>, Failure> {
+    let path = match (path, moving.is_empty()) {
         (Some(path), false) => path,
-        (None, true) => return Ok(vec![Frame { line: 0, poses: Vec::new() }]),
+        (None, true) => return Ok(as_it_stands()),
         (None, false) => {
             return Err(Failure::Usage(
                 "expected FRAMES, because instances of the scene move (see --help)".into(),
@@ -37,16 +41,16 @@ pub(super) fn read(path: Option<&Path>, scene: &SceneText) -> Result<Vec<Frame>,
             continue;
         }
         let wrong = |text: String| Failure::invalid(path, format_args!("line {line}: {text}"));
-        if words.len() != NUMBERS * scene.moving.len() {
+        if words.len() != NUMBERS * moving.len() {
             return Err(wrong(format!(
                 "expected {} numbers, 12 for each of {} moving instances, found {}",
-                NUMBERS * scene.moving.len(),
-                scene.moving.len(),
+                NUMBERS * moving.len(),
+                moving.len(),
                 words.len()
             )));
         }
-        let mut frame = Frame { line, poses: Vec::with_capacity(scene.moving.len()) };
-        for (name, words) in scene.moving.iter().zip(words.chunks(NUMBERS)) {
+        let mut frame = Frame { line, poses: Vec::with_capacity(moving.len()) };
+        for (name, words) in moving.iter().zip(words.chunks(NUMBERS)) {
             let pose =
                 poses::parse(&words.join(" ")).map_err(|text| wrong(format!("instance {name}: {text}")))?;
             frame.poses.extend(pose);

@@ -10,6 +10,7 @@ pub(crate) use arguments::SceneArguments;
 
 use crate::console::{self, Failure};
 use crate::query;
+use crate::query::side::is_baked;
 use asked::{Question, Run};
 use record::Record;
 use std::io::{IsTerminal, stdout};
@@ -18,12 +19,21 @@ use std::io::{IsTerminal, stdout};
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = query::backend(&arguments.isa)?;
     let question = Question::new(arguments)?;
-    let text = file::read(&arguments.scene)?;
-    let mut frames = frames::read(arguments.frames.as_deref(), &text)?;
+    let (mut scene, mut frames) = if is_baked(&arguments.scene)? {
+        let scene = file::open(&arguments.scene, backend)?;
+        let frames = match &arguments.frames {
+            Some(path) => frames::read(Some(path), &scene.names_of_moving())?,
+            None => frames::as_it_stands(),
+        };
+        (scene, frames)
+    } else {
+        let text = file::read(&arguments.scene)?;
+        let frames = frames::read(arguments.frames.as_deref(), &text.moving)?;
+        (file::load(&arguments.scene, &text, &arguments.layout, backend)?, frames)
+    };
     if arguments.limit > 0 {
         frames.truncate(arguments.limit);
     }
-    let mut scene = file::load(&arguments.scene, &text, &arguments.layout, backend)?;
     let run = if arguments.jobs > 1 {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(arguments.jobs)).build();
         let pool = pool.map_err(|error| {

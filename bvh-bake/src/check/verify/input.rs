@@ -3,7 +3,8 @@
 
 use super::VerifyError;
 use crate::input::gather::InputOrder;
-use crate::input::mesh::Mesh;
+use crate::input::mesh::{Instance, Mesh, renumber};
+use std::borrow::Cow;
 
 /// Three corners as the input states them, in mesh units.
 pub(super) type InputCorners = [[f64; 3]; 3];
@@ -12,6 +13,9 @@ pub(super) type InputCorners = [[f64; 3]; 3];
 pub(super) trait Input {
     /// Returns the number of triangles of each object that has any.
     fn counts(&self) -> &[u64];
+
+    /// Returns the instances, by the numbers of objects in `counts`.
+    fn instances(&self) -> Cow<'_, [Instance]>;
 
     /// Calls `visit` for every triangle, by ascending ids from 0, with the object's number in `counts`, the id and
     /// the corners.
@@ -65,6 +69,13 @@ impl Input for InMemory<'_> {
         &self.counts
     }
 
+    fn instances(&self) -> Cow<'_, [Instance]> {
+        let mut instances = self.mesh.instances.clone();
+        let is_full = self.mesh.objects.iter().map(|object| !object.triangles.is_empty());
+        renumber(&mut instances, &is_full.collect::<Vec<_>>());
+        instances.into()
+    }
+
     fn visit(
         &self,
         visit: &mut dyn FnMut(u32, u32, &InputCorners) -> Result<(), VerifyError>,
@@ -81,6 +92,10 @@ impl Input for InMemory<'_> {
 impl Input for InputOrder {
     fn counts(&self) -> &[u64] {
         InputOrder::counts(self)
+    }
+
+    fn instances(&self) -> Cow<'_, [Instance]> {
+        InputOrder::instances(self).into()
     }
 
     fn visit(

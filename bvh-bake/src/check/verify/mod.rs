@@ -16,7 +16,7 @@ mod second_reading;
 use crate::check::prove::{prove_bounds, validate_in_parallel};
 use crate::error::BakeError;
 use crate::input::gather::Gatherer;
-use crate::input::mesh::{InputError, Mesh};
+use crate::input::mesh::{InputError, Instance, Mesh};
 use crate::input::{GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
 use crate::progress::Progress;
 use crate::storage::resources::Resources;
@@ -95,8 +95,8 @@ impl VerifyError {
 }
 
 /// Verifies that a file is a faithful bake of a mesh: the file is valid; every bound contains what is below it; the
-/// triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones; and no corner has
-/// moved farther than the file states.
+/// triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones; no corner has moved
+/// farther than the file states; and the instances are those of the mesh.
 ///
 /// Cost: about that of reading the mesh. Memory: 8 bytes per triangle of the mesh; in addition, 60 bytes per stored
 /// triangle with ids, or 40 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
@@ -139,7 +139,8 @@ impl VerifyOptions {
 /// The bytes of memory for a process whose caller gives no `VerifyOptions::max_memory`.
 const USUAL_MEMORY: u64 = 3 << 29;
 
-/// Verifies a file of any size like [`verify`]. The file and the meshes are read piece by piece.
+/// Verifies a file of any size like [`verify`]. The file and the meshes are read piece by piece. If the file is a scene, the
+/// meshes are read as scenes.
 ///
 /// OBJ files of up to a 32nd of the memory are read a second time, with the parser of the crate `tobj`, and both readings
 /// have to agree: the first is that of the bake, whose mistakes it would share. Files that `tobj` is known to read
@@ -170,6 +171,7 @@ pub fn verify_files(
     let mut inputs = Vec::new();
     for mesh in meshes {
         let input = InputFile::find(mesh, &resources.progress).map_err(BakeError::from)?;
+        let input = input.as_scene(layout.has_instances());
         if input.format() == MeshFormat::Gltf && options.max_memory.is_some() {
             let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
             enough(mesh, bytes.saturating_add(Resources::least_of_check()))?;
@@ -199,6 +201,7 @@ where
     let inflation = prove_bounds(layout, source)?;
     let input = input()?;
     match_objects(layout, input.counts())?;
+    match_instances(layout, source, &input.instances())?;
     let all = input.counts().iter().sum();
     for (number, object) in layout.objects.iter().enumerate() {
         let own = if layout.objects.len() == 1 { all } else { input.counts()[number] };
@@ -223,9 +226,32 @@ where
 /// Checks that a file has one object for the whole mesh, or one for each object of the mesh that has triangles.
 fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
     match layout.objects.len() {
-        1 => Ok(()),
+        1 if !layout.has_instances() => Ok(()),
         count if count == full.len() => Ok(()),
         count => Err(VerifyError::differs("objects", format!("1 or {}", full.len()), count)),
+    }
+}
+
+/// Checks that a file has the instances of the mesh, in their order.
+fn match_instances<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    expected: &[Instance],
+) -> Result<(), VerifyError>
+where
+    VerifyError: From<S::Error>,
+{
+    let found = layout.read_instances(source)?;
+    if found.len() != expected.len() {
+        return Err(VerifyError::differs("instances", expected.len(), found.len()));
+    }
+    match (0..).zip(expected.iter().zip(&found)).find(|(_, (expected, found))| expected != found) {
+        Some((number, (expected, found))) => Err(VerifyError::differs(
+            format!("instance {number}"),
+            format!("{expected:?}"),
+            format!("{found:?}"),
+        )),
+        None => Ok(()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Keeps the triangles of an input in the order of their ids, without placing or rounding them.
 
 use crate::error::BakeError;
+use crate::input::mesh::{Instance, renumber, tell_apart};
 use crate::storage::{Spill, Stream};
 use crate::triangles::Part;
 use std::borrow::Cow;
@@ -47,14 +48,17 @@ pub(crate) struct InputOrder {
     counts: Vec<u64>,
     /// For each object, its number among the objects with triangles.
     numbers: Vec<u32>,
+    instances: Vec<Instance>,
 }
 
 impl InputOrder {
-    /// Makes the order of the given parts and runs. `objects` is the number of all objects, with or without triangles.
+    /// Makes the order of the given parts and runs. `objects` is the number of all objects, with or without triangles, and
+    /// instances are by these numbers.
     pub(super) fn new(
         parts: Vec<Part>,
         runs: ObjectRuns,
         objects: usize,
+        mut instances: Vec<Instance>,
         spill: &Spill,
     ) -> Result<Self, BakeError> {
         let runs = runs.finish(spill)?;
@@ -62,17 +66,25 @@ impl InputOrder {
         for piece in runs.pieces() {
             piece.all()?.iter().for_each(|&[object, count]| all[object as usize] += u64::from(count));
         }
+        let is_full: Vec<bool> = all.iter().map(|&count| count > 0).collect();
+        renumber(&mut instances, &is_full);
+        tell_apart(&mut instances);
         let (mut counts, mut numbers) = (Vec::new(), Vec::new());
         for count in all {
             numbers.push(counts.len() as u32);
             counts.extend(Some(count).filter(|&count| count > 0));
         }
-        Ok(Self { parts, runs, counts, numbers })
+        Ok(Self { parts, runs, counts, numbers, instances })
     }
 
     /// Returns the number of triangles of each object that has any.
     pub(crate) fn counts(&self) -> &[u64] {
         &self.counts
+    }
+
+    /// Returns the instances, by the numbers of objects among those with triangles.
+    pub(crate) fn instances(&self) -> &[Instance] {
+        &self.instances
     }
 
     /// Calls `visit` for every triangle with its object's number among those with triangles, its id and its corners.

@@ -2,7 +2,7 @@
 
 use super::Gatherer;
 use crate::error::Halt;
-use crate::input::mesh::{Mesh, Object};
+use crate::input::mesh::{Instance, Mesh, Object};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -17,6 +17,11 @@ impl Gatherer<'_> {
             self.names[number].1 |= !self.split;
             self.add_vertices(number, used_vertices(object));
         }
+        let placed = mesh.instances.iter().map(|instance| Instance {
+            object: instance.object.saturating_add(first as u32),
+            ..instance.clone()
+        });
+        self.instances.extend(placed);
         for (number, places) in self.runs_of(mesh) {
             let object = &mesh.objects[number];
             let (triangles, ids) = (&object.triangles[places.clone()], &object.triangle_ids[places]);

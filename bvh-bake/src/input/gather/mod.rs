@@ -18,6 +18,7 @@ use super::{Checksums, InputFile, MeshFormat, obj, ply, stl};
 use crate::error::BakeError;
 use crate::error::InputError;
 use crate::error::{Fault, Halt, Place, ReadError};
+use crate::input::mesh::{Instance, renumber, tell_apart};
 use crate::limits::MAX_TRIANGLES;
 use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
@@ -46,6 +47,8 @@ pub(crate) struct Gatherer<'a> {
     /// Whether objects stay separate.
     split: bool,
     spill: Spill,
+    /// The instances of all inputs, by the numbers of their objects.
+    instances: Vec<Instance>,
     /// The names of the objects of all inputs, and whether each object counts as having triangles.
     names: Vec<(String, bool)>,
     /// The bodies to bake: one per object, or one for all objects.
@@ -85,6 +88,7 @@ impl<'a> Gatherer<'a> {
             resources,
             split,
             spill: resources.scratch.spill(),
+            instances: Vec::new(),
             names: Vec::new(),
             bodies: Vec::new(),
             current: 0,
@@ -137,6 +141,9 @@ impl<'a> Gatherer<'a> {
             Checksums { file, mesh: None }
         };
         self.name_after(input.path(), first_object);
+        if input.is_scene() {
+            self.place_from(first_object);
+        }
         if self.triangles == before {
             return Err(ReadError::Mesh { path: input.path().to_owned(), source: InputError::Empty }.into());
         }
@@ -166,6 +173,26 @@ impl<'a> Gatherer<'a> {
             let unnamed = self.names[first..].iter_mut().filter(|(name, _)| name.is_empty());
             unnamed.for_each(|(name, _)| *name = super::stem(path));
         }
+    }
+
+    /// Gives each object from the number `first` on an instance where it stands, unless the file had instances.
+    fn place_from(&mut self, first: usize) {
+        if self.instances.last().is_some_and(|last| last.object as usize >= first) {
+            return;
+        }
+        for (number, (name, _)) in self.names.iter().enumerate().skip(first) {
+            let instance = Instance { name: name.clone(), ..Instance::of_object(number as u32) };
+            self.instances.push(instance);
+        }
+    }
+
+    /// Takes the instances out. Their objects are numbered among those with triangles, and their names are told apart.
+    pub(crate) fn take_instances(&mut self) -> Vec<Instance> {
+        let mut instances = std::mem::take(&mut self.instances);
+        let is_full: Vec<bool> = self.names.iter().map(|(_, counts)| *counts).collect();
+        renumber(&mut instances, &is_full);
+        tell_apart(&mut instances);
+        instances
     }
 
     /// Begins an object and returns its number.
@@ -288,7 +315,7 @@ impl<'a> Gatherer<'a> {
     /// Returns all triangles as they were read, in the order of their ids. The gatherer must have been made by
     /// [`in_input_order`](Self::in_input_order).
     pub(crate) fn into_input_order(self) -> Result<InputOrder, BakeError> {
-        let Self { names, mut bodies, spill, runs, .. } = self;
+        let Self { names, mut bodies, spill, runs, instances, .. } = self;
         let mut parts = Vec::new();
         for body in &mut bodies {
             if !body.open.is_empty() {
@@ -296,7 +323,8 @@ impl<'a> Gatherer<'a> {
             }
             parts.append(&mut body.parts);
         }
-        InputOrder::new(parts, runs.unwrap_or_else(ObjectRuns::new), names.len(), &spill)
+        let runs = runs.unwrap_or_else(ObjectRuns::new);
+        InputOrder::new(parts, runs, names.len(), instances, &spill)
     }
 
     /// Returns all objects with triangles, ready to be baked. `grid_error` returns the largest move that quantisation

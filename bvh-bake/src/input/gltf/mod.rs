@@ -1,10 +1,11 @@
-//! Reads glTF 2.0 scenes: each node with a mesh becomes an object, and the nodes above it place it.
+//! Reads glTF 2.0 scenes, in one of two ways. As a mesh, each node with a mesh becomes an object, and the nodes above it
+//! place it. As a scene, each mesh becomes an object, or one per scale (module `frame`), and each node an instance of it.
 //!
 //! The `gltf` crate reads and validates the document. Accessors are read in module `accessor`, because the crate's own
 //! iterators panic on counts and strides that a file may contain; buffers are found in module `buffer`. The reader
 //! takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without a parent.
 //! Transforms are read as f32 and multiplied in f64. Triangles, strips and fans are read; points and lines are not.
-//! Skins, morph targets and animations move nothing. A mesh that several nodes share is copied for each. The degenerate
+//! Skins, morph targets and animations move nothing. As a mesh, what several nodes share is copied for each. The degenerate
 //! triangles that join the parts of a strip are left out, because they are no part of the surface; other degenerate
 //! triangles are kept.
 //!
@@ -13,12 +14,15 @@
 
 mod accessor;
 mod buffer;
+mod frame;
 
 use super::next_ids;
 use crate::error::{Fault, Place, excerpt};
 use crate::input::mesh::{Mesh, Object};
 use crate::progress::Progress;
 use buffer::Buffers;
+use bvh_format::instances::Instance;
+use frame::{Affine, Frame, IDENTITY, Scales};
 use gltf::Document;
 use gltf::json::{self, validation::Checked};
 use gltf::mesh::{Mode, Semantic};
@@ -31,13 +35,17 @@ const MAX_COPIES: u64 = 1 << 26;
 /// The number of vertices that a primitive counts as, besides its own, to bound the time that primitives take.
 const PRIMITIVE_ITEMS: usize = 16;
 
-pub(super) fn read(bytes: &[u8], path: &Path, progress: &Progress) -> Result<Mesh, Fault> {
+/// Reads a file as a mesh or as a scene.
+pub(super) fn read(bytes: &[u8], path: &Path, as_scene: bool, progress: &Progress) -> Result<Mesh, Fault> {
     let (text, blob) = split(bytes)?;
     let document = parse(text, blob.is_some())?;
     let mut scene = Scene {
         document: &document,
+        as_scene,
         buffers: Buffers::new(blob, path, progress),
         mesh: Mesh::default(),
+        variants: HashMap::new(),
+        scales: Scales::of(document.nodes().map(|node| node.transform())),
         next_id: 0,
         items: 0,
     };
@@ -127,17 +135,36 @@ fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
     })
 }
 
-/// The first three rows of a 4x4 matrix.
-type Affine = [[f64; 4]; 3];
-
-const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+/// Whether S of a [`Frame`] is the same, to the bit.
+type ShapeBits = [[u64; 3]; 3];
 
 struct Scene<'a> {
     document: &'a Document,
+    /// Whether nodes become instances.
+    as_scene: bool,
     buffers: Buffers<'a>,
     mesh: Mesh,
+    /// The object of each mesh and shape, as a scene.
+    variants: HashMap<(usize, ShapeBits), u32>,
+    scales: Scales,
     next_id: u32,
     items: u64,
+}
+
+/// What a node stands in: a matrix, or a frame if nodes become instances.
+#[derive(Clone, Copy)]
+enum Parent {
+    Matrix(Affine),
+    Frame(Frame),
+}
+
+impl Parent {
+    fn of_child(&self, node: &gltf::Node, scales: &mut Scales) -> Self {
+        match self {
+            Self::Matrix(matrix) => Self::Matrix(frame::product(matrix, &frame::local(node.transform()))),
+            Self::Frame(frame) => Self::Frame(frame.of_child(node.transform(), scales)),
+        }
+    }
 }
 
 impl Scene<'_> {
@@ -146,8 +173,8 @@ impl Scene<'_> {
         let document = self.document;
         let scene = document.default_scene().or_else(|| document.scenes().next());
         let mut seen = vec![false; document.nodes().len()];
-        let mut todo: Vec<(gltf::Node, Affine)> = match scene {
-            Some(scene) => scene.nodes().map(|node| (node, IDENTITY)).collect(),
+        let mut todo: Vec<(gltf::Node, Parent)> = match scene {
+            Some(scene) => scene.nodes().map(|node| (node, self.world())).collect(),
             None => {
                 let mut has_parent = seen.clone();
                 document
@@ -157,31 +184,69 @@ impl Scene<'_> {
                 document
                     .nodes()
                     .filter(|node| !has_parent[node.index()])
-                    .map(|node| (node, IDENTITY))
+                    .map(|node| (node, self.world()))
                     .collect()
             }
         };
         todo.reverse();
-        while let Some((node, scene_from_parent)) = todo.pop() {
+        while let Some((node, parent)) = todo.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {
                 let found = format!("node {} twice", node.index());
                 return Err(Fault::new(Place::File, "nodes that form trees", found));
             }
-            let scene_from_node = product(&scene_from_parent, &local(node.transform()));
+            let own = parent.of_child(&node, &mut self.scales);
             if let Some(mesh) = node.mesh() {
                 let name = node.name().or(mesh.name()).unwrap_or_default();
-                self.read_mesh(name, &mesh, &scene_from_node)?;
+                match &own {
+                    Parent::Matrix(placed) => {
+                        self.read_mesh(name, &mesh, frame::mirrors(placed), |point| {
+                            frame::apply(placed, point)
+                        })?;
+                    }
+                    Parent::Frame(frame) => self.add_instance(name, &mesh, frame)?,
+                }
             }
             let first = todo.len();
-            todo.extend(node.children().map(|child| (child, scene_from_node)));
+            todo.extend(node.children().map(|child| (child, own)));
             todo[first..].reverse();
         }
         Ok(())
     }
 
-    fn read_mesh(&mut self, name: &str, mesh: &gltf::Mesh, placed: &Affine) -> Result<(), Fault> {
+    /// Returns what the topmost nodes stand in.
+    fn world(&self) -> Parent {
+        if self.as_scene { Parent::Frame(Frame::WORLD) } else { Parent::Matrix(IDENTITY) }
+    }
+
+    /// Adds an instance of a mesh, which is read once for each shape.
+    fn add_instance(&mut self, name: &str, mesh: &gltf::Mesh, frame: &Frame) -> Result<(), Fault> {
+        let key = (mesh.index(), frame.shape.map(|row| row.map(|value| (value + 0.0).to_bits())));
+        let object = match self.variants.get(&key) {
+            Some(&object) => object,
+            None => {
+                let object = self.mesh.objects.len() as u32;
+                let of_mesh = mesh.name().unwrap_or(name);
+                self.read_mesh(of_mesh, mesh, frame.mirrors(), |point| frame.shaped(point))?;
+                self.variants.insert(key, object);
+                object
+            }
+        };
+        let (rotation, translation) = (frame.rotation, frame.translation);
+        let instance =
+            Instance { name: name.to_owned(), rotation, translation, ..Instance::of_object(object) };
+        self.mesh.instances.push(instance);
+        Ok(())
+    }
+
+    /// Reads a mesh as an object whose vertices are moved by `place`.
+    fn read_mesh(
+        &mut self,
+        name: &str,
+        mesh: &gltf::Mesh,
+        mirrors: bool,
+        place: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> Result<(), Fault> {
         let mut object = Object { name: name.to_owned(), ..Object::default() };
-        let mirrors = determinant(placed) < 0.0;
         // Primitives often share their vertices. The map leads from an accessor to its first vertex and its number of
         // vertices.
         let mut shared: HashMap<usize, (usize, usize)> = HashMap::new();
@@ -197,7 +262,7 @@ impl Scene<'_> {
                     let first = object.positions.len();
                     let positions = accessor::positions(&accessor, &mut self.buffers)?;
                     self.spend(positions.len())?;
-                    object.positions.extend(positions.iter().map(|&position| apply(placed, position)));
+                    object.positions.extend(positions.iter().map(|&position| place(position)));
                     let known = (first, positions.len());
                     shared.insert(accessor.index(), known);
                     known
@@ -231,7 +296,7 @@ impl Scene<'_> {
         let most = MAX_COPIES + self.buffers.total;
         self.items += items as u64;
         if self.items > most {
-            return Err(Fault::Limit { place: Place::File, most, what: "vertices and indices in the scene" });
+            return Err(Fault::Limit { place: Place::File, most, what: "vertices and indices, nodes that share a mesh each with its own (as a scene they share it)" });
         }
         Ok(())
     }
@@ -263,47 +328,4 @@ fn assemble(mode: Mode, indices: &[u32]) -> Result<Vec<[u32; 3]>, Fault> {
             }
         },
     }
-}
-
-/// Returns a node's own transform. A rotation is normalised, because its f32 numbers are inexact.
-fn local(transform: gltf::scene::Transform) -> Affine {
-    match transform {
-        gltf::scene::Transform::Matrix { matrix } => {
-            std::array::from_fn(|row| std::array::from_fn(|column| f64::from(matrix[column][row])))
-        }
-        gltf::scene::Transform::Decomposed { translation, rotation, scale } => {
-            let [x, y, z, w] = rotation.map(f64::from);
-            let norm = x * x + y * y + z * z + w * w;
-            let s = if norm > 0.0 { 2.0 / norm } else { 0.0 };
-            let rotation = [
-                [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-                [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
-                [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
-            ];
-            std::array::from_fn(|row| {
-                let [a, b, c] =
-                    std::array::from_fn(|column| rotation[row][column] * f64::from(scale[column]));
-                [a, b, c, f64::from(translation[row])]
-            })
-        }
-    }
-}
-
-fn product(a: &Affine, b: &Affine) -> Affine {
-    std::array::from_fn(|row| {
-        std::array::from_fn(|column| {
-            let [x, y, z, w] = a[row];
-            let sum = x * b[0][column] + y * b[1][column] + z * b[2][column];
-            if column == 3 { sum + w } else { sum }
-        })
-    })
-}
-
-fn apply(m: &Affine, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * x + row[1] * y + row[2] * z + row[3])
-}
-
-fn determinant(m: &Affine) -> f64 {
-    let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
-    m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
 }
