@@ -181,7 +181,7 @@ impl<'a> FileBake<'a> {
     fn find_inputs(&self) -> Result<Vec<InputFile<'_>>, BakeError> {
         let mut inputs = Vec::new();
         for path in &self.inputs {
-            let input = InputFile::find(path, &self.progress)?.as_scene(self.options.scene);
+            let input = InputFile::find(path, &self.progress)?.for_scene(self.options.scene);
             if input.format() == MeshFormat::Gltf {
                 let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
                 self.require_memory(0, Resources::least(0).saturating_add(bytes))?;

@@ -39,7 +39,7 @@ impl<'a> InputFile<'a> {
     }
 
     /// Sets whether the nodes of a glTF file become instances.
-    pub(crate) fn as_scene(self, as_scene: bool) -> Self {
+    pub(crate) fn for_scene(self, as_scene: bool) -> Self {
         Self { as_scene, ..self }
     }
 

@@ -121,7 +121,7 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
 /// The errors of [`read`].
 pub fn read_scene(path: &Path) -> Result<Mesh, ReadError> {
     let progress = Progress::default();
-    Ok(collect(&InputFile::find(path, &progress)?.as_scene(true), &progress, WHOLE)?.0)
+    Ok(collect(&InputFile::find(path, &progress)?.for_scene(true), &progress, WHOLE)?.0)
 }
 
 /// Reads a mesh from the bytes of a file. `source` names the file in errors. Other files that a glTF file names are

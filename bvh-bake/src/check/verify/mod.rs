@@ -171,7 +171,7 @@ pub fn verify_files(
     let mut inputs = Vec::new();
     for mesh in meshes {
         let input = InputFile::find(mesh, &resources.progress).map_err(BakeError::from)?;
-        let input = input.as_scene(layout.has_instances());
+        let input = input.for_scene(layout.has_instances());
         if input.format() == MeshFormat::Gltf && options.max_memory.is_some() {
             let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
             enough(mesh, bytes.saturating_add(Resources::least_of_check()))?;

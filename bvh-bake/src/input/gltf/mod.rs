@@ -296,7 +296,11 @@ impl Scene<'_> {
         let most = MAX_COPIES + self.buffers.total;
         self.items += items as u64;
         if self.items > most {
-            return Err(Fault::Limit { place: Place::File, most, what: "vertices and indices, nodes that share a mesh each with its own (as a scene they share it)" });
+            return Err(Fault::Limit {
+                place: Place::File,
+                most,
+                what: "vertices and indices, nodes that share a mesh each with its own (as a scene they share it)",
+            });
         }
         Ok(())
     }
