@@ -139,14 +139,15 @@ fn ask(scene: &mut Scene) -> Answers {
     answers
 }
 
-/// Scenes with one thread and two on each backend.
+/// Scenes with one thread and two on each backend, with trackers and without.
 fn scenes() -> Vec<Scene> {
     let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
     backends
         .flat_map(|backend| {
-            [false, true].map(|parallel| {
+            [(false, false), (false, true), (true, false), (true, true)].map(|(parallel, tracking)| {
                 let mut scene = Scene::with_backend(backend);
                 scene.set_parallel(parallel);
+                scene.set_tracking(tracking);
                 scene
             })
         })
@@ -221,6 +222,39 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
         }
     }
     assert!(touching > 20 && apart > 3, "{touching} {apart}");
+}
+
+/// Where instances move little, trackers save work, and no answer changes.
+#[test]
+fn trackers_save_work_where_steps_are_small() {
+    let small: Vec<Triangle> =
+        sphere(3).iter().map(|corners| corners.map(|corner| corner.map(|c| 0.4 * c))).collect();
+    let (ring, ball) = (shape(&torus(24, 12)), shape(&small));
+    let at = |x: f64, y: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, y, 0.1]).unwrap();
+    let mut scenes = [Scene::new().unwrap(), Scene::new().unwrap()];
+    scenes[1].set_tracking(true);
+    let ids: Vec<_> = scenes
+        .iter_mut()
+        .map(|scene| {
+            let _still = scene.add(ring.clone(), at(0.0, 0.0)).unwrap();
+            scene.add(ball.clone(), at(0.0, 0.0)).unwrap()
+        })
+        .collect();
+    let (mut work, mut touching) = ([0, 0], 0);
+    for step in 0..1000 {
+        // Inside the hole of the ring, where its box is of no use, and into the ring and back.
+        let angle = f64::from(step) / 1000.0 * std::f64::consts::TAU;
+        let moved = at(0.35 * angle.sin(), 0.05 * angle.cos());
+        let mut answers = Vec::new();
+        for (number, scene) in scenes.iter_mut().enumerate() {
+            scene.set_pose(ids[number], moved).unwrap();
+            answers.push(scene.pairs_in_contact().unwrap());
+            work[number] += scene.stats().node_tests;
+        }
+        assert_eq!(answers[0], answers[1], "step {step}");
+        touching += answers[0].len();
+    }
+    assert!(touching > 100 && touching < 900 && 4 * work[1] < 3 * work[0], "{touching} {work:?}");
 }
 
 /// Many instances of which few are near each other: what the tree of boxes is for.

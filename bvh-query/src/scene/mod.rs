@@ -10,6 +10,7 @@ mod broad_phase;
 mod error;
 mod instance;
 mod question;
+mod trackers;
 mod workers;
 mod world_box;
 
@@ -30,6 +31,7 @@ use instance::Instance;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
+use trackers::Trackers;
 use workers::Workers;
 use world_box::WorldBox;
 
@@ -78,6 +80,7 @@ pub struct Scene {
     workers: Workers,
     /// The pair that was nearest, or in contact, in the last question: a likely answer of the next.
     likely: Option<(u32, u32)>,
+    trackers: Trackers,
     stats: QueryStats,
     pairs_asked: u64,
 }
@@ -101,6 +104,7 @@ impl Scene {
             broad: BroadPhase::default(),
             workers: Workers::new(backend),
             likely: None,
+            trackers: Trackers::default(),
             stats: QueryStats::default(),
             pairs_asked: 0,
         }
@@ -153,6 +157,19 @@ impl Scene {
     #[cfg(feature = "parallel")]
     pub fn set_parallel(&mut self, parallel: bool) {
         self.workers.parallel = parallel;
+    }
+
+    /// Lets the scene remember of each pair what it last found ([`Tracker`](crate::Tracker)), which changes no answer about
+    /// contact or a distance to compare with, and helps where instances move little from question to question.
+    ///
+    /// On the project's test scenes, where instances move by some 3 degrees a frame, a frame takes 0.95 to 1.17 times as long;
+    /// with a twentieth of the steps 0.84 to 1.12 times, and with a two-hundredth 0.61 to 0.83 times. A tracker holds some 300
+    /// bytes; there is one for each pair that the last question was about, and at most 1,024 more.
+    ///
+    /// What a tracker knows need not be looked up: a question may have an answer where it would otherwise meet a damaged page or
+    /// exceed the budget.
+    pub fn set_tracking(&mut self, tracking: bool) {
+        self.trackers.on = tracking;
     }
 
     /// Lets the question about each pair visit at most this many pairs of nodes, as

@@ -6,10 +6,12 @@ use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
+use crate::query::tracker::Tracker;
 use crate::scene::broad_phase::NearestFirst;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::{Scene, SceneError};
 use std::ops::ControlFlow;
+use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// A pair of instances; A is the lower one.
@@ -57,6 +59,24 @@ struct PlacedPair<'a> {
     b: &'a OwnedShape,
     /// B in A's frame.
     pose: Pose,
+    /// What is remembered of the pair, if the scene wants that.
+    tracker: Option<MutexGuard<'a, Tracker>>,
+}
+
+impl PlacedPair<'_> {
+    fn collide(&mut self, querier: &mut Querier) -> Result<bool, QueryError> {
+        match &mut self.tracker {
+            Some(tracker) => tracker.collide(querier, self.a, self.b, &self.pose),
+            None => querier.collide(self.a, self.b, &self.pose),
+        }
+    }
+
+    fn within(&mut self, querier: &mut Querier, d: f64) -> Result<bool, QueryError> {
+        match &mut self.tracker {
+            Some(tracker) => tracker.within(querier, self.a, self.b, &self.pose, d),
+            None => querier.within(self.a, self.b, &self.pose, d),
+        }
+    }
 }
 
 impl Candidate {
@@ -73,7 +93,7 @@ impl Scene {
     /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
     /// suffice, unless another pair is found to touch.
     pub fn collide(&mut self) -> Result<bool, SceneError> {
-        self.any(0.0, |querier, pair| querier.collide(pair.a, pair.b, &pair.pose))
+        self.any(0.0, |querier, pair| pair.collide(querier))
     }
 
     /// Returns whether any pair is at most `d` apart, in mesh units.
@@ -82,7 +102,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::collide`].
     pub fn within(&mut self, d: f64) -> Result<bool, SceneError> {
         check_distance(d)?;
-        self.any(d, |querier, pair| querier.within(pair.a, pair.b, &pair.pose, d))
+        self.any(d, |querier, pair| pair.within(querier, d))
     }
 
     /// Returns all pairs that touch.
@@ -90,7 +110,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Pair`] with the first pair whose question has no answer.
     pub fn pairs_in_contact(&mut self) -> Result<Vec<ScenePair>, SceneError> {
-        self.all(0.0, |querier, pair| querier.collide(pair.a, pair.b, &pair.pose))
+        self.all(0.0, |querier, pair| pair.collide(querier))
     }
 
     /// Returns all pairs that are at most `d` apart, in mesh units.
@@ -99,7 +119,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::pairs_in_contact`].
     pub fn pairs_within(&mut self, d: f64) -> Result<Vec<ScenePair>, SceneError> {
         check_distance(d)?;
-        self.all(d, |querier, pair| querier.within(pair.a, pair.b, &pair.pose, d))
+        self.all(d, |querier, pair| pair.within(querier, d))
     }
 
     /// Returns all pairs of triangles in contact.
@@ -130,9 +150,8 @@ impl Scene {
     ) -> Result<(), SceneError> {
         check_distance(d)?;
         for candidate in self.near(d) {
-            let found = self.each(&[candidate], |querier, pair| {
-                Ok(querier.within(pair.a, pair.b, &pair.pose, d)?.then_some(pair.ids))
-            })?;
+            let found =
+                self.each(&[candidate], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
             if found.into_iter().any(|pair| visit(pair).is_break()) {
                 break;
             }
@@ -230,7 +249,7 @@ impl Scene {
     fn any(
         &mut self,
         limit: f64,
-        ask: impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<bool, SceneError> {
         self.start();
         let likely = self.likely_candidate();
@@ -252,7 +271,7 @@ impl Scene {
     fn any_of(
         &mut self,
         candidates: &[Candidate],
-        ask: &(impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
+        ask: &(impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
     ) -> Result<bool, SceneError> {
         let is_found = AtomicBool::new(false);
         let answers = self.each(candidates, |querier, pair| {
@@ -279,7 +298,7 @@ impl Scene {
     fn all(
         &mut self,
         limit: f64,
-        ask: impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<Vec<ScenePair>, SceneError> {
         let candidates = self.near(limit);
         self.each(&candidates, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))
@@ -319,10 +338,11 @@ impl Scene {
     fn each<R: Send>(
         &mut self,
         candidates: &[Candidate],
-        ask: impl Fn(&mut Querier, &PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         let mut stats = self.stats;
         let asked = AtomicU64::new(self.pairs_asked);
+        self.trackers.expect(candidates.iter().map(|candidate| (candidate.a, candidate.b)));
         let scene = &*self;
         let found = scene.workers.each(candidates, &mut stats, |querier, candidate| {
             let Some((a, b)) = scene.both(candidate) else { return Ok(None) };
@@ -330,7 +350,8 @@ impl Scene {
             let ids = ScenePair { a: a.id(candidate.a), b: b.id(candidate.b) };
             let before = querier.questions();
             let (a, b) = (a.shape.opened()?, b.shape.opened()?);
-            let answer = ask(querier, &PlacedPair { ids, a: &a, b: &b, pose });
+            let tracker = scene.trackers.get((candidate.a, candidate.b));
+            let answer = ask(querier, &mut PlacedPair { ids, a: &a, b: &b, pose, tracker });
             asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
             answer
         });
