@@ -4,6 +4,7 @@ use crate::bake::BakeArguments;
 use crate::check::{ValidateArguments, VerifyArguments};
 use crate::console::{self, Failure};
 use crate::dump::DumpArguments;
+use crate::motion::MotionArguments;
 use crate::query::QueryArguments;
 use crate::report::ReportArguments;
 use crate::scene::SceneArguments;
@@ -35,6 +36,8 @@ pub(crate) enum Command {
     Verify(VerifyArguments),
     /// Ask whether two meshes touch, where, and how far apart they are
     Query(QueryArguments),
+    /// Ask whether the way between two poses is free at every moment, and where it ends
+    Motion(MotionArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(SceneArguments),
     /// Measure which layout suits some meshes: the speed, size and error of each
@@ -59,7 +62,7 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query, scene or report (see cbvh --help)"
+            "expected a command: bake, dump, validate, verify, query, motion, scene or report (see cbvh --help)"
                 .into(),
         );
     }

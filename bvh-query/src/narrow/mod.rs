@@ -37,17 +37,17 @@ pub(crate) type Triangle = [Point; 3];
 const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 #[inline(always)]
-fn subtract(p: Point, q: Point) -> Point {
+pub(crate) fn subtract(p: Point, q: Point) -> Point {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
 #[inline(always)]
-fn dot(p: Point, q: Point) -> f64 {
+pub(crate) fn dot(p: Point, q: Point) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 #[inline(always)]
-fn cross(p: Point, q: Point) -> Point {
+pub(crate) fn cross(p: Point, q: Point) -> Point {
     [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
 }
 

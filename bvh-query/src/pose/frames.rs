@@ -56,10 +56,10 @@ pub(crate) fn inverse([x, y, z]: &Rotation) -> Rotation {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i] * scale))
 }
 
-fn product(left: &Rotation, right: &Rotation) -> Rotation {
+pub(crate) fn product(left: &Rotation, right: &Rotation) -> Rotation {
     left.map(|row| [0, 1, 2].map(|j| (row[0] * right[0][j] + row[1] * right[1][j]) + row[2] * right[2][j]))
 }
 
-fn turn(rotation: &Rotation, v: [f64; 3]) -> [f64; 3] {
+pub(crate) fn turn(rotation: &Rotation, v: [f64; 3]) -> [f64; 3] {
     rotation.map(|row| (row[0] * v[0] + row[1] * v[1]) + row[2] * v[2])
 }

@@ -72,11 +72,17 @@ impl Pose {
         if handedness(&rotation) < 0.0 {
             return Err(PoseError::Reflection);
         }
+        Ok(Self::between_valid(rotation, translation))
+    }
+
+    /// Makes a pose between valid ones. In the spectral norm, its rotation departs from a rigid one by at most as much as
+    /// theirs may, three times the limit for an entry; that bounds the stretch, which is what queries charge.
+    pub(crate) fn between_valid(rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Self {
         let flush = |tiny: f64| move |v: f64| if v.abs() < tiny { 0.0 } else { v };
-        Ok(Self {
+        Self {
             rotation: rotation.map(|row| row.map(flush(MIN_ROTATION_ENTRY))),
             translation: translation.map(flush(MIN_TRANSLATION)),
-        })
+        }
     }
 
     /// Creates a pose from the 12 numbers of a row-major 3x4 matrix `[R | t]`.

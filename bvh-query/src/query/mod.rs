@@ -1,4 +1,4 @@
-//! The questions: collide, contacts, distance, within. Each is a visitor of the one pair walk.
+//! The questions: collide, contacts, distance, within, motion. Each is a visitor of the one pair walk.
 
 pub(crate) mod answers;
 #[cfg(feature = "parallel")]
@@ -6,11 +6,13 @@ pub(crate) mod batch;
 mod bounding_volumes;
 mod collide;
 mod contacts;
+mod displacement;
 mod distance;
 mod exact;
-mod motion;
+pub(crate) mod motion;
 pub(crate) mod options;
 mod placed_pair;
 pub(crate) mod querier;
 mod search;
+mod sweep;
 pub(crate) mod tracker;

@@ -78,6 +78,7 @@ pub(super) fn each_pair<R>(
                     bvh_b: b.bvh(),
                     object_b,
                     placement: &placement,
+                    end: &placement,
                 },
                 pose,
                 frame: OnceCell::new(),

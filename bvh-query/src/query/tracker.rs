@@ -8,7 +8,7 @@
 //!   closest points is the first witness direction. The pair is no answer itself: the walk prunes strictly beyond the
 //!   limit, meets this pair or a nearer one, and decides as it always does.
 //! - *A clearance*: certified bounds of the distance in an earlier pose. No vertex of B moves farther than
-//!   [`motion`] from that pose to a new one, so that the distance changes by no more. Where the bounds decide the
+//!   [`displacement`] from that pose to a new one, so that the distance changes by no more. Where the bounds decide the
 //!   question, there is no walk.
 //!
 //! Both belong to two open files and the objects asked about. They are forgotten when a question is about others.
@@ -25,9 +25,9 @@ use crate::file::shape::Shape;
 use crate::narrow::{Triangle, triangles_intersect, triangles_within};
 use crate::pose::Pose;
 use crate::query::answers::Distance;
+use crate::query::displacement::{displacement, size};
 use crate::query::distance::no_answer;
 use crate::query::exact::{TriangleDistance, placed, stored};
-use crate::query::motion::{motion, size};
 use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::placed_pair::Found;
 use crate::query::querier::Querier;
@@ -222,13 +222,13 @@ impl Tracker {
             *self = Self::default();
         }
         self.last = Some(Asked { sides, pose: *pose });
-        last.map(|last| motion(b, &last.pose, pose))
+        last.map(|last| displacement(b, &last.pose, pose))
     }
 
     /// Returns certified bounds of the distance in a new pose.
     fn bounds(&self, b: Shape<'_>, pose: &Pose) -> Option<(f64, f64)> {
         let held = self.clearance.as_ref()?;
-        let moved = motion(b, &held.pose, pose);
+        let moved = displacement(b, &held.pose, pose);
         Some(((held.lower - moved).next_down(), (held.upper + moved).next_up()))
     }
 

@@ -56,6 +56,8 @@ pub(crate) struct Witness {
 pub(crate) struct NodeTest {
     /// B along A's directions.
     alignment: Alignment,
+    /// B along A's directions in the other placement, if there are two.
+    end: Alignment,
     /// A along B's directions, prepared once that pays.
     inverse: Alignment,
     looks_along_b: bool,
@@ -70,6 +72,7 @@ impl NodeTest {
     /// An empty test, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
         alignment: Alignment::NONE,
+        end: Alignment::NONE,
         inverse: Alignment::NONE,
         looks_along_b: false,
         placement: Placement::NONE,
@@ -93,6 +96,12 @@ impl NodeTest {
             (pair.object_a.profile().directions(), pair.object_b.profile().directions());
         (self.reach_a, self.reach_b) = (reach_a, reach_b);
         self.alignment.prepare(isa, pair.placement, self.set_b, reach_b.ends);
+    }
+
+    /// Prepares the other placement of B.
+    #[inline(always)]
+    pub(crate) fn prepare_end<I: Isa>(&mut self, isa: I, end: &Placement) {
+        self.end.prepare(isa, end, self.set_b, self.reach_b.ends);
     }
 
     /// Adopts a new witness direction.
@@ -153,6 +162,18 @@ impl NodeTest {
     #[inline(always)]
     pub(crate) fn align_b<I: Isa>(&self, isa: I, group: &Group, aligned: &mut Group) {
         self.alignment.align(isa, self.set_a, group, aligned);
+    }
+
+    /// Computes slabs along A's directions that hold B's in both placements, rounded outward, after `prepare_end`.
+    #[inline(always)]
+    pub(crate) fn align_b_at_both_ends<I: Isa>(&self, isa: I, group: &Group, joined: &mut Group) {
+        self.alignment.align(isa, self.set_a, group, joined);
+        let mut other = Group::ZERO;
+        self.end.align(isa, self.set_a, group, &mut other);
+        for row in 0..4 {
+            isa.store(isa.load(&joined.lo[row]).min(isa.load(&other.lo[row])), &mut joined.lo[row]);
+            isa.store(isa.load(&joined.hi[row]).max(isa.load(&other.hi[row])), &mut joined.hi[row]);
+        }
     }
 
     /// Computes A's slab ends along B's directions, rounded outward, after `look_along_b`.

@@ -83,4 +83,6 @@ pub(crate) struct ObjectPair<'a> {
     pub(crate) bvh_b: &'a Bvh,
     pub(crate) object_b: &'a Object,
     pub(crate) placement: &'a Placement,
+    /// Where B is as well, for walks that sweep; else the same.
+    pub(crate) end: &'a Placement,
 }

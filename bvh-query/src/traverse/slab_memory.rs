@@ -52,6 +52,11 @@ impl SlabMemory {
         (self.pause, self.balance, self.next_pause) = (NODE_TESTS_BEFORE_SLABS, 0, FIRST_PAUSE);
     }
 
+    /// Makes no slab test in this walk.
+    pub(crate) fn stop(&mut self) {
+        self.applies = false;
+    }
+
     /// Returns whether the next slab test is to be made.
     #[inline(always)]
     pub(crate) fn are_due(&mut self) -> bool {

@@ -51,6 +51,9 @@ pub(crate) enum Order {
 /// What a query does with the pairs of leaf packets that a walk meets.
 pub(crate) trait Visitor {
     const MEASURE: Measure;
+    /// Whether bounds are to hold for two placements of B at a time, `ObjectPair::placement` and `ObjectPair::end`: then a
+    /// bound is one along a direction on which B is on the same side of A in both.
+    const SWEEPS: bool = false;
 
     fn order(&self) -> Order;
 
@@ -202,6 +205,11 @@ fn walk<I: Isa, W: Visitor>(
     let reach_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
     memory.slabs.start(&pair);
     node_test.prepare(isa, &pair, (reach_a, reach_b));
+    if W::SWEEPS {
+        // What else bounds a pair knows of one placement only.
+        node_test.prepare_end(isa, pair.end);
+        memory.slabs.stop();
+    }
     let mut witness: Option<Witness> = None;
     node_test.update_witness(&mut witness, visitor.witness());
     let (mut tests, mut leaves) = (0, 0);
@@ -252,7 +260,8 @@ fn walk<I: Isa, W: Visitor>(
             continue;
         }
         let WalkMemory { nodes_a, nodes_b, large_leaves, .. } = memory;
-        if tests >= NODE_TESTS_BEFORE_TRIANGLE_BOUNDS
+        if !W::SWEEPS
+            && tests >= NODE_TESTS_BEFORE_TRIANGLE_BOUNDS
             && large_leaves.are_beyond(
                 &pair,
                 (nodes_a, nodes_b),
@@ -263,10 +272,10 @@ fn walk<I: Isa, W: Visitor>(
         {
             continue;
         }
-        if tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_test.looks_along_b() {
+        if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_test.looks_along_b() {
             node_test.look_along_b(isa);
         }
-        let sides = memory.open(isa, &pair, node_test, next)?;
+        let sides = memory.open::<I, W>(isa, &pair, node_test, next)?;
         tests += memory.push_children(
             isa,
             W::MEASURE,
@@ -358,6 +367,24 @@ impl Task for AlignB<'_> {
     }
 }
 
+/// Aligns an opened node of B in both placements to A's directions, and joins the slabs.
+struct AlignBothEnds<'a> {
+    node_test: &'a NodeTest,
+    node: &'a CachedNode,
+    to: &'a mut [Group; 2],
+}
+
+impl Task for AlignBothEnds<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        for part in 0..self.node.count.div_ceil(4) {
+            self.node_test.align_b_at_both_ends(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+        }
+    }
+}
+
 impl WalkMemory {
     /// Starts a query that may visit this many pairs.
     pub(crate) fn start(&mut self, budget: u64) {
@@ -415,7 +442,7 @@ impl WalkMemory {
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
-    fn open<I: Isa>(
+    fn open<I: Isa, W: Visitor>(
         &mut self,
         isa: I,
         pair: &ObjectPair<'_>,
@@ -444,7 +471,12 @@ impl WalkMemory {
             (sides.node_b, sides.only_b) = (number, None);
             let (to, is_aligned) = self.aligned_b.of(number);
             if !is_aligned {
-                isa.run(AlignB { node_test, node: self.nodes_b.get(number), to });
+                let node = self.nodes_b.get(number);
+                if W::SWEEPS {
+                    isa.run(AlignBothEnds { node_test, node, to });
+                } else {
+                    isa.run(AlignB { node_test, node, to });
+                }
             }
         }
         Ok(sides)

@@ -1,7 +1,6 @@
 //! Times queries of files evicted from the page cache.
 
-use super::question::{Answer, Question};
-use super::runner::Run;
+use super::question::{Answer, Question, Run};
 use super::side::{How, Side, Sides};
 use crate::console::Failure;
 use crate::process::from_disk::{self, FromDisk};

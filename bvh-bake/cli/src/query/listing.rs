@@ -1,9 +1,8 @@
 //! The answers about a pose file for a person: one line per pose, then the timing.
 
 use super::arguments::Mode;
-use super::question::{Answer, Question};
+use super::question::{Answer, Question, Run};
 use super::record::Record;
-use super::runner::Run;
 use crate::console::plural;
 use cbvh_measure::spread::quantile;
 use std::fmt::Write;
@@ -52,7 +51,7 @@ fn in_words(answer: &Answer, question: &Question) -> String {
 }
 
 /// Returns nanoseconds in a unit that gives few digits.
-fn time(nanoseconds: u64) -> String {
+pub(crate) fn time(nanoseconds: u64) -> String {
     match nanoseconds as f64 {
         ns if ns < 1e3 => format!("{ns} ns"),
         ns if ns < 1e6 => format!("{:.1} µs", ns / 1e3),

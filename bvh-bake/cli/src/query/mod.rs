@@ -2,22 +2,22 @@
 
 mod arguments;
 mod cold;
-mod listing;
+pub(crate) mod listing;
 pub(crate) mod number;
-mod once;
+pub(crate) mod once;
 pub(crate) mod poses;
 mod question;
 pub(crate) mod record;
-mod runner;
+pub(crate) mod runner;
 pub(crate) mod side;
 
 pub(crate) use arguments::QueryArguments;
 
 use crate::console::{self, Failure};
 use bvh_query::{Backend, Pose, Querier};
-use question::Question;
+use question::{Question, Run};
 use record::Record;
-use runner::{Limits, Run};
+use runner::Limits;
 use side::{How, Side, Sides, is_baked};
 use std::io::{IsTerminal, stdout};
 use std::path::{Path, PathBuf};
@@ -60,8 +60,9 @@ fn run_files(
     let sides = Sides { a: &a, b: &b };
     let limits = Limits { jobs: usize::from(arguments.jobs), warm: arguments.warm, budget: arguments.budget };
     for (stem, poses) in &files {
-        let run = runner::run(&sides, poses, question, backend, &limits).map_err(|e| sides.blame(e))?;
-        tell(arguments, question, &Record::new(&sides, question, backend, stem, &run, None), &run)?;
+        let ask = |querier: &mut Querier, pose: &Pose| question.ask(querier, &sides, pose);
+        let run = runner::run(poses, ask, backend, &limits).map_err(|e| sides.blame(e))?;
+        tell(arguments, question, &Record::of_poses(&sides, question, backend, stem, &run, None), &run)?;
     }
     Ok(())
 }
@@ -111,7 +112,12 @@ fn run_cold(
         // The files are opened only now, because the system does not evict what a process has mapped.
         let (a, b) = sides(arguments)?;
         let sides = Sides { a: &a, b: &b };
-        tell(arguments, question, &Record::new(&sides, question, backend, stem, &run, Some(means)), &run)?;
+        tell(
+            arguments,
+            question,
+            &Record::of_poses(&sides, question, backend, stem, &run, Some(means)),
+            &run,
+        )?;
     }
     Ok(())
 }
@@ -129,7 +135,7 @@ fn tell(arguments: &QueryArguments, question: &Question, record: &Record, run: &
 }
 
 /// Writes a text file whole or not at all.
-fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     let written = bvh_bake::write_atomically(path, text.as_bytes());
     written.map_err(|error| Failure::from_bake(&path.display().to_string(), &error))
 }

@@ -16,7 +16,7 @@ use std::path::Path;
 const MAX_LISTED: usize = 10;
 
 /// Asks the question and prints the answer.
-pub(crate) fn answer(
+pub(super) fn answer(
     sides: &Sides<'_>,
     pose: &Pose,
     question: &Question,
@@ -61,7 +61,7 @@ pub(crate) fn answer(
     console::text(&text)
 }
 
-fn describe(sides: &Sides<'_>, answer: &Distance) -> String {
+pub(crate) fn describe(sides: &Sides<'_>, answer: &Distance) -> String {
     let Distance { distance, lower, upper, point_a, point_b, .. } = answer;
     let a = name(sides.a, answer.object_a, answer.triangle_a);
     let b = name(sides.b, answer.object_b, answer.triangle_b);
@@ -90,7 +90,7 @@ fn name(side: &Side, object: u32, triangle: u32) -> String {
 }
 
 /// Returns both triangles as faces, and the segment between the closest points as a line, all in the frame of A.
-fn witness_obj(sides: &Sides<'_>, pose: &Pose, answer: &Distance) -> Result<String, Failure> {
+pub(crate) fn witness_obj(sides: &Sides<'_>, pose: &Pose, answer: &Distance) -> Result<String, Failure> {
     let a = corners(sides.a, answer.object_a, answer.triangle_a)?;
     let b = corners(sides.b, answer.object_b, answer.triangle_b)?.map(|corner| pose.place(corner));
     let mut text = format!("# distance {:?}\n", answer.distance);

@@ -1,6 +1,7 @@
 //! What a query asks about each pose, and what it answers.
 
 use super::arguments::{Mode, QueryArguments};
+use super::runner;
 use super::side::Sides;
 use crate::console::Failure;
 use bvh_query::{DistanceOptions, Pose, Querier, QueryError};
@@ -25,6 +26,12 @@ pub(super) enum Answer {
     /// A distance in mesh units.
     Length(f64),
 }
+
+/// An answer and its nanoseconds.
+pub(super) type Timed = (Answer, u64);
+
+/// The results of a file of poses.
+pub(super) type Run = runner::Run<Answer>;
 
 impl Question {
     /// Takes the question from the command line, and refuses options that do not belong to its mode.

@@ -2,8 +2,8 @@
 
 use super::cold::Means;
 use super::number::significant;
-use super::question::{Answer, Question};
-use super::runner::{Run, Timed};
+use super::question::{Answer, Question, Run, Timed};
+use super::runner;
 use super::side::{Side, Sides};
 use crate::console::hex;
 use crate::process::resident;
@@ -46,9 +46,18 @@ impl Times {
     }
 }
 
-/// The JSON line of a pose file: the fields that programs of this protocol share, and further ones.
+/// What the answers of a file come to.
+pub(crate) struct Summed {
+    pub(crate) mode: &'static str,
+    pub(crate) positives: u64,
+    pub(crate) sum: f64,
+    /// A hash of the answers without times; `None` if there may be others.
+    pub(crate) answers: Option<u64>,
+}
+
+/// The JSON line of a file of poses or motions: the fields that programs of this protocol share, and further ones.
 #[derive(Serialize)]
-pub(super) struct Record {
+pub(crate) struct Record {
     peer: &'static str,
     version: &'static str,
     mode: &'static str,
@@ -80,7 +89,8 @@ pub(super) struct Record {
 }
 
 impl Record {
-    pub(super) fn new(
+    /// Describes the answers about poses.
+    pub(super) fn of_poses(
         sides: &Sides<'_>,
         question: &Question,
         backend: Backend,
@@ -89,22 +99,37 @@ impl Record {
         cold: Option<Means>,
     ) -> Self {
         let answers = &run.answers;
-        let count = answers.len();
+        let complete = answers.len() == run.requested && question.is_exact();
+        let summed = Summed {
+            mode: question.mode.name(),
+            positives: answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
+            sum: answers.iter().map(|(answer, _)| answer.value()).sum(),
+            answers: complete.then(|| hash(answers)),
+        };
+        Self { cold, ..Self::new(sides, summed, backend, stem, run) }
+    }
+
+    pub(crate) fn new<A>(
+        sides: &Sides<'_>,
+        summed: Summed,
+        backend: Backend,
+        stem: &str,
+        run: &runner::Run<A>,
+    ) -> Self {
         let (bytes_a, stored_a) = sides.a.bytes_and_stored();
         let (bytes_b, stored_b) = sides.b.bytes_and_stored();
-        let complete = count == run.requested && question.is_exact();
         Self {
             peer: "cbvh",
             version: env!("CARGO_PKG_VERSION"),
-            mode: question.mode.name(),
+            mode: summed.mode,
             poses: stem.to_owned(),
             tris_a: sides.a.triangles(),
             tris_b: sides.b.triangles(),
             build_a_s: sides.a.build_seconds,
             build_b_s: sides.b.build_seconds,
-            times: Times::new(answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds),
-            positives: answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
-            sum: answers.iter().map(|(answer, _)| answer.value()).sum(),
+            times: Times::new(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds),
+            positives: summed.positives,
+            sum: summed.sum,
             peak_rss_mb: resident::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),
             rss_bytes_per_tri: -1.0,
             api_bytes_per_tri_a: bytes_a as f64 / stored_a as f64,
@@ -114,13 +139,13 @@ impl Record {
             triangle_encoding: both(sides, |side| {
                 side.shape().objects().first().map_or("", |object| object.triangle_encoding().name())
             }),
-            answers_xxh3: complete.then(|| hex(hash(answers))),
+            answers_xxh3: summed.answers.map(hex),
             node_tests: run.stats.node_tests,
             triangle_tests: run.stats.packet_tests,
             exact_tests: run.stats.exact_tests,
             file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
             jobs: run.jobs,
-            cold,
+            cold: None,
         }
     }
 }

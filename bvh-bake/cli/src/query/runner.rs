@@ -1,59 +1,45 @@
-//! Asks about every pose of a file on one thread or several, and times each query by itself.
+//! Asks about every pose or motion of a file on one thread or several, and times each query by itself.
 //!
-//! First come `warm` untimed queries from the end of the file, then all poses in order until the budget is spent. Each
-//! thread takes the next pose. The answers are put back in order, so that a budget that ends early leaves the first ones.
+//! First come `warm` untimed queries from the end of the file, then all items in order until the budget is spent. Each
+//! thread takes the next one. The answers are put back in order, so that a budget that ends early leaves the first ones.
 
-use super::question::{Answer, Question};
-use super::side::Sides;
-use bvh_query::{Backend, Pose, Querier, QueryError, QueryStats};
+use bvh_query::{Backend, Querier, QueryError, QueryStats};
 use cbvh_measure::rounds::add;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// An answer and its nanoseconds.
-pub(super) type Timed = (Answer, u64);
-
 /// The limits of a run.
-pub(super) struct Limits {
-    pub(super) jobs: usize,
-    pub(super) warm: usize,
+pub(crate) struct Limits {
+    pub(crate) jobs: usize,
+    pub(crate) warm: usize,
     /// The budget in seconds; `None` for no limit.
-    pub(super) budget: Option<f64>,
+    pub(crate) budget: Option<f64>,
 }
 
 /// The results of a run.
-pub(super) struct Run {
-    /// The answers in the order of the poses. There are fewer than poses if the budget ended.
-    pub(super) answers: Vec<Timed>,
-    pub(super) requested: usize,
+pub(crate) struct Run<A> {
+    /// The answers and their nanoseconds, in the order of the file. There are fewer than asked if the budget ended.
+    pub(crate) answers: Vec<(A, u64)>,
+    pub(crate) requested: usize,
     /// The number of threads used.
-    pub(super) jobs: usize,
+    pub(crate) jobs: usize,
     /// The seconds from the first query to the last.
-    pub(super) total_seconds: f64,
-    pub(super) stats: QueryStats,
+    pub(crate) total_seconds: f64,
+    pub(crate) stats: QueryStats,
 }
 
-/// Asks about all poses.
-pub(super) fn run(
-    sides: &Sides<'_>,
-    poses: &[Pose],
-    question: &Question,
+/// Asks about all items.
+pub(crate) fn run<T: Sync, A: Clone + Send>(
+    items: &[T],
+    ask: impl Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
     backend: Backend,
     limits: &Limits,
-) -> Result<Run, QueryError> {
-    let jobs = limits.jobs.min(poses.len()).max(1);
-    let worker = Worker {
-        sides,
-        poses,
-        question,
-        backend,
-        limits,
-        next: AtomicUsize::new(0),
-        ready: Barrier::new(jobs),
-    };
+) -> Result<Run<A>, QueryError> {
+    let jobs = limits.jobs.min(items.len()).max(1);
+    let worker = Worker { items, ask, backend, limits, next: AtomicUsize::new(0), ready: Barrier::new(jobs) };
     let shares = if jobs == 1 { vec![worker.work()] } else { work_together(&worker, jobs) };
-    let mut answers = vec![None; poses.len()];
+    let mut answers = vec![None; items.len()];
     let mut stats = QueryStats::default();
     let mut total_seconds = 0.0f64;
     for share in shares {
@@ -62,12 +48,18 @@ pub(super) fn run(
         total_seconds = total_seconds.max(share.seconds);
         share.answers.into_iter().for_each(|(index, timed)| answers[index] = Some(timed));
     }
-    // Poses are taken in order, and each one that is taken is answered, so that there are no gaps.
+    // Items are taken in order, and each one that is taken is answered, so that there are no gaps.
     let answers = answers.into_iter().map_while(|answer| answer).collect();
-    Ok(Run { answers, requested: poses.len(), jobs, total_seconds, stats })
+    Ok(Run { answers, requested: items.len(), jobs, total_seconds, stats })
 }
 
-fn work_together(worker: &Worker<'_>, jobs: usize) -> Vec<Result<Share, QueryError>> {
+fn work_together<T: Sync, A: Send, F>(
+    worker: &Worker<'_, T, F>,
+    jobs: usize,
+) -> Vec<Result<Share<A>, QueryError>>
+where
+    F: Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
+{
     std::thread::scope(|scope| {
         let others: Vec<_> = (1..jobs).map(|_| scope.spawn(|| worker.work())).collect();
         let own = worker.work();
@@ -80,10 +72,9 @@ fn work_together(worker: &Worker<'_>, jobs: usize) -> Vec<Result<Share, QueryErr
 }
 
 /// The work that all threads share.
-struct Worker<'a> {
-    sides: &'a Sides<'a>,
-    poses: &'a [Pose],
-    question: &'a Question,
+struct Worker<'a, T, F> {
+    items: &'a [T],
+    ask: F,
     backend: Backend,
     limits: &'a Limits,
     next: AtomicUsize,
@@ -91,26 +82,26 @@ struct Worker<'a> {
 }
 
 /// The results of one thread.
-struct Share {
-    answers: Vec<(usize, Timed)>,
+struct Share<A> {
+    answers: Vec<(usize, (A, u64))>,
     stats: QueryStats,
     seconds: f64,
 }
 
-impl Worker<'_> {
-    fn work(&self) -> Result<Share, QueryError> {
+impl<T, A, F: Fn(&mut Querier, &T) -> Result<A, QueryError>> Worker<'_, T, F> {
+    fn work(&self) -> Result<Share<A>, QueryError> {
         let mut querier = Querier::with_backend(self.backend);
         let budget = self.limits.budget.unwrap_or(f64::INFINITY);
         let start = Instant::now();
-        for pose in self.poses.iter().rev().take(self.limits.warm) {
+        for item in self.items.iter().rev().take(self.limits.warm) {
             if start.elapsed().as_secs_f64() >= budget / 4.0 {
                 break;
             }
             // The timed part meets the same error again. Returning it here would leave the other threads at the barrier.
-            let _ = self.question.ask(&mut querier, self.sides, pose);
+            let _ = (self.ask)(&mut querier, item);
         }
         let mut share = Share {
-            answers: Vec::with_capacity(self.poses.len()),
+            answers: Vec::with_capacity(self.items.len()),
             stats: QueryStats::default(),
             seconds: 0.0,
         };
@@ -118,9 +109,9 @@ impl Worker<'_> {
         let start = Instant::now();
         loop {
             let index = self.next.fetch_add(1, Ordering::Relaxed);
-            let Some(pose) = self.poses.get(index) else { break };
+            let Some(item) = self.items.get(index) else { break };
             let before = Instant::now();
-            let answer = self.question.ask(&mut querier, self.sides, pose);
+            let answer = (self.ask)(&mut querier, item);
             let nanoseconds = before.elapsed().as_nanos() as u64;
             share.answers.push((index, (answer?, nanoseconds)));
             add(&mut share.stats, querier.stats());

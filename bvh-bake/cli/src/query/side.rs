@@ -94,12 +94,12 @@ pub(crate) struct Sides<'a> {
 
 impl<'a> Sides<'a> {
     /// Returns what is queried on each side.
-    pub(super) fn shapes(&self) -> (Shape<'a>, Shape<'a>) {
+    pub(crate) fn shapes(&self) -> (Shape<'a>, Shape<'a>) {
         (self.a.shape(), self.b.shape())
     }
 
     /// Turns an error of a query into one of the file that caused it.
-    pub(super) fn blame(&self, error: QueryError) -> Failure {
+    pub(crate) fn blame(&self, error: QueryError) -> Failure {
         match error {
             QueryError::Backend(error) => error.into(),
             QueryError::Budget { .. } => Failure::Limit(error.to_string()),

@@ -1,0 +1,452 @@
+//! Paths: where B is at each moment, and how far it is from a straight line meanwhile.
+
+use crate::pose::frames::{product, turn};
+use crate::pose::{Pose, PoseError};
+
+/// A motion of B in A's frame, over times from 0 to 1.
+///
+/// [`Motion`] and [`Polyline`] are paths. Implement it for others, such as a link of a robot whose joints move.
+pub trait Path {
+    /// Returns where B is at a time from 0 to 1. The same time gives the same pose, to the bit.
+    fn pose(&self, t: f64) -> Pose;
+
+    /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
+    /// origin of B's frame, is during `[t0, t1]` from the straight segment between where it is at `t0` and at `t1`. It must
+    /// hold at every time for which [`Path::pose`] is asked, with all rounding, and must not be NaN. Answers are only as
+    /// certain as this bound; the smaller it is for short intervals, the less work is a question.
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
+}
+
+impl<P: Path + ?Sized> Path for &P {
+    fn pose(&self, t: f64) -> Pose {
+        (**self).pose(t)
+    }
+
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        (**self).sagitta(radius, t0, t1)
+    }
+}
+
+type Matrix = [[f64; 3]; 3];
+
+/// How far a computed pose may take a point from the ideal one, as a fraction of the magnitudes involved: 32 roundings, which
+/// is twice what a sine and cosine (one rounding each), Rodrigues' formula and a product of matrices amount to.
+const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+/// The least cosine of half the angle between two poses, for which the shorter way between them is certain.
+const MIN_HALF_COSINE: f64 = 1e-9;
+
+/// Why there is no motion between two poses.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MotionError {
+    /// The poses are half a turn apart, so that neither way round is the shorter one.
+    #[error("expected a turn of less than half a circle, found {0} radians; divide it by a pose between")]
+    HalfTurn(f64),
+    /// A number that is not finite, or a direction of length 0.
+    #[error("{name}: expected {expected}, found {found}")]
+    Number {
+        /// The parameter.
+        name: &'static str,
+        /// What is allowed.
+        expected: &'static str,
+        /// The number given.
+        found: f64,
+    },
+    /// A pose on the way that no query takes.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// A polyline of fewer than two poses.
+    #[error("expected at least two poses, found {0}")]
+    TooFewPoses(usize),
+}
+
+/// A rotation at a constant rate about an axis of A's frame, with a translation at a constant rate: [`Motion::between`] two
+/// poses, or a [`Motion::screw`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    start: Pose,
+    end: Pose,
+    /// The rotation at the start; between poses, the nearest orthonormal one.
+    rotation: Matrix,
+    /// What the rotations of `start` and `end` differ from orthonormal ones by.
+    defects: [Matrix; 2],
+    /// Of length 1.
+    axis: [f64; 3],
+    /// In radians.
+    angle: f64,
+    course: Course,
+}
+
+/// What the origin of B's frame does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Course {
+    /// It moves on a line from the start to the end.
+    Line,
+    /// It turns about a point on the axis, and is shifted along the axis.
+    Screw { point: [f64; 3], shift: f64 },
+}
+
+impl Motion {
+    /// Returns the motion that planners call interpolation in SE(3): the origin of B's frame moves on a line, and B turns about
+    /// one axis the shorter way (slerp), both at a constant rate. `pose(0)` and `pose(1)` are `start` and `end`, bit for bit.
+    ///
+    /// A rotation that is not orthonormal (a pose may be 2^-20 off) is interpolated in its nearest orthonormal one, and what it
+    /// is off by is interpolated linearly.
+    ///
+    /// # Errors
+    /// [`MotionError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
+    pub fn between(start: &Pose, end: &Pose) -> Result<Self, MotionError> {
+        let nearest = |pose: &Pose| Pose::nearest(*pose.rotation(), [0.0; 3]).map(|pose| *pose.rotation());
+        let (first, last) = (nearest(start)?, nearest(end)?);
+        let [x, y, z, w] = quaternion(&product(&last, &transposed(&first)));
+        let sine = (x * x + y * y + z * z).sqrt();
+        let angle = 2.0 * libm::atan2(sine, w);
+        if w < MIN_HALF_COSINE {
+            return Err(MotionError::HalfTurn(angle));
+        }
+        let axis = if sine > 0.0 { [x / sine, y / sine, z / sine] } else { [1.0, 0.0, 0.0] };
+        let reached = product(&rodrigues(axis, angle), &first);
+        Ok(Self {
+            start: *start,
+            end: *end,
+            rotation: first,
+            defects: [difference(start.rotation(), &first), difference(end.rotation(), &reached)],
+            axis,
+            angle,
+            course: Course::Line,
+        })
+    }
+
+    /// Returns a screw motion from `start`: a rotation by `angle` radians, any number of turns, about the axis through `point`
+    /// with `direction` (of any length), in A's frame, and a shift by `shift` mesh units along it.
+    ///
+    /// # Errors
+    /// [`MotionError::Number`] if a number is not finite or the direction has no length, [`MotionError::Pose`] if the end is no
+    /// pose.
+    pub fn screw(
+        start: &Pose,
+        point: [f64; 3],
+        direction: [f64; 3],
+        angle: f64,
+        shift: f64,
+    ) -> Result<Self, MotionError> {
+        let most = direction.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        let wrong = |name, expected, found| MotionError::Number { name, expected, found };
+        let length = direction.map(|value| value / most);
+        let length = (length[0] * length[0] + length[1] * length[1] + length[2] * length[2]).sqrt();
+        if !(most > 0.0 && length.is_finite()) {
+            return Err(wrong("direction", "a finite direction of a length above 0", most));
+        }
+        if let Some(&found) = point.iter().find(|value| !value.is_finite()) {
+            return Err(wrong("point", "finite coordinates", found));
+        }
+        for (name, found) in [("angle", angle), ("shift", shift)] {
+            if !found.is_finite() || found.abs() > 1e9 && name == "angle" {
+                return Err(wrong(name, "a finite number, an angle of at most 1e9 radians", found));
+            }
+        }
+        let mut screw = Self {
+            start: *start,
+            end: *start,
+            // What it is off by turns with it.
+            rotation: *start.rotation(),
+            defects: [[[0.0; 3]; 3]; 2],
+            axis: direction.map(|value| value / most / length),
+            angle,
+            course: Course::Screw { point, shift },
+        };
+        let (rotation, translation) = screw.parts(1.0);
+        screw.end = Pose::new(rotation, translation)?;
+        Ok(screw)
+    }
+
+    /// Returns the angle that B turns by, in radians.
+    pub fn angle(&self) -> f64 {
+        self.angle
+    }
+
+    /// Returns rotation and translation at a time.
+    fn parts(&self, t: f64) -> (Matrix, [f64; 3]) {
+        let turn_by = rodrigues(self.axis, t * self.angle);
+        let ideal = product(&turn_by, &self.rotation);
+        let rotation = [0, 1, 2].map(|i| {
+            [0, 1, 2].map(|j| ideal[i][j] + ((1.0 - t) * self.defects[0][i][j] + t * self.defects[1][i][j]))
+        });
+        let (from, to) = (self.start.translation(), self.end.translation());
+        let translation = match self.course {
+            Course::Line => [0, 1, 2].map(|k| (1.0 - t) * from[k] + t * to[k]),
+            Course::Screw { point, shift } => {
+                let turned = turn(&turn_by, [0, 1, 2].map(|k| from[k] - point[k]));
+                [0, 1, 2].map(|k| turned[k] + (point[k] + t * shift * self.axis[k]))
+            }
+        };
+        (rotation, translation)
+    }
+
+    /// Returns how far rounding may take a point within `radius` of B's origin from where it ideally is.
+    fn rounding(&self, radius: f64) -> f64 {
+        let (from, to) = (self.start.translation(), self.end.translation());
+        let mut magnitude = radius;
+        for k in 0..3 {
+            magnitude += from[k].abs() + to[k].abs();
+            if let Course::Screw { point, shift } = self.course {
+                magnitude += 2.0 * point[k].abs() + shift.abs();
+            }
+        }
+        // The angle is rounded before its sine is taken.
+        POSE_ERROR * (1.0 + self.angle.abs()) * magnitude
+    }
+
+    /// Returns how far a point within `radius` of B's origin is at most from the axis about which it turns.
+    fn arm(&self, radius: f64) -> f64 {
+        match self.course {
+            Course::Line => radius,
+            Course::Screw { point, .. } => {
+                let from = self.start.translation();
+                let offset = [0, 1, 2].map(|k| from[k] - point[k]);
+                radius + (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt()
+            }
+        }
+    }
+}
+
+/// A point at distance r from the axis moves on an arc of angle a, and linearly along the axis and with the origin, which
+/// adds nothing to its distance from the segment. The arc is at most r (1 - cos(a / 2)) <= r a^2 / 8 from its chord, for any
+/// a. Defects of rotations are linear in time, and stretch lengths by less than 2^-18.
+impl Path for Motion {
+    fn pose(&self, t: f64) -> Pose {
+        if t <= 0.0 {
+            return self.start;
+        }
+        if t >= 1.0 {
+            return self.end;
+        }
+        let (rotation, translation) = self.parts(t);
+        Pose::between_valid(rotation, translation)
+    }
+
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        let turned = (t1 - t0) * self.angle;
+        let arc = self.arm(radius) * (turned * turned) / 8.0;
+        // Thrice: of the point, and of both ends of the segment.
+        arc * (1.0 + 1.0 / (1 << 17) as f64) + 3.0 * self.rounding(radius)
+    }
+}
+
+/// Motions between one pose after another, each of which takes the same time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polyline {
+    motions: Vec<Motion>,
+}
+
+impl Polyline {
+    /// Returns the path through the poses, with [`Motion::between`] from each to the next.
+    ///
+    /// # Errors
+    /// [`MotionError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
+    pub fn new(poses: &[Pose]) -> Result<Self, MotionError> {
+        if poses.len() < 2 {
+            return Err(MotionError::TooFewPoses(poses.len()));
+        }
+        let motions = poses.windows(2).map(|pair| Motion::between(&pair[0], &pair[1]));
+        Ok(Self { motions: motions.collect::<Result<_, _>>()? })
+    }
+
+    /// Returns the number of the motion at a time, and the time within it.
+    fn at(&self, t: f64) -> (usize, f64) {
+        let scaled = t.clamp(0.0, 1.0) * self.motions.len() as f64;
+        let number = (scaled as usize).min(self.motions.len() - 1);
+        (number, scaled - number as f64)
+    }
+}
+
+impl Path for Polyline {
+    fn pose(&self, t: f64) -> Pose {
+        let (number, t) = self.at(t);
+        self.motions[number].pose(t)
+    }
+
+    /// Within one motion, that of the motion; else half the length of the way, since a point of it is no farther than that
+    /// from the nearer end.
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        let ((first, from), (last, to)) = (self.at(t0), self.at(t1));
+        // The time within a motion is rounded, by less than this share of it.
+        let slack = 1.0 / (1u64 << 50) as f64 * self.motions.len() as f64;
+        let speed = |motion: &Motion| {
+            let (a, b) = (motion.start.translation(), motion.end.translation());
+            let moved = [0, 1, 2].map(|k| b[k] - a[k]);
+            let line = (moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]).sqrt();
+            (line + motion.angle.abs() * radius) * (1.0 + 1.0 / (1 << 17) as f64)
+        };
+        if first == last {
+            let motion = &self.motions[first];
+            return motion.sagitta(radius, from, to) + 3.0 * slack * speed(motion);
+        }
+        let way: f64 = (first..=last)
+            .map(|number| {
+                let share = match number {
+                    _ if number == first => 1.0 - from,
+                    _ if number == last => to,
+                    _ => 1.0,
+                };
+                let motion = &self.motions[number];
+                (share + slack) * speed(motion) + 3.0 * motion.rounding(radius)
+            })
+            .sum();
+        way
+    }
+}
+
+/// Returns the rotation by an angle about an axis of length 1 (Rodrigues' formula).
+fn rodrigues([x, y, z]: [f64; 3], angle: f64) -> Matrix {
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    // 1 - cos a without cancellation.
+    let half = libm::sin(0.5 * angle);
+    let versine = 2.0 * half * half;
+    [
+        [cosine + x * x * versine, x * y * versine - z * sine, x * z * versine + y * sine],
+        [x * y * versine + z * sine, cosine + y * y * versine, y * z * versine - x * sine],
+        [x * z * versine - y * sine, y * z * versine + x * sine, cosine + z * z * versine],
+    ]
+}
+
+/// Returns the unit quaternion of a rotation, with w >= 0: of four times the squares of its entries, the largest is taken
+/// from the diagonal, and the others from sums and differences (S. W. Shepperd, "Quaternion from rotation matrix", 1978).
+fn quaternion(r: &Matrix) -> [f64; 4] {
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let [x, y, z] = [0, 1, 2].map(|k| 1.0 + 2.0 * r[k][k] - trace);
+    let w = 1.0 + trace;
+    let sums = [r[2][1] + r[1][2], r[0][2] + r[2][0], r[1][0] + r[0][1]];
+    let differences = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];
+    let most = x.max(y).max(z).max(w);
+    let q = if most == w {
+        [differences[0], differences[1], differences[2], w]
+    } else if most == x {
+        [x, sums[2], sums[1], differences[0]]
+    } else if most == y {
+        [sums[2], y, sums[0], differences[1]]
+    } else {
+        [sums[1], sums[0], z, differences[2]]
+    };
+    let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    let sign = if q[3] < 0.0 { -length } else { length };
+    q.map(|value| value / sign)
+}
+
+fn transposed(m: &Matrix) -> Matrix {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
+}
+
+fn difference(a: &Matrix, b: &Matrix) -> Matrix {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][j] - b[i][j]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(axis: [f64; 3], angle: f64, translation: [f64; 3]) -> Pose {
+        let length = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
+        Pose::new(rodrigues(axis.map(|v| v / length), angle), translation).unwrap()
+    }
+
+    fn signed(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(state: &mut u64) -> [f64; 3] {
+        [signed(state), signed(state), signed(state)]
+    }
+
+    fn paths(state: &mut u64) -> Vec<Box<dyn Path>> {
+        let mut paths: Vec<Box<dyn Path>> = Vec::new();
+        for angle in [0.0, 1e-9, 0.1, 1.0, 3.0, 3.1] {
+            let start = pose(vector(state), 3.0 * signed(state), vector(state).map(|v| 10.0 * v));
+            let turned = pose(vector(state), angle, vector(state));
+            let end = Pose::new(product(turned.rotation(), start.rotation()), vector(state)).unwrap();
+            paths.push(Box::new(Motion::between(&start, &end).unwrap()));
+            for turns in [0.3, 2.0, -17.0] {
+                let shift = 3.0 * signed(state);
+                paths.push(Box::new(
+                    Motion::screw(&start, vector(state), vector(state), turns, shift).unwrap(),
+                ));
+            }
+            let third = pose(vector(state), signed(state), vector(state));
+            paths.push(Box::new(Polyline::new(&[start, end, third]).unwrap()));
+        }
+        // A rotation near the limit of what is rigid.
+        let mut skewed = *Pose::IDENTITY.rotation();
+        skewed[0][1] = 0.9 / (1 << 20) as f64;
+        let start = Pose::new(skewed, [0.0; 3]).unwrap();
+        paths.push(Box::new(Motion::between(&start, &pose([1.0, 2.0, 3.0], 1.0, [1.0; 3])).unwrap()));
+        paths
+    }
+
+    #[test]
+    fn motions_begin_and_end_at_their_poses() {
+        let state = &mut 5;
+        for _ in 0..100 {
+            let [start, end] = [(); 2].map(|()| pose(vector(state), 3.0 * signed(state), vector(state)));
+            let motion = Motion::between(&start, &end).unwrap();
+            assert_eq!((motion.pose(0.0), motion.pose(1.0)), (start, end));
+            assert!(motion.angle() <= std::f64::consts::PI);
+            // Nothing jumps at either end.
+            for (near, at) in [(1e-12, start), (1.0 - 1e-12, end)] {
+                let pose = motion.pose(near);
+                let off = difference(pose.rotation(), at.rotation()).into_iter().flatten();
+                assert!(
+                    off.chain([0, 1, 2].map(|k| pose.translation()[k] - at.translation()[k]))
+                        .all(|v| v.abs() < 1e-11)
+                );
+            }
+        }
+        let half = pose([0.0, 0.0, 1.0], std::f64::consts::PI, [0.0; 3]);
+        assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(MotionError::HalfTurn(_))));
+        let most = pose([0.0, 0.0, 1.0], 179.9f64.to_radians(), [0.0; 3]);
+        let motion = Motion::between(&Pose::IDENTITY, &most).unwrap();
+        let middle = pose([0.0, 0.0, 1.0], 89.95f64.to_radians(), [0.0; 3]);
+        assert!(
+            difference(motion.pose(0.5).rotation(), middle.rotation())
+                .as_flattened()
+                .iter()
+                .all(|v| v.abs() < 1e-14)
+        );
+        assert!(Polyline::new(&[half]).is_err());
+        assert!(Motion::screw(&half, [0.0; 3], [0.0; 3], 1.0, 1.0).is_err());
+        assert!(Motion::screw(&half, [0.0; 3], [1.0, 0.0, 0.0], f64::NAN, 1.0).is_err());
+        assert!(Motion::screw(&half, [0.0; 3], [1.0, 0.0, 0.0], 1.0, 1e300).is_err());
+    }
+
+    /// Points on the sphere of the radius never leave the segment by more than the bound, and some come near it.
+    #[test]
+    fn no_point_leaves_its_segment_by_more_than_the_sagitta() {
+        let state = &mut 11;
+        let mut largest: f64 = 0.0;
+        for path in paths(state) {
+            for _ in 0..60 {
+                let level = (signed(state).abs() * 20.0) as i32;
+                let size = 0.5f64.powi(level);
+                let t0 = (signed(state).abs() / size).floor() * size;
+                let t1 = (t0 + size).min(1.0);
+                let radius = 2.0 * signed(state).abs() + 1e-6;
+                let bound = path.sagitta(radius, t0, t1);
+                let p = vector(state);
+                let length = p.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let p = p.map(|v| v / length * radius);
+                let (a, b) = (path.pose(t0).place(p), path.pose(t1).place(p));
+                for step in 0..=64 {
+                    let at = path.pose(t0 + (t1 - t0) * f64::from(step) / 64.0).place(p);
+                    let (ab, ap) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| at[k] - a[k]));
+                    let squared = ab.iter().map(|v| v * v).sum::<f64>();
+                    let along = (0..3).map(|k| ab[k] * ap[k]).sum::<f64>();
+                    let s = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+                    let off = (0..3).map(|k| (ap[k] - s * ab[k]).powi(2)).sum::<f64>().sqrt();
+                    assert!(off <= bound, "{off:e} of {bound:e}, from {t0} to {t1}");
+                    largest = largest.max(if level < 8 { off / bound } else { 0.0 });
+                }
+            }
+        }
+        assert!(largest > 0.5, "{largest}");
+    }
+}
