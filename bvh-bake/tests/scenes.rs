@@ -78,7 +78,7 @@ fn nodes_share_their_meshes() {
         [("left", 0), ("left.2", 0), ("big", 1), ("tetra", 1), ("", 2), ("mirrored", 3), ("matrix", 1)];
     assert_eq!(all.collect::<Vec<_>>(), expected);
     let names: Vec<_> = mesh.objects.iter().map(|object| object.name.as_str()).collect();
-    assert_eq!(names, ["tetra", "tetra", "", "tetra"]);
+    assert_eq!(names, ["tetra", "tetra", "scene", "tetra"]);
     assert_eq!(mesh.objects[1].positions[2], [0.0, 4.0, 0.0]);
     assert_eq!((mesh.objects[0].triangles[0], mesh.objects[3].triangles[0]), ([0, 2, 1], [0, 1, 2]));
     assert_eq!(mesh.instances[6].rotation, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
@@ -112,13 +112,14 @@ fn random_nodes(random: &mut Random, count: usize, uniform: bool) -> (String, us
         let scale = if uniform { [factor; 3] } else { [factor, 1.0, 0.5] };
         let [x, y, z, w, a, b, c] = [(); 7].map(|()| number(random));
         if random.below(3) == 0 {
+            let [x, y, z, w] = [x, y, z, w].map(f64::from);
             let s = 2.0 / (x * x + y * y + z * z + w * w);
             let columns = [
                 [1.0 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)],
                 [s * (x * y - z * w), 1.0 - s * (x * x + z * z), s * (y * z + x * w)],
                 [s * (x * z + y * w), s * (y * z - x * w), 1.0 - s * (x * x + y * y)],
             ];
-            let columns = [0, 1, 2].map(|k| columns[k].map(|value| value * scale[k]));
+            let columns = [0, 1, 2].map(|k| columns[k].map(|value| (value * f64::from(scale[k])) as f32));
             let [p, q, r] = columns.map(|[x, y, z]| format!("{x},{y},{z},0"));
             parts.push(format!("\"matrix\":[{p},{q},{r},{a},{b},{c},1]"));
         } else {
@@ -152,7 +153,7 @@ fn instances_stand_where_the_mesh_has_its_triangles() {
                 for (corner, placed) in corners.iter().zip(placed) {
                     let expected = object.positions[*corner as usize];
                     let off = (0..3).map(|k| (expected[k] - placed[k]).abs()).fold(0.0, f64::max);
-                    // Each matrix may be off by 2^-21.
+                    // Each matrix may be off by 2^-22.
                     assert!(off <= 1e-5 * size, "{off:e} of {size}: {expected:?} at {placed:?}");
                 }
             }
@@ -187,6 +188,18 @@ fn scenes_of_files_are_baked_and_verified() {
     let within = folder.path().join("within.cbvh");
     bake(&inputs, &within, &options, Some(64 << 20));
     assert!(fs::read(&within).unwrap() == bytes);
+    // Objects without a name are called after their file, and so are their instances.
+    let plain = [folder.path().join("plain.obj"), folder.path().join("solid.stl")];
+    fs::write(&plain[0], "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let facet =
+        "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    fs::write(&plain[1], format!("solid\n{facet}endsolid\n")).unwrap();
+    bake(&plain, &within, &options, None);
+    verify_files(&within, &plain, &VerifyOptions::default()).unwrap();
+    let baked = fs::read(&within).unwrap();
+    let instances = Layout::read(&baked).unwrap().read_instances(&baked[..]).unwrap();
+    assert_eq!(instances.iter().map(|instance| &instance.name[..]).collect::<Vec<_>>(), ["plain", "solid"]);
+    assert_eq!(read_scene(&plain[0]).unwrap().instances[0], instances[0]);
     for ids in [true, false] {
         bake(&inputs, &within, &options.clone().ids(ids), None);
         verify_files(&within, &inputs, &VerifyOptions::default()).unwrap();
@@ -200,7 +213,7 @@ fn scenes_of_files_are_baked_and_verified() {
     fs::write(&glb, self::glb(r#"{"name":"a","mesh":0,"translation":[5,0,1]},{"name":"b","mesh":0}"#))
         .unwrap();
     let said = verify_files(&within, &inputs, &VerifyOptions::default()).unwrap_err().to_string();
-    assert!(said.starts_with("instance 0: expected Instance") && said.contains("[5.0, 0.0, 1.0]"), "{said}");
+    assert_eq!(said, "translation of instance 0: expected [5.0, 0.0, 1.0], found [5.0, 0.0, 0.0]");
     let far = self::glb(r#"{"children":[1],"scale":[1e38,1e38,1e38]},{"mesh":0,"translation":[1e38,0,0]}"#);
     fs::write(&glb, far).unwrap();
     let said = FileBake::new(&inputs, &output).options(options).run().unwrap_err().to_string();
@@ -232,8 +245,8 @@ fn instances_of_a_mesh_in_memory_are_baked() {
             other => panic!("{other:?}"),
         }
     };
-    assert_eq!(differs(|mesh| mesh.instances[2].name = "x".into()), "instance 1");
-    assert_eq!(differs(|mesh| mesh.instances[3].translation[0] = 1e-300), "instance 2");
+    assert_eq!(differs(|mesh| mesh.instances[2].name = "x".into()), "name of instance 1");
+    assert_eq!(differs(|mesh| mesh.instances[3].translation[0] = 1e-300), "translation of instance 2");
     assert_eq!(differs(|mesh| mesh.instances.clear()), "instances");
     mesh.instances[0].object = 3;
     let said = to_bytes(&mesh, &Options::default()).unwrap_err().to_string();

@@ -173,7 +173,7 @@ pub(crate) fn read_instances(section: &[u8], at: u64, objects: usize) -> Result<
                 Rule::InstanceTable,
                 at,
                 expected,
-                format!("{} from {start}", record.name_length),
+                format!("{} others from {start}", record.name_length),
             )
         })?;
         names_left -= name.len();
@@ -191,8 +191,8 @@ pub(crate) fn read_instances(section: &[u8], at: u64, objects: usize) -> Result<
             translation: record.translation.map(|t| t.get()),
         };
         if let Some((what, found)) = instance.pose_fault() {
-            let expected = format!("{what} of instance {index} {name:?}");
-            return Err(FormatError::new(Rule::InstancePose, at + 32, expected, format!("{found:e}")));
+            let found = format!("{found:e} in instance {index} {name:?}");
+            return Err(FormatError::new(Rule::InstancePose, at + 32, what, found));
         }
         ensure(name.is_empty() || taken.insert(name), Rule::InstanceName, at, || {
             (format!("a name of its own for instance {index}"), format!("{name:?} again"))

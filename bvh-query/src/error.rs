@@ -75,7 +75,7 @@ pub enum QueryError {
     #[error(transparent)]
     Pose(#[from] PoseError),
     /// A file that is opened at first need is not there, or has changed since its header was read.
-    #[error("{}: expected the file as it was when it was added, found {found}; add it again", path.display())]
+    #[error("{}: expected the file as it was when it was added, found {found}; bring it back, or add what is there now", path.display())]
     File {
         /// The file.
         path: PathBuf,

@@ -686,7 +686,7 @@ fn files_open_at_first_need_and_few_stay_open() {
             if objects.len() == stored.objects().len() { stored } else { stored.object(first).unwrap() }
         };
         let stored: Vec<_> = paths.iter().zip(&shapes).map(same).collect();
-        assert_eq!(files.open(), 0);
+        assert_eq!(files.open_count(), 0);
         let (mut lazy, mut eager) = (Scene::new().unwrap(), Scene::new().unwrap());
         lazy.set_parallel(parallel);
         for _ in 0..40 {
@@ -697,9 +697,9 @@ fn files_open_at_first_need_and_few_stay_open() {
                 eager.add(shapes[number].clone(), world).unwrap()
             );
         }
-        assert_eq!(files.open(), 0);
+        assert_eq!(files.open_count(), 0);
         assert!(ask(&mut lazy) == ask(&mut eager));
-        assert!((1..=most).contains(&files.open()), "{} of {most}", files.open());
+        assert!((1..=most).contains(&files.open_count()), "{} of {most}", files.open_count());
     }
 }
 
@@ -733,4 +733,34 @@ fn a_file_that_vanishes_or_changes_is_named() {
     assert!(scene.collide().unwrap());
     std::fs::remove_file(&paths[1]).unwrap();
     assert!(scene.collide().unwrap());
+}
+
+/// However many pairs are near, all of them are remembered, also by questions that ask about one pair after another.
+#[test]
+fn trackers_of_many_pairs_are_kept() {
+    let small = shape(&cube());
+    let turn = Pose::from_quaternion([0.0, 0.0, 0.1f64.sin(), 0.1f64.cos()], [0.0; 3]).unwrap();
+    // In a grid with gaps between the cubes, turned so that boxes overlap.
+    let place = |number: usize, shift: f64| {
+        let on = [2.3 * (number % 30) as f64 + shift, 2.3 * (number / 30) as f64, 0.0];
+        Pose::new(*turn.rotation(), on).unwrap()
+    };
+    let mut work = Vec::new();
+    for tracking in [false, true] {
+        let mut scene = Scene::new().unwrap();
+        scene.set_tracking(tracking);
+        let ids: Vec<_> =
+            (0..900).map(|number| scene.add(small.clone(), place(number, 0.0)).unwrap()).collect();
+        let mut tests = 0;
+        for step in 0..12 {
+            let moved = ids.iter().enumerate().step_by(2);
+            let moved = moved.map(|(number, &id)| (id, place(number, 1e-9 * f64::from(step))));
+            scene.set_poses(moved).unwrap();
+            scene.visit_pairs_within(0.01, |_| ControlFlow::Continue(())).unwrap();
+            assert!(scene.pairs_asked() > 1500);
+            tests += scene.stats().node_tests;
+        }
+        work.push(tests);
+    }
+    assert!(2 * work[1] < work[0], "{work:?}");
 }

@@ -227,6 +227,7 @@ fn check_instances(instances: &[Instance], objects: usize) -> Result<(), InputEr
         return Err(InputError::TooManyInstances(instances.len() as u64));
     }
     let mut names = HashSet::new();
+    let mut bytes = 0u64;
     for (number, instance) in instances.iter().enumerate() {
         let wrong = |expected: &str, found: String| InputError::Instance {
             number,
@@ -234,6 +235,10 @@ fn check_instances(instances: &[Instance], objects: usize) -> Result<(), InputEr
             expected: expected.to_owned(),
             found,
         };
+        bytes += instance.name.len() as u64;
+        if bytes > u64::from(u32::MAX) {
+            return Err(wrong("names of fewer than 2^32 bytes together", bytes.to_string()));
+        }
         if instance.object as usize >= objects {
             return Err(wrong(&format!("an object below {objects}"), instance.object.to_string()));
         }

@@ -25,7 +25,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 /// for part in std::fs::read_dir("parts")? {
 ///     scene.add(files.shape(part?.path())?, Pose::IDENTITY)?;
 /// }
-/// println!("{} pairs touch, {} files are open", scene.pairs_in_contact()?.len(), files.open());
+/// println!("{} pairs touch, {} files are open", scene.pairs_in_contact()?.len(), files.open_count());
 /// # Ok(())
 /// # }
 /// ```
@@ -66,7 +66,8 @@ impl Files {
         Self(Arc::new(Shelf { most: most.max(1), clock: AtomicU64::new(0), open: Mutex::default() }))
     }
 
-    /// Reads the header and the object table of a file, and returns all of its objects as one shape.
+    /// Reads the header and the object table of a file, and returns all of its objects as one shape. Clone a shape rather
+    /// than reading its file again: each reading counts as a file of its own.
     ///
     /// # Errors
     /// The errors of [`Bvh::open`], which documents what a file that is open asks for.
@@ -84,7 +85,7 @@ impl Files {
     }
 
     /// Returns how many files stay open at present.
-    pub fn open(&self) -> usize {
+    pub fn open_count(&self) -> usize {
         locked(&self.0.open).len()
     }
 }
@@ -144,6 +145,7 @@ impl Known {
         let bvh = Bvh::open(&self.path).map_err(|error| {
             failed(match error {
                 OpenError::Io { source, .. } => source.to_string(),
+                OpenError::Format { source, .. } => format!("a breach of {}", source.rule),
                 other => other.to_string(),
             })
         })?;

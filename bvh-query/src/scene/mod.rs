@@ -112,7 +112,7 @@ impl Scene {
 
     /// Opens a scene file: maps it and makes a scene of its instances, in their order. `cbvh bake --scene` makes such files.
     ///
-    /// Cost: that of reading the object table and the instances, and some 0.2 us per instance. Nothing else of the file is
+    /// Cost: that of reading the object table and the instances, and some 0.5 to 1.5 us per instance. Nothing else of the file is
     /// read until a question needs it. [`Bvh::open`] documents what a mapped file asks for.
     ///
     /// # Errors
@@ -129,13 +129,22 @@ impl Scene {
     /// [`SceneError::NoInstances`] if the file says nothing of a world; [`SceneError::Query`] if its instances break a rule
     /// of the format, or as for [`Scene::new`].
     pub fn of_file(bvh: impl Into<Arc<Bvh>>) -> Result<Self, SceneError> {
+        Self::of_file_with_backend(bvh, Backend::detect().map_err(|error| SceneError::Query(error.into()))?)
+    }
+
+    /// Makes a scene of the instances of a file, as [`Scene::of_file`] does, with a backend. The portable backend replaces one
+    /// that the CPU lacks.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::of_file`], but for those of the backend.
+    pub fn of_file_with_backend(bvh: impl Into<Arc<Bvh>>, backend: Backend) -> Result<Self, SceneError> {
         let bvh = bvh.into();
         let damaged = |error: FormatError| SceneError::Query(error.into());
         let instances = bvh.layout().read_instances(bvh.bytes()).map_err(damaged)?;
         if instances.is_empty() {
             return Err(SceneError::NoInstances);
         }
-        let mut scene = Self::new()?;
+        let mut scene = Self::with_backend(backend);
         for instance in instances {
             // The instance is of an object of the file by rule 41, and rigid by rule 42.
             let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
@@ -146,11 +155,6 @@ impl Scene {
             scene.insert(name, shape.unwrap_or_else(|| bvh.clone().into()).into(), world, groups)?;
         }
         Ok(scene)
-    }
-
-    /// Changes the backend, which changes no answer. The portable backend replaces one that the CPU lacks.
-    pub fn set_backend(&mut self, backend: Backend) {
-        self.workers.set_backend(backend);
     }
 
     /// Lets questions use all threads of the rayon pool that they are called in. Without it they use one.
@@ -164,7 +168,7 @@ impl Scene {
     ///
     /// On the project's test scenes, where instances move by some 3 degrees a frame, a frame takes 0.95 to 1.17 times as long;
     /// with a twentieth of the steps 0.84 to 1.12 times, and with a two-hundredth 0.61 to 0.83 times. A tracker holds some 300
-    /// bytes; there is one for each pair that the last question was about, and at most 1,024 more.
+    /// bytes; there is one for each pair that the last question was about, and at most as many more as the one before was about, and 1,024.
     ///
     /// What a tracker knows need not be looked up: a question may have an answer where it would otherwise meet a damaged page or
     /// exceed the budget.
@@ -403,6 +407,7 @@ impl Scene {
     /// Starts a question: builds the broad phase, if it does not show all instances as they are.
     fn start(&mut self) {
         (self.stats, self.pairs_asked) = (QueryStats::default(), 0);
+        self.trackers.start();
         let item = |(place, instance): (u32, &Option<Instance>)| Some(instance.as_ref()?.item(place));
         self.broad.refresh((0..).zip(&self.instances).filter_map(item), self.instances.len());
     }

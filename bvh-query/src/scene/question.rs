@@ -149,7 +149,9 @@ impl Scene {
         mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
         check_distance(d)?;
-        for candidate in self.near(d) {
+        let candidates = self.near(d);
+        self.remember(&candidates);
+        for candidate in candidates {
             let found =
                 self.each(&[candidate], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
             if found.into_iter().any(|pair| visit(pair).is_break()) {
@@ -274,6 +276,7 @@ impl Scene {
         ask: &(impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
     ) -> Result<bool, SceneError> {
         let is_found = AtomicBool::new(false);
+        self.remember(candidates);
         let answers = self.each(candidates, |querier, pair| {
             if is_found.load(Ordering::Relaxed) {
                 return Ok(None);
@@ -301,6 +304,7 @@ impl Scene {
         ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<Vec<ScenePair>, SceneError> {
         let candidates = self.near(limit);
+        self.remember(&candidates);
         self.each(&candidates, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))
     }
 
@@ -334,6 +338,11 @@ impl Scene {
         (first.groups.meet(second.groups) && !first.allows(b)).then_some(candidate)
     }
 
+    /// Makes a tracker for each candidate, if the scene wants that.
+    fn remember(&mut self, candidates: &[Candidate]) {
+        self.trackers.expect(candidates.iter().map(|candidate| (candidate.a, candidate.b)));
+    }
+
     /// Asks about each candidate, in the order of the candidates.
     fn each<R: Send>(
         &mut self,
@@ -342,7 +351,6 @@ impl Scene {
     ) -> Result<Vec<R>, SceneError> {
         let mut stats = self.stats;
         let asked = AtomicU64::new(self.pairs_asked);
-        self.trackers.expect(candidates.iter().map(|candidate| (candidate.a, candidate.b)));
         let scene = &*self;
         let found = scene.workers.each(candidates, &mut stats, |querier, candidate| {
             let Some((a, b)) = scene.both(candidate) else { return Ok(None) };

@@ -17,6 +17,8 @@ pub(super) struct Trackers {
     /// question use one each.
     of: HashMap<(u32, u32), (u64, Mutex<Tracker>)>,
     questions: u64,
+    /// The number of pairs that the question is about.
+    asked: usize,
 }
 
 impl Clone for Trackers {
@@ -33,20 +35,29 @@ impl fmt::Debug for Trackers {
 }
 
 impl Trackers {
-    /// Makes a tracker for each pair that has none.
-    pub(super) fn expect(&mut self, pairs: impl ExactSizeIterator<Item = (u32, u32)>) {
+    /// Begins a question. Lets go of pairs that the last one was not about, if they are many.
+    pub(super) fn start(&mut self) {
         if !self.on {
             self.of.clear();
             return;
         }
-        self.questions += 1;
-        let most = pairs.len() + MOST_IDLE;
-        for pair in pairs {
-            self.of.entry(pair).or_default().0 = self.questions;
+        let last = self.questions;
+        if self.of.len() > self.asked + MOST_IDLE {
+            self.of.retain(|_, (asked, _)| *asked == last);
         }
-        if self.of.len() > most {
-            let now = self.questions;
-            self.of.retain(|_, (asked, _)| *asked == now);
+        self.questions += 1;
+        self.asked = 0;
+    }
+
+    /// Makes a tracker for each pair that the question is about and that has none.
+    pub(super) fn expect(&mut self, pairs: impl Iterator<Item = (u32, u32)>) {
+        if !self.on {
+            return;
+        }
+        for pair in pairs {
+            let asked = &mut self.of.entry(pair).or_default().0;
+            self.asked += usize::from(*asked != self.questions);
+            *asked = self.questions;
         }
     }
 

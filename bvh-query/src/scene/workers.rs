@@ -46,11 +46,6 @@ impl Workers {
         }
     }
 
-    pub(super) fn set_backend(&mut self, backend: Backend) {
-        self.backend = backend;
-        self.idle = Mutex::default();
-    }
-
     /// Returns the number of threads that questions use.
     pub(super) fn threads(&self) -> usize {
         #[cfg(feature = "parallel")]

@@ -44,10 +44,8 @@ impl Side {
         let start = Instant::now();
         let bvh = Bvh::open_with(path, how.read_ahead)?;
         let side = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
-        if side.bvh.layout().has_instances() && side.object.is_none() {
-            // Its objects are in frames of their own: together they are no mesh.
-            let what = "expected a mesh, found a scene; ask cbvh scene, or name an object with --object";
-            return Err(Failure::invalid(path, what));
+        if side.object.is_none() {
+            refuse_scene(path, &side.bvh)?;
         }
         Ok(side)
     }
@@ -113,6 +111,16 @@ impl<'a> Sides<'a> {
             error => Failure::Usage(error.to_string()),
         }
     }
+}
+
+/// Refuses a scene where a mesh is needed: its objects are in frames of their own, and together no mesh.
+pub(crate) fn refuse_scene(path: &Path, bvh: &Bvh) -> Result<(), Failure> {
+    if !bvh.layout().has_instances() {
+        return Ok(());
+    }
+    let what = "expected a mesh, or one object of a scene, found a scene; cbvh scene asks about it, and cbvh dump lists \
+                its objects";
+    Err(Failure::invalid(path, what))
 }
 
 /// Returns whether a file is a `.cbvh` file by its content or by its name. The name counts too, so that a damaged file is

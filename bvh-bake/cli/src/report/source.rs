@@ -1,7 +1,7 @@
 //! The mesh to bake: read from a mesh file, or taken out of a `.cbvh` file.
 
 use crate::console::Failure;
-use crate::query::side::is_baked;
+use crate::query::side::{is_baked, refuse_scene};
 use bvh_bake::input;
 use bvh_bake::mesh::Mesh;
 use bvh_format::ids::decode_id;
@@ -25,6 +25,7 @@ pub(super) fn mesh(path: &Path) -> Result<Mesh, Failure> {
 /// file stores only one of several exact duplicates, so the others are missing.
 fn unbaked(path: &Path) -> Result<Mesh, Failure> {
     let bvh = Bvh::open(path)?;
+    refuse_scene(path, &bvh)?;
     validate(bvh.bytes()).map_err(|error| Failure::invalid(path, error))?;
     let (layout, bytes) = (bvh.layout(), bvh.bytes());
     let mut triangles = Vec::new();

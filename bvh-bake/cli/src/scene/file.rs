@@ -120,13 +120,21 @@ impl SceneText {
 }
 
 impl LoadedScene {
-    /// Returns the names of the moving instances, or their numbers if they have none.
+    /// Returns the name of an instance as it is printed: in quotes unless it is one plain word, and `#` and the number of an
+    /// instance without a name.
+    pub(super) fn name(&self, id: InstanceId) -> String {
+        match self.scene.name(id) {
+            Ok(Some(name)) if name.chars().all(|c| c.is_ascii_graphic() && !"\"#".contains(c)) => {
+                name.to_owned()
+            }
+            Ok(Some(name)) => format!("{name:?}"),
+            _ => format!("#{id}"),
+        }
+    }
+
+    /// Returns the names of the moving instances.
     pub(super) fn names_of_moving(&self) -> Vec<String> {
-        let name = |&id: &InstanceId| match self.scene.name(id) {
-            Ok(Some(name)) => name.to_owned(),
-            _ => id.to_string(),
-        };
-        self.moving.iter().map(name).collect()
+        self.moving.iter().map(|&id| self.name(id)).collect()
     }
 }
 
@@ -135,8 +143,8 @@ pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
     let start = Instant::now();
     let bvh = Arc::new(Bvh::open(path)?);
     bvh.check_all().map_err(|error| Failure::invalid(path, error))?;
-    let mut scene = Scene::of_file(bvh.clone()).map_err(|error| Failure::invalid(path, error))?;
-    scene.set_backend(backend);
+    let scene = Scene::of_file_with_backend(bvh.clone(), backend);
+    let scene = scene.map_err(|error| Failure::invalid(path, error))?;
     let records = bvh.objects().iter().map(|object| object.record());
     // The counts are as the file states them, and those of a forged file may overflow.
     let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);

@@ -20,10 +20,12 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = query::backend(&arguments.isa)?;
     let question = Question::new(arguments)?;
     let (mut scene, mut frames) = if is_baked(&arguments.scene)? {
-        let scene = file::open(&arguments.scene, backend)?;
-        let frames = match &arguments.frames {
-            Some(path) => frames::read(Some(path), &scene.names_of_moving())?,
-            None => frames::as_it_stands(),
+        let mut scene = file::open(&arguments.scene, backend)?;
+        let frames = if let Some(path) = &arguments.frames {
+            frames::read(Some(path), &scene.names_of_moving())?
+        } else {
+            scene.moving.clear();
+            frames::as_it_stands()
         };
         (scene, frames)
     } else {

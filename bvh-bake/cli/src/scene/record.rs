@@ -100,18 +100,13 @@ impl Record {
     }
 }
 
-/// Returns the name of an instance of the scene.
-fn name(scene: &LoadedScene, id: InstanceId) -> String {
-    scene.scene.name(id).ok().flatten().map_or_else(|| id.to_string(), str::to_owned)
-}
-
 /// Returns XXH3-64 of names and values in order, without times.
 fn hash(scene: &LoadedScene, run: &Run) -> u64 {
     let mut hasher = Hasher::default();
     for (answer, _) in &run.answers {
         let mut pair = |a: InstanceId, b: InstanceId| {
             for id in [a, b] {
-                hasher.update(name(scene, id).as_bytes());
+                hasher.update(scene.name(id).as_bytes());
                 hasher.update(&[0]);
             }
         };
@@ -150,16 +145,14 @@ pub(super) fn list(scene: &LoadedScene, question: &Question, run: &Run) -> Strin
                 let count = pairs.len() as u64;
                 let what = if question.mode == Mode::Within { "near enough" } else { "touching" };
                 let _ = writeln!(text, "frame {number}: {count} {} {what}", plural(count, "pair"));
-                pairs
-                    .iter()
-                    .try_for_each(|of| writeln!(text, "  {} {}", name(scene, of.a), name(scene, of.b)))
+                pairs.iter().try_for_each(|of| writeln!(text, "  {} {}", scene.name(of.a), scene.name(of.b)))
             }
             Answer::Nearest(None) => writeln!(text, "frame {number}: no pairs"),
             Answer::Nearest(Some((of, distance))) => writeln!(
                 text,
                 "frame {number}: {} {} {} mesh units apart",
-                name(scene, of.a),
-                name(scene, of.b),
+                scene.name(of.a),
+                scene.name(of.b),
                 significant(*distance)
             ),
         };

@@ -228,6 +228,7 @@ fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
     match layout.objects.len() {
         1 if !layout.has_instances() => Ok(()),
         count if count == full.len() => Ok(()),
+        count if layout.has_instances() => Err(VerifyError::differs("objects", full.len(), count)),
         count => Err(VerifyError::differs("objects", format!("1 or {}", full.len()), count)),
     }
 }
@@ -246,13 +247,31 @@ where
         return Err(VerifyError::differs("instances", expected.len(), found.len()));
     }
     match (0..).zip(expected.iter().zip(&found)).find(|(_, (expected, found))| expected != found) {
-        Some((number, (expected, found))) => Err(VerifyError::differs(
-            format!("instance {number}"),
-            format!("{expected:?}"),
-            format!("{found:?}"),
-        )),
+        Some((number, (expected, found))) => {
+            let (what, expected, found) = difference(expected, found);
+            Err(VerifyError::differs(format!("{what} of instance {number}"), expected, found))
+        }
         None => Ok(()),
     }
+}
+
+/// Returns the first field in which two instances differ, and its values.
+fn difference(expected: &Instance, found: &Instance) -> (&'static str, String, String) {
+    let of = |instance: &Instance| {
+        let Instance { name, object, member, meets, rotation, translation } = instance;
+        [
+            ("name", format!("{name:?}")),
+            ("object", object.to_string()),
+            ("groups", format!("{member:#x}, meets {meets:#x}")),
+            ("rotation", format!("{rotation:?}")),
+            ("translation", format!("{translation:?}")),
+        ]
+    };
+    let mut fields = of(expected).into_iter().zip(of(found));
+    let differing = fields.find(|((_, expected), (_, found))| expected != found);
+    differing.map_or(("pose", String::new(), String::new()), |((what, expected), (_, found))| {
+        (what, expected, found)
+    })
 }
 
 /// Returns the number of the file's object for an object of the mesh, counted among those with triangles.

@@ -29,7 +29,6 @@ use input_order::ObjectRuns;
 use rayon::prelude::*;
 use solids::SolidsForBake;
 use std::ops::Range;
-use std::path::Path;
 use std::sync::OnceLock;
 use std::thread;
 
@@ -140,7 +139,7 @@ impl<'a> Gatherer<'a> {
             let file = file.ok_or_else(|| input.failed(std::io::ErrorKind::UnexpectedEof.into()))?;
             Checksums { file, mesh: None }
         };
-        self.name_after(input.path(), first_object);
+        self.name_after(input, first_object);
         if input.is_scene() {
             self.place_from(first_object);
         }
@@ -167,11 +166,12 @@ impl<'a> Gatherer<'a> {
         self.add_faces(&faces, &names, &tally)
     }
 
-    /// Names the objects from the number `first` on after their file, if objects stay separate and have no name.
-    fn name_after(&mut self, path: &Path, first: usize) {
-        if self.split {
+    /// Names the objects from the number `first` on after their file, if objects stay separate and have no name. A glTF
+    /// file has named the instances of its meshes.
+    fn name_after(&mut self, input: &InputFile, first: usize) {
+        if self.split || input.is_scene() {
             let unnamed = self.names[first..].iter_mut().filter(|(name, _)| name.is_empty());
-            unnamed.for_each(|(name, _)| *name = super::stem(path));
+            unnamed.for_each(|(name, _)| *name = super::stem(input.path()));
         }
     }
 

@@ -11,9 +11,9 @@ pub(super) type Linear = [[f64; 3]; 3];
 pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 const UNIT: Linear = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// How far the columns of a matrix of f32 numbers may be from a rotation times scales to be taken as one: four times what
-/// rounding to f32 and a few products of such matrices do.
-const MATRIX_ERROR: f64 = 1.0 / (1u32 << 21) as f64;
+/// How far the columns of a matrix of f32 numbers may be from a rotation times scales to be taken as one: twice what rounding
+/// its entries to f32 does.
+const MATRIX_ERROR: f64 = 1.0 / (1u32 << 22) as f64;
 
 /// A node's place in the world: a point x of its mesh stands at R (S x) + t. The rotation R and the translation t are
 /// the pose of an instance; S, the scales and whatever else is left, is baked into the mesh. Nodes that differ in R and t
@@ -76,7 +76,7 @@ impl Frame {
 }
 
 /// The scales that nodes state, and those of all matrices so far. Matrices of f32 numbers that differ by a rotation alone
-/// seem to have scales that differ in the last digits; all of them take the one that is known first.
+/// seem to have scales that differ in the last digits; all of them take the nearest one that is known.
 pub(super) struct Scales(BTreeSet<u64>);
 
 impl Scales {
@@ -94,7 +94,8 @@ impl Scales {
     fn snap(&mut self, scale: f64) -> f64 {
         // Numbers above 0 are in the order of their bits.
         let range = (scale * (1.0 - MATRIX_ERROR)).to_bits()..=(scale * (1.0 + MATRIX_ERROR)).to_bits();
-        if let Some(&known) = self.0.range(range).next() {
+        let off = |&known: &u64| known.abs_diff(scale.to_bits());
+        if let Some(known) = self.0.range(range).copied().min_by_key(off) {
             return f64::from_bits(known);
         }
         self.0.insert(scale.to_bits());

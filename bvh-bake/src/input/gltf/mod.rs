@@ -220,6 +220,8 @@ impl Scene<'_> {
 
     /// Adds an instance of a mesh, which is read once for each shape.
     fn add_instance(&mut self, name: &str, mesh: &gltf::Mesh, frame: &Frame) -> Result<(), Fault> {
+        // An inherited name is a copy.
+        self.spend(name.len() / 8 + PRIMITIVE_ITEMS)?;
         let key = (mesh.index(), frame.shape.map(|row| row.map(|value| (value + 0.0).to_bits())));
         let object = match self.variants.get(&key) {
             Some(&object) => object,
@@ -299,7 +301,7 @@ impl Scene<'_> {
             return Err(Fault::Limit {
                 place: Place::File,
                 most,
-                what: "vertices and indices, nodes that share a mesh each with its own (as a scene they share it)",
+                what: "vertices, indices and names, nodes that share a mesh each with its own (as a scene they share it)",
             });
         }
         Ok(())
