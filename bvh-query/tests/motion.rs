@@ -327,3 +327,38 @@ fn labelled_motions_are_answered_rightly() {
         assert!(all >= 40 && 1000 * near <= all, "{near} of {all} motions of {name} are near");
     }
 }
+
+/// Translations of one triangle past another, which may be segments or points, with labels from rational arithmetic. Those
+/// whose vertices are f32 are baked; many touch at the start, or only just.
+#[test]
+fn exact_translations_are_answered() {
+    let Some(path) = shared("motions/ccd/translations.txt") else { return };
+    let text = std::fs::read_to_string(path).unwrap();
+    let (mut answered, mut near) = (0, 0);
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (hits, is_f32) = (words[2] == "1", words[3] == "1");
+        if !is_f32 {
+            continue;
+        }
+        let numbers: Vec<f64> = words[4..].iter().map(|word| word.parse().unwrap()).collect();
+        let points = numbers.as_chunks::<3>().0;
+        let [a, b] = [0, 3].map(|first| baked(&[[points[first], points[first + 1], points[first + 2]]]));
+        let moved = Pose::new(*Pose::IDENTITY.rotation(), points[6]).unwrap();
+        let motion = Motion::between(&Pose::IDENTITY, &moved).unwrap();
+        for querier in &mut queriers() {
+            let answer = querier.motion(&a, &b, &motion, &MotionOptions::new().tolerance(1e-11)).unwrap();
+            match answer {
+                MotionAnswer::Free => assert!(!hits, "{line}"),
+                MotionAnswer::Hit { .. } => assert!(hits, "{line}"),
+                // A point meets a triangle at one instant, which may be no f64. Its two neighbours are apart.
+                MotionAnswer::Near { distance, .. } => {
+                    assert!(hits && distance.distance <= 1e-11, "{line}");
+                    near += 1;
+                }
+            }
+            answered += 1;
+        }
+    }
+    assert!(answered > 100 && 2 * near < answered, "{near} of {answered} are near");
+}
