@@ -9,7 +9,7 @@
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
-//! | is the way free, and where does it end? | [`Querier::motion`] | free, hit or near, certain at every moment |
+//! | is the way free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
 //! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
 //! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
@@ -26,6 +26,7 @@
 //!
 //! - `cargo run --release --example collide`: two meshes in one pose, touching or how far apart.
 //! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
+//! - `cargo run --release --example planner`: a way through an environment, each edge of which is certified to be free.
 //! - `cargo run --release --example robot`: a robot of a URDF file among obstacles, in a [`Scene`].
 //! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
 //!
@@ -73,6 +74,7 @@ pub use pose::{Pose, PoseError};
 pub use query::answers::{Contact, Distance, QueryStats};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
+pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
 pub use query::options::DistanceOptions;
 pub use query::querier::Querier;

@@ -5,7 +5,7 @@ mod common;
 
 use bvh_query::{
     Backend, Bvh, Motion, MotionAnswer, MotionError, MotionOptions, Path, Polyline, Pose, Querier,
-    QueryError, motion_reach,
+    QueryError, displacement, motion_reach,
 };
 use cbvh_testkit::depth::rounds;
 use common::shapes::{cube, plate, sphere, torus};
@@ -115,6 +115,8 @@ fn answers_are_those_of_the_definition() {
         for querier in &mut queriers {
             let answer = querier.motion(a, b, &*path, &options).unwrap();
             assert_eq!(answer, expected, "round {round}, {:?}", querier.backend());
+            let is_free = querier.is_free(a, b, &*path, &options).unwrap();
+            assert_eq!(is_free, expected == MotionAnswer::Free, "round {round}, {:?}", querier.backend());
         }
         kinds[match expected {
             MotionAnswer::Free => 0,
@@ -254,6 +256,50 @@ fn hard_motions_have_their_answers() {
     assert!(matches!(answer, MotionAnswer::Near { distance, .. } if distance.distance <= 1e-2), "{answer:?}");
 }
 
+/// On any number of threads, a batch has the answers of the querier.
+#[test]
+#[cfg(feature = "parallel")]
+fn batches_of_motions_have_the_same_answers() {
+    let random = &mut Random::new(17);
+    let (a, b) = (baked(&torus(24, 12)), baked(&sphere(2)));
+    let motions: Vec<Motion> = (0..100)
+        .map(|_| Motion::between(&random_pose(random, 4.0), &random_pose(random, 4.0)).unwrap())
+        .collect();
+    let (mut querier, options) = (Querier::new().unwrap(), MotionOptions::new().clearance(0.1));
+    let expected: Vec<_> =
+        motions.iter().map(|motion| querier.motion(&a, &b, motion, &options).unwrap()).collect();
+    let free: Vec<bool> = expected.iter().map(|answer| *answer == MotionAnswer::Free).collect();
+    assert!(free.contains(&true) && free.contains(&false));
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let batch = bvh_query::Batch::new(&a, &b).unwrap();
+        assert_eq!(pool.install(|| batch.motion(&motions, &options)), Ok(expected.clone()));
+        assert_eq!(pool.install(|| batch.is_free(&motions, &options)), Ok(free.clone()));
+    }
+}
+
+/// As long as B moves by less than the least distance, it stays apart.
+#[test]
+fn a_distance_says_how_far_b_may_move() {
+    let random = &mut Random::new(18);
+    let (a, b) = (baked(&torus(24, 12)), baked(&sphere(2)));
+    let mut querier = Querier::new().unwrap();
+    let (mut safe, mut near) = (0, 0);
+    for _ in 0..400 {
+        let pose = random_pose(random, 4.0);
+        let distance = querier.distance(&a, &b, &pose).unwrap();
+        let end = random_pose(random, 4.0);
+        let moved = Motion::between(&pose, &end).unwrap().pose(0.2 * random.signed().abs());
+        if displacement(&b, &pose, &moved) < distance.lower {
+            assert!(!querier.collide(&a, &b, &moved).unwrap());
+            safe += 1;
+        } else if !querier.collide(&a, &b, &moved).unwrap() {
+            near += 1;
+        }
+    }
+    assert!(safe > 20 && near > 20, "{safe} {near}");
+}
+
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
     let (mut querier, block) = (Querier::new().unwrap(), baked(&cube()));
@@ -308,6 +354,8 @@ fn labelled_motions_are_answered_rightly() {
                 let motion = Motion::between(&pose(0), &pose(12)).unwrap();
                 let answer = querier.motion(&a, &b, &motion, &MotionOptions::new()).unwrap();
                 let words: Vec<&str> = label.split_whitespace().collect();
+                let is_free = querier.is_free(&a, &b, &motion, &MotionOptions::new()).unwrap();
+                assert_eq!(is_free, answer == MotionAnswer::Free);
                 all += 1;
                 match (words[0], answer) {
                     // Ten digits are printed.

@@ -11,15 +11,17 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::isa::Backend;
+use crate::motion::Path;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance};
+use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Asks about many poses of one pair of meshes, on all threads of the rayon pool it is called in.
+/// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
 /// The answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads. Give poses
 /// that follow a path in the order of the path, because neighbours share a [`Tracker`]; other poses cost what they cost
@@ -135,11 +137,37 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Returns what `ask` answers for every pose, or the first pose that ends the batch and what it ended with.
-    fn each<T: Send, E: Send>(
+    /// Answers [`Querier::motion`] for each path.
+    ///
+    /// # Errors
+    /// Returns the error of the first path that fails.
+    pub fn motion<P: Path + Sync>(
         &self,
-        poses: &[Pose],
-        ask: impl Fn(&mut Querier, &mut Tracker, &Pose) -> Result<T, E> + Sync,
+        paths: &[P],
+        options: &MotionOptions,
+    ) -> Result<Vec<MotionAnswer>, QueryError> {
+        self.each(paths, |querier, _, path| querier.motion(self.a, self.b, path, options))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::is_free`] for each path, such as the edges of a planner.
+    ///
+    /// # Errors
+    /// Returns the error of the first path that fails.
+    pub fn is_free<P: Path + Sync>(
+        &self,
+        paths: &[P],
+        options: &MotionOptions,
+    ) -> Result<Vec<bool>, QueryError> {
+        self.each(paths, |querier, _, path| querier.is_free(self.a, self.b, path, options))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Returns what `ask` answers for every pose, or the first pose that ends the batch and what it ended with.
+    fn each<P: Sync, T: Send, E: Send>(
+        &self,
+        poses: &[P],
+        ask: impl Fn(&mut Querier, &mut Tracker, &P) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, (usize, E)> {
         let length = (poses.len() / MIN_RUNS_PER_BATCH).clamp(1, MAX_POSES_PER_RUN);
         let runs = poses.len().div_ceil(length);

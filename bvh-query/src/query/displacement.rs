@@ -17,17 +17,20 @@ fn half_sides(object: &Object) -> [f64; 3] {
     [0, 1, 2].map(|axis| (f64::from(hi[axis].get()) - f64::from(lo[axis].get())) / 2.0)
 }
 
-/// Returns an upper bound of how far any vertex of B moves from one pose to another, in mesh units.
-///
-/// A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
-/// moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.
-///
-/// Rounding: let m be the sum, over the axes, of the magnitudes of the origin, of both ends of the box and of both
-/// translations; rows of rotations have entries of at most 1 + 2^-20. Each placed vertex is off by at most 8u m along an
-/// axis, twice; centre, half sides and the changes by 8u m, the products and sums above by 16u m; u = 2^-53. That is
-/// below 2^-47 m, and over the three axes below 2^-46 m, which is charged. Squares underflow below 2^-511, which is
-/// charged too.
-pub(crate) fn displacement(b: Shape<'_>, from: &Pose, to: &Pose) -> f64 {
+/// Returns an upper bound of how far any vertex of B moves from one pose to another, in mesh units. So one answer about a
+/// distance shows how far B may move or turn and surely stays apart: as long as this is below
+/// [`Distance::lower`](crate::Distance::lower), the meshes do not touch. It says nothing of the way: see
+/// [`motion_reach`](crate::motion_reach).
+pub fn displacement<'a>(b: impl Into<Shape<'a>>, from: &Pose, to: &Pose) -> f64 {
+    // A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
+    // moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.
+    //
+    // Rounding: let m be the sum, over the axes, of the magnitudes of the origin, of both ends of the box and of both
+    // translations; rows of rotations have entries of at most 1 + 2^-20. Each placed vertex is off by at most 8u m along an
+    // axis, twice; centre, half sides and the changes by 8u m, the products and sums above by 16u m; u = 2^-53. That is
+    // below 2^-47 m, and over the three axes below 2^-46 m, which is charged. Squares underflow below 2^-511, which is
+    // charged too.
+    let b = b.into();
     let mut change = [[0.0; 3]; 3];
     let mut shift = [0.0; 3];
     let mut translations = 0.0;

@@ -6,7 +6,7 @@ pub(crate) mod batch;
 mod bounding_volumes;
 mod collide;
 mod contacts;
-mod displacement;
+pub(crate) mod displacement;
 mod distance;
 mod exact;
 pub(crate) mod motion;

@@ -27,6 +27,7 @@ use crate::query::querier::Querier;
 use crate::query::search::Search;
 use crate::query::sweep::{Room, Sweep, SweptPair};
 use bvh_format::object::Object;
+use std::collections::VecDeque;
 use std::rc::Rc;
 
 /// The most pairs of triangles that are kept from interval to interval.
@@ -34,6 +35,8 @@ const MOST_PAIRS: usize = 16;
 /// The most pairs of packets that the first interval's walk looks at; each halving allows four times as many. A long interval
 /// in which much is near is given up early, and a short one has to be looked through in the end.
 const FIRST_PACKET_TESTS: f64 = 24.0;
+/// How many intervals may wait while any hit is looked for by long intervals first.
+const MOST_SPREAD: usize = 64;
 /// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
 const MAX_DEPTH: u32 = 45;
 /// The default tolerance, as a fraction of the diagonal of the larger object's box.
@@ -106,6 +109,22 @@ struct Interval {
     pairs: Option<Rc<[SweptPair]>>,
 }
 
+/// What a search is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    /// The first hit.
+    First,
+    /// Whether there is any, or anything undecided.
+    Any,
+}
+
+/// What a search has found.
+enum Outcome {
+    Free,
+    Hit { free_until: f64, touching_at: f64 },
+    Undecided { free_until: f64, at: f64 },
+}
+
 /// What stays the same during a search.
 struct Question<'a> {
     a: Shape<'a>,
@@ -141,24 +160,67 @@ impl Querier {
     ) -> Result<MotionAnswer, QueryError> {
         let question = Question::new(a.into(), b.into(), path, options)?;
         self.start();
+        match self.search_time(&question, Wanted::First)? {
+            Outcome::Free => Ok(MotionAnswer::Free),
+            Outcome::Hit { free_until, touching_at } => {
+                let contact = self.distance_at(&question, &path.pose(touching_at))?;
+                Ok(MotionAnswer::Hit { free_until, touching_at, contact })
+            }
+            Outcome::Undecided { free_until, at } => {
+                let distance = self.distance_at(&question, &path.pose(at))?;
+                Ok(MotionAnswer::Near { free_until, at, distance })
+            }
+        }
+    }
+
+    /// Returns whether B's way is certainly free: whether [`Querier::motion`] answers [`MotionAnswer::Free`]. It does not look
+    /// for the first hit but for any, in poses spread over the way, and so says no in less time. This is what planners ask.
+    ///
+    /// # Errors
+    /// The errors of [`Querier::motion`].
+    pub fn is_free<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<bool, QueryError> {
+        let question = Question::new(a.into(), b.into(), path, options)?;
+        self.start();
+        Ok(matches!(self.search_time(&question, Wanted::Any)?, Outcome::Free))
+    }
+
+    /// Searches time for what is wanted.
+    fn search_time(&mut self, question: &Question<'_>, wanted: Wanted) -> Result<Outcome, QueryError> {
+        let path = question.path;
         let ends = [path.pose(0.0), path.pose(1.0)];
-        if self.is_within(&question, &ends[0], question.clearance)? {
-            return self.hit(&question, 0.0, 0.0);
+        if self.is_within(question, &ends[0], question.clearance)? {
+            return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
         }
         let mut undecided: Option<(f64, f64)> = None;
-        let mut todo = vec![Interval { times: [0.0, 1.0], poses: ends, depth: 0, pairs: None }];
-        while let Some(interval) = todo.pop() {
+        let mut todo = VecDeque::from([Interval { times: [0.0, 1.0], poses: ends, depth: 0, pairs: None }]);
+        loop {
+            // The first hit is met in the order of time; any hit sooner by long intervals first, as long as they are few.
+            let spread = wanted == Wanted::Any && todo.len() < MOST_SPREAD;
+            let Some(interval) = (if spread { todo.pop_front() } else { todo.pop_back() }) else { break };
             self.memory.visit()?;
             let [t0, t1] = interval.times;
             let at = t0 + (t1 - t0) / 2.0;
             let middle = path.pose(at);
             let reach = question.reach(&interval, at, &middle);
             let is_cell = reach <= question.tolerance / 8.0;
-            let pairs = self.not_apart(&question, &interval, &middle)?;
+            let pairs = self.not_apart(question, &interval, &middle)?;
             if pairs.as_ref().is_some_and(|pairs| pairs.is_empty()) {
                 continue;
             }
+            let is_within = |querier: &mut Self, d: f64| match &pairs {
+                Some(pairs) => Ok(any_within(pairs, &middle, d)),
+                None => querier.is_within(question, &middle, d),
+            };
             if !is_cell {
+                if wanted == Wanted::Any && is_within(self, question.clearance)? {
+                    return Ok(Outcome::Hit { free_until: 0.0, touching_at: at });
+                }
                 if interval.depth == MAX_DEPTH {
                     return Err(QueryError::Number {
                         name: "tolerance",
@@ -168,29 +230,34 @@ impl Querier {
                 }
                 let depth = interval.depth + 1;
                 let [start, end] = interval.poses;
-                todo.push(Interval { times: [at, t1], poses: [middle, end], depth, pairs: pairs.clone() });
-                todo.push(Interval { times: [t0, at], poses: [start, middle], depth, pairs });
+                let halves = [
+                    Interval { times: [t0, at], poses: [start, middle], depth, pairs: pairs.clone() },
+                    Interval { times: [at, t1], poses: [middle, end], depth, pairs },
+                ];
+                if spread {
+                    todo.extend(halves)
+                } else {
+                    todo.extend(halves.into_iter().rev())
+                }
                 continue;
             }
-            let is_within = |querier: &mut Self, d: f64| match &pairs {
-                Some(pairs) => Ok(any_within(pairs, &middle, d)),
-                None => querier.is_within(&question, &middle, d),
-            };
             if !is_within(self, question.clearance + reach)? {
                 continue;
             }
             if is_within(self, question.clearance)? {
                 let free_until = undecided.map_or(t0, |(free_until, _)| free_until);
-                return self.hit(&question, free_until, at);
+                return Ok(Outcome::Hit { free_until, touching_at: at });
             }
             undecided.get_or_insert((t0, at));
+            if wanted == Wanted::Any {
+                break;
+            }
         }
-        let Some((free_until, at)) = undecided else { return Ok(MotionAnswer::Free) };
-        if self.is_within(&question, &ends[1], question.clearance)? {
-            return self.hit(&question, free_until, 1.0);
+        let Some((free_until, at)) = undecided else { return Ok(Outcome::Free) };
+        if self.is_within(question, &ends[1], question.clearance)? {
+            return Ok(Outcome::Hit { free_until, touching_at: 1.0 });
         }
-        let distance = self.distance_at(&question, &path.pose(at))?;
-        Ok(MotionAnswer::Near { free_until, at, distance })
+        Ok(Outcome::Undecided { free_until, at })
     }
 
     /// Returns the pairs of triangles that may come within the clearance during an interval, unless there are many.
@@ -224,17 +291,6 @@ impl Querier {
         let mut search = Search::new(DistanceOptions::default(), d);
         self.search(question.a, question.b, pose, &mut search)?;
         Ok(search.done)
-    }
-
-    fn hit(
-        &mut self,
-        question: &Question<'_>,
-        free_until: f64,
-        touching_at: f64,
-    ) -> Result<MotionAnswer, QueryError> {
-        let pose = question.path.pose(touching_at);
-        let contact = self.distance_at(question, &pose)?;
-        Ok(MotionAnswer::Hit { free_until, touching_at, contact })
     }
 
     /// Returns the answer of [`Querier::distance`].
