@@ -1,7 +1,11 @@
 //! Plans a way for a robot through an environment with RRT-Connect (Kuffner and LaValle, ICRA 2000), each edge of which is
 //! certified: free at every moment, not at samples.
 //!
-//!     cargo run --release --example planner
+//! ```text
+//! cargo run --release --example planner
+//! ```
+
+#![allow(clippy::print_stdout, reason = "a program prints its answers")]
 
 use bvh_bake::{Options, input, to_bytes};
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Pose, Querier};
