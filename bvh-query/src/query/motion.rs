@@ -105,7 +105,7 @@ struct Interval {
     times: [f64; 2],
     poses: [Pose; 2],
     depth: u32,
-    /// The pairs of triangles that are not apart all the time, if they are few.
+    /// Among which all pairs of triangles are that are not apart all the time, if they are few.
     pairs: Option<Rc<[SweptPair]>>,
 }
 
@@ -218,7 +218,12 @@ impl Querier {
                 None => querier.is_within(question, &middle, d),
             };
             if !is_cell {
-                if wanted == Wanted::Any && is_within(self, question.clearance)? {
+                // Of a few pairs, the first one is the likeliest.
+                let likely = |querier: &mut Self| match &pairs {
+                    Some(pairs) => Ok(any_within(&pairs[..1], &middle, question.clearance)),
+                    None => querier.is_within(question, &middle, question.clearance),
+                };
+                if wanted == Wanted::Any && likely(self)? {
                     return Ok(Outcome::Hit { free_until: 0.0, touching_at: at });
                 }
                 if interval.depth == MAX_DEPTH {
@@ -260,7 +265,8 @@ impl Querier {
         Ok(Outcome::Undecided { free_until, at })
     }
 
-    /// Returns the pairs of triangles that may come within the clearance during an interval, unless there are many.
+    /// Returns pairs of triangles, among which are all that may come within the clearance during an interval, unless there are
+    /// many. If there are any, the first one may.
     fn not_apart(
         &mut self,
         question: &Question<'_>,
@@ -271,7 +277,10 @@ impl Querier {
         let sweep = Sweep { start, middle: *middle, end, limit: question.limit(interval) };
         if let Some(pairs) = &interval.pairs {
             self.memory.visit()?;
-            return Ok(Some(pairs.iter().filter(|pair| !sweep.sets_apart(pair)).copied().collect()));
+            // One pair that is not apart suffices to halve the interval. It is the first one to look at in both halves; those
+            // before it are apart all the time, and those behind it are not looked at yet.
+            let first = pairs.iter().position(|pair| !sweep.sets_apart(pair)).unwrap_or(pairs.len());
+            return Ok(Some(if first == 0 { pairs.clone() } else { pairs[first..].into() }));
         }
         let mut found = Vec::new();
         let is_crowded = each_pair(question.a, question.b, middle, |placed| {
@@ -295,6 +304,12 @@ impl Querier {
 
     /// Returns the answer of [`Querier::distance`].
     fn distance_at(&mut self, question: &Question<'_>, pose: &Pose) -> Result<Distance, QueryError> {
+        // Where there is contact, the answer is the first one, and a search would only find out that there is.
+        if question.clearance == 0.0
+            && let Some(first) = self.first_contact(question.a, question.b, pose)?
+        {
+            return Ok(first.distance(0.0));
+        }
         let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
         let best = self.nearest(question.a, question.b, pose, &mut search)?;
         let best = best.ok_or_else(|| crate::query::distance::no_answer(question.a))?;
