@@ -2,7 +2,6 @@
 
 use crate::isa::BackendError;
 use crate::pose::PoseError;
-use crate::scene::SceneError;
 use bvh_format::FormatError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -26,14 +25,6 @@ pub enum OpenError {
         path: PathBuf,
         /// The rule that is broken, and where.
         source: FormatError,
-    },
-    /// The file is valid, but it is no scene that can be asked.
-    #[error("{}: {source}", path.display())]
-    Scene {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: Box<SceneError>,
     },
 }
 

@@ -79,7 +79,9 @@ pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
 pub use query::options::DistanceOptions;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
-pub use scene::{Groups, InstanceId, Scene, SceneContact, SceneDistance, SceneError, ScenePair, SceneShape};
+pub use scene::{
+    Groups, InstanceId, OpenSceneError, Scene, SceneContact, SceneDistance, SceneError, ScenePair, SceneShape,
+};
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///

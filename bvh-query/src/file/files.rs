@@ -146,7 +146,6 @@ impl Known {
             failed(match error {
                 OpenError::Io { source, .. } => source.to_string(),
                 OpenError::Format { source, .. } => format!("a breach of {}", source.rule),
-                other => other.to_string(),
             })
         })?;
         let is_same = bvh.layout().content_checksum == self.content_checksum && bvh.objects() == self.objects;

@@ -14,11 +14,10 @@ mod trackers;
 mod workers;
 mod world_box;
 
-pub use error::SceneError;
+pub use error::{OpenSceneError, SceneError};
 pub use instance::{Groups, InstanceId, SceneShape};
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
-use crate::error::OpenError;
 use crate::file::bvh::Bvh;
 use crate::file::owned_shape::OwnedShape;
 use crate::isa::Backend;
@@ -116,11 +115,12 @@ impl Scene {
     /// read until a question needs it. [`Bvh::open`] documents what a mapped file asks for.
     ///
     /// # Errors
-    /// The errors of [`Bvh::open`], and [`OpenError::Scene`] with those of [`Scene::of_file`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+    /// [`OpenSceneError::Open`] with the errors of [`Bvh::open`], and [`OpenSceneError::Scene`] with those of
+    /// [`Scene::of_file`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenSceneError> {
         let path = path.as_ref();
         let scene = Self::of_file(Bvh::open(path)?);
-        scene.map_err(|source| OpenError::Scene { path: path.to_owned(), source: Box::new(source) })
+        scene.map_err(|source| OpenSceneError::Scene { path: path.to_owned(), source: Box::new(source) })
     }
 
     /// Makes a scene of the instances of a file, in their order.
