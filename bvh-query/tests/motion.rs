@@ -314,6 +314,22 @@ fn numbers_that_mean_nothing_are_refused() {
     }
     assert_eq!(refused(MotionOptions::new().tolerance(0.0)), "tolerance");
     assert_eq!(refused(MotionOptions::new().tolerance(1e-18)), "tolerance");
+    // A path of a user whose bound is no number leaves nothing certain.
+    struct Unbounded(f64);
+    impl Path for Unbounded {
+        fn pose(&self, t: f64) -> Pose {
+            at(9.0 + t, 0.0, 0.0)
+        }
+        fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
+            self.0
+        }
+    }
+    for wrong in [f64::NAN, -1.0, f64::INFINITY] {
+        let answer = querier.motion(&block, &block, &Unbounded(wrong), &MotionOptions::new());
+        assert!(matches!(answer, Err(QueryError::Number { name: "tolerance", .. })), "{answer:?}");
+    }
+    let bent = querier.motion(&block, &block, &Unbounded(1e-9), &MotionOptions::new());
+    assert_eq!(bent, Ok(MotionAnswer::Free));
     querier.set_budget(10);
     let answer = querier.motion(&block, &block, &motion, &MotionOptions::new());
     assert_eq!(answer, Err(QueryError::Budget { visits: 10 }));

@@ -2,6 +2,7 @@
 
 use crate::pose::frames::{product, turn};
 use crate::pose::{Pose, PoseError};
+use bvh_format::object::MAX_COORDINATE;
 
 /// A motion of B in A's frame, over times from 0 to 1.
 ///
@@ -12,7 +13,7 @@ pub trait Path {
 
     /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
     /// origin of B's frame, is during `[t0, t1]` from the straight segment between where it is at `t0` and at `t1`. It must
-    /// hold at every time for which [`Path::pose`] is asked, with all rounding, and must not be NaN. Answers are only as
+    /// hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as infinite. Answers are only as
     /// certain as this bound; the smaller it is for short intervals, the less work is a question.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
@@ -145,6 +146,12 @@ impl Motion {
                 return Err(wrong(name, "a finite number, an angle of at most 1e9 radians", found));
             }
         }
+        // On its way, B's origin stays within this of A's origin along each axis.
+        let from = start.translation();
+        let far = (0..3).map(|k| 2.0 * point[k].abs() + from[k].abs()).sum::<f64>() + shift.abs();
+        if far > MAX_COORDINATE {
+            return Err(wrong("point", "an axis and a shift with which B stays within 2^120", far));
+        }
         let mut screw = Self {
             start: *start,
             end: *start,
@@ -215,7 +222,8 @@ impl Motion {
 /// a. Defects of rotations are linear in time, and stretch lengths by less than 2^-18.
 impl Path for Motion {
     fn pose(&self, t: f64) -> Pose {
-        if t <= 0.0 {
+        // NaN is no time; it counts as the start.
+        if t.is_nan() || t <= 0.0 {
             return self.start;
         }
         if t >= 1.0 {
@@ -416,6 +424,14 @@ mod tests {
         assert!(Motion::screw(&half, [0.0; 3], [0.0; 3], 1.0, 1.0).is_err());
         assert!(Motion::screw(&half, [0.0; 3], [1.0, 0.0, 0.0], f64::NAN, 1.0).is_err());
         assert!(Motion::screw(&half, [0.0; 3], [1.0, 0.0, 0.0], 1.0, 1e300).is_err());
+        // A whole turn ends where it begins, but would lead too far.
+        let axis = [1e300, 0.0, 0.0];
+        assert!(Motion::screw(&half, axis, [0.0, 0.0, 1.0], std::f64::consts::TAU, 0.0).is_err());
+        assert!(Motion::screw(&half, axis, [0.0, 0.0, 1.0], 0.0, 0.0).is_err());
+        assert_eq!(motion.pose(f64::NAN), motion.pose(0.0));
+        assert_eq!((motion.pose(-1.0), motion.pose(f64::INFINITY)), (motion.pose(0.0), motion.pose(1.0)));
+        let line = Polyline::new(&[Pose::IDENTITY, most]).unwrap();
+        assert_eq!((line.pose(f64::NAN), line.pose(9.0)), (line.pose(0.0), line.pose(1.0)));
     }
 
     /// Points on the sphere of the radius never leave the segment by more than the bound, and some come near it.

@@ -338,22 +338,27 @@ impl<'a> Question<'a> {
         Ok(Self { a, b, path, clearance, tolerance, radius: radius(b), magnitude_a: radius(a) })
     }
 
+    /// Returns the sagitta of the path. A number of a user's path that is none leaves nothing certain.
+    fn sagitta(&self, t0: f64, t1: f64) -> f64 {
+        let sagitta = self.path.sagitta(self.radius, t0, t1);
+        if sagitta >= 0.0 { sagitta } else { f64::INFINITY }
+    }
+
     /// Returns how far apart parts have to be at both ends of an interval to be left out: farther than the clearance and a
     /// quarter of the tolerance all the time.
     fn limit(&self, interval: &Interval) -> f64 {
         let [t0, t1] = interval.times;
         let translations = interval.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
         let magnitude = 3.0 * (self.radius + self.magnitude_a) + translations.sum::<f64>();
-        let sagitta = self.path.sagitta(self.radius, t0, t1);
+        let sagitta = self.sagitta(t0, t1);
         (self.clearance + self.tolerance / 4.0 + sagitta) * (1.0 + ROUNDING) + ROUNDING * magnitude
     }
 
     /// Returns how far any vertex of B is at most from where it is in the middle of an interval.
     fn reach(&self, interval: &Interval, at: f64, middle: &Pose) -> f64 {
         let [t0, t1] = interval.times;
-        let half = |pose: &Pose, from: f64, to: f64| {
-            displacement(self.b, middle, pose) + self.path.sagitta(self.radius, from, to)
-        };
+        let half =
+            |pose: &Pose, from: f64, to: f64| displacement(self.b, middle, pose) + self.sagitta(from, to);
         half(&interval.poses[0], t0, at).max(half(&interval.poses[1], at, t1))
     }
 }

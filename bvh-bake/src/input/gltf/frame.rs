@@ -251,6 +251,7 @@ mod tests {
                     for column in 0..3 {
                         let off = (back[row][column] - f64::from(matrix[column][row])).abs();
                         assert!(off <= MATRIX_ERROR * largest, "{off:e} of {scales:?}");
+                        // A few roundings of f64 numbers below 1.
                         let unit = dot(rotation[row], rotation[column]);
                         assert!((unit - if row == column { 1.0 } else { 0.0 }).abs() < 1e-15);
                     }

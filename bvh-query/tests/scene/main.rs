@@ -2,18 +2,20 @@
 
 #![cfg(feature = "parallel")]
 
+#[path = "../common/mod.rs"]
 mod common;
+mod files;
+mod trackers;
 
 use bvh_query::{
-    Backend, Bvh, Contact, Distance, Files, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError,
-    QueryStats, Scene, SceneError, ScenePair,
+    Backend, Bvh, Contact, Distance, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError, QueryStats,
+    Scene, SceneError, ScenePair,
 };
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::section;
 use common::shapes::{cube, moved, plate, sphere, torus};
 use common::{Random, Triangle, bake, mesh, random_pose, shared};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 fn shape(triangles: &[Triangle]) -> OwnedShape {
@@ -222,39 +224,6 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
         }
     }
     assert!(touching > 20 && apart > 3, "{touching} {apart}");
-}
-
-/// Where instances move little, trackers save work, and no answer changes.
-#[test]
-fn trackers_save_work_where_steps_are_small() {
-    let small: Vec<Triangle> =
-        sphere(3).iter().map(|corners| corners.map(|corner| corner.map(|c| 0.4 * c))).collect();
-    let (ring, ball) = (shape(&torus(24, 12)), shape(&small));
-    let at = |x: f64, y: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, y, 0.1]).unwrap();
-    let mut scenes = [Scene::new().unwrap(), Scene::new().unwrap()];
-    scenes[1].set_tracking(true);
-    let ids: Vec<_> = scenes
-        .iter_mut()
-        .map(|scene| {
-            let _still = scene.add(ring.clone(), at(0.0, 0.0)).unwrap();
-            scene.add(ball.clone(), at(0.0, 0.0)).unwrap()
-        })
-        .collect();
-    let (mut work, mut touching) = ([0, 0], 0);
-    for step in 0..1000 {
-        // Inside the hole of the ring, where its box is of no use, and into the ring and back.
-        let angle = f64::from(step) / 1000.0 * std::f64::consts::TAU;
-        let moved = at(0.35 * angle.sin(), 0.05 * angle.cos());
-        let mut answers = Vec::new();
-        for (number, scene) in scenes.iter_mut().enumerate() {
-            scene.set_pose(ids[number], moved).unwrap();
-            answers.push(scene.pairs_in_contact().unwrap());
-            work[number] += scene.stats().node_tests;
-        }
-        assert_eq!(answers[0], answers[1], "step {step}");
-        touching += answers[0].len();
-    }
-    assert!(touching > 100 && touching < 900 && 4 * work[1] < 3 * work[0], "{touching} {work:?}");
 }
 
 /// Many instances of which few are near each other: what the tree of boxes is for.
@@ -621,146 +590,4 @@ fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
             }
         }
     }
-}
-
-/// Writes a file of its own for each shape, and returns the folder and the paths.
-fn files_of(shapes: &[OwnedShape]) -> (tempfile::TempDir, Vec<PathBuf>) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |number: usize| folder.path().join(format!("{number}.cbvh"));
-    let paths: Vec<_> = (0..shapes.len()).map(path).collect();
-    paths.iter().zip(shapes).for_each(|(path, shape)| std::fs::write(path, shape.bvh().bytes()).unwrap());
-    (folder, paths)
-}
-
-/// A scene file is a scene of its objects, each with its name, its pose and its groups.
-#[test]
-fn a_scene_file_is_the_scene_of_its_instances() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-scene.cbvh");
-    let mut opened = Scene::open(&path).unwrap();
-    let bvh = Arc::new(Bvh::open(&path).unwrap());
-    let mut built = Scene::new().unwrap();
-    let turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-    let cube = OwnedShape::object(bvh.clone(), 0).unwrap();
-    built.add_named("cube", cube.clone(), Pose::IDENTITY).unwrap();
-    let turned = built.add_named("turned", cube.clone(), Pose::new(turn, [1.5, 0.0, -2.5]).unwrap()).unwrap();
-    built.set_groups(turned, Groups { member: 6, meets: 1 }).unwrap();
-    built.add(cube, Pose::IDENTITY).unwrap();
-    assert_eq!(opened.len(), 3);
-    assert_eq!(opened.instances().collect::<Vec<_>>(), built.instances().collect::<Vec<_>>());
-    for id in built.instances() {
-        assert_eq!(opened.name(id), built.name(id));
-        assert_eq!(opened.pose(id), built.pose(id));
-    }
-    assert_eq!(ask(&mut opened), ask(&mut built));
-    assert_eq!(opened.pairs_in_contact().unwrap().len(), 1);
-    opened.set_groups(turned, Groups::ALL).unwrap();
-    built.set_groups(turned, Groups::ALL).unwrap();
-    assert_eq!(ask(&mut opened), ask(&mut built));
-    assert_eq!(opened.distance().unwrap().unwrap().distance.distance, 0.0);
-
-    let plain = path.with_file_name("ok-plain.cbvh");
-    let said = Scene::open(&plain).unwrap_err().to_string();
-    assert!(said.contains("ok-plain.cbvh: expected a scene, a file with instances, found none"), "{said}");
-    for (bad, rule) in
-        [("R40-no-instances", "R40"), ("R41-object-1", "R41"), ("R42-scaled", "R42"), ("R43-twice", "R43")]
-    {
-        let bad = path.with_file_name(format!("bad-{bad}.cbvh"));
-        // Without its world, the file is as good as any.
-        assert!(Bvh::open(&bad).is_ok());
-        let said = Scene::open(&bad).unwrap_err().to_string();
-        assert!(said.contains(rule) && said.contains("bad-R"), "{said}");
-    }
-}
-
-/// Files that open at first need give the answers of open ones, and no more than the bound stay open.
-#[test]
-fn files_open_at_first_need_and_few_stay_open() {
-    let shapes = shapes();
-    let (_folder, paths) = files_of(&shapes);
-    let mut random = Random::new(7);
-    for (most, parallel) in [(1, false), (2, false), (2, true), (100, true)] {
-        let files = Files::new(most);
-        let same = |(path, shape): (&PathBuf, &OwnedShape)| {
-            let (stored, objects) = (files.shape(path).unwrap(), shape.shape().objects());
-            let first = shape.bvh().objects().iter().position(|object| object == &objects[0]).unwrap();
-            if objects.len() == stored.objects().len() { stored } else { stored.object(first).unwrap() }
-        };
-        let stored: Vec<_> = paths.iter().zip(&shapes).map(same).collect();
-        assert_eq!(files.open_count(), 0);
-        let (mut lazy, mut eager) = (Scene::new().unwrap(), Scene::new().unwrap());
-        lazy.set_parallel(parallel);
-        for _ in 0..40 {
-            let number = random.below(shapes.len());
-            let world = place(&mut random, &shapes[number], 3.0);
-            assert_eq!(
-                lazy.add(stored[number].clone(), world).unwrap(),
-                eager.add(shapes[number].clone(), world).unwrap()
-            );
-        }
-        assert_eq!(files.open_count(), 0);
-        assert!(ask(&mut lazy) == ask(&mut eager));
-        assert!((1..=most).contains(&files.open_count()), "{} of {most}", files.open_count());
-    }
-}
-
-/// Whoever needs a file that vanished, or is another one now, is told which.
-#[test]
-fn a_file_that_vanishes_or_changes_is_named() {
-    let both = [shape(&sphere(2)), shape(&sphere(3))];
-    let (_folder, paths) = files_of(&both);
-    let files = Files::new(4);
-    let stored: Vec<_> = paths.iter().map(|path| files.shape(path).unwrap()).collect();
-    assert!(stored[0].object(0).is_some() && stored[0].object(1).is_none());
-    let mut scene = Scene::new().unwrap();
-    let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
-    scene.add_named("first", stored[0].clone(), at(0.0)).unwrap();
-    let second = scene.add_named("second", stored[1].clone(), at(9.0)).unwrap();
-    std::fs::remove_file(&paths[1]).unwrap();
-    // Far apart, nobody needs it.
-    assert_eq!(scene.pairs_in_contact().unwrap(), []);
-    scene.set_pose(second, at(0.5)).unwrap();
-    let said = scene.pairs_in_contact().unwrap_err().to_string();
-    assert!(said.starts_with("instances first and second: ") && said.contains("1.cbvh: expected"), "{said}");
-    assert!(said.contains("No such file") && !said.contains('\n'), "{said}");
-    std::fs::write(&paths[1], both[0].bvh().bytes()).unwrap();
-    let said = scene.collide().unwrap_err().to_string();
-    assert!(said.contains("1.cbvh") && said.contains("found other contents"), "{said}");
-    std::fs::write(&paths[1], b"no").unwrap();
-    let said = scene.distance().unwrap_err().to_string();
-    assert!(said.contains("1.cbvh") && said.contains("R01"), "{said}");
-    // The same file again is as good as ever, and an open file stays what it is.
-    std::fs::write(&paths[1], both[1].bvh().bytes()).unwrap();
-    assert!(scene.collide().unwrap());
-    std::fs::remove_file(&paths[1]).unwrap();
-    assert!(scene.collide().unwrap());
-}
-
-/// However many pairs are near, all of them are remembered, also by questions that ask about one pair after another.
-#[test]
-fn trackers_of_many_pairs_are_kept() {
-    let small = shape(&cube());
-    let turn = Pose::from_quaternion([0.0, 0.0, 0.1f64.sin(), 0.1f64.cos()], [0.0; 3]).unwrap();
-    // In a grid with gaps between the cubes, turned so that boxes overlap.
-    let place = |number: usize, shift: f64| {
-        let on = [2.3 * (number % 30) as f64 + shift, 2.3 * (number / 30) as f64, 0.0];
-        Pose::new(*turn.rotation(), on).unwrap()
-    };
-    let mut work = Vec::new();
-    for tracking in [false, true] {
-        let mut scene = Scene::new().unwrap();
-        scene.set_tracking(tracking);
-        let ids: Vec<_> =
-            (0..900).map(|number| scene.add(small.clone(), place(number, 0.0)).unwrap()).collect();
-        let mut tests = 0;
-        for step in 0..12 {
-            let moved = ids.iter().enumerate().step_by(2);
-            let moved = moved.map(|(number, &id)| (id, place(number, 1e-9 * f64::from(step))));
-            scene.set_poses(moved).unwrap();
-            scene.visit_pairs_within(0.01, |_| ControlFlow::Continue(())).unwrap();
-            assert!(scene.pairs_asked() > 1500);
-            tests += scene.stats().node_tests;
-        }
-        work.push(tests);
-    }
-    assert!(2 * work[1] < work[0], "{work:?}");
 }

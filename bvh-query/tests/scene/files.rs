@@ -1,0 +1,119 @@
+//! Scene files, and scenes whose files are opened at first need.
+
+use super::common::shapes::sphere;
+use super::{Random, ask, place, shape, shapes};
+use bvh_query::{Bvh, Files, Groups, OwnedShape, Pose, Scene};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Writes a file of its own for each shape, and returns the folder and the paths.
+fn files_of(shapes: &[OwnedShape]) -> (tempfile::TempDir, Vec<PathBuf>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |number: usize| folder.path().join(format!("{number}.cbvh"));
+    let paths: Vec<_> = (0..shapes.len()).map(path).collect();
+    paths.iter().zip(shapes).for_each(|(path, shape)| std::fs::write(path, shape.bvh().bytes()).unwrap());
+    (folder, paths)
+}
+
+/// A scene file is a scene of its objects, each with its name, its pose and its groups.
+#[test]
+fn a_scene_file_is_the_scene_of_its_instances() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-scene.cbvh");
+    let mut opened = Scene::open(&path).unwrap();
+    let bvh = Arc::new(Bvh::open(&path).unwrap());
+    let mut built = Scene::new().unwrap();
+    let turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    let cube = OwnedShape::object(bvh.clone(), 0).unwrap();
+    built.add_named("cube", cube.clone(), Pose::IDENTITY).unwrap();
+    let turned = built.add_named("turned", cube.clone(), Pose::new(turn, [1.5, 0.0, -2.5]).unwrap()).unwrap();
+    built.set_groups(turned, Groups { member: 6, meets: 1 }).unwrap();
+    built.add(cube, Pose::IDENTITY).unwrap();
+    assert_eq!(opened.len(), 3);
+    assert_eq!(opened.instances().collect::<Vec<_>>(), built.instances().collect::<Vec<_>>());
+    for id in built.instances() {
+        assert_eq!(opened.name(id), built.name(id));
+        assert_eq!(opened.pose(id), built.pose(id));
+    }
+    assert_eq!(ask(&mut opened), ask(&mut built));
+    assert_eq!(opened.pairs_in_contact().unwrap().len(), 1);
+    opened.set_groups(turned, Groups::ALL).unwrap();
+    built.set_groups(turned, Groups::ALL).unwrap();
+    assert_eq!(ask(&mut opened), ask(&mut built));
+    assert_eq!(opened.distance().unwrap().unwrap().distance.distance, 0.0);
+
+    let plain = path.with_file_name("ok-plain.cbvh");
+    let said = Scene::open(&plain).unwrap_err().to_string();
+    assert!(said.contains("ok-plain.cbvh: expected a scene, a file with instances, found none"), "{said}");
+    for (bad, rule) in
+        [("R40-no-instances", "R40"), ("R41-object-1", "R41"), ("R42-scaled", "R42"), ("R43-twice", "R43")]
+    {
+        let bad = path.with_file_name(format!("bad-{bad}.cbvh"));
+        // Without its world, the file is as good as any.
+        assert!(Bvh::open(&bad).is_ok());
+        let said = Scene::open(&bad).unwrap_err().to_string();
+        assert!(said.contains(rule) && said.contains("bad-R"), "{said}");
+    }
+}
+
+/// Files that open at first need give the answers of open ones, and no more than the bound stay open.
+#[test]
+fn files_open_at_first_need_and_few_stay_open() {
+    let shapes = shapes();
+    let (_folder, paths) = files_of(&shapes);
+    let mut random = Random::new(7);
+    for (most, parallel) in [(1, false), (2, false), (2, true), (100, true)] {
+        let files = Files::new(most);
+        let same = |(path, shape): (&PathBuf, &OwnedShape)| {
+            let (stored, objects) = (files.shape(path).unwrap(), shape.shape().objects());
+            let first = shape.bvh().objects().iter().position(|object| object == &objects[0]).unwrap();
+            if objects.len() == stored.objects().len() { stored } else { stored.object(first).unwrap() }
+        };
+        let stored: Vec<_> = paths.iter().zip(&shapes).map(same).collect();
+        assert_eq!(files.open_count(), 0);
+        let (mut lazy, mut eager) = (Scene::new().unwrap(), Scene::new().unwrap());
+        lazy.set_parallel(parallel);
+        for _ in 0..40 {
+            let number = random.below(shapes.len());
+            let world = place(&mut random, &shapes[number], 3.0);
+            assert_eq!(
+                lazy.add(stored[number].clone(), world).unwrap(),
+                eager.add(shapes[number].clone(), world).unwrap()
+            );
+        }
+        assert_eq!(files.open_count(), 0);
+        assert!(ask(&mut lazy) == ask(&mut eager));
+        assert!((1..=most).contains(&files.open_count()), "{} of {most}", files.open_count());
+    }
+}
+
+/// Whoever needs a file that vanished, or is another one now, is told which.
+#[test]
+fn a_file_that_vanishes_or_changes_is_named() {
+    let both = [shape(&sphere(2)), shape(&sphere(3))];
+    let (_folder, paths) = files_of(&both);
+    let files = Files::new(4);
+    let stored: Vec<_> = paths.iter().map(|path| files.shape(path).unwrap()).collect();
+    assert!(stored[0].object(0).is_some() && stored[0].object(1).is_none());
+    let mut scene = Scene::new().unwrap();
+    let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
+    scene.add_named("first", stored[0].clone(), at(0.0)).unwrap();
+    let second = scene.add_named("second", stored[1].clone(), at(9.0)).unwrap();
+    std::fs::remove_file(&paths[1]).unwrap();
+    // Far apart, nobody needs it.
+    assert_eq!(scene.pairs_in_contact().unwrap(), []);
+    scene.set_pose(second, at(0.5)).unwrap();
+    let said = scene.pairs_in_contact().unwrap_err().to_string();
+    assert!(said.starts_with("instances first and second: ") && said.contains("1.cbvh: expected"), "{said}");
+    assert!(said.contains("No such file") && !said.contains('\n'), "{said}");
+    std::fs::write(&paths[1], both[0].bvh().bytes()).unwrap();
+    let said = scene.collide().unwrap_err().to_string();
+    assert!(said.contains("1.cbvh") && said.contains("found other contents"), "{said}");
+    std::fs::write(&paths[1], b"no").unwrap();
+    let said = scene.distance().unwrap_err().to_string();
+    assert!(said.contains("1.cbvh") && said.contains("R01"), "{said}");
+    // The same file again is as good as ever, and an open file stays what it is.
+    std::fs::write(&paths[1], both[1].bvh().bytes()).unwrap();
+    assert!(scene.collide().unwrap());
+    std::fs::remove_file(&paths[1]).unwrap();
+    assert!(scene.collide().unwrap());
+}
