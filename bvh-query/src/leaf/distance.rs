@@ -16,7 +16,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, U, repeat, splat4, tile};
-use crate::leaf::math::{Corners, Vec3, along, dot, edges, max3, min3, project, sub};
+use crate::leaf::math::{Corners, Vec3, add, along, dot, edges, max3, min3, project, sub};
 use crate::leaf::placed_packet::load4;
 use crate::leaf::queue::TriangleQueue;
 
@@ -78,6 +78,54 @@ pub(crate) fn near<I: Isa>(isa: I, local: &Local<'_>, limit: f32) -> u16 {
     !far
 }
 
+/// Lanes whose triangles may be closer than `limit` while B moves from where it is in the first frame to where it is in the
+/// second one, looking along directions that are the same at both ends: A's axes, the normals of A's faces and, midway
+/// between both ends, those of B's faces and from centroid to centroid.
+#[inline(always)]
+pub(crate) fn swept_near<I: Isa>(isa: I, [start, end]: [&Local<'_>; 2], limit: f32) -> u16 {
+    let ((a, from), (_, to)) = (start.lanes(isa), end.lanes(isa));
+    let limit = (limit + slack(start).max(slack(end))) * (1.0 + 64.0 * U);
+    let plain = isa.splat(limit);
+    let mut far = 0;
+    for axis in 0..3 {
+        let of_a = [a[0][axis], a[1][axis], a[2][axis]];
+        let of_b = [[from[0][axis], from[1][axis], from[2][axis]], [to[0][axis], to[1][axis], to[2][axis]]];
+        let ends_b = join([min3(of_b[0]), max3(of_b[0])], [min3(of_b[1]), max3(of_b[1])]);
+        far |= I::V::bits(plain.lt(gap([min3(of_a), max3(of_a)], ends_b)));
+    }
+    let squared = isa.splat(limit * limit);
+    let normal = repeat(isa, &start.a.normal);
+    let ends = [isa.repeat(&start.a.lo), isa.repeat(&start.a.hi)];
+    let ends_b = join(ends_of(&from, normal), ends_of(&to, normal));
+    far |= far_along(isa, gap(ends, ends_b), isa.repeat(&start.a.squared), squared);
+    if !far == 0 {
+        return 0;
+    }
+    let normal = tile_sum(isa, &start.b.normal, &end.b.normal);
+    let ends_b = join(ends_of(&from, normal), ends_of(&to, normal));
+    far |= far_along(isa, gap(ends_of(&a, normal), ends_b), dot(normal, normal), squared);
+    let (of_a, shift) =
+        (repeat(isa, &start.a.sum), [0, 1, 2].map(|k| 3.0 * (start.offset[k] + end.offset[k])));
+    let of_b = tile_sum(isa, &start.b.sum, &end.b.sum);
+    let shift = [isa.splat(shift[0]), isa.splat(shift[1]), isa.splat(shift[2])];
+    let between = sub(add(of_b, shift), add(of_a, of_a));
+    let ends_b = join(ends_of(&from, between), ends_of(&to, between));
+    far |= far_along(isa, gap(ends_of(&a, between), ends_b), dot(between, between), squared);
+    !far
+}
+
+/// The sum of vectors of B at both ends, in the lanes of their pairs.
+#[inline(always)]
+fn tile_sum<I: Isa>(isa: I, start: &[[f32; 4]; 3], end: &[[f32; 4]; 3]) -> Vec3<I::V> {
+    add(tile(isa, start), tile(isa, end))
+}
+
+/// The least interval that holds two.
+#[inline(always)]
+fn join<V: Lanes>([lo, hi]: [V; 2], [other_lo, other_hi]: [V; 2]) -> [V; 2] {
+    [lo.min(other_lo), hi.max(other_hi)]
+}
+
 /// The least and the greatest of the corners' projections.
 #[inline(always)]
 fn ends_of<V: Lanes>(corners: &Corners<V>, direction: Vec3<V>) -> [V; 2] {
@@ -124,10 +172,42 @@ impl<V: Lanes> Guess<V> {
 #[inline(always)]
 pub(crate) fn bounds<I: Isa>(isa: I, queue: &TriangleQueue) -> Bounds {
     let (a, b) = queue.corners(isa);
-    let slack = queue.error(isa).mul_add(isa.splat(4.0), queue.reach(isa).mul(isa.splat(16.0 * U)));
+    certify(isa, slack_of(isa, queue), &a, &b, closest(isa, &a, &b))
+}
+
+/// Lanes of two queues, of the same pairs in the same order, whose triangles may be closer than `limit` while B moves from
+/// where the first queue has it to where the second one has it. Looks along the line between the closest points, with B
+/// midway between.
+#[inline(always)]
+pub(crate) fn swept_bounds<I: Isa>(isa: I, [start, end]: [&TriangleQueue; 2], limit: f32) -> u16 {
+    let ((a, from), (_, to)) = (start.corners(isa), end.corners(isa));
+    let half = isa.splat(0.5);
+    let mut middle = from;
+    for corner in 0..3 {
+        for axis in 0..3 {
+            middle[corner][axis] = from[corner][axis].add(to[corner][axis]).mul(half);
+        }
+    }
+    let slack = slack_of(isa, start).max(slack_of(isa, end));
+    let Guess { squared, direction } = closest(isa, &a, &middle);
+    let near = min3(project(&from, direction)).min(min3(project(&to, direction)));
+    let gap = near.sub(max3(project(&a, direction)));
+    let limit = slack.add(isa.splat(limit)).mul(isa.splat(1.0 + 64.0 * U));
+    start.filled() & !far_along(isa, gap, squared, limit.mul(limit))
+}
+
+/// The error of the bounds of the pairs in a queue.
+#[inline(always)]
+fn slack_of<I: Isa>(isa: I, queue: &TriangleQueue) -> I::V {
+    queue.error(isa).mul_add(isa.splat(4.0), queue.reach(isa).mul(isa.splat(16.0 * U)))
+}
+
+/// Guesses the closest points of pairs of triangles.
+#[inline(always)]
+fn closest<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>) -> Guess<I::V> {
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
     let mut guess = Guess { squared: isa.splat(f32::INFINITY), direction: [zero; 3] };
-    let (edges_a, edges_b) = (edges(&a), edges(&b));
+    let (edges_a, edges_b) = (edges(a), edges(b));
     let (inverse_a, inverse_b) = (inverse_squares(one, edges_a), inverse_squares(one, edges_b));
     for i in 0..3 {
         for j in 0..3 {
@@ -147,9 +227,9 @@ pub(crate) fn bounds<I: Isa>(isa: I, queue: &TriangleQueue) -> Bounds {
             guess.improve(sub(point_b, along(between, on_a, edge_a)));
         }
     }
-    corners_on_face(isa, &a, &edges_a, &b, &mut guess, false);
-    corners_on_face(isa, &b, &edges_b, &a, &mut guess, true);
-    certify(isa, slack, &a, &b, guess)
+    corners_on_face(isa, a, &edges_a, b, &mut guess, false);
+    corners_on_face(isa, b, &edges_b, a, &mut guess, true);
+    guess
 }
 
 /// Between 0 and 1. NaN, from edges of no length, ends as 0: `max` returns its second operand.

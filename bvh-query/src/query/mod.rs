@@ -14,5 +14,4 @@ pub(crate) mod options;
 mod placed_pair;
 pub(crate) mod querier;
 mod search;
-mod sweep;
 pub(crate) mod tracker;

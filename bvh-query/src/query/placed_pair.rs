@@ -5,7 +5,7 @@ use crate::file::place::LeafPacket;
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
 use crate::leaf::local::{Local, LocalFrame};
-use crate::leaf::placed_packet::PlacedPackets;
+use crate::leaf::placed_packet::{PlacedPacket, PlacedPackets};
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
@@ -21,6 +21,17 @@ pub(crate) struct PlacedPair<'a> {
     frame: OnceCell<LocalFrame>,
     /// The numbers that the objects have in their files.
     pub(crate) numbers: (u32, u32),
+}
+
+impl<'p> PlacedPair<'p> {
+    /// Returns the same objects with B elsewhere.
+    pub(crate) fn moved<'q>(&self, pose: &'q Pose, placement: &'q Placement) -> PlacedPair<'q>
+    where
+        'p: 'q,
+    {
+        let pair = ObjectPair { placement, end: placement, ..self.pair };
+        PlacedPair { pair, pose, frame: OnceCell::new(), numbers: self.numbers }
+    }
 }
 
 impl PlacedPair<'_> {
@@ -39,17 +50,39 @@ impl PlacedPair<'_> {
         [packets_a, packets_b]: &'a mut [PlacedPackets; 2],
         (a, b): (LeafPacket, LeafPacket),
     ) -> Result<Local<'a>, QueryError> {
-        let ObjectPair { bvh_a, object_a, bvh_b, object_b, .. } = self.pair;
-        let frame = self.frame();
-        let (known, placed_a) = packets_a.place(a.page, a.packet);
+        Ok(Local::new(self.frame(), self.place_a(isa, packets_a, a)?, self.place_b(isa, packets_b, b)?))
+    }
+
+    /// Fetches a leaf packet of A.
+    #[inline(always)]
+    pub(crate) fn place_a<'a, I: Isa>(
+        &self,
+        isa: I,
+        packets: &'a mut PlacedPackets,
+        leaf: LeafPacket,
+    ) -> Result<&'a PlacedPacket, QueryError> {
+        let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
-            placed_a.place_a(isa, frame, bvh_a.packet(object_a, a, &mut Packet::default())?);
+            let ObjectPair { bvh_a, object_a, .. } = self.pair;
+            placed.place_a(isa, self.frame(), bvh_a.packet(object_a, leaf, &mut Packet::default())?);
         }
-        let (known, placed_b) = packets_b.place(b.page, b.packet);
+        Ok(placed)
+    }
+
+    /// Fetches a leaf packet of B.
+    #[inline(always)]
+    pub(crate) fn place_b<'a, I: Isa>(
+        &self,
+        isa: I,
+        packets: &'a mut PlacedPackets,
+        leaf: LeafPacket,
+    ) -> Result<&'a PlacedPacket, QueryError> {
+        let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
-            placed_b.place_b(isa, frame, bvh_b.packet(object_b, b, &mut Packet::default())?);
+            let ObjectPair { bvh_b, object_b, .. } = self.pair;
+            placed.place_b(isa, self.frame(), bvh_b.packet(object_b, leaf, &mut Packet::default())?);
         }
-        Ok(Local::new(frame, placed_a, placed_b))
+        Ok(placed)
     }
 }
 

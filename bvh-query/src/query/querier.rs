@@ -5,6 +5,7 @@ use crate::isa::Backend;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
+use crate::query::motion::sweep::Ends;
 use crate::query::search::BoundedPair;
 use crate::traverse::walk::WalkMemory;
 
@@ -34,6 +35,8 @@ pub struct Querier {
     pub(super) queue: TriangleQueue,
     /// Of A and of B.
     pub(super) packets: [PlacedPackets; 2],
+    /// For sweeps: what is in A's frame at the end of an interval.
+    pub(super) at_end: Ends,
     pub(super) bounded: Vec<BoundedPair>,
     budget: u64,
     pub(super) stats: QueryStats,
@@ -58,6 +61,7 @@ impl Querier {
             memory: WalkMemory::default(),
             queue: TriangleQueue::default(),
             packets: Default::default(),
+            at_end: Ends::default(),
             bounded: Vec::new(),
             budget: u64::MAX,
             stats: QueryStats::default(),

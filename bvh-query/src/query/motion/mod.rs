@@ -1,0 +1,162 @@
+//! Is the way free, and where does it end? A search over time, certain at every moment.
+//!
+//! An answer has a definition that knows nothing of how it is found. Time is halved again and again into *cells*, until B
+//! moves by at most an eighth of the tolerance within a cell: [`motion_reach`]. A cell is *clear* if, in the pose of its
+//! middle, the meshes are farther apart than the clearance and that reach. The cells are met in the order of time:
+//!
+//! - In a clear cell nothing comes within the clearance.
+//! - In one that is not clear, the pose of the middle decides exactly: within the clearance is a hit.
+//! - Else the cell is undecided, and so is the answer, unless a later cell is a hit.
+//!
+//! The search leaves out cells that are certainly clear, many at a time: during an interval, everything that stays farther
+//! apart than the clearance and a quarter of the tolerance ([`sweep`]). Where few pairs of triangles are left,
+//! they are kept from interval to interval; all others are apart during the whole interval, so that these pairs alone decide.
+//! So what a filter sees does not show in an answer, which has the same bits on every backend.
+
+mod pairs;
+mod question;
+mod search;
+pub(super) mod sweep;
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::motion::Path;
+use crate::pose::Pose;
+use crate::query::answers::Distance;
+use crate::query::options::DistanceOptions;
+use crate::query::querier::Querier;
+use crate::query::search::Search;
+use question::Question;
+use search::{Outcome, TimeSearch};
+
+/// What counts as a hit, and how exactly time is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct MotionOptions {
+    /// Meshes that come as near as this hit, in mesh units; 0 for contact.
+    pub clearance: f64,
+    /// How near B may come to a hit, beyond the clearance, without an answer that says free or hit, in mesh units; `None` for a
+    /// millionth of the diagonal of the larger object's box. A smaller one costs more.
+    pub tolerance: Option<f64>,
+}
+
+impl MotionOptions {
+    /// Asks for contact, with the default tolerance.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Sets the distance that counts as a hit, in mesh units. A query refuses one that is negative or not finite.
+    #[must_use]
+    pub fn clearance(self, clearance: f64) -> Self {
+        Self { clearance, ..self }
+    }
+
+    /// Sets the tolerance in mesh units. A query refuses one that is not above 0 and finite.
+    #[must_use]
+    pub fn tolerance(self, tolerance: impl Into<Option<f64>>) -> Self {
+        Self { tolerance: tolerance.into(), ..self }
+    }
+}
+
+/// Whether a way is free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MotionAnswer {
+    /// At no time from 0 to 1 are the meshes within the clearance.
+    Free,
+    /// They are within the clearance in the pose at `touching_at`.
+    Hit {
+        /// Before this time they certainly are not. It equals `touching_at` only where both are 0.
+        free_until: f64,
+        /// A time at which they are: the earliest one found.
+        touching_at: f64,
+        /// The answer of [`Querier::distance`] for that pose.
+        contact: Distance,
+    },
+    /// They come so near that neither can be told: the distance is at most the clearance and the tolerance, and in no pose
+    /// that was looked at are they within the clearance.
+    Near {
+        /// Before this time they certainly are not within the clearance.
+        free_until: f64,
+        /// The time of the first undecided pose.
+        at: f64,
+        /// The answer of [`Querier::distance`] for that pose.
+        distance: Distance,
+    },
+}
+
+impl Querier {
+    /// Returns whether B's way is free, with B moving in A's frame along `path`, and where it ends if it is not.
+    ///
+    /// The answer is certain: [`MotionAnswer::Free`] holds at every moment, not at samples, and a [`MotionAnswer::Hit`] names a
+    /// pose in which the meshes are within the clearance. Contact at time 0 counts. Answers have the same bits on every
+    /// backend and in any order of questions. As for [`Querier::collide`], meshes are surfaces.
+    ///
+    /// Cost: about one query of contact for each interval that has to be looked at: few where B stays apart by more than it
+    /// turns aside, some fifty for a hit.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] for a clearance or a tolerance that means nothing, or a tolerance so small that time cannot be
+    /// halved as often as it needs; and the errors of [`Querier::within`]. A budget is for all intervals together.
+    pub fn motion<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<MotionAnswer, QueryError> {
+        let question = Question::new(a.into(), b.into(), path, options)?;
+        self.start();
+        match TimeSearch::new(self, &question).first()? {
+            Outcome::Free => Ok(MotionAnswer::Free),
+            Outcome::Hit { free_until, touching_at } => {
+                let contact = self.distance_at(&question, &path.pose(touching_at))?;
+                Ok(MotionAnswer::Hit { free_until, touching_at, contact })
+            }
+            Outcome::Undecided { free_until, at } => {
+                let distance = self.distance_at(&question, &path.pose(at))?;
+                Ok(MotionAnswer::Near { free_until, at, distance })
+            }
+        }
+    }
+
+    /// Returns whether B's way is certainly free: whether [`Querier::motion`] answers [`MotionAnswer::Free`]. It does not look
+    /// for the first hit but for any, in poses spread over the way, and so says no in less time. This is what planners ask.
+    ///
+    /// # Errors
+    /// The errors of [`Querier::motion`].
+    pub fn is_free<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<bool, QueryError> {
+        let question = Question::new(a.into(), b.into(), path, options)?;
+        self.start();
+        TimeSearch::new(self, &question).is_free()
+    }
+
+    /// Returns the answer of [`Querier::distance`].
+    fn distance_at(&mut self, question: &Question<'_>, pose: &Pose) -> Result<Distance, QueryError> {
+        // Where there is contact, the answer is the first one, and a search would only find out that there is.
+        if question.clearance == 0.0
+            && let Some(first) = self.first_contact(question.a, question.b, pose)?
+        {
+            return Ok(first.distance(0.0));
+        }
+        let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
+        let best = self.nearest(question.a, question.b, pose, &mut search)?;
+        let best = best.ok_or_else(|| crate::query::distance::no_answer(question.a))?;
+        Ok(best.distance(search.proved()))
+    }
+}
+
+/// Returns how far any vertex of B is at most, during `[t0, t1]`, from where it is in the middle of that time, in mesh units:
+/// how far vertices are there from where they are at either end, and the sagitta of either half. [`Querier::motion`] halves
+/// time until this is at most an eighth of the tolerance.
+pub fn motion_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn Path, t0: f64, t1: f64) -> f64 {
+    let b = b.into();
+    let question = Question::unchecked(b, b, path);
+    question.middle(&question.stretch(t0, t1)).reach
+}

@@ -1,0 +1,125 @@
+//! What stays the same while time is searched, and what is asked of a stretch of time: how far B is from its middle, and how
+//! far apart parts have to be at both ends.
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::motion::Path;
+use crate::pose::Pose;
+use crate::query::displacement::displacement;
+use crate::query::motion::MotionOptions;
+use crate::query::options::check_distance;
+use bvh_format::object::Object;
+
+/// The default tolerance, as a fraction of the diagonal of the larger object's box.
+const DEFAULT_TOLERANCE: f64 = 1e-6;
+/// More than the relative error of all `f64` arithmetic on coordinates here.
+const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// Two shapes, the path of B in A's frame, and what counts as a hit.
+pub(super) struct Question<'a> {
+    pub(super) a: Shape<'a>,
+    pub(super) b: Shape<'a>,
+    pub(super) path: &'a dyn Path,
+    pub(super) clearance: f64,
+    pub(super) tolerance: f64,
+    /// The diagonal of the larger object's box.
+    pub(super) size: f64,
+    /// How far vertices of B are at most from the origin of its frame.
+    radius: f64,
+    /// The same of A.
+    radius_a: f64,
+}
+
+/// A stretch of time, and where B is at its ends.
+#[derive(Clone, Copy)]
+pub(super) struct Stretch {
+    pub(super) times: [f64; 2],
+    pub(super) poses: [Pose; 2],
+}
+
+/// The middle of a stretch of time.
+#[derive(Clone, Copy)]
+pub(super) struct Middle {
+    pub(super) at: f64,
+    pub(super) pose: Pose,
+    /// How far any vertex of B is at most from where it is now, during the stretch.
+    pub(super) reach: f64,
+}
+
+impl<'a> Question<'a> {
+    pub(super) fn new(
+        a: Shape<'a>,
+        b: Shape<'a>,
+        path: &'a dyn Path,
+        options: &MotionOptions,
+    ) -> Result<Self, QueryError> {
+        check_distance(options.clearance)?;
+        let mut question = Self::unchecked(a, b, path);
+        question.clearance = options.clearance;
+        // Two points have no diagonal.
+        let default = if question.size > 0.0 { DEFAULT_TOLERANCE * question.size } else { DEFAULT_TOLERANCE };
+        question.tolerance = options.tolerance.unwrap_or(default);
+        if !(question.tolerance.is_finite() && question.tolerance > 0.0) {
+            let (name, expected) = ("tolerance", "a finite length above 0");
+            return Err(QueryError::Number { name, expected, found: question.tolerance });
+        }
+        Ok(question)
+    }
+
+    /// A question without clearance and tolerance.
+    pub(super) fn unchecked(a: Shape<'a>, b: Shape<'a>, path: &'a dyn Path) -> Self {
+        let largest = |shape: Shape<'_>| shape.objects().iter().map(diagonal).fold(0.0, f64::max);
+        let size = largest(a).max(largest(b));
+        Self { a, b, path, clearance: 0.0, tolerance: 0.0, size, radius: radius(b), radius_a: radius(a) }
+    }
+
+    /// Returns the stretch between two times.
+    pub(super) fn stretch(&self, t0: f64, t1: f64) -> Stretch {
+        Stretch { times: [t0, t1], poses: [self.path.pose(t0), self.path.pose(t1)] }
+    }
+
+    /// Returns the middle of a stretch.
+    pub(super) fn middle(&self, stretch: &Stretch) -> Middle {
+        let [t0, t1] = stretch.times;
+        let at = t0 + (t1 - t0) / 2.0;
+        let pose = self.path.pose(at);
+        let half = |end: &Pose, from, to| displacement(self.b, &pose, end) + self.sagitta(from, to);
+        let reach = half(&stretch.poses[0], t0, at).max(half(&stretch.poses[1], at, t1));
+        Middle { at, pose, reach }
+    }
+
+    /// Returns how far apart parts have to be at both ends of a stretch to be left out: farther than the clearance and a
+    /// quarter of the tolerance all the time.
+    pub(super) fn limit(&self, stretch: &Stretch) -> f64 {
+        let [t0, t1] = stretch.times;
+        let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
+        let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
+        let least = self.clearance + self.tolerance / 4.0 + self.sagitta(t0, t1);
+        least * (1.0 + ROUNDING) + ROUNDING * magnitude
+    }
+
+    /// Returns the sagitta of the path. A number of a user's path that is none leaves nothing certain.
+    fn sagitta(&self, t0: f64, t1: f64) -> f64 {
+        let sagitta = self.path.sagitta(self.radius, t0, t1);
+        if sagitta >= 0.0 { sagitta } else { f64::INFINITY }
+    }
+}
+
+/// Returns how far vertices of a shape are at most from the origin of its frame, rounded up, in mesh units.
+fn radius(shape: Shape<'_>) -> f64 {
+    let of = |object: &Object| {
+        let [lo, hi] = object.bounding_box();
+        let far: f64 = (0..3).map(|axis| lo[axis].abs().max(hi[axis].abs()).powi(2)).sum();
+        let (centre, radius) = object.bounding_sphere();
+        let centre: f64 = centre.iter().map(|value| value * value).sum();
+        far.sqrt().min(centre.sqrt() + radius)
+    };
+    // A rotation may stretch by 2^-19.
+    shape.objects().iter().map(of).fold(0.0, f64::max) * (1.0 + 1.0 / (1 << 18) as f64)
+}
+
+/// Returns the diagonal of an object's box, in mesh units.
+fn diagonal(object: &Object) -> f64 {
+    let [lo, hi] = object.bounding_box();
+    (0..3).map(|axis| (hi[axis] - lo[axis]).powi(2)).sum::<f64>().sqrt()
+}

@@ -1,0 +1,340 @@
+//! The search over time: which stretches are left out, and which cells are decided.
+//!
+//! ```text
+//! stretches := {[0, 1]}
+//! while stretch := earliest(stretches):
+//!     if it is a cell: decide it
+//!     if a sweep sets the meshes apart all the time: skip
+//!     if its end is within the clearance, or few pairs of triangles are left: descend to the cell of the first contact,
+//!         as far as can be told cheaply, and set apart what was passed on the way, several stretches at once
+//!     else halve it
+//! ```
+//!
+//! Descending is a guess, which costs little: what lies before the cell is not believed to be free, but set apart or looked
+//! at; what lies behind waits.
+
+use crate::error::QueryError;
+use crate::pose::Pose;
+use crate::query::displacement::displacement;
+use crate::query::motion::pairs::{Kept, Sweep};
+use crate::query::motion::question::{Middle, Question, Stretch};
+use crate::query::motion::sweep::Room;
+use crate::query::options::DistanceOptions;
+use crate::query::placed_pair::each_pair;
+use crate::query::querier::Querier;
+use crate::query::search::Search;
+use std::collections::VecDeque;
+
+/// The most pairs of triangles that are kept from stretch to stretch.
+const MOST_PAIRS: usize = 48;
+/// The most pairs of packets that the first walk looks at; each halving allows four times as many. A long stretch in which
+/// much is near is given up early, and a short one has to be looked through in the end.
+const FIRST_PACKET_TESTS: f64 = 24.0;
+/// A stretch that ends within the clearance is swept when B moves by less than this fraction of the larger object's
+/// diagonal: few pairs of triangles are likely to be left.
+const FINE: f64 = 1.0 / 1024.0;
+/// How many stretches may wait while any hit is looked for by long stretches first.
+const MOST_SPREAD: usize = 64;
+/// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
+const MAX_DEPTH: u32 = 45;
+/// Stretches are set apart together up to where B has still to move by this many times what their ends have to be apart.
+const SAFE_REST: f64 = 4.0;
+
+/// What a search has found.
+pub(super) enum Outcome {
+    Free,
+    Hit { free_until: f64, touching_at: f64 },
+    Undecided { free_until: f64, at: f64 },
+}
+
+/// A stretch that has to be looked at: one that comes of halving the whole time `depth` times.
+#[derive(Clone)]
+struct Interval {
+    stretch: Stretch,
+    depth: u32,
+    /// Whether the end is within the clearance, if that is known: then nothing sets the meshes apart all the time.
+    ends_within: Option<bool>,
+    /// Among which all pairs of triangles are that are not apart all the time, if they are few.
+    pairs: Option<Kept>,
+}
+
+/// What a cell is found to be.
+enum Cell {
+    Clear,
+    Hit,
+    Undecided,
+}
+
+/// A search for the first hit, or for any.
+pub(super) struct TimeSearch<'s, 'a> {
+    querier: &'s mut Querier,
+    question: &'s Question<'a>,
+}
+
+impl<'s, 'a> TimeSearch<'s, 'a> {
+    pub(super) fn new(querier: &'s mut Querier, question: &'s Question<'a>) -> Self {
+        Self { querier, question }
+    }
+
+    /// Returns the first hit, or the first cell that is undecided.
+    pub(super) fn first(&mut self) -> Result<Outcome, QueryError> {
+        let whole = self.whole();
+        if self.is_within(&whole.stretch.poses[0], self.question.clearance)? {
+            return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
+        }
+        let mut undecided: Option<(f64, f64)> = None;
+        let mut todo = vec![whole];
+        while let Some(interval) = todo.pop() {
+            self.querier.memory.visit()?;
+            let middle = self.question.middle(&interval.stretch);
+            if self.is_cell(&middle) {
+                let start = interval.stretch.times[0];
+                match self.decide(&interval, &middle)? {
+                    Cell::Clear => {}
+                    Cell::Hit => {
+                        let free_until = undecided.map_or(start, |(free_until, _)| free_until);
+                        return Ok(Outcome::Hit { free_until, touching_at: middle.at });
+                    }
+                    Cell::Undecided => {
+                        undecided.get_or_insert((start, middle.at));
+                    }
+                }
+            } else {
+                self.look(interval, &middle, &mut todo)?;
+            }
+        }
+        let Some((free_until, at)) = undecided else { return Ok(Outcome::Free) };
+        if self.is_within(&self.question.path.pose(1.0), self.question.clearance)? {
+            return Ok(Outcome::Hit { free_until, touching_at: 1.0 });
+        }
+        Ok(Outcome::Undecided { free_until, at })
+    }
+
+    /// Returns whether there is neither a hit nor a cell that is undecided. Long stretches come first, as long as they are
+    /// few: a hit is met sooner in poses that are spread over the way.
+    pub(super) fn is_free(&mut self) -> Result<bool, QueryError> {
+        let (whole, clearance) = (self.whole(), self.question.clearance);
+        if self.is_within(&whole.stretch.poses[0], clearance)? {
+            return Ok(false);
+        }
+        let mut todo = VecDeque::from([whole]);
+        loop {
+            let spread = todo.len() < MOST_SPREAD;
+            let Some(mut interval) = (if spread { todo.pop_front() } else { todo.pop_back() }) else {
+                return Ok(true);
+            };
+            self.querier.memory.visit()?;
+            let middle = self.question.middle(&interval.stretch);
+            if self.is_cell(&middle) {
+                if !matches!(self.decide(&interval, &middle)?, Cell::Clear) {
+                    return Ok(false);
+                }
+                continue;
+            }
+            interval.pairs = self.not_apart(&interval, &middle.pose)?;
+            let hits = match &interval.pairs {
+                Some(pairs) if pairs.left().is_empty() => continue,
+                // Of a few pairs, the first one is the likeliest.
+                Some(pairs) => self.querier.any_pair_within(&pairs.left()[..1], &middle.pose, clearance),
+                None => self.is_within(&middle.pose, clearance)?,
+            };
+            if hits {
+                return Ok(false);
+            }
+            let halves = self.halves(&interval, &middle)?;
+            if spread { todo.extend(halves) } else { todo.extend(halves.into_iter().rev()) }
+        }
+    }
+
+    fn whole(&self) -> Interval {
+        Interval { stretch: self.question.stretch(0.0, 1.0), depth: 0, ends_within: None, pairs: None }
+    }
+
+    fn is_cell(&self, middle: &Middle) -> bool {
+        middle.reach <= self.question.tolerance / 8.0
+    }
+
+    /// Decides a cell by the definition.
+    fn decide(&mut self, interval: &Interval, middle: &Middle) -> Result<Cell, QueryError> {
+        let clearance = self.question.clearance;
+        let mut is_within = |d: f64| match &interval.pairs {
+            Some(pairs) => Ok(self.querier.any_pair_within(pairs.left(), &middle.pose, d)),
+            None => self.is_within(&middle.pose, d),
+        };
+        if !is_within(clearance + middle.reach)? {
+            return Ok(Cell::Clear);
+        }
+        Ok(if is_within(clearance)? { Cell::Hit } else { Cell::Undecided })
+    }
+
+    /// Adds what is left of an interval to the intervals to look at, of which the last one comes next.
+    fn look(
+        &mut self,
+        mut interval: Interval,
+        middle: &Middle,
+        todo: &mut Vec<Interval>,
+    ) -> Result<(), QueryError> {
+        let ends_within = interval.pairs.is_none() && interval.ends_within == Some(true);
+        if ends_within && middle.reach > FINE * self.question.size {
+            return self.descend(interval, None, todo);
+        }
+        interval.pairs = self.not_apart(&interval, &middle.pose)?;
+        if let Some(pairs) = &interval.pairs {
+            if pairs.left().is_empty() {
+                return Ok(());
+            }
+            if let Some(time) = self.querier.contact_time(self.question, &interval.stretch, pairs.left()) {
+                return self.descend(interval, Some(time), todo);
+            }
+        }
+        let mut halves = self.halves(&interval, middle)?;
+        if interval.pairs.is_none() {
+            let clearance = self.question.clearance;
+            halves[0].ends_within = Some(self.is_within(&middle.pose, clearance)?);
+            if interval.ends_within.is_none() {
+                halves[1].ends_within = Some(self.is_within(&interval.stretch.poses[1], clearance)?);
+            }
+        }
+        todo.extend(halves.into_iter().rev());
+        Ok(())
+    }
+
+    /// Goes down to the cell of a contact, at a time if one is given, else from where there is none to where there is, until
+    /// B moves little. Adds that cell and the intervals beside the way.
+    fn descend(
+        &mut self,
+        mut interval: Interval,
+        time: Option<f64>,
+        todo: &mut Vec<Interval>,
+    ) -> Result<(), QueryError> {
+        let mut passed = Vec::new();
+        loop {
+            let middle = self.question.middle(&interval.stretch);
+            let is_fine = time.is_none() && middle.reach <= FINE * self.question.size;
+            if is_fine || self.is_cell(&middle) {
+                break;
+            }
+            let is_before = match time {
+                Some(time) => time < middle.at,
+                None => self.is_within(&middle.pose, self.question.clearance)?,
+            };
+            let [mut left, right] = self.halves(&interval, &middle)?;
+            left.ends_within = time.is_none().then_some(is_before);
+            if is_before {
+                todo.push(right);
+                interval = left;
+            } else {
+                passed.push(left);
+                interval = right;
+            }
+        }
+        let contact = self.question.stretch(time.unwrap_or(interval.stretch.times[1]), 1.0);
+        todo.push(interval);
+        self.pass(passed, &contact, todo)
+    }
+
+    /// Adds those of some adjoining intervals before a contact that are not set apart, in the order of time.
+    fn pass(
+        &mut self,
+        passed: Vec<Interval>,
+        contact: &Stretch,
+        todo: &mut Vec<Interval>,
+    ) -> Result<(), QueryError> {
+        let first_new = todo.len();
+        let mut rest = passed.as_slice();
+        while let [first, ..] = rest {
+            let (count, stretch) = self.safe_stretch(rest, contact);
+            let (group, later) = rest.split_at(count);
+            rest = later;
+            if count == 1 {
+                todo.push(first.clone());
+                continue;
+            }
+            let joined = Interval { stretch, ..first.clone() };
+            let pairs = self.not_apart(&joined, &self.question.middle(&stretch).pose)?;
+            if pairs.as_ref().is_none_or(|pairs| !pairs.left().is_empty()) {
+                todo.extend(group.iter().map(|one| Interval { pairs: pairs.clone(), ..one.clone() }));
+            }
+        }
+        todo[first_new..].reverse();
+        Ok(())
+    }
+
+    /// Returns how many of some adjoining intervals are likely to be set apart together, and the stretch of them.
+    fn safe_stretch(&self, rest: &[Interval], contact: &Stretch) -> (usize, Stretch) {
+        let start = &rest[0].stretch;
+        let (time, pose) = (contact.times[0], contact.poses[0]);
+        let speed = displacement(self.question.b, &start.poses[0], &pose) / (time - start.times[0]);
+        let joined = |count: usize| {
+            let end = &rest[count - 1].stretch;
+            Stretch { times: [start.times[0], end.times[1]], poses: [start.poses[0], end.poses[1]] }
+        };
+        let is_safe = |count: &usize| {
+            let stretch = joined(*count);
+            speed * (time - stretch.times[1]) >= SAFE_REST * self.question.limit(&stretch)
+        };
+        let count = (2..=rest.len()).rev().find(is_safe).unwrap_or(1);
+        (count, joined(count))
+    }
+
+    /// Halves an interval.
+    fn halves(&self, interval: &Interval, middle: &Middle) -> Result<[Interval; 2], QueryError> {
+        if interval.depth == MAX_DEPTH {
+            return Err(QueryError::Number {
+                name: "tolerance",
+                expected: "more than B moves in 2^-45 of the time",
+                found: self.question.tolerance,
+            });
+        }
+        let Stretch { times: [t0, t1], poses: [start, end] } = interval.stretch;
+        let half = |times, poses, ends_within| Interval {
+            stretch: Stretch { times, poses },
+            depth: interval.depth + 1,
+            ends_within,
+            pairs: interval.pairs.clone(),
+        };
+        Ok([
+            half([t0, middle.at], [start, middle.pose], None),
+            half([middle.at, t1], [middle.pose, end], interval.ends_within),
+        ])
+    }
+
+    /// Returns pairs of triangles, among which are all that may come within the clearance during an interval, unless there are
+    /// many. If there are any, the first one may.
+    fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
+        let question = self.question;
+        let [start, end] = interval.stretch.poses;
+        let sweep = Sweep { start, middle: *middle, end, limit: question.limit(&interval.stretch) };
+        let pairs = match &interval.pairs {
+            Some(pairs) => pairs.clone(),
+            None => {
+                let packet_tests = (FIRST_PACKET_TESTS * 4f64.powi(interval.depth as i32)) as u64;
+                let room = Room { pairs: MOST_PAIRS, packet_tests };
+                let mut found = Vec::new();
+                let is_crowded = each_pair(question.a, question.b, middle, |placed| {
+                    let is_whole = self.querier.sweep((placed, &sweep), &mut found, room)?;
+                    Ok((!is_whole).then_some(()))
+                })?;
+                if is_crowded.is_some() {
+                    return Ok(None);
+                }
+                Kept::new(found)
+            }
+        };
+        self.querier.memory.visit()?;
+        // One pair that is not apart suffices. It is the first one to look at in both halves; those before it are apart all
+        // the time, and those behind it are not looked at yet.
+        Ok(Some(self.querier.leave_out(&sweep, pairs)))
+    }
+
+    /// Returns whether the meshes are at most `d` apart in a pose.
+    fn is_within(&mut self, pose: &Pose, d: f64) -> Result<bool, QueryError> {
+        let Question { a, b, .. } = *self.question;
+        if d == 0.0 {
+            return Ok(self.querier.any_contact(a, b, pose)?.is_some());
+        }
+        let mut search = Search::new(DistanceOptions::default(), d);
+        self.querier.search(a, b, pose, &mut search)?;
+        Ok(search.done)
+    }
+}
