@@ -1,14 +1,16 @@
-//! Moves a robot among obstacles, and tells what touches and how much room is left.
+//! Moves a robot among obstacles, and tells what touches, how much room is left, and whether the ways between are free.
 //!
 //! ```text
 //! cargo run --release --example robot -- [URDF]
 //! ```
 //!
 //! The robot is a URDF file whose collision meshes are beside it; by default, a small arm from the folder `testdata` of the
-//! workspace. Links that a joint connects may touch. All joints that turn or slide follow a wave within their limits.
+//! workspace. Links that a joint connects may touch. All joints that turn or slide follow a wave within their limits. From one
+//! step to the next, they turn and slide at a constant rate, which is how planners and controllers connect configurations: a
+//! path of a user's own, [`LinkPath`].
 #![allow(clippy::print_stdout, reason = "a program prints its answers")]
 
-use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, PoseError, Scene};
+use bvh_query::{Bvh, Groups, InstanceId, MotionOptions, OwnedShape, Pose, PoseError, Scene, SceneMotion};
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -36,8 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     for step in 0..24 {
         let time = f64::from(step) / 24.0;
+        let values = robot.values(time);
         // The poses of all links at once: either all move or none.
-        scene.set_poses(robot.poses(time)?)?;
+        scene.set_poses(robot.poses(&values)?)?;
         let touching = scene.pairs_in_contact()?;
         if touching.is_empty() {
             let Some(nearest) = scene.distance()? else { continue };
@@ -48,6 +51,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         for pair in touching {
             let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
             println!("{time:.2}: {} touches {}", a.unwrap_or_default(), b.unwrap_or_default());
+        }
+        let next = robot.values(time + 1.0 / 24.0);
+        let paths: Vec<LinkPath<'_>> = (0..robot.parts.len())
+            .map(|part| LinkPath { robot: &robot, part, from: &values, to: &next })
+            .collect();
+        let paths: Vec<(InstanceId, &(dyn bvh_query::Path + Sync))> =
+            paths.iter().map(|path| (robot.parts[path.part].2, path as _)).collect();
+        if let SceneMotion::Hit { free_until, contact, .. } = scene.motion(&paths, &MotionOptions::new())? {
+            let (a, b) = (scene.name(contact.pair.a)?, scene.name(contact.pair.b)?);
+            let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
+            println!(
+                "      the way to the next step is free for {free_until:.4} of it, until {a} and {b} touch"
+            );
         }
     }
     Ok(())
@@ -92,15 +108,22 @@ impl Robot {
         Ok(Self { joints: in_order(urdf.joints), parts })
     }
 
-    /// Returns the poses of all parts in the world at a time from 0 to 1: forward kinematics, from the base outward.
-    fn poses(&self, time: f64) -> Result<Vec<(InstanceId, Pose)>, PoseError> {
-        let mut links: HashMap<&str, Pose> = HashMap::new();
-        for (number, joint) in self.joints.iter().enumerate() {
-            let parent = links.get(joint.parent.link.as_str()).copied().unwrap_or(Pose::IDENTITY);
+    /// Returns the values of all joints at a time from 0 to 1.
+    fn values(&self, time: f64) -> Vec<f64> {
+        let value = |(number, joint): (usize, &Joint)| {
             let middle = (joint.limit.lower + joint.limit.upper) / 2.0;
             let wave = ((1.0 + number as f64) * std::f64::consts::TAU * time).sin();
-            let value = middle + 0.4 * (joint.limit.upper - joint.limit.lower) * wave;
-            let pose = moved(joint, value)?.then(&origin(&joint.origin)?)?.then(&parent)?;
+            middle + 0.4 * (joint.limit.upper - joint.limit.lower) * wave
+        };
+        self.joints.iter().enumerate().map(value).collect()
+    }
+
+    /// Returns the poses of all parts in the world, given the values of all joints: forward kinematics, from the base outward.
+    fn poses(&self, values: &[f64]) -> Result<Vec<(InstanceId, Pose)>, PoseError> {
+        let mut links: HashMap<&str, Pose> = HashMap::new();
+        for (joint, value) in self.joints.iter().zip(values) {
+            let parent = links.get(joint.parent.link.as_str()).copied().unwrap_or(Pose::IDENTITY);
+            let pose = moved(joint, *value)?.then(&origin(&joint.origin)?)?.then(&parent)?;
             links.insert(&joint.child.link, pose);
         }
         let part = |(link, origin, id): &(String, Pose, InstanceId)| {
@@ -108,6 +131,55 @@ impl Robot {
             Ok((*id, origin.then(&link)?))
         };
         self.parts.iter().map(part).collect()
+    }
+
+    /// Returns the joints that move a part, by their numbers, from the part inward.
+    fn chain(&self, part: usize) -> Vec<usize> {
+        let mut chain = Vec::new();
+        let mut link = &self.parts[part].0;
+        while let Some(number) = self.joints.iter().position(|joint| joint.child.link == *link) {
+            chain.push(number);
+            link = &self.joints[number].parent.link;
+        }
+        chain
+    }
+}
+
+/// The path of a part while all joints go from some values to others at constant rates.
+struct LinkPath<'a> {
+    robot: &'a Robot,
+    part: usize,
+    from: &'a [f64],
+    to: &'a [f64],
+}
+
+impl bvh_query::Path for LinkPath<'_> {
+    fn pose(&self, t: f64) -> Pose {
+        let values: Vec<f64> =
+            self.from.iter().zip(self.to).map(|(from, to)| (1.0 - t) * from + t * to).collect();
+        // Rotations stay as rigid as rounding leaves them, and a pose of the start is one.
+        self.robot.poses(&values).map_or(Pose::IDENTITY, |poses| poses[self.part].1)
+    }
+
+    /// An eighth of the greatest acceleration times the square of the time. Joint j moves a point that is `arm` from its axis
+    /// at a rate of at most `rate * arm`, and every joint further in, i, turns that velocity: the acceleration is at most the
+    /// sum of `rate_i * rate_j * arm_j` over all pairs of joints, j being the outer one. A slide has an arm of 1.
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mut arm = radius + length(self.robot.parts[self.part].1.translation());
+        let (mut acceleration, mut outer) = (0.0, 0.0);
+        for number in self.robot.chain(self.part) {
+            let joint = &self.robot.joints[number];
+            let rate = (self.to[number] - self.from[number]).abs();
+            let is_slide = joint.joint_type == JointType::Prismatic;
+            let moved = rate * if is_slide { 1.0 } else { arm };
+            // With itself once, and twice with each joint further out.
+            acceleration += rate * (moved + 2.0 * outer);
+            outer += moved;
+            arm += length(*joint.origin.xyz)
+                + if is_slide { self.from[number].abs().max(self.to[number].abs()) } else { 0.0 };
+        }
+        acceleration * (t1 - t0).powi(2) / 8.0 + 1e-12 * arm
     }
 }
 

@@ -27,7 +27,8 @@
 //! - `cargo run --release --example collide`: two meshes in one pose, touching or how far apart.
 //! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
 //! - `cargo run --release --example planner`: a way through an environment, each edge of which is certified to be free.
-//! - `cargo run --release --example robot`: a robot of a URDF file among obstacles, in a [`Scene`].
+//! - `cargo run --release --example robot`: a robot of a URDF file among obstacles, in a [`Scene`], in
+//!   poses and on the ways between.
 //! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
 //!
 //! In short:
@@ -69,7 +70,7 @@ pub use file::mapped::ReadAhead;
 pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
-pub use motion::{Motion, MotionError, Path, Polyline};
+pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
 pub use pose::{Pose, PoseError};
 pub use query::answers::{Contact, Distance, QueryStats};
 #[cfg(feature = "parallel")]
@@ -80,7 +81,8 @@ pub use query::options::DistanceOptions;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceId, OpenSceneError, Scene, SceneContact, SceneDistance, SceneError, ScenePair, SceneShape,
+    Groups, InstanceId, OpenSceneError, Scene, SceneContact, SceneDistance, SceneError, SceneMotion,
+    ScenePair, SceneShape,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

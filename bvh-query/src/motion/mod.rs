@@ -1,5 +1,7 @@
 //! Motions of B in A's frame: the paths that questions about the way between two poses take.
 
 mod path;
+mod relative;
 
 pub use path::{Motion, MotionError, Path, Polyline};
+pub use relative::RelativePath;

@@ -12,9 +12,10 @@ pub trait Path {
     fn pose(&self, t: f64) -> Pose;
 
     /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
-    /// origin of B's frame, is during `[t0, t1]` from the straight segment between where it is at `t0` and at `t1`. It must
-    /// hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as infinite. Answers are only as
-    /// certain as this bound; the smaller it is for short intervals, the less work is a question.
+    /// origin of B's frame, is during `[t0, t1]` from where it would be if it went straight, at a constant rate, from where it
+    /// is at `t0` to where it is at `t1`. That is at most an eighth of the greatest acceleration times the square of the time.
+    /// It must hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as
+    /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work is a question.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
 
@@ -218,8 +219,8 @@ impl Motion {
 }
 
 /// A point at distance r from the axis moves on an arc of angle a, and linearly along the axis and with the origin, which
-/// adds nothing to its distance from the segment. The arc is at most r (1 - cos(a / 2)) <= r a^2 / 8 from its chord, for any
-/// a. Defects of rotations are linear in time, and stretch lengths by less than 2^-18.
+/// adds nothing. On the arc its acceleration is r a^2, for any a. Defects of rotations are linear in time, and stretch lengths
+/// by less than 2^-18.
 impl Path for Motion {
     fn pose(&self, t: f64) -> Pose {
         // NaN is no time; it counts as the start.
@@ -274,8 +275,8 @@ impl Path for Polyline {
         self.motions[number].pose(t)
     }
 
-    /// Within one motion, that of the motion; else half the length of the way, since a point of it is no farther than that
-    /// from the nearer end.
+    /// Within one motion, that of the motion; else the length of the way, since neither the point nor where it would be is
+    /// farther than that from both ends together.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         let ((first, from), (last, to)) = (self.at(t0), self.at(t1));
         // The time within a motion is rounded, by less than this share of it.
@@ -350,7 +351,7 @@ fn difference(a: &Matrix, b: &Matrix) -> Matrix {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     fn pose(axis: [f64; 3], angle: f64, translation: [f64; 3]) -> Pose {
@@ -358,7 +359,7 @@ mod tests {
         Pose::new(rodrigues(axis.map(|v| v / length), angle), translation).unwrap()
     }
 
-    fn signed(state: &mut u64) -> f64 {
+    pub(in crate::motion) fn signed(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
@@ -367,7 +368,7 @@ mod tests {
         [signed(state), signed(state), signed(state)]
     }
 
-    fn paths(state: &mut u64) -> Vec<Box<dyn Path>> {
+    pub(in crate::motion) fn paths(state: &mut u64) -> Vec<Box<dyn Path>> {
         let mut paths: Vec<Box<dyn Path>> = Vec::new();
         for angle in [0.0, 1e-9, 0.1, 1.0, 3.0, 3.1] {
             let start = pose(vector(state), 3.0 * signed(state), vector(state).map(|v| 10.0 * v));
@@ -434,6 +435,28 @@ mod tests {
         assert_eq!((line.pose(f64::NAN), line.pose(9.0)), (line.pose(0.0), line.pose(1.0)));
     }
 
+    /// How far a random point is at most from where it would be on its way straight through a random interval of length
+    /// 2^-level, as a share of the bound.
+    pub(in crate::motion) fn departure(path: &dyn Path, level: i32, state: &mut u64) -> f64 {
+        let size = 0.5f64.powi(level);
+        let t0 = (signed(state).abs() / size).floor() * size;
+        let t1 = (t0 + size).min(1.0);
+        let radius = 2.0 * signed(state).abs() + 1e-6;
+        let bound = path.sagitta(radius, t0, t1);
+        let p = vector(state);
+        let length = p.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let p = p.map(|v| v / length * radius);
+        let (a, b) = (path.pose(t0).place(p), path.pose(t1).place(p));
+        let mut largest: f64 = 0.0;
+        for step in 0..=64 {
+            let share = f64::from(step) / 64.0;
+            let at = path.pose(t0 + (t1 - t0) * share).place(p);
+            let off = (0..3).map(|k| (at[k] - a[k] - share * (b[k] - a[k])).powi(2)).sum::<f64>().sqrt();
+            largest = largest.max(off / bound);
+        }
+        largest
+    }
+
     /// Points on the sphere of the radius never leave the segment by more than the bound, and some come near it.
     #[test]
     fn no_point_leaves_its_segment_by_more_than_the_sagitta() {
@@ -442,25 +465,9 @@ mod tests {
         for path in paths(state) {
             for _ in 0..60 {
                 let level = (signed(state).abs() * 20.0) as i32;
-                let size = 0.5f64.powi(level);
-                let t0 = (signed(state).abs() / size).floor() * size;
-                let t1 = (t0 + size).min(1.0);
-                let radius = 2.0 * signed(state).abs() + 1e-6;
-                let bound = path.sagitta(radius, t0, t1);
-                let p = vector(state);
-                let length = p.iter().map(|v| v * v).sum::<f64>().sqrt();
-                let p = p.map(|v| v / length * radius);
-                let (a, b) = (path.pose(t0).place(p), path.pose(t1).place(p));
-                for step in 0..=64 {
-                    let at = path.pose(t0 + (t1 - t0) * f64::from(step) / 64.0).place(p);
-                    let (ab, ap) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| at[k] - a[k]));
-                    let squared = ab.iter().map(|v| v * v).sum::<f64>();
-                    let along = (0..3).map(|k| ab[k] * ap[k]).sum::<f64>();
-                    let s = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
-                    let off = (0..3).map(|k| (ap[k] - s * ab[k]).powi(2)).sum::<f64>().sqrt();
-                    assert!(off <= bound, "{off:e} of {bound:e}, from {t0} to {t1}");
-                    largest = largest.max(if level < 8 { off / bound } else { 0.0 });
-                }
+                let ratio = departure(&*path, level, state);
+                assert!(ratio <= 1.0, "{ratio} at level {level}");
+                largest = largest.max(if level < 8 { ratio } else { 0.0 });
             }
         }
         assert!(largest > 0.5, "{largest}");

@@ -93,6 +93,32 @@ impl BroadPhase {
         pairs((&self.moving, &self.moving), limit, &mut visit);
     }
 
+    /// Calls `visit` with each place whose groups meet those given and whose box is near another box. How far apart they may
+    /// be, `limit` says of a box or of one that holds it.
+    pub(super) fn near(
+        &self,
+        bounds: &WorldBox,
+        groups: Groups,
+        limit: impl Fn(&WorldBox) -> f64,
+        mut visit: impl FnMut(u32),
+    ) {
+        for tree in [&self.still, &self.moving] {
+            let mut open: Vec<u32> = if tree.nodes.is_empty() { vec![] } else { vec![0] };
+            while let Some(number) = open.pop() {
+                let node = &tree.nodes[number as usize];
+                let is_near = || bounds.squared_gap(&node.bounds) <= limit(&node.bounds).powi(2);
+                if !node.groups.meet(groups) || !is_near() {
+                    continue;
+                }
+                if node.is_leaf() {
+                    visit(node.children[1]);
+                } else {
+                    open.extend(node.children);
+                }
+            }
+        }
+    }
+
     fn tree(&self, which: Which) -> &Tree {
         match which {
             Which::Still => &self.still,

@@ -9,6 +9,7 @@
 mod broad_phase;
 mod error;
 mod instance;
+mod motion;
 mod question;
 mod trackers;
 mod workers;
@@ -16,6 +17,7 @@ mod world_box;
 
 pub use error::{OpenSceneError, SceneError};
 pub use instance::{Groups, InstanceId, SceneShape};
+pub use motion::SceneMotion;
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
 use crate::file::bvh::Bvh;

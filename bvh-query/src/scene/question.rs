@@ -14,10 +14,11 @@ use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A pair of instances; A is the lower one.
+/// A pair of instances; A is the lower one, but in answers about motions ([`SceneMotion`](crate::SceneMotion)) one that stands
+/// still.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct ScenePair {
-    /// The lower instance, whose frame answers are in.
+    /// The instance whose frame answers are in.
     pub a: InstanceId,
     /// The other instance.
     pub b: InstanceId,
@@ -374,13 +375,18 @@ impl Scene {
     }
 
     /// Names the pair whose question has no answer.
-    fn pair_error(&self, pair: ScenePair, source: QueryError) -> SceneError {
+    pub(super) fn pair_error(&self, pair: ScenePair, source: QueryError) -> SceneError {
         SceneError::Pair { a: self.describe(pair.a), b: self.describe(pair.b), source }
     }
 
     /// Returns both instances of a candidate.
     fn both(&self, candidate: &Candidate) -> Option<(&Instance, &Instance)> {
+        self.instances_at(candidate.a, candidate.b)
+    }
+
+    /// Returns the instances in two places.
+    pub(super) fn instances_at(&self, a: u32, b: u32) -> Option<(&Instance, &Instance)> {
         let of = |place: u32| self.instances.get(place as usize)?.as_ref();
-        Some((of(candidate.a)?, of(candidate.b)?))
+        Some((of(a)?, of(b)?))
     }
 }

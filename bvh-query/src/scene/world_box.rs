@@ -66,6 +66,13 @@ impl WorldBox {
         Self { lo: [lo(0), lo(1), lo(2)], hi: [hi(0), hi(1), hi(2)] }
     }
 
+    /// Returns a box that is larger by some mesh units on every side.
+    pub(super) fn grown(&self, by: f64) -> Self {
+        // More than all roundings.
+        let by = |end: f64| by * (1.0 + 1.0 / (1u64 << 40) as f64) + ERROR * end.abs();
+        Self { lo: self.lo.map(|end| end - by(end)), hi: self.hi.map(|end| end + by(end)) }
+    }
+
     /// Returns the sum of the sides: how often a box is met grows with it. That of the empty box is 0.
     pub(super) fn girth(&self) -> f64 {
         (0..3).map(|k| (self.hi[k] - self.lo[k]).max(0.0)).sum()

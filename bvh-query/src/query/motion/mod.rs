@@ -18,12 +18,15 @@ mod question;
 mod search;
 pub(super) mod sweep;
 
+pub(crate) use question::{radius, tolerance};
+pub(crate) use search::Earliest;
+
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::Path;
 use crate::pose::Pose;
 use crate::query::answers::Distance;
-use crate::query::options::DistanceOptions;
+use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::querier::Querier;
 use crate::query::search::Search;
 use question::Question;
@@ -56,6 +59,19 @@ impl MotionOptions {
     #[must_use]
     pub fn tolerance(self, tolerance: impl Into<Option<f64>>) -> Self {
         Self { tolerance: tolerance.into(), ..self }
+    }
+}
+
+impl MotionOptions {
+    /// Refuses numbers that mean nothing.
+    pub(crate) fn check(&self) -> Result<(), QueryError> {
+        check_distance(self.clearance)?;
+        match self.tolerance {
+            Some(found) if !(found.is_finite() && found > 0.0) => {
+                Err(QueryError::Number { name: "tolerance", expected: "a finite length above 0", found })
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -105,9 +121,21 @@ impl Querier {
         path: &dyn Path,
         options: &MotionOptions,
     ) -> Result<MotionAnswer, QueryError> {
-        let question = Question::new(a.into(), b.into(), path, options)?;
+        self.motion_before(a.into(), b.into(), path, options, &Earliest::new())
+    }
+
+    /// Answers as `motion` does, but for what is later than the earliest hit of all searches side by side.
+    pub(crate) fn motion_before(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        path: &dyn Path,
+        options: &MotionOptions,
+        earliest: &Earliest,
+    ) -> Result<MotionAnswer, QueryError> {
+        let question = Question::new(a, b, path, options)?;
         self.start();
-        match TimeSearch::new(self, &question).first()? {
+        match TimeSearch::new(self, &question).first(earliest)? {
             Outcome::Free => Ok(MotionAnswer::Free),
             Outcome::Hit { free_until, touching_at } => {
                 let contact = self.distance_at(&question, &path.pose(touching_at))?;

@@ -7,7 +7,6 @@ use crate::motion::Path;
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
-use crate::query::options::check_distance;
 use bvh_format::object::Object;
 
 /// The default tolerance, as a fraction of the diagonal of the larger object's box.
@@ -53,24 +52,24 @@ impl<'a> Question<'a> {
         path: &'a dyn Path,
         options: &MotionOptions,
     ) -> Result<Self, QueryError> {
-        check_distance(options.clearance)?;
-        let mut question = Self::unchecked(a, b, path);
-        question.clearance = options.clearance;
-        // Two points have no diagonal.
-        let default = if question.size > 0.0 { DEFAULT_TOLERANCE * question.size } else { DEFAULT_TOLERANCE };
-        question.tolerance = options.tolerance.unwrap_or(default);
-        if !(question.tolerance.is_finite() && question.tolerance > 0.0) {
-            let (name, expected) = ("tolerance", "a finite length above 0");
-            return Err(QueryError::Number { name, expected, found: question.tolerance });
-        }
-        Ok(question)
+        options.check()?;
+        let (clearance, tolerance) = (options.clearance, tolerance(a.objects(), b.objects(), options));
+        Ok(Self { clearance, tolerance, ..Self::unchecked(a, b, path) })
     }
 
     /// A question without clearance and tolerance.
     pub(super) fn unchecked(a: Shape<'a>, b: Shape<'a>, path: &'a dyn Path) -> Self {
-        let largest = |shape: Shape<'_>| shape.objects().iter().map(diagonal).fold(0.0, f64::max);
-        let size = largest(a).max(largest(b));
-        Self { a, b, path, clearance: 0.0, tolerance: 0.0, size, radius: radius(b), radius_a: radius(a) }
+        let size = size(a.objects()).max(size(b.objects()));
+        Self {
+            a,
+            b,
+            path,
+            clearance: 0.0,
+            tolerance: 0.0,
+            size,
+            radius: radius(b.objects()),
+            radius_a: radius(a.objects()),
+        }
     }
 
     /// Returns the stretch between two times.
@@ -105,8 +104,16 @@ impl<'a> Question<'a> {
     }
 }
 
-/// Returns how far vertices of a shape are at most from the origin of its frame, rounded up, in mesh units.
-fn radius(shape: Shape<'_>) -> f64 {
+/// Returns the tolerance of a question about two shapes.
+pub(crate) fn tolerance(a: &[Object], b: &[Object], options: &MotionOptions) -> f64 {
+    let size = size(a).max(size(b));
+    // Two points have no diagonal.
+    let default = if size > 0.0 { DEFAULT_TOLERANCE * size } else { DEFAULT_TOLERANCE };
+    options.tolerance.unwrap_or(default)
+}
+
+/// Returns how far vertices of objects are at most from the origin of their frame, rounded up, in mesh units.
+pub(crate) fn radius(objects: &[Object]) -> f64 {
     let of = |object: &Object| {
         let [lo, hi] = object.bounding_box();
         let far: f64 = (0..3).map(|axis| lo[axis].abs().max(hi[axis].abs()).powi(2)).sum();
@@ -115,11 +122,14 @@ fn radius(shape: Shape<'_>) -> f64 {
         far.sqrt().min(centre.sqrt() + radius)
     };
     // A rotation may stretch by 2^-19.
-    shape.objects().iter().map(of).fold(0.0, f64::max) * (1.0 + 1.0 / (1 << 18) as f64)
+    objects.iter().map(of).fold(0.0, f64::max) * (1.0 + 1.0 / (1 << 18) as f64)
 }
 
-/// Returns the diagonal of an object's box, in mesh units.
-fn diagonal(object: &Object) -> f64 {
-    let [lo, hi] = object.bounding_box();
-    (0..3).map(|axis| (hi[axis] - lo[axis]).powi(2)).sum::<f64>().sqrt()
+/// Returns the largest diagonal of the boxes of objects, in mesh units.
+fn size(objects: &[Object]) -> f64 {
+    let diagonal = |object: &Object| {
+        let [lo, hi] = object.bounding_box();
+        (0..3).map(|axis| (hi[axis] - lo[axis]).powi(2)).sum::<f64>().sqrt()
+    };
+    objects.iter().map(diagonal).fold(0.0, f64::max)
 }

@@ -24,6 +24,7 @@ use crate::query::placed_pair::each_pair;
 use crate::query::querier::Querier;
 use crate::query::search::Search;
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The most pairs of triangles that are kept from stretch to stretch.
 const MOST_PAIRS: usize = 48;
@@ -65,6 +66,25 @@ enum Cell {
     Undecided,
 }
 
+/// The earliest hit that several searches side by side have found so far.
+pub(crate) struct Earliest(AtomicU64);
+
+impl Earliest {
+    /// No search has found any.
+    pub(crate) fn new() -> Self {
+        Self(AtomicU64::new(f64::INFINITY.to_bits()))
+    }
+
+    fn time(&self) -> f64 {
+        f64::from_bits(self.0.load(Ordering::Relaxed))
+    }
+
+    fn lower(&self, time: f64) {
+        // Numbers from 0 on are ordered as their bits are.
+        self.0.fetch_min(time.to_bits(), Ordering::Relaxed);
+    }
+}
+
 /// A search for the first hit, or for any.
 pub(super) struct TimeSearch<'s, 'a> {
     querier: &'s mut Querier,
@@ -76,8 +96,17 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Self { querier, question }
     }
 
-    /// Returns the first hit, or the first cell that is undecided.
-    pub(super) fn first(&mut self) -> Result<Outcome, QueryError> {
+    /// Returns the first hit, or the first cell that is undecided. What is later than the earliest hit of all searches side by
+    /// side is not looked at.
+    pub(super) fn first(&mut self, earliest: &Earliest) -> Result<Outcome, QueryError> {
+        let found = self.first_before(earliest)?;
+        if let Outcome::Hit { touching_at, .. } = found {
+            earliest.lower(touching_at);
+        }
+        Ok(found)
+    }
+
+    fn first_before(&mut self, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let whole = self.whole();
         if self.is_within(&whole.stretch.poses[0], self.question.clearance)? {
             return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
@@ -85,6 +114,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         let mut undecided: Option<(f64, f64)> = None;
         let mut todo = vec![whole];
         while let Some(interval) = todo.pop() {
+            if interval.stretch.times[0] > earliest.time() {
+                break;
+            }
             self.querier.memory.visit()?;
             let middle = self.question.middle(&interval.stretch);
             if self.is_cell(&middle) {

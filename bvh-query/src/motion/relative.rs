@@ -1,0 +1,145 @@
+//! The path of B in A's frame when both move in the world.
+
+use crate::motion::Path;
+use crate::pose::Pose;
+
+/// The path of B in A's frame, given the paths of both in the world: at each time, `Pose::relative` of their poses. This is
+/// what [`Scene::motion`](crate::Scene::motion) asks a querier about.
+///
+/// Where poses of A and B have no relative pose, because a rotation is farther from rigid than 2^-23 or a translation beyond
+/// 2^118, B counts as unmoved, and the sagitta as infinite.
+#[derive(Clone, Copy)]
+pub struct RelativePath<'a> {
+    a: &'a dyn Path,
+    b: &'a dyn Path,
+}
+
+impl<'a> RelativePath<'a> {
+    /// Returns the path of B in A's frame.
+    pub fn new(a: &'a dyn Path, b: &'a dyn Path) -> Self {
+        Self { a, b }
+    }
+}
+
+/// What stands still, in the world.
+impl Path for Pose {
+    fn pose(&self, _t: f64) -> Pose {
+        *self
+    }
+
+    fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
+        0.0
+    }
+}
+
+type Matrix = [[f64; 3]; 3];
+
+/// More than the norm of the inverse of any pose's rotation.
+const MOST: f64 = 1.0 + 1.0 / (1 << 18) as f64;
+/// More than the relative error of all arithmetic here.
+const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// Let M be the inverse of A's rotation R, w the way from A's origin to a point of B, in the world, and q = M w where the
+/// point is in A's frame. An index "lin" stands for what is linear in time between both ends, which are indexed 0 and 1; D
+/// for a difference of the ends.
+///
+/// - w is within e = s_b(r) + s_a(0) of w_lin, by both sagittas, and no longer than W, the larger of both ends and e.
+/// - R_lin M_lin = I + X with |X| <= x = |DR|^2 m^2 / 4, where m bounds |M|. So R_lin^-1 is within m x / (1 - x) of M_lin.
+/// - R c is within s_a(|c|) + s_a(0) of R_lin c. So M w is within m (s_a(W') + s_a(0)) of R_lin^-1 w, W' = m W / (1 - x).
+/// - M_lin w_lin is within |DM| |Dw| / 4 of q_lin, and |DM| <= m^2 |DR|.
+///
+/// Together q is within m x W / (1 - x) + m (s_a(W') + s_a(0)) + m e + m^2 |DR| |Dw| / 4 of q_lin. Where x is no less than a
+/// half, 2 m W takes the place of the first two terms. The poses of both are computed with an error of less than 2^-45 of the
+/// magnitudes involved (`spec/numerics.md`), which is charged thrice, as are roundings here.
+impl Path for RelativePath<'_> {
+    fn pose(&self, t: f64) -> Pose {
+        Pose::relative(&self.a.pose(t), &self.b.pose(t)).unwrap_or(Pose::IDENTITY)
+    }
+
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        let [a0, a1] = [self.a.pose(t0), self.a.pose(t1)];
+        let [b0, b1] = [self.b.pose(t0), self.b.pose(t1)];
+        if Pose::relative(&a0, &b0).is_err() || Pose::relative(&a1, &b1).is_err() {
+            return f64::INFINITY;
+        }
+        let of = |path: &dyn Path, radius: f64| {
+            let sagitta = path.sagitta(radius, t0, t1);
+            if sagitta >= 0.0 { sagitta } else { f64::INFINITY }
+        };
+        let [way_0, way_1] = [between(&a0, &b0), between(&a1, &b1)];
+        let turned = norm(&difference(a1.rotation(), a0.rotation()));
+        let moved = length([0, 1, 2].map(|k| way_1[k] - way_0[k]))
+            + norm(&difference(b1.rotation(), b0.rotation())) * radius;
+        let still_a = of(self.a, 0.0);
+        let bent = of(self.b, radius) + still_a;
+        let farthest = length(way_0).max(length(way_1)) + MOST * radius + bent;
+        let x = turned * turned * MOST * MOST / 4.0;
+        let turning = if x < 0.5 {
+            let rest = 1.0 / (1.0 - x);
+            MOST * (x * farthest * rest + of(self.a, MOST * farthest * rest) + still_a)
+        } else {
+            2.0 * MOST * farthest
+        };
+        let magnitude =
+            radius + [a0, a1, b0, b1].iter().flat_map(|pose| pose.translation()).map(f64::abs).sum::<f64>();
+        let crossed = MOST * MOST * turned * moved / 4.0;
+        (turning + MOST * bent + crossed) * (1.0 + ROUNDING) + 2.0 * ROUNDING * magnitude
+    }
+}
+
+/// From A's origin to B's, in the world.
+fn between(a: &Pose, b: &Pose) -> [f64; 3] {
+    let (from, to) = (a.translation(), b.translation());
+    [0, 1, 2].map(|k| to[k] - from[k])
+}
+
+fn difference(x: &Matrix, y: &Matrix) -> Matrix {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| x[i][j] - y[i][j]))
+}
+
+/// The Frobenius norm, which is no less than the operator's.
+fn norm(matrix: &Matrix) -> f64 {
+    matrix.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::path::tests::{departure, paths, signed};
+
+    #[test]
+    fn no_point_of_b_leaves_its_segment_in_the_frame_of_a() {
+        let state = &mut 5;
+        let mut largest: f64 = 0.0;
+        let worlds = paths(state);
+        for a in &worlds {
+            for b in worlds.iter().step_by(2) {
+                let path = RelativePath::new(&**a, &**b);
+                for _ in 0..6 {
+                    let level = (signed(state).abs() * 20.0) as i32;
+                    let ratio = departure(&path, level, state);
+                    assert!(ratio <= 1.0, "{ratio} at level {level}");
+                    largest = largest.max(if (3..8).contains(&level) { ratio } else { 0.0 });
+                }
+            }
+        }
+        assert!(largest > 0.2, "{largest}");
+    }
+
+    /// Among what stands still, there is nothing but rounding; and a path in the frame of what stands still keeps its sagitta.
+    #[test]
+    fn what_stands_still_adds_nothing() {
+        let state = &mut 6;
+        for path in paths(state) {
+            let still = path.pose(0.3);
+            let of = |a: &dyn Path, b: &dyn Path| RelativePath::new(a, b).sagitta(1.0, 0.25, 0.5);
+            assert!(of(&still, &still) < 1e-9);
+            let own = path.sagitta(1.0, 0.25, 0.5);
+            assert!((of(&still, &*path) - own).abs() <= 1e-5 * own + 1e-9);
+        }
+    }
+}

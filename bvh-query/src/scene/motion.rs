@@ -1,0 +1,288 @@
+//! Motions in a scene: some instances on paths, the rest still, and all pairs of which one moves.
+//!
+//! A pair is about one path: that of B in the frame of A, the one that stands still, or the lower one. Pairs are left out
+//! whose boxes never come near each other. The whole time is divided into slices for that: during a slice, an instance stays
+//! in the box around both ends, but for the sagitta.
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::motion::{Path, RelativePath};
+use crate::query::motion::{Earliest, MotionAnswer, MotionOptions, radius, tolerance};
+use crate::query::querier::Querier;
+use crate::scene::instance::{Instance, InstanceId};
+use crate::scene::question::{SceneDistance, ScenePair};
+use crate::scene::world_box::WorldBox;
+use crate::scene::{Scene, SceneError, check_world};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Into how many slices the time is divided, so that boxes follow the paths.
+const SLICES: usize = 16;
+
+/// Whether the ways of all moving instances are free. Of a pair of which one stands still, that one is A; else the lower one
+/// is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SceneMotion {
+    /// At no time from 0 to 1 is any pair within the clearance.
+    Free,
+    /// A pair is within the clearance in the poses at `touching_at`.
+    Hit {
+        /// Before this time certainly no pair is. It equals `touching_at` only where both are 0.
+        free_until: f64,
+        /// A time at which the pair is: the earliest one found.
+        touching_at: f64,
+        /// The pair, and its distance at that time. Of several, the first pair.
+        contact: SceneDistance,
+    },
+    /// A pair comes so near that neither can be told, as for [`MotionAnswer::Near`].
+    Near {
+        /// Before this time certainly no pair is within the clearance.
+        free_until: f64,
+        /// The time of the first undecided poses.
+        at: f64,
+        /// The pair, and its distance at that time.
+        distance: SceneDistance,
+    },
+}
+
+/// A path in the world that threads share.
+type WorldPath<'a> = &'a (dyn Path + Sync);
+
+/// A pair to ask about: places of instances, and the first slice in which their boxes come near each other.
+#[derive(Clone, Copy, Debug)]
+struct Encounter {
+    slice: usize,
+    a: u32,
+    b: u32,
+}
+
+/// A moving instance, and where it is during each slice.
+struct Moving<'a> {
+    place: u32,
+    instance: &'a Instance,
+    slices: Vec<WorldBox>,
+}
+
+/// What is asked: the paths by the places of their instances.
+struct Ways<'a> {
+    paths: BTreeMap<u32, WorldPath<'a>>,
+    options: &'a MotionOptions,
+}
+
+impl Scene {
+    /// Returns whether the ways of some instances are free while they move in the world along `paths`, at the same time, and
+    /// the rest stands still. Asked about are all pairs of which one moves, as in other questions: their groups meet, and
+    /// they may not touch. Where an instance on a path stands now does not matter, and it stays there.
+    ///
+    /// The answer is certain at every moment, and that of [`Querier::motion`] about each pair along its
+    /// [`RelativePath`], put together: the earliest hit, before which no pair may be within the clearance. The default tolerance
+    /// is that of each pair. Of an instance that is named twice, the last path counts.
+    ///
+    /// Cost: that of [`Querier::motion`] for each pair whose boxes come near each other, until the earliest hit. Where both
+    /// instances turn, more intervals are looked at than where one stands still.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`]; [`SceneError::Pose`] as for [`Scene::add`], of a path's start and end;
+    /// [`SceneError::Query`] for a clearance or a tolerance that means nothing; and [`SceneError::Pair`] with a pair whose question has no
+    /// answer.
+    pub fn motion(
+        &mut self,
+        paths: &[(InstanceId, WorldPath<'_>)],
+        options: &MotionOptions,
+    ) -> Result<SceneMotion, SceneError> {
+        let ways = self.ways(paths, options)?;
+        let encounters = self.encounters(&ways);
+        let earliest = Earliest::new();
+        let answers = self.each_way(&encounters, &ways, |querier, pair, a, b, path| {
+            let answer = querier.motion_before(a, b, path, options, &earliest)?;
+            Ok((answer != MotionAnswer::Free).then_some((pair, answer)))
+        })?;
+        Ok(together(&answers))
+    }
+
+    /// Returns whether the ways are certainly free: whether [`Scene::motion`] answers [`SceneMotion::Free`], which takes less
+    /// time to find out. This is what planners ask. To check many edges on all cores, clone the scene for each thread.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::motion`], unless another pair is found not to be free.
+    pub fn is_free(
+        &mut self,
+        paths: &[(InstanceId, WorldPath<'_>)],
+        options: &MotionOptions,
+    ) -> Result<bool, SceneError> {
+        let ways = self.ways(paths, options)?;
+        let encounters = self.encounters(&ways);
+        let is_hit = AtomicBool::new(false);
+        let answers = self.each_way(&encounters, &ways, |querier, pair, a, b, path| {
+            if is_hit.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let answer = querier.is_free(a, b, path, options);
+            if answer == Ok(false) {
+                is_hit.store(true, Ordering::Relaxed);
+            }
+            Ok((answer != Ok(true)).then_some((pair, answer)))
+        })?;
+        if answers.iter().any(|(_, answer)| answer.is_ok()) {
+            return Ok(false);
+        }
+        match answers.into_iter().next() {
+            Some((pair, Err(source))) => Err(self.pair_error(pair, source)),
+            _ => Ok(true),
+        }
+    }
+
+    /// Checks what is given.
+    fn ways<'a>(
+        &mut self,
+        paths: &[(InstanceId, WorldPath<'a>)],
+        options: &'a MotionOptions,
+    ) -> Result<Ways<'a>, SceneError> {
+        options.check()?;
+        for &(id, path) in paths {
+            self.place(id)?;
+            for world in [path.pose(0.0), path.pose(1.0)] {
+                check_world(&world).map_err(|(what, found)| SceneError::Pose {
+                    instance: self.describe(id),
+                    what,
+                    found,
+                })?;
+            }
+        }
+        self.start();
+        Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })
+    }
+
+    /// Returns the pairs that may come within the clearance, in the order in which their boxes do.
+    fn encounters(&self, ways: &Ways<'_>) -> Vec<Encounter> {
+        let moving: Vec<Moving<'_>> =
+            ways.paths.iter().filter_map(|(&place, &path)| self.moving(place, path)).collect();
+        let mut encounters = Vec::new();
+        for (number, one) in moving.iter().enumerate() {
+            let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
+            let mut near = Vec::new();
+            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other);
+            self.broad.near(&whole, one.instance.groups, limit, |place| near.push(place));
+            for place in near.into_iter().filter(|place| !ways.paths.contains_key(place)) {
+                let Some(other) = self.instances.get(place as usize).and_then(Option::as_ref) else {
+                    continue;
+                };
+                let slices = [other.bounds; SLICES];
+                let pair = [(place, other, slices.as_slice()), (one.place, one.instance, &one.slices)];
+                encounters.extend(self.encounter(pair, ways));
+            }
+            for other in &moving[number + 1..] {
+                let pair = [one, other].map(|of| (of.place, of.instance, of.slices.as_slice()));
+                encounters.extend(self.encounter(pair, ways));
+            }
+        }
+        encounters.sort_unstable_by_key(|encounter| (encounter.slice, encounter.a, encounter.b));
+        encounters
+    }
+
+    /// Returns a moving instance with its boxes.
+    fn moving(&self, place: u32, path: WorldPath<'_>) -> Option<Moving<'_>> {
+        let instance = self.instances.get(place as usize)?.as_ref()?;
+        let objects = instance.shape.objects();
+        let radius = radius(objects);
+        let ends: Vec<WorldBox> =
+            (0..=SLICES).map(|end| WorldBox::of(objects, &path.pose(time(end)))).collect();
+        let slice = |number: usize| {
+            let sagitta = path.sagitta(radius, time(number), time(number + 1));
+            let sagitta = if sagitta >= 0.0 { sagitta } else { f64::INFINITY };
+            ends[number].union(&ends[number + 1]).grown(sagitta)
+        };
+        Some(Moving { place, instance, slices: (0..SLICES).map(slice).collect() })
+    }
+
+    /// Returns when the boxes of two instances first come near each other, if they do and are asked about.
+    fn encounter(
+        &self,
+        [(a, one, slices), (b, other, others)]: [(u32, &Instance, &[WorldBox]); 2],
+        ways: &Ways<'_>,
+    ) -> Option<Encounter> {
+        if !one.groups.meet(other.groups) || one.allows(b) {
+            return None;
+        }
+        let tolerance = tolerance(one.shape.objects(), other.shape.objects(), ways.options);
+        let limit = (ways.options.clearance + tolerance).powi(2);
+        let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
+        let slice = slices.iter().zip(others).position(is_near);
+        slice.map(|slice| Encounter { slice, a, b })
+    }
+
+    /// Asks about each pair with the path of B in A's frame.
+    fn each_way<R: Send>(
+        &mut self,
+        encounters: &[Encounter],
+        ways: &Ways<'_>,
+        ask: impl Fn(&mut Querier, ScenePair, Shape<'_>, Shape<'_>, &dyn Path) -> Result<Option<R>, QueryError>
+        + Sync,
+    ) -> Result<Vec<R>, SceneError> {
+        let mut stats = self.stats;
+        let scene = &*self;
+        let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
+            let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
+            let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
+            let (shape_a, shape_b) = (one.shape.opened()?, other.shape.opened()?);
+            let pair = ScenePair { a: one.id(a), b: other.id(b) };
+            ask(querier, pair, shape_a.shape(), shape_b.shape(), &path)
+        });
+        self.stats = stats;
+        self.pairs_asked = encounters.len() as u64;
+        found.map_err(|(number, source)| {
+            let Encounter { a, b, .. } = encounters[number];
+            match self.instances_at(a, b) {
+                Some((one, other)) => self.pair_error(ScenePair { a: one.id(a), b: other.id(b) }, source),
+                None => source.into(),
+            }
+        })
+    }
+}
+
+impl Ways<'_> {
+    /// Returns the path of an instance, which may be its pose.
+    fn path<'a>(&'a self, place: u32, instance: &'a Instance) -> &'a dyn Path {
+        match self.paths.get(&place) {
+            Some(&path) => path,
+            None => &instance.world,
+        }
+    }
+
+    /// Returns how far apart the boxes of two instances may be for a question to matter. The diagonal of an object's own box
+    /// is at most the square root of 3 times that of any box around it, and no side of the latter is longer than all.
+    fn limit_by_boxes(&self, one: &WorldBox, other: &WorldBox) -> f64 {
+        let default = 2e-6 * one.girth().max(other.girth());
+        self.options.clearance + self.options.tolerance.unwrap_or(default)
+    }
+}
+
+/// The start of a slice, or the end of the last one.
+fn time(slice: usize) -> f64 {
+    slice as f64 / SLICES as f64
+}
+
+/// Puts the answers about pairs together; pairs that are free are not among them.
+fn together(answers: &[(ScenePair, MotionAnswer)]) -> SceneMotion {
+    let (mut free, mut hit, mut near) = (f64::INFINITY, None, None);
+    for &(pair, answer) in answers {
+        let of = |time: f64, distance| (time, SceneDistance { pair, distance });
+        let (free_until, found, first) = match answer {
+            MotionAnswer::Free => continue,
+            MotionAnswer::Hit { free_until, touching_at, contact } => {
+                (free_until, of(touching_at, contact), &mut hit)
+            }
+            MotionAnswer::Near { free_until, at, distance } => (free_until, of(at, distance), &mut near),
+        };
+        free = free.min(free_until);
+        let order = |&(time, ref distance): &(f64, SceneDistance)| (time, distance.pair);
+        if first.as_ref().is_none_or(|first| order(&found) < order(first)) {
+            *first = Some(found);
+        }
+    }
+    match (hit, near) {
+        (Some((touching_at, contact)), _) => SceneMotion::Hit { free_until: free, touching_at, contact },
+        (None, Some((at, distance))) => SceneMotion::Near { free_until: free, at, distance },
+        (None, None) => SceneMotion::Free,
+    }
+}
