@@ -393,7 +393,7 @@ fn labelled_motions_are_answered_rightly() {
 }
 
 /// Translations of one triangle past another, which may be segments or points, with labels from rational arithmetic. Those
-/// whose vertices are f32 are baked; many touch at the start, or only just.
+/// whose vertices are f32 are baked; many touch at the start, or only just. The search itself has a test with all of them.
 #[test]
 fn exact_translations_are_answered() {
     let Some(path) = shared("motions/ccd/translations.txt") else { return };

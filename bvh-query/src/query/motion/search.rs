@@ -111,8 +111,19 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         if self.is_within(&whole.stretch.poses[0], self.question.clearance)? {
             return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
         }
+        let found = self.in_order(whole, earliest)?;
+        if let Outcome::Undecided { free_until, .. } = found
+            && self.is_within(&self.question.path.pose(1.0), self.question.clearance)?
+        {
+            return Ok(Outcome::Hit { free_until, touching_at: 1.0 });
+        }
+        Ok(found)
+    }
+
+    /// Looks at an interval and its parts in the order of time.
+    fn in_order(&mut self, interval: Interval, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let mut undecided: Option<(f64, f64)> = None;
-        let mut todo = vec![whole];
+        let mut todo = vec![interval];
         while let Some(interval) = todo.pop() {
             if interval.stretch.times[0] > earliest.time() {
                 break;
@@ -135,11 +146,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                 self.look(interval, &middle, &mut todo)?;
             }
         }
-        let Some((free_until, at)) = undecided else { return Ok(Outcome::Free) };
-        if self.is_within(&self.question.path.pose(1.0), self.question.clearance)? {
-            return Ok(Outcome::Hit { free_until, touching_at: 1.0 });
-        }
-        Ok(Outcome::Undecided { free_until, at })
+        Ok(undecided.map_or(Outcome::Free, |(free_until, at)| Outcome::Undecided { free_until, at }))
     }
 
     /// Returns whether there is neither a hit nor a cell that is undecided. Long stretches come first, as long as they are
@@ -368,5 +375,87 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         let mut search = Search::new(DistanceOptions::default(), d);
         self.querier.search(a, b, pose, &mut search)?;
         Ok(search.done)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::bvh::Bvh;
+    use crate::isa::Backend;
+    use crate::motion::Motion;
+    use crate::query::motion::MotionOptions;
+    use crate::query::motion::pairs::SweptPair;
+    use bvh_bake::mesh::Mesh;
+
+    type Triangle = [[f64; 3]; 3];
+
+    const TRANSLATIONS: &str =
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/motions/ccd/translations.txt");
+
+    /// A mesh of one triangle, whose vertices are rounded to `f32`.
+    fn baked(triangle: &Triangle) -> Bvh {
+        let corners = triangle.map(|corner| corner.map(|x| f64::from(x as f32)));
+        let mesh = Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2]]);
+        Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default()).unwrap().0).unwrap()
+    }
+
+    /// Asks about two triangles whose vertices need not be `f32`: the search as it is when one pair is left of a walk. The
+    /// meshes say only how far B may be from its frame's origin, which does not matter for a translation.
+    fn ask(backend: Backend, pair: SweptPair, path: &Motion, tolerance: f64) -> Outcome {
+        let (a, b) = (baked(&pair.a), baked(&pair.b));
+        let options = MotionOptions::new().tolerance(tolerance);
+        let question = Question::new(a.all(), b.all(), path, &options).unwrap();
+        let mut querier = Querier::with_backend(backend);
+        querier.start();
+        let mut search = TimeSearch::new(&mut querier, &question);
+        let interval = Interval { pairs: Some(Kept::new(vec![pair])), ..search.whole() };
+        let mut touches_at =
+            |time: usize| search.querier.any_pair_within(&[pair], &interval.stretch.poses[time], 0.0);
+        if touches_at(0) {
+            return Outcome::Hit { free_until: 0.0, touching_at: 0.0 };
+        }
+        let touches_at_end = touches_at(1);
+        match search.in_order(interval, &Earliest::new()).unwrap() {
+            Outcome::Undecided { free_until, .. } if touches_at_end => {
+                Outcome::Hit { free_until, touching_at: 1.0 }
+            }
+            outcome => outcome,
+        }
+    }
+
+    /// Translations of a triangle, an edge or a point past another, with labels from rational arithmetic; many touch at the
+    /// start, or only just. A point meets a triangle at one instant, which may be no `f64`; then the answer is undecided.
+    #[test]
+    fn translations_of_f64_triangles_are_as_labelled() {
+        let Ok(text) = std::fs::read_to_string(TRANSLATIONS) else {
+            eprintln!("skipped: there is no {TRANSLATIONS}");
+            return;
+        };
+        // By label: free and hit.
+        let (mut all, mut undecided) = ([0; 2], [0; 2]);
+        for line in text.lines().filter(|line| !line.starts_with('#')) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let is_labelled_hit = words[2] == "1";
+            let numbers: Vec<f64> = words[4..].iter().map(|word| word.parse().unwrap()).collect();
+            let points = numbers.as_chunks::<3>().0;
+            let pair =
+                SweptPair { a: [points[0], points[1], points[2]], b: [points[3], points[4], points[5]] };
+            let moved = Pose::new(*Pose::IDENTITY.rotation(), points[6]).unwrap();
+            let path = Motion::between(&Pose::IDENTITY, &moved).unwrap();
+            let size = points[..6].as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                all[usize::from(is_labelled_hit)] += 1;
+                match ask(backend, pair, &path, 1e-11 * size) {
+                    Outcome::Free => assert!(!is_labelled_hit, "free: {line}"),
+                    Outcome::Hit { .. } => assert!(is_labelled_hit, "hit: {line}"),
+                    Outcome::Undecided { .. } => undecided[usize::from(is_labelled_hit)] += 1,
+                }
+            }
+        }
+        assert!(
+            20 * undecided[0] < all[0] && undecided[1] < all[1],
+            "{undecided:?} of {all:?} are undecided"
+        );
     }
 }
