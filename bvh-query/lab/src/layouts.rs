@@ -93,7 +93,7 @@ fn measure(pair: &Pair, backend: Backend, sweep: &Sweep, limit: usize) -> Result
         }
     }
     let mut given = Vec::new();
-    for file in &pair.poses {
+    for file in &pair.files {
         given.extend(input::poses(file)?);
     }
     let mut querier = Querier::with_backend(backend);

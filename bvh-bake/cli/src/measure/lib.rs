@@ -11,3 +11,4 @@ pub mod poses;
 pub mod rounds;
 pub mod spread;
 pub mod table;
+pub mod turns;

@@ -1,25 +1,25 @@
-//! Reads a list of pairs, one per line: a name, two meshes and, optionally, files of poses.
+//! Reads a list of pairs, one per line: a name, two meshes and, optionally, files of poses or motions.
 
 use std::path::{Path, PathBuf};
 
-/// A pair of meshes and the poses to ask about.
+/// A pair of meshes and the files of what to ask about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
     /// Its name in reports.
     pub name: String,
     /// The first mesh.
     pub a: PathBuf,
-    /// The mesh that the poses place.
+    /// The mesh that is placed or moved.
     pub b: PathBuf,
-    /// Files of poses; if there are none, poses are made.
-    pub poses: Vec<PathBuf>,
+    /// Files of poses or of motions; if there are none, some are made.
+    pub files: Vec<PathBuf>,
 }
 
 /// The form of a line, for messages.
-const LINE: &str = "NAME A B [POSES[,POSES...]]";
+const LINE: &str = "NAME A B [FILE[,FILE...]]";
 
 /// Parses the list in the file `list`, whose content is `bytes`. Meshes are in the folder `meshes`, by default that of
-/// the list. `poses` names files of poses for all pairs, separated by commas, in which `%s` stands for the pair's name.
+/// the list. `files` names further files for all pairs, separated by commas, in which `%s` stands for the pair's name.
 ///
 /// # Errors
 /// Returns a message that names the line, what was expected and what was found.
@@ -27,7 +27,7 @@ pub fn parse(
     bytes: &[u8],
     list: &Path,
     meshes: Option<&Path>,
-    poses: Option<&str>,
+    files: Option<&str>,
 ) -> Result<Vec<Pair>, String> {
     let beside = list.parent().unwrap_or(Path::new(""));
     let meshes = meshes.unwrap_or(beside);
@@ -48,10 +48,10 @@ pub fn parse(
             text.split(',').filter(|file| !file.is_empty()).map(str::to_owned).collect()
         };
         let listed = words.get(3).map(|files| split(files)).unwrap_or_default();
-        let mut files: Vec<PathBuf> = listed.iter().map(|file| beside.join(file)).collect();
-        let given = poses.map(split).unwrap_or_default();
-        files.extend(given.iter().map(|file| PathBuf::from(file.replace("%s", name))));
-        pairs.push(Pair { name: name.to_owned(), a: meshes.join(a), b: meshes.join(b), poses: files });
+        let mut all: Vec<PathBuf> = listed.iter().map(|file| beside.join(file)).collect();
+        let given = files.map(split).unwrap_or_default();
+        all.extend(given.iter().map(|file| PathBuf::from(file.replace("%s", name))));
+        pairs.push(Pair { name: name.to_owned(), a: meshes.join(a), b: meshes.join(b), files: all });
     }
     if pairs.is_empty() { Err(format!("expected lines {LINE}, found none")) } else { Ok(pairs) }
 }

@@ -1,17 +1,9 @@
-//! Asks questions of several subjects in rounds and times each query alone.
+//! Asks questions about poses of several subjects in rounds and times each query alone.
 //!
-//! Within a round the subjects take turns at each question, and the next round starts with another subject, so that
-//! drift (clock, temperature, neighbours) affects all of them alike. A turn is a few untimed queries and then all poses
-//! in their order. Caches hold what the previous queries left there, which is called warm.
+//! Within a round the subjects take turns at each question.
 
+use crate::turns;
 use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, QueryError, QueryStats};
-use std::time::Instant;
-
-/// Untimed queries before each turn.
-const WARM_UP_QUERIES: usize = 3;
-/// The number of subjects by which the start moves on from round to round. It shares no factor with usual numbers of
-/// subjects, so that the order of turns differs from round to round.
-const STRIDE: usize = 17;
 
 /// A question about two meshes in a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,8 +129,7 @@ pub fn rounds(
     let mut queriers: Vec<Querier> = subjects.iter().map(|_| Querier::with_backend(backend)).collect();
     for round in 0..rounds {
         for (number, &question) in questions.iter().enumerate() {
-            for turn in 0..subjects.len() {
-                let subject = (turn + STRIDE * round) % subjects.len();
+            for subject in turns::order(round, subjects.len()) {
                 take_turn(question, &mut queriers[subject], &subjects[subject], &mut all[subject][number])?;
             }
         }
@@ -146,7 +137,7 @@ pub fn rounds(
     Ok(all)
 }
 
-/// Asks in all poses, after a few queries that are not timed.
+/// Asks in all poses.
 fn take_turn(
     question: Question,
     querier: &mut Querier,
@@ -154,20 +145,16 @@ fn take_turn(
     asked: &mut Asked,
 ) -> Result<(), QueryError> {
     let &Subject { a, b, poses } = subject;
-    for pose in poses.iter().rev().take(WARM_UP_QUERIES) {
-        question.ask(querier, a, b, pose)?;
-    }
-    let is_first = asked.rounds.is_empty();
-    let mut times = Vec::with_capacity(poses.len());
-    for pose in poses {
-        let before = Instant::now();
+    let answers = turns::take_turn(poses, |pose| {
         let answer = question.ask(querier, a, b, pose)?;
-        times.push(before.elapsed().as_nanos() as u64);
-        if is_first {
+        Ok((answer, querier.stats()))
+    })?;
+    if asked.rounds.is_empty() {
+        for &((answer, stats), _) in &answers {
             asked.answers.push(answer);
-            add(&mut asked.stats, querier.stats());
+            add(&mut asked.stats, stats);
         }
     }
-    asked.rounds.push(times);
+    asked.rounds.push(answers.into_iter().map(|(_, nanoseconds)| nanoseconds).collect());
     Ok(())
 }

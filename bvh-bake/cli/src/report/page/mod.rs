@@ -1,10 +1,10 @@
 //! `report.html`: one page for people, with sentences, plots and tables. It needs no other file.
 
-mod tables;
+pub(super) mod table;
 mod text;
 
 use super::document::Report;
-use super::{best, figure};
+use super::kind::Kind;
 use cbvh_measure::plot;
 use std::fmt::Write;
 
@@ -24,30 +24,31 @@ padding: .5rem 1rem; }
 ";
 
 /// Returns the page.
-pub(super) fn page(report: &Report) -> Result<String, Box<dyn std::error::Error>> {
+pub(super) fn page<K: Kind>(report: &Report<K>) -> Result<String, Box<dyn std::error::Error>> {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: which layout for these meshes</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<h1>Which layout for these meshes?</h1>\n"
+         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: {0}</title>\n<style>{STYLE}</style>\n\
+         </head>\n<body>\n<h1>{0}</h1>\n",
+        K::TITLE
     );
     page.push_str(&text::opening(report));
     for pair in &report.pairs {
         let _ = writeln!(page, "<h2 id=\"{0}\">{0}</h2>", escape(&pair.name));
-        page.push_str(&text::pair(pair));
+        page.push_str(&text::pair::<K>(pair));
         page.push_str("<ul>\n");
-        for sentence in best::sentences(report, pair) {
+        for sentence in K::sentences(report, pair) {
             let _ = writeln!(page, "<li>{}</li>", escape(&sentence));
         }
         page.push_str("</ul>\n");
-        page.push_str(&plot::svg(&[figure::of_pair(report, &pair.name)])?);
-        page.push_str(&tables::all(report, &pair.name));
+        page.push_str(&plot::svg(&[K::figure(report, &pair.name)])?);
+        page.push_str(&K::tables(report, &pair.name));
     }
-    page.push_str(&text::methods(report));
+    page.push_str(&K::methods(&report.settings));
     Ok(page + "</body>\n</html>\n")
 }
 
 /// Escapes text for an element or an attribute.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let escaped = |c: char| match c {
         '&' => "&amp;".to_owned(),
         '<' => "&lt;".to_owned(),

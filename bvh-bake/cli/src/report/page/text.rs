@@ -1,18 +1,18 @@
-//! The words around plots and tables: what was measured, where, how, and what the figures do not tell.
+//! The words around plots and tables: what was measured, where, and whether the answers were right.
 
 use super::escape;
 use crate::report::document::{PairRecord, Report, SideRecord};
+use crate::report::kind::Kind;
 use cbvh_measure::table::whole;
 
 /// Says what the page is about, and whether the answers were right.
-pub(super) fn opening(report: &Report) -> String {
+pub(super) fn opening<K: Kind>(report: &Report<K>) -> String {
     let names: Vec<String> =
         report.pairs.iter().map(|pair| format!("<a href=\"#{0}\">{0}</a>", escape(&pair.name))).collect();
     let mut text = format!(
-        "<p>A layout is how a <code>.cbvh</code> file stores bounding volumes (its profile) and triangles (their \
-         encoding). This page tells for each pair of meshes how fast every layout answers, how many bytes it takes, \
-         and how far its distances are from the exact ones. Pairs: {}.</p>\n\
+        "<p>{} Pairs: {}.</p>\n\
          <p>Measured on {} with cbvh {} (format {}), backend {}, one thread, on {}.</p>\n",
+        K::ABOUT,
         names.join(", "),
         report.origin.date,
         report.origin.version,
@@ -21,8 +21,7 @@ pub(super) fn opening(report: &Report) -> String {
         escape(&report.origin.machine.text())
     );
     if report.wrong.is_empty() {
-        text += "<p>All answers are right: layouts that store the same triangles agree about contact, and about \
-                 distances to the last bit. Distances with an allowed error were within it.</p>\n";
+        text += &format!("<p>{}</p>\n", K::RIGHT);
     } else {
         let some: String =
             report.wrong.iter().take(20).map(|line| format!("<li>{}</li>\n", escape(line))).collect();
@@ -35,7 +34,7 @@ pub(super) fn opening(report: &Report) -> String {
     for (holds, warning) in [
         (
             report.settings.quick,
-            "This was a quick run with few poses and two rounds. Do not quote its figures.",
+            "This was a quick run that asked little in two rounds. Do not quote its figures.",
         ),
         (report.origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
         (
@@ -50,47 +49,11 @@ pub(super) fn opening(report: &Report) -> String {
     text
 }
 
-/// Says what a pair is and in which poses it was asked.
-pub(super) fn pair(pair: &PairRecord) -> String {
+/// Says what a pair is and what it was asked about.
+pub(super) fn pair<K: Kind>(pair: &PairRecord<K::Items>) -> String {
     let side = |side: &SideRecord| {
         let triangles = whole(side.triangles as f64);
         format!("{}, {triangles} triangles, diagonal {:.4} mesh units", escape(&side.mesh), side.diagonal)
     };
-    let plural = if pair.poses == 1 { "" } else { "s" };
-    format!(
-        "<p>A: {}. B: {}. {} pose{plural} ({}).</p>\n",
-        side(&pair.a),
-        side(&pair.b),
-        pair.poses,
-        escape(&pair.poses_from)
-    )
-}
-
-/// Says how it was measured and what the figures do not tell.
-pub(super) fn methods(report: &Report) -> String {
-    let rounds = report.settings.rounds;
-    format!(
-        "<h2 id=\"methods\">How it was measured</h2>\n<ul>\n\
-         <li><strong>Times</strong> are those of single queries on one thread that is bound to one processor. All \
-         layouts take turns in each of {rounds} rounds, with three untimed queries before each turn, so caches hold \
-         what earlier queries left there. A median is taken over the poses of a round and then over the rounds. Nine \
-         tenths of the poses take less than the 90 % time.</li>\n\
-         <li><strong>The order of the tables</strong> is by the geometric mean of the median times for contact and \
-         for distance. A dot marks layouts that no other one beats in both time and bytes.</li>\n\
-         <li><strong>Errors</strong> are relative to the exact distance of the mesh, over the poses in which the \
-         meshes are apart. Layouts without loss give that distance exactly unless an error is allowed. The errors in \
-         the tables are those found; other poses may come closer to what is allowed.</li>\n\
-         <li><strong>Quantised triangles</strong> have moved by up to the length in the table, 1e-5 of the mesh's \
-         diagonal by default. Near contact this is a large part of the distance.</li>\n\
-         <li><strong>Node tests</strong> compare up to 16 pairs of bounding volumes at once, <strong>packet \
-         tests</strong> up to 16 pairs of triangles; what these cannot decide goes to <strong>exact tests</strong> of \
-         one pair of triangles each.</li>\n</ul>\n\
-         <h2 id=\"limits\">What the figures do not tell</h2>\n<ul>\n\
-         <li>They compare layouts on one machine on one day. On a virtual machine neighbours share the last cache and \
-         the memory.</li>\n\
-         <li>A median hides what single poses cost, and it depends on the mix of poses near contact and far \
-         apart.</li>\n\
-         <li>Files that are not in memory yet take longer to answer first: see <code>cbvh query --cold</code>.</li>\n\
-         </ul>\n"
-    )
+    format!("<p>A: {}. B: {}. {}.</p>\n", side(&pair.a), side(&pair.b), escape(&K::items(&pair.items)))
 }

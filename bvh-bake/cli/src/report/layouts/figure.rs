@@ -1,17 +1,12 @@
 //! The plots of a pair: time against bytes for both exact questions, and time against error for distance.
 
-use super::document::Report;
+use super::Report;
 use super::row::Row;
 use bvh_format::leaf::TriangleEncoding;
 use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
 use cbvh_measure::rounds::Question;
 
 const TIME: &str = "median time per query, \u{b5}s";
-
-/// Returns the plots of all pairs.
-pub(super) fn of_all_pairs(report: &Report) -> Vec<Figure> {
-    report.pairs.iter().map(|pair| of_pair(report, &pair.name)).collect()
-}
 
 /// Returns the plots of a pair.
 pub(super) fn of_pair(report: &Report, pair: &str) -> Figure {

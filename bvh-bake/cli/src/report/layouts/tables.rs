@@ -1,11 +1,12 @@
 //! The tables of a pair, the fastest layout first. Each figure carries the value that `report.csv` has for it.
 
-use super::escape;
-use crate::report::best::{Candidate, ranked};
-use crate::report::document::Report;
-use crate::report::row::Row;
+use super::Report;
+use super::best::{Candidate, ranked};
+use super::row::Row;
+use crate::report::page::escape;
+use crate::report::page::table::{Figure, Heads, Line, percent, table, value};
 use cbvh_measure::rounds::Question;
-use cbvh_measure::table::{Cell, Cells, micro};
+use cbvh_measure::table::micro;
 use std::fmt::Write;
 
 /// A column: its head, the question and the field of its figures, and how they are shown.
@@ -55,7 +56,7 @@ pub(super) fn all(report: &Report, pair: &str) -> String {
     let mut text = String::new();
     let mut add = |title: &str, caption: &str, candidates: &[Candidate<'_>], columns: &[Columns]| {
         let _ = writeln!(text, "<h3>{title}</h3>\n<p>{caption}</p>");
-        text += &table(&rows, candidates, columns);
+        text += &table_of(&rows, candidates, columns);
     };
     add(
         "Layouts without loss",
@@ -114,63 +115,32 @@ pub(super) fn all(report: &Report, pair: &str) -> String {
     text
 }
 
-fn table(rows: &[&Row], candidates: &[Candidate<'_>], groups: &[Columns]) -> String {
-    let mut text = String::from("<div class=\"scroll\"><table>\n<thead><tr class=\"groups\"><th></th>");
-    for (head, columns) in groups {
-        let _ = write!(text, "<th class=\"first\" colspan=\"{}\">{head}</th>", columns.len());
-    }
-    text += "</tr>\n<tr><th>layout</th>";
-    let columns = || groups.iter().flat_map(|(_, columns)| columns.iter().enumerate());
-    for (place, column) in columns() {
-        let _ = write!(text, "<th{}>{}</th>", first(place), column.head);
-    }
-    text += "</tr></thead>\n<tbody>\n";
+/// Returns the table of some layouts.
+fn table_of(rows: &[&Row], candidates: &[Candidate<'_>], groups: &[Columns]) -> String {
+    let heads: Vec<Heads> = groups
+        .iter()
+        .map(|(head, columns)| Heads { head, columns: columns.iter().map(|column| column.head).collect() })
+        .collect();
     let figure = |candidate: &Candidate<'_>, column: &Column| {
         let is_it = |row: &&&Row| row.layout == candidate.collide.layout && row.question == column.question;
-        let (_, cell) =
-            rows.iter().find(is_it)?.cells().into_iter().find(|(name, _)| *name == column.field)?;
-        if let Cell::Number(value) = cell { Some(value) } else { None }
+        let value = value(*rows.iter().find(is_it)?, column.field)?;
+        let (question, rel_err) = (column.question.name(), column.question.rel_err().unwrap_or(0.0));
+        let of = format!("data-question=\"{question}\" data-rel-err=\"{rel_err:?}\"");
+        Some(Figure { of, field: column.field, value, shown: (column.show)(value) })
     };
-    let least: Vec<Option<f64>> = columns()
-        .map(|(_, column)| {
-            let figures = || candidates.iter().filter_map(|one| figure(one, column));
-            // If all values are equal, none is marked as the best.
-            figures().reduce(f64::min).filter(|&least| figures().any(|figure| figure > least))
-        })
-        .collect();
-    for candidate in candidates {
+    let line = |candidate: &Candidate<'_>| {
         let name = escape(&candidate.name());
         let is_on_front =
             [candidate.collide, candidate.distance].iter().any(|row| row.pareto_bytes == Some(true));
         let dot = if is_on_front { " \u{2022}" } else { "" };
-        let pair = escape(&candidate.collide.pair);
-        let _ = write!(text, "<tr data-pair=\"{pair}\" data-layout=\"{name}\"><td>{name}{dot}</td>");
-        for ((place, column), least) in columns().zip(&least) {
-            let Some(value) = figure(candidate, column) else {
-                let _ = write!(text, "<td{}>\u{2013}</td>", first(place));
-                continue;
-            };
-            let is_best = Some(value) == *least;
-            let shown = (column.show)(value);
-            let shown = if is_best { format!("<b>{shown}</b>") } else { shown };
-            let _ = write!(
-                text,
-                "<td{} data-question=\"{}\" data-rel-err=\"{:?}\" data-field=\"{}\" data-value=\"{value:?}\">{shown}\
-                 </td>",
-                first(place),
-                column.question.name(),
-                column.question.rel_err().unwrap_or(0.0),
-                column.field,
-            );
+        let columns = groups.iter().flat_map(|(_, columns)| columns);
+        Line {
+            of: format!("data-pair=\"{}\" data-layout=\"{name}\"", escape(&candidate.collide.pair)),
+            name: format!("{name}{dot}"),
+            figures: columns.map(|column| figure(candidate, column)).collect(),
         }
-        text += "</tr>\n";
-    }
-    text + "</tbody></table></div>\n"
-}
-
-/// The class of the first column of a group.
-fn first(place: usize) -> &'static str {
-    if place == 0 { " class=\"first\"" } else { "" }
+    };
+    table("layout", &heads, &candidates.iter().map(line).collect::<Vec<_>>())
 }
 
 fn tenths(value: f64) -> String {
@@ -184,15 +154,4 @@ fn excess(value: f64) -> String {
 
 fn scientific(value: f64) -> String {
     if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
-}
-
-/// A relative error in percent, with two digits.
-fn percent(value: f64) -> String {
-    match 100.0 * value {
-        0.0 => "0".to_owned(),
-        percent @ 10.0.. => format!("{percent:.0} %"),
-        percent @ 1.0.. => format!("{percent:.1} %"),
-        percent @ 0.001.. => format!("{:.1$} %", percent, (1.0 - percent.log10().floor()) as usize),
-        percent => format!("{percent:.0e} %"),
-    }
 }

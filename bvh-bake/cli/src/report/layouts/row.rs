@@ -33,7 +33,7 @@ pub(super) struct Errors {
 
 /// A row.
 #[derive(Debug, Clone)]
-pub(super) struct Row {
+pub(in crate::report) struct Row {
     pub(super) pair: String,
     pub(super) layout: Layout,
     pub(super) question: Question,

@@ -1,7 +1,7 @@
 //! The answer to "which layout?", in a few sentences per pair.
 
-use super::document::{PairRecord, Report};
 use super::row::Row;
+use super::{PairRecord, Report};
 use cbvh_measure::rounds::Question;
 use cbvh_measure::table::micro;
 
