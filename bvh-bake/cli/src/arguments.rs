@@ -40,7 +40,7 @@ pub(crate) enum Command {
     Motion(MotionArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(SceneArguments),
-    /// Measure which layout suits some meshes: the speed, size and error of each
+    /// Measure speed against error on some meshes: of each layout, or of samples and certified answers about motions
     Report(ReportArguments),
 }
 

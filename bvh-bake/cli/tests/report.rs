@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::documents::{elements, number, same_figures};
-use common::{cbvh_in, names, poses, torus};
+use common::documents::{elements, fetches_nothing, number, report_files, same_figures};
+use common::{cbvh_in, poses, torus};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -32,15 +32,7 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     fs::write(directory.join("pairs.txt"), list).unwrap();
     let ended = report(directory, &["pairs.txt", "--out", "new/out", "--quick"]);
     assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
-    let out = directory.join("new/out");
-    assert_eq!(names(&out), ["report.csv", "report.html", "report.json", "report.svg"]);
-    let [csv, html, json, svg] = ["csv", "html", "json", "svg"]
-        .map(|extension| fs::read_to_string(out.join(format!("report.{extension}"))).unwrap());
-    for text in [&csv, &html, &json, &svg] {
-        assert!(!text.contains("NaN") && !text.contains("inf,") && !text.contains(">inf"));
-        assert!(!text.contains(directory.to_str().unwrap()), "a path of this machine");
-    }
-
+    let [csv, html, json, svg] = report_files(directory, "new/out");
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();
@@ -84,14 +76,7 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
         let marks = document.iter().filter(|(name, _)| name == "polygon").count();
         assert!(marks >= 2 * (2 * 24 + 4 * 24), "{marks}");
     }
-    // The page fetches nothing from elsewhere.
-    let outside = ["src", "xlink:href"];
-    for (name, attributes) in &in_page {
-        assert!(
-            name != "script" && name != "link" && outside.iter().all(|key| !attributes.contains_key(*key))
-        );
-        assert!(attributes.get("href").is_none_or(|to| to.starts_with('#')));
-    }
+    fetches_nothing(&in_page);
     for pair in ["fcl", "tori"] {
         let tests = |layout| number(find(pair, layout, "distance", 0.0), "node_tests").unwrap();
         assert!(tests("dop26-u8-wide f32") < tests("dop6-u8 f32"), "{pair}");
@@ -157,9 +142,12 @@ fn what_is_wrong_is_told_in_one_line_before_the_work() {
     fails(1, &["good.txt", "--quick", "--rounds", "3", "--out", "o"], &["--quick"]);
     fails(1, &["good.txt", "--out", "o", "--isa", "mmx"], &["mmx"]);
     fails(1, &["good.txt", "--out", "o", "--rounds", "0"], &["--rounds"]);
+    fails(1, &["good.txt", "--out", "o", "--motions", "--poses", "p.txt"], &["--motions", "--poses"]);
+    fails(1, &["good.txt", "--out", "o", "--motions", "m.txt"], &["m.txt"]);
     fails(2, &["missing.txt", "--out", "o"], &["missing.txt"]);
     fails(2, &["lost.txt", "--out", "o"], &["missing.obj"]);
     fails(2, &["good.txt", "--poses", "%s.poses", "--out", "o"], &["one.poses"]);
+    fails(2, &["good.txt", "--motions=%s.motions", "--out", "o"], &["one.motions"]);
     fails(2, &["good.txt", "--out", "one.obj"], &["one.obj", "expected a folder"]);
     fails(3, &["empty.txt", "--out", "o"], &["empty.txt", "NAME A B"]);
     fails(3, &["bad.txt", "--out", "o"], &["bad.txt: line 2", "found 2 words"]);
@@ -167,5 +155,8 @@ fn what_is_wrong_is_told_in_one_line_before_the_work() {
     fails(3, &["mesh.txt", "--out", "o"], &["bad.obj: line 2"]);
     fails(3, &["poses.txt", "--out", "o"], &["p.txt: line 1", "found 3"]);
     fails(3, &["void.txt", "--out", "o"], &["empty.txt: expected poses, found none"]);
+    fails(3, &["poses.txt", "--motions", "--out", "o"], &["p.txt: line 1", "expected 24 numbers", "found 3"]);
+    fails(3, &["void.txt", "--motions", "--out", "o"], &["empty.txt", "in at least one line, found none"]);
+    fails(3, &["bad.txt", "--motions", "--out", "o"], &["bad.txt: line 2", "found 2 words"]);
     assert!(!directory.join("o").exists());
 }

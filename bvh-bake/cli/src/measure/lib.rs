@@ -3,6 +3,7 @@
 //! This library is the part of the command that both programs share. It is not meant for applications, and nothing in
 //! it is stable.
 
+pub mod motions;
 pub mod origin;
 pub mod pairs;
 pub mod pin;

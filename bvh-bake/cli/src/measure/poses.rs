@@ -74,8 +74,19 @@ impl<'a> Approach<'a> {
 
     /// Returns the pose in which the centres are `t` apart, mesh units.
     pub fn at(&self, t: f64) -> Pose {
-        let translation = [0, 1, 2].map(|i| self.centre_a[i] + t * self.away[i] - self.turned[i]);
+        let centre = self.centre_of_b(t);
+        let translation = [0, 1, 2].map(|i| centre[i] - self.turned[i]);
         Pose::new(self.rotation, translation).unwrap_or(Pose::IDENTITY)
+    }
+
+    /// Returns the direction from A to B, of length 1.
+    pub fn away(&self) -> [f64; 3] {
+        self.away
+    }
+
+    /// Returns the centre of B in the frame of A, when the centres are `t` apart, mesh units.
+    pub fn centre_of_b(&self, t: f64) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.centre_a[i] + t * self.away[i])
     }
 
     /// Returns a pose in which the smaller sphere lies inside the larger one, or both share much of their space.

@@ -38,6 +38,12 @@ impl Spread {
     }
 }
 
+/// Returns the median over the rounds of their means; `None` if there are none.
+pub fn mean_of_rounds(rounds: &[Vec<u64>]) -> Option<f64> {
+    let filled = rounds.iter().filter(|round| !round.is_empty());
+    median(filled.map(|round| round.iter().sum::<u64>() as f64 / round.len() as f64).collect())
+}
+
 /// Returns the sorted value at a fraction of the way from the least to the largest, by the rule of the protocol of `cbvh
 /// query`; 0 if there are none.
 pub fn quantile(sorted: &[u64], fraction: f64) -> u64 {
@@ -72,7 +78,8 @@ mod tests {
             (0..4).map(|more| poses.iter().map(|time| time + more).collect()).collect();
         let of_rounds = Spread::of_rounds(&rounds).unwrap();
         assert_eq!((of_rounds.median, of_rounds.quartiles, of_rounds.p90), (52.0, [51.0, 53.0], 92.0));
-        assert_eq!(Spread::of_rounds(&[]), None);
+        assert_eq!(mean_of_rounds(&rounds), Some(51.5));
+        assert_eq!((Spread::of_rounds(&[]), mean_of_rounds(&[Vec::new()])), (None, None));
         assert_eq!((median(vec![3.0, 1.0, 2.0]), median(Vec::new())), (Some(2.0), None));
     }
 }

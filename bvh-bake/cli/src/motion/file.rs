@@ -9,7 +9,7 @@ use std::path::Path;
 const EXPECTED: &str = "expected 24 numbers, two poses of 12 numbers each";
 
 /// Reads a file of motions. `#` starts a comment, and blank lines are skipped.
-pub(super) fn read(path: &Path) -> Result<Vec<Motion>, Failure> {
+pub(crate) fn read(path: &Path) -> Result<Vec<Motion>, Failure> {
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let mut motions = Vec::new();
     for (number, line) in (1..).zip(String::from_utf8_lossy(&bytes).lines()) {

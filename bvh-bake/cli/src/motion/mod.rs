@@ -1,7 +1,7 @@
 //! `cbvh motion`: asks whether the way between two poses is free, and where it ends, timing each motion.
 
 mod arguments;
-mod file;
+pub(crate) mod file;
 
 pub(crate) use arguments::MotionArguments;
 

@@ -20,6 +20,7 @@ const QUICK: (usize, usize) = (2, 10);
 #[serde(rename_all = "lowercase")]
 pub(super) enum Limit {
     Poses(usize),
+    Motions(usize),
 }
 
 /// How much is measured.
@@ -42,7 +43,7 @@ impl Settings {
     /// Returns the largest number of items per pair, 0 for all.
     pub(super) fn limit(&self) -> usize {
         match self.limit {
-            Limit::Poses(limit) => limit,
+            Limit::Poses(limit) | Limit::Motions(limit) => limit,
         }
     }
 }

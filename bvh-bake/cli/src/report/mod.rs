@@ -1,7 +1,7 @@
-//! `cbvh report`: speed against error on some meshes.
+//! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
 //!
-//! `layouts/` is a kind of report. What comes before and after the measurement is the same for any kind: the list of pairs,
-//! the meshes, and four files that hold the same figures: a table, JSON, a drawing and a page for people.
+//! `layouts/` and `motions/` are the two kinds of report. They share what comes before and after the measurement: the list
+//! of pairs, the meshes, and four files that hold the same figures: a table, JSON, a drawing and a page for people.
 
 mod arguments;
 mod baked;
@@ -10,6 +10,7 @@ mod files;
 mod inputs;
 mod kind;
 mod layouts;
+mod motions;
 mod page;
 mod source;
 
@@ -20,9 +21,13 @@ use crate::query;
 use document::{Report, Settings};
 use kind::{Kind, Subject};
 use layouts::Layouts;
+use motions::Motions;
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
-    run_kind::<Layouts>(arguments, arguments.poses.as_deref())
+    match &arguments.motions {
+        None => run_kind::<Layouts>(arguments, arguments.poses.as_deref()),
+        Some(files) => run_kind::<Motions>(arguments, files.as_deref()),
+    }
 }
 
 /// Measures one pair after another. `files` are further files of items for all pairs.

@@ -1,7 +1,10 @@
 //! Parses the files of a report: tables, and documents that follow the rules of XML.
 
+use super::names;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 /// Returns the lines of comma-separated values, each as a map from names to values. No field here contains a comma.
 pub(crate) fn rows_of(csv: &str) -> Vec<BTreeMap<String, String>> {
@@ -72,5 +75,30 @@ pub(crate) fn same_figures(csv: &str, rows: &[Value]) {
                 value => assert_eq!(cell.parse::<f64>().unwrap(), value.as_f64().unwrap(), "{name}"),
             }
         }
+    }
+}
+
+/// Returns the four files: table, page, JSON and drawing.
+pub(crate) fn report_files(directory: &Path, out: &str) -> [String; 4] {
+    let out = directory.join(out);
+    assert_eq!(names(&out), ["report.csv", "report.html", "report.json", "report.svg"]);
+    let files = ["csv", "html", "json", "svg"]
+        .map(|extension| fs::read_to_string(out.join(format!("report.{extension}"))).unwrap());
+    for text in &files {
+        assert!(!text.contains("NaN") && !text.contains("inf,") && !text.contains(">inf"));
+        assert!(!text.contains(directory.to_str().unwrap()), "a path of this machine");
+    }
+    files
+}
+
+/// Asserts that a page fetches nothing from elsewhere.
+#[track_caller]
+pub(crate) fn fetches_nothing(page: &[Element]) {
+    let outside = ["src", "xlink:href"];
+    for (name, attributes) in page {
+        assert!(
+            name != "script" && name != "link" && outside.iter().all(|key| !attributes.contains_key(*key))
+        );
+        assert!(attributes.get("href").is_none_or(|to| to.starts_with('#')));
     }
 }

@@ -1,0 +1,141 @@
+//! Compares what is said about motions with the certified answers.
+//!
+//! Samples may miss a contact and be late with one. They may not find one where the way is certified free: this would be an
+//! error of the certified answer, or of the query about a pose.
+
+use super::method::{Method, Said};
+use bvh_query::MotionAnswer;
+use cbvh_measure::spread::median;
+
+/// The errors of one way to ask.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Errors {
+    /// Certified hits of which it says that the way is free.
+    pub(super) missed: u64,
+    /// How late its first contacts are after the time until which the way is certified free, as a fraction of the way.
+    pub(super) late_median: Option<f64>,
+    pub(super) late_max: Option<f64>,
+    /// Motions that a certified answer leaves undecided.
+    pub(super) undecided: Option<u64>,
+}
+
+/// Returns the errors, and a line for each contradiction.
+pub(super) fn judge(
+    pair: &str,
+    method: Method,
+    certified: &[MotionAnswer],
+    said: &[Said],
+) -> (Errors, Vec<String>) {
+    let both = || certified.iter().zip(said);
+    let late = both().filter_map(|(certified, said)| late(method, certified, *said));
+    let late: Vec<f64> = late.collect();
+    let missed = both().filter(|&(certified, &said)| is_hit(certified) && said == Said::Free);
+    let undecided = both().filter(|&(certified, said)| is_undecided(certified, *said));
+    let errors = Errors {
+        missed: missed.count() as u64,
+        late_max: late.iter().copied().reduce(f64::max),
+        late_median: median(late),
+        undecided: method.samples().is_none().then(|| undecided.count() as u64),
+    };
+    let samples = method.samples().map_or(String::new(), |samples| format!("{samples} "));
+    let wrong = (1..).zip(both()).filter_map(|(number, (certified, &said))| {
+        let text = contradiction(method, certified, said)?;
+        Some(format!("{pair}, {samples}{}, motion {number}: {text}", method.name()))
+    });
+    (errors, wrong.collect())
+}
+
+pub(super) fn is_hit(certified: &MotionAnswer) -> bool {
+    matches!(certified, MotionAnswer::Hit { .. })
+}
+
+/// Returns how late a first contact is.
+fn late(method: Method, certified: &MotionAnswer, said: Said) -> Option<f64> {
+    match (certified, said) {
+        (MotionAnswer::Hit { free_until, .. }, Said::Contact(time)) if method.finds_the_first() => {
+            Some(time - free_until)
+        }
+        _ => None,
+    }
+}
+
+/// Returns whether an answer other than free tells nothing: `is_free` does not say which motions it leaves undecided.
+fn is_undecided(certified: &MotionAnswer, said: Said) -> bool {
+    said == Said::Undecided || said == Said::NotFree && matches!(certified, MotionAnswer::Near { .. })
+}
+
+/// Says what is wrong.
+fn contradiction(method: Method, certified: &MotionAnswer, said: Said) -> Option<String> {
+    let free_until = match (certified, said) {
+        (MotionAnswer::Free, Said::Free) => return None,
+        (MotionAnswer::Free, _) => return Some(format!("expected a free way, found {said:?}")),
+        (MotionAnswer::Hit { free_until, .. } | MotionAnswer::Near { free_until, .. }, _) => *free_until,
+    };
+    match said {
+        Said::Contact(time) if time < free_until => {
+            Some(format!("expected a free way until {free_until:?}, found a contact at {time:?}"))
+        }
+        Said::Free if method.samples().is_none() => {
+            Some("expected a way that is not free, found Free".into())
+        }
+        Said::Undecided if is_hit(certified) => Some("expected a hit, found Undecided".into()),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_bake::mesh::Mesh;
+    use bvh_bake::{Options, to_bytes};
+    use bvh_query::{Bvh, Motion, MotionOptions, Pose, Querier};
+
+    /// Returns the answers about two meshes that meet at a quarter of the time, and about two that part.
+    fn certified() -> [MotionAnswer; 2] {
+        let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let spike = [[0.2, 0.2, 0.0], [0.4, 0.2, 0.0], [0.3, 0.2, 1.0]];
+        let mesh = Mesh::from_triangles([floor, spike].concat(), vec![[0, 1, 2], [3, 4, 5]]);
+        let bvh = Bvh::from_bytes(to_bytes(&mesh, &Options::default()).unwrap().0).unwrap();
+        [-2.0, 3.0].map(|end| {
+            let at = |z| Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, z]).unwrap();
+            let motion = Motion::between(&at(2.0), &at(end)).unwrap();
+            Querier::new().unwrap().motion(&bvh, &bvh, &motion, &MotionOptions::new()).unwrap()
+        })
+    }
+
+    #[test]
+    fn missed_and_late_contacts_are_counted() {
+        let [hit, free] = certified();
+        let judged = |said: [Said; 4]| {
+            let (errors, wrong) = judge("pair", Method::Ordered(10), &[hit, hit, hit, free], &said);
+            assert!(wrong.is_empty(), "{wrong:?}");
+            errors
+        };
+        let errors = judged([Said::Contact(0.75), Said::Free, Said::Contact(0.375), Said::Free]);
+        assert_eq!((errors.missed, errors.undecided), (1, None));
+        let late = [errors.late_median, errors.late_max].map(|late| (late.unwrap() * 1e3).round());
+        assert_eq!(late, [500.0, 500.0]);
+        let errors = judged([Said::Free; 4]);
+        assert_eq!((errors.missed, errors.late_median, errors.late_max), (3, None, None));
+    }
+
+    #[test]
+    fn a_contact_where_the_way_is_free_is_wrong() {
+        let [hit, free] = certified();
+        let wrong = |method, certified, said| judge("pair", method, &[certified], &[said]).1;
+        let sampled = Method::Spread(30);
+        assert_eq!(
+            wrong(sampled, free, Said::Contact(0.5)),
+            ["pair, 30 spread samples, motion 1: expected a free way, found Contact(0.5)"]
+        );
+        let early = wrong(sampled, hit, Said::Contact(0.125));
+        assert!(early[0].contains("found a contact at 0.125"), "{early:?}");
+        for right in [Said::Free, Said::Contact(1.0)] {
+            assert!(wrong(sampled, hit, right).is_empty());
+        }
+        assert!(wrong(Method::IsFree, hit, Said::NotFree).is_empty());
+        assert_eq!(wrong(Method::IsFree, hit, Said::Free).len(), 1);
+        assert_eq!(wrong(Method::IsFree, free, Said::NotFree).len(), 1);
+        assert_eq!(wrong(Method::Motion, hit, Said::Undecided).len(), 1);
+    }
+}
