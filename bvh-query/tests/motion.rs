@@ -9,7 +9,7 @@ use bvh_query::{
 };
 use cbvh_testkit::depth::rounds;
 use common::shapes::{cube, plate, sphere, torus};
-use common::{Random, Triangle, bake, mesh, random_pose, shared};
+use common::{Random, Triangle, bake, mesh, note, random_pose, shared, shared_mesh};
 
 fn baked(triangles: &[Triangle]) -> Bvh {
     bake(&mesh(triangles), &bvh_bake::Options::default())
@@ -172,6 +172,36 @@ fn random_motions_are_free_where_they_say_so() {
         all += 1;
     }
     assert!(hits > all / 10 && hits < all, "{hits} of {all}");
+}
+
+/// Random ways of the open pairs of meshes past each other and through, each sampled at a thousand poses.
+#[test]
+fn random_motions_of_large_meshes_are_free_where_they_say_so() {
+    let random = &mut Random::new(19);
+    for (name_a, name_b) in [("fclenv", "fclrob"), ("bunny", "bunny"), ("apollo", "apollo"), ("a1", "hand")] {
+        let read = |name: &str| shared_mesh(&format!("{name}.obj"));
+        let (Some(a), Some(b)) = (read(name_a), read(name_b)) else { return };
+        let [a, b] = [a, b].map(|mesh| bake(&mesh, &bvh_bake::Options::default()));
+        let sphere = |bvh: &Bvh| bvh.objects()[0].bounding_sphere();
+        let ((centre_a, radius_a), (centre_b, radius_b)) = (sphere(&a), sphere(&b));
+        // B's middle is somewhere around A's, a little more than both radii away at most.
+        let mut place = || {
+            let turned = random_pose(random, 1.0);
+            let at = random.point().map(|v| 1.1 * (radius_a + radius_b) * v);
+            let middle = turned.place(centre_b);
+            let shift = [0, 1, 2].map(|k| centre_a[k] + at[k] - (middle[k] - turned.translation()[k]));
+            Pose::new(*turned.rotation(), shift).unwrap()
+        };
+        let mut querier = Querier::new().unwrap();
+        let (mut hits, all) = (0, rounds(3) as u32);
+        for round in 0..all {
+            let motion = Motion::between(&place(), &place()).unwrap();
+            let what = format!("{name_a} {name_b} {round}");
+            hits += u32::from(check(&mut querier, (&a, &b), &motion, 1000, &what));
+        }
+        assert!(all < 100 || hits > all / 20 && hits < all - all / 20, "{hits} of {all}");
+        note(&format!("{name_a} {name_b}: {hits} of {all} random motions hit"));
+    }
 }
 
 /// Shapes whose answers are known: what samplers miss and what tolerances invent.

@@ -27,13 +27,16 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The most pairs of triangles that are kept from stretch to stretch.
-const MOST_PAIRS: usize = 48;
-/// The most pairs of packets that the first walk looks at; each halving allows four times as many. A long stretch in which
+const MOST_PAIRS: usize = 24;
+/// The most pairs of packets that the first walk looks at; each halving allows eight times as many. A long stretch in which
 /// much is near is given up early, and a short one has to be looked through in the end.
-const FIRST_PACKET_TESTS: f64 = 24.0;
+const FIRST_PACKET_TESTS: u64 = 12;
 /// A stretch that ends within the clearance is swept when B moves by less than this fraction of the larger object's
 /// diagonal: few pairs of triangles are likely to be left.
-const FINE: f64 = 1.0 / 1024.0;
+const FINE: f64 = 1.0 / 4096.0;
+/// Within a stretch in which B moves by less than this many times the tolerance, no time of contact is guessed: there are as
+/// few cells as a guess would take to find the right one.
+const LEAST_GUESSED: f64 = 16.0;
 /// How many stretches may wait while any hit is looked for by long stretches first.
 const MOST_SPREAD: usize = 64;
 /// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
@@ -222,7 +225,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             if pairs.left().is_empty() {
                 return Ok(());
             }
-            if let Some(time) = self.querier.contact_time(self.question, &interval.stretch, pairs.left()) {
+            if middle.reach > LEAST_GUESSED * self.question.tolerance
+                && let Some(time) = self.querier.contact_time(self.question, &interval.stretch, pairs.left())
+            {
                 return self.descend(interval, Some(time), todo);
             }
         }
@@ -347,7 +352,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         let pairs = match &interval.pairs {
             Some(pairs) => pairs.clone(),
             None => {
-                let packet_tests = (FIRST_PACKET_TESTS * 4f64.powi(interval.depth as i32)) as u64;
+                let packet_tests = FIRST_PACKET_TESTS << (3 * interval.depth).min(48);
                 let room = Room { pairs: MOST_PAIRS, packet_tests };
                 let mut found = Vec::new();
                 let is_crowded = each_pair(question.a, question.b, middle, |placed| {
