@@ -16,8 +16,8 @@ use crate::scene::{Scene, SceneError, check_world};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Into how many slices the time is divided, so that boxes follow the paths.
-const SLICES: usize = 16;
+/// Into how many slices the time is divided at most, so that boxes follow the paths.
+const MOST_SLICES: usize = 16;
 
 /// Whether the ways of all moving instances are free. Of a pair of which one stands still, that one is A; else the lower one
 /// is.
@@ -60,7 +60,17 @@ struct Encounter {
 struct Moving<'a> {
     place: u32,
     instance: &'a Instance,
+    /// The girth of its box at the start.
+    girth: f64,
     slices: Vec<WorldBox>,
+}
+
+impl Moving<'_> {
+    /// Returns into how many slices to divide a time of one slice: as many as the box is larger than the instance.
+    fn slices_worthwhile(&self) -> usize {
+        let times = self.slices[0].girth() / self.girth;
+        if times.is_finite() { (times as usize).clamp(1, MOST_SLICES) } else { MOST_SLICES }
+    }
 }
 
 /// What is asked: the paths by the places of their instances.
@@ -155,8 +165,14 @@ impl Scene {
 
     /// Returns the pairs that may come within the clearance, in the order in which their boxes do.
     fn encounters(&self, ways: &Ways<'_>) -> Vec<Encounter> {
-        let moving: Vec<Moving<'_>> =
-            ways.paths.iter().filter_map(|(&place, &path)| self.moving(place, path)).collect();
+        let all = |slices: usize| -> Vec<Moving<'_>> {
+            ways.paths.iter().filter_map(|(&place, &path)| self.moving(place, path, slices)).collect()
+        };
+        let mut moving = all(1);
+        let slices = moving.iter().map(Moving::slices_worthwhile).max().unwrap_or(1);
+        if slices > 1 {
+            moving = all(slices);
+        }
         let mut encounters = Vec::new();
         for (number, one) in moving.iter().enumerate() {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
@@ -167,8 +183,8 @@ impl Scene {
                 let Some(other) = self.instances.get(place as usize).and_then(Option::as_ref) else {
                     continue;
                 };
-                let slices = [other.bounds; SLICES];
-                let pair = [(place, other, slices.as_slice()), (one.place, one.instance, &one.slices)];
+                let still = vec![other.bounds; slices];
+                let pair = [(place, other, still.as_slice()), (one.place, one.instance, &one.slices)];
                 encounters.extend(self.encounter(pair, ways));
             }
             for other in &moving[number + 1..] {
@@ -181,18 +197,20 @@ impl Scene {
     }
 
     /// Returns a moving instance with its boxes.
-    fn moving(&self, place: u32, path: WorldPath<'_>) -> Option<Moving<'_>> {
+    fn moving(&self, place: u32, path: WorldPath<'_>, slices: usize) -> Option<Moving<'_>> {
         let instance = self.instances.get(place as usize)?.as_ref()?;
         let objects = instance.shape.objects();
         let radius = radius(objects);
+        let time = |end: usize| end as f64 / slices as f64;
         let ends: Vec<WorldBox> =
-            (0..=SLICES).map(|end| WorldBox::of(objects, &path.pose(time(end)))).collect();
+            (0..=slices).map(|end| WorldBox::of(objects, &path.pose(time(end)))).collect();
         let slice = |number: usize| {
             let sagitta = path.sagitta(radius, time(number), time(number + 1));
             let sagitta = if sagitta >= 0.0 { sagitta } else { f64::INFINITY };
             ends[number].union(&ends[number + 1]).grown(sagitta)
         };
-        Some(Moving { place, instance, slices: (0..SLICES).map(slice).collect() })
+        let slices = (0..slices).map(slice).collect();
+        Some(Moving { place, instance, girth: ends[0].girth(), slices })
     }
 
     /// Returns when the boxes of two instances first come near each other, if they do and are asked about.
@@ -255,11 +273,6 @@ impl Ways<'_> {
         let default = 2e-6 * one.girth().max(other.girth());
         self.options.clearance + self.options.tolerance.unwrap_or(default)
     }
-}
-
-/// The start of a slice, or the end of the last one.
-fn time(slice: usize) -> f64 {
-    slice as f64 / SLICES as f64
 }
 
 /// Puts the answers about pairs together; pairs that are free are not among them.
