@@ -9,11 +9,12 @@
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
+//! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
 //! | is the way free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
 //! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
 //! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
-//! all cores. `Batch`, and scenes on all cores, need the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
+//! all cores, as [`ProbeBatch`] does about many points. `Batch`, and scenes on all cores, need the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
 //! `mint` converts matrices and quaternions of other crates to a [`Pose`].
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or
@@ -72,12 +73,14 @@ pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
 pub use pose::{Pose, PoseError};
-pub use query::answers::{Contact, Distance, QueryStats};
+pub use query::answers::{ClosestPoint, Contact, Distance, QueryStats};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
 pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
 pub use query::options::DistanceOptions;
+#[cfg(feature = "parallel")]
+pub use query::probe_batch::ProbeBatch;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{

@@ -151,14 +151,20 @@ fn far_along<I: Isa>(isa: I, gap: I::V, squared: I::V, limit_squared: I::V) -> u
 
 /// The best guess so far.
 #[derive(Clone, Copy)]
-struct Guess<V> {
+pub(super) struct Guess<V> {
     squared: V,
     direction: Vec3<V>,
 }
 
 impl<V: Lanes> Guess<V> {
+    /// Nothing is guessed yet.
     #[inline(always)]
-    fn improve(&mut self, direction: Vec3<V>) {
+    pub(super) fn none<I: Isa<V = V>>(isa: I) -> Self {
+        Self { squared: isa.splat(f32::INFINITY), direction: [isa.splat(0.0); 3] }
+    }
+
+    #[inline(always)]
+    pub(super) fn improve(&mut self, direction: Vec3<V>) {
         let squared = dot(direction, direction);
         let closer = squared.lt(self.squared);
         self.squared = V::select(closer, squared, self.squared);
@@ -206,7 +212,7 @@ fn slack_of<I: Isa>(isa: I, queue: &TriangleQueue) -> I::V {
 #[inline(always)]
 fn closest<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>) -> Guess<I::V> {
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
-    let mut guess = Guess { squared: isa.splat(f32::INFINITY), direction: [zero; 3] };
+    let mut guess = Guess::none(isa);
     let (edges_a, edges_b) = (edges(a), edges(b));
     let (inverse_a, inverse_b) = (inverse_squares(one, edges_a), inverse_squares(one, edges_b));
     for i in 0..3 {
@@ -227,8 +233,8 @@ fn closest<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>) -> Guess<I::V> 
             guess.improve(sub(point_b, along(between, on_a, edge_a)));
         }
     }
-    corners_on_face(isa, a, &edges_a, b, &mut guess, false);
-    corners_on_face(isa, b, &edges_b, a, &mut guess, true);
+    points_on_face(isa, a, &edges_a, b, &mut guess, false);
+    points_on_face(isa, b, &edges_b, a, &mut guess, true);
     guess
 }
 
@@ -240,18 +246,18 @@ fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
 
 /// Returns the inverse of the squared length of each edge.
 #[inline(always)]
-fn inverse_squares<V: Lanes>(one: V, edges: Corners<V>) -> Vec3<V> {
+pub(super) fn inverse_squares<V: Lanes>(one: V, edges: Corners<V>) -> Vec3<V> {
     let [x, y, z] = edges;
     [one.div(dot(x, x)), one.div(dot(y, y)), one.div(dot(z, z))]
 }
 
-/// Each corner in `points` against the face of `t`. `towards` tells that the points are A's.
+/// Each of some points against the face of `t`. `towards` tells that the points are A's.
 #[inline(always)]
-fn corners_on_face<I: Isa>(
+pub(super) fn points_on_face<I: Isa, const N: usize>(
     isa: I,
     t: &Corners<I::V>,
     edges: &Corners<I::V>,
-    points: &Corners<I::V>,
+    points: &[Vec3<I::V>; N],
     guess: &mut Guess<I::V>,
     towards: bool,
 ) {
@@ -260,8 +266,8 @@ fn corners_on_face<I: Isa>(
     let edge_2 = sub(t[2], t[0]);
     let (d11, d12, d22) = (dot(edge_1, edge_1), dot(edge_1, edge_2), dot(edge_2, edge_2));
     let inverse = one.div(d12.neg_mul_add(d12, d11.mul(d22)));
-    for corner in 0..3 {
-        let v = sub(points[corner], t[0]);
+    for &point in points {
+        let v = sub(point, t[0]);
         let (p1, p2) = (dot(v, edge_1), dot(v, edge_2));
         let first = p2.neg_mul_add(d12, p1.mul(d22)).mul(inverse);
         let second = p1.neg_mul_add(d12, p2.mul(d11)).mul(inverse);
@@ -274,7 +280,13 @@ fn corners_on_face<I: Isa>(
 }
 
 #[inline(always)]
-fn certify<I: Isa>(isa: I, slack: I::V, a: &Corners<I::V>, b: &Corners<I::V>, guess: Guess<I::V>) -> Bounds {
+pub(super) fn certify<I: Isa>(
+    isa: I,
+    slack: I::V,
+    a: &Corners<I::V>,
+    b: &Corners<I::V>,
+    guess: Guess<I::V>,
+) -> Bounds {
     let least = isa.splat(MIN_CERTIFIED_SQUARE);
     let length = guess.squared.max(least).sqrt();
     let n = guess.direction;

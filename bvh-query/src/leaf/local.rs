@@ -35,7 +35,7 @@ pub(crate) struct LocalFrame {
     /// Units of the frame in a mesh unit, a power of two.
     pub(crate) scale: f32,
     /// Bound on the f64 error, units of the frame.
-    error: f32,
+    pub(super) error: f32,
 }
 
 impl LocalFrame {

@@ -8,4 +8,5 @@ pub(crate) mod distance;
 pub(crate) mod local;
 pub(crate) mod math;
 pub(crate) mod placed_packet;
+pub(crate) mod point;
 pub(crate) mod queue;

@@ -38,6 +38,24 @@ pub struct Distance {
     pub triangle_b: u32,
 }
 
+/// The closest point of a mesh to a given one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ClosestPoint {
+    /// The distance in mesh units; 0 if and only if the given point is on the mesh.
+    pub distance: f64,
+    /// The mesh is certainly at least this far away.
+    pub lower: f64,
+    /// The mesh is certainly at most this far away.
+    pub upper: f64,
+    /// The closest point, in the mesh's frame.
+    pub point: [f64; 3],
+    /// The number that its object has in the file.
+    pub object: u32,
+    /// Its triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle: u32,
+}
+
 /// How much work the last query was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]

@@ -5,6 +5,7 @@ use crate::isa::Backend;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
+use crate::query::closest_point::BoundedTriangle;
 use crate::query::motion::sweep::Ends;
 use crate::query::search::BoundedPair;
 use crate::traverse::walk::WalkMemory;
@@ -38,6 +39,7 @@ pub struct Querier {
     /// For sweeps: what is in A's frame at the end of an interval.
     pub(super) at_end: Ends,
     pub(super) bounded: Vec<BoundedPair>,
+    pub(super) bounded_triangles: Vec<BoundedTriangle>,
     budget: u64,
     pub(super) stats: QueryStats,
     questions: u64,
@@ -63,6 +65,7 @@ impl Querier {
             packets: Default::default(),
             at_end: Ends::default(),
             bounded: Vec::new(),
+            bounded_triangles: Vec::new(),
             budget: u64::MAX,
             stats: QueryStats::default(),
             questions: 0,

@@ -8,6 +8,7 @@ pub(crate) mod leaf_pairs;
 pub(crate) mod node_cache;
 pub(crate) mod node_test;
 pub(crate) mod placement;
+pub(crate) mod probe_walk;
 pub(crate) mod slab_memory;
 pub(crate) mod slab_test;
 pub(crate) mod walk;

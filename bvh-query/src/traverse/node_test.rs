@@ -255,9 +255,15 @@ fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::
     lo_a.sub(hi_b).max(lo_b.sub(hi_a))
 }
 
-/// Runs `gaps` for the directions of a set.
+/// Returns the gap of each of 16 pairs, four nodes of A and four of B, along the directions of a set, which the groups of both
+/// are aligned to.
 #[inline(always)]
-fn gaps_along<I: Isa>(isa: I, measure: Measure, set: DirectionSet, ends: (&Group, &Group)) -> I::V {
+pub(crate) fn gaps_along<I: Isa>(
+    isa: I,
+    measure: Measure,
+    set: DirectionSet,
+    ends: (&Group, &Group),
+) -> I::V {
     match set {
         DirectionSet::Dop6 => gaps::<I, 3>(isa, measure, ends),
         DirectionSet::Dop14 => gaps::<I, 7>(isa, measure, ends),

@@ -24,6 +24,7 @@
 //! deeper than its number of treelets. Nothing recurses.
 
 use crate::error::QueryError;
+use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
 use crate::traverse::frames::{Entry, Frames};
@@ -32,7 +33,9 @@ use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_test::{Measure, NodeTest, Witness};
 use crate::traverse::placement::ObjectPair;
+use crate::traverse::probe_walk::{ProbeFrame, ProbeWalk};
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
+use bvh_format::object::Object;
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -98,6 +101,8 @@ pub(crate) struct WalkMemory {
     /// Best-first: the entry of least bound is next.
     list: Frames,
     large_leaves: LargeLeaves,
+    /// What is left of the node tests of points.
+    probe_stack: Vec<ProbeFrame>,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
@@ -389,6 +394,18 @@ impl WalkMemory {
     /// Starts a query that may visit this many pairs.
     pub(crate) fn start(&mut self, budget: u64) {
         (self.budget, self.left) = (budget, budget);
+    }
+
+    /// Returns a walk of one object for some probes.
+    pub(crate) fn probe_walk<'a, V>(
+        &'a mut self,
+        bvh: &'a Bvh,
+        object: &'a Object,
+        probes: usize,
+        visitor: &'a mut V,
+    ) -> ProbeWalk<'a, V> {
+        let Self { nodes_a, probe_stack, left, budget, .. } = self;
+        ProbeWalk { bvh, object, nodes: nodes_a, stack: probe_stack, left, budget: *budget, probes, visitor }
     }
 
     /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.

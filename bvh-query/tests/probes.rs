@@ -1,0 +1,204 @@
+//! Points: against labels from exact arithmetic, against the distance to a mesh that is a point, and where ties decide.
+
+mod common;
+
+#[cfg(feature = "parallel")]
+use bvh_query::ProbeBatch;
+use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
+use cbvh_testkit::depth::rounds;
+use common::shapes::{cube, moved, plate, sphere, torus};
+use common::{Random, Triangle, bake, mesh, note, shared};
+
+fn baked(triangles: &[Triangle]) -> Bvh {
+    bake(&mesh(triangles), &bvh_bake::Options::default())
+}
+
+fn queriers() -> Vec<Querier> {
+    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+    backends.map(Querier::with_backend).collect()
+}
+
+/// A label that is not the least distance, and what is: computed with rationals over all triangles near the point.
+const MISLABELLED: (&str, f64) =
+    ("-0.030366769060492516 0.15410411357879639 -0.0039105289615690708", 0.000_227_573_734_231_122_88);
+
+/// The labels are exact distances, rounded once, about vertices rounded to f32: a point on a vertex, an edge or a face, a
+/// little off it, or anywhere.
+#[test]
+fn labelled_points_have_their_distances() {
+    for name in ["ball", "bunny", "nao", "apollo", "dragon"] {
+        let folder = if name == "ball" { "probes" } else { "meshes" };
+        let Some(path) = shared(&format!("{folder}/{name}.obj")) else { return };
+        let Some(points) = shared(&format!("probes/{name}_points.txt")) else { return };
+        let mut read = bvh_bake::input::read(&path).unwrap();
+        for object in &mut read.objects {
+            object.positions.iter_mut().for_each(|p| *p = p.map(|v| f64::from(v as f32)));
+        }
+        let bvh = bake(&read, &bvh_bake::Options::default());
+        let size = bvh.objects()[0].bounding_sphere().1;
+        let mut queriers = queriers();
+        let text = std::fs::read_to_string(points).unwrap();
+        let (mut on, mut all, mut worst) = (0, 0, 0.0f64);
+        for line in text.lines().filter(|line| !line.starts_with('#')) {
+            let (numbers, label) = line.split_once('#').unwrap();
+            let numbers: Vec<f64> = numbers.split_whitespace().map(|word| word.parse().unwrap()).collect();
+            let point = [numbers[0], numbers[1], numbers[2]];
+            let mut words = label.split_whitespace();
+            words.find(|word| *word == "dist").unwrap();
+            let label = words.next().unwrap().parse().unwrap();
+            let exact = if line.starts_with(MISLABELLED.0) { MISLABELLED.1 } else { label };
+            let mut first = None;
+            for querier in &mut queriers {
+                let found = querier.closest_point(&bvh, point, f64::INFINITY).unwrap().unwrap();
+                assert_eq!(*first.get_or_insert(found), found, "{name} {line} {:?}", querier.backend());
+            }
+            let found = first.unwrap();
+            assert_eq!(found.distance == 0.0, exact == 0.0, "{name} {line}");
+            // The label itself is rounded.
+            let slack = exact * f64::EPSILON;
+            assert!(found.lower <= exact + slack && exact - slack <= found.upper, "{name} {line} {found:?}");
+            worst = worst.max((found.distance - exact).abs() / size);
+            let off: f64 = (0..3).map(|k| (found.point[k] - point[k]).powi(2)).sum::<f64>().sqrt();
+            assert!((off - exact).abs() <= 1e-15 * size, "{name} {line} {found:?}");
+            on += u32::from(exact == 0.0);
+            all += 1;
+        }
+        assert!(worst <= 1e-16 && on > 50, "{worst:e}, {on} on the mesh");
+        note(&format!(
+            "{name}: {all} points, {on} on the mesh, distances off by at most {worst:e} of its radius"
+        ));
+    }
+}
+
+/// Random points beside, on and in meshes, and far away: the answer is that of a mesh without area at the point.
+#[test]
+fn a_point_is_as_far_as_a_mesh_that_is_a_point() {
+    let random = &mut Random::new(41);
+    let mut two = mesh(&sphere(2));
+    two.objects.extend(mesh(&moved(&torus(9, 6), 0.5, [3.0, 0.0, 0.0])).objects);
+    let split = bvh_bake::Options::default().split_objects(true);
+    let shapes = [baked(&cube()), baked(&plate(6)), baked(&torus(24, 12)), bake(&two, &split)];
+    let mut queriers = queriers();
+    let mut tied = 0;
+    for round in 0..rounds(300) {
+        let bvh = &shapes[random.below(shapes.len())];
+        let spread = [0.9, 2.0, 50.0][random.below(3)];
+        // Often a point of a lattice, where vertices are and ties come from.
+        let lattice = round % 3 == 0;
+        let point = random.point().map(|v| {
+            let v = if lattice { (2.0 * spread * v).round() / 2.0 } else { spread * v };
+            f64::from(v as f32)
+        });
+        let one = baked(&[[point; 3]]);
+        let expected = queriers[0].distance(bvh, &one, &Pose::IDENTITY).unwrap();
+        for querier in &mut queriers {
+            let found = querier.closest_point(bvh, point, f64::INFINITY).unwrap().unwrap();
+            assert_eq!(found.distance, expected.distance, "{point:?} {:?}", querier.backend());
+            if expected.distance > 0.0 {
+                assert_eq!(
+                    (found.object, found.triangle),
+                    (expected.object_a, expected.triangle_a),
+                    "{point:?}"
+                );
+                assert_eq!((found.lower, found.upper), (expected.lower, expected.upper));
+                assert_eq!(found.point, expected.point_a);
+            }
+            // The limit itself counts, the next number below does not.
+            let d = found.distance;
+            assert_eq!(querier.closest_point(bvh, point, d.max(found.upper)), Ok(Some(found)));
+            if found.lower > 0.0 {
+                assert_eq!(querier.closest_point(bvh, point, found.lower * (1.0 - 1e-9)), Ok(None));
+            }
+        }
+        tied += u32::from(lattice && expected.distance > 0.0);
+    }
+    assert!(tied > 10, "{tied}");
+}
+
+#[test]
+fn ties_go_to_the_lowest_numbers_and_a_limit_is_exact() {
+    let mut two = mesh(&cube());
+    two.objects.extend(mesh(&cube()).objects);
+    let bvh = bake(&two, &bvh_bake::Options::default().split_objects(true));
+    for querier in &mut queriers() {
+        // From the middle of both cubes all faces are equally near, and from a corner outside all that meet there.
+        let middle = querier.closest_point(&bvh, [0.0; 3], f64::INFINITY).unwrap().unwrap();
+        assert_eq!((middle.distance, middle.object, middle.triangle), (1.0, 0, 0));
+        let corner = querier.closest_point(&bvh, [2.0, 2.0, 2.0], f64::INFINITY).unwrap().unwrap();
+        let meets = |t: &Triangle| t.contains(&[1.0; 3]);
+        assert_eq!((corner.point, corner.object), ([1.0; 3], 0));
+        assert_eq!(corner.triangle as usize, cube().iter().position(meets).unwrap());
+        assert_eq!(corner.distance, 3f64.sqrt());
+        // On the mesh, too.
+        let on = querier.closest_point(&bvh, [1.0, 1.0, 1.0], 0.0).unwrap().unwrap();
+        assert_eq!((on.distance, on.triangle), (0.0, corner.triangle));
+        assert_eq!(querier.closest_point(&bvh, [0.0, 0.0, 3.0], 2.0).unwrap().unwrap().distance, 2.0);
+        assert_eq!(querier.closest_point(&bvh, [0.0, 0.0, 3.0], 2f64.next_down()), Ok(None));
+        // Far away, all is equally far in f64; and at the edge of what coordinates may be.
+        for far in [1e9, 1e25, 2f64.powi(120)] {
+            let found = querier.closest_point(&bvh, [far, 0.0, 0.0], f64::INFINITY).unwrap().unwrap();
+            assert_eq!(found.distance, far - 1.0);
+        }
+        for wrong in [f64::NAN, f64::INFINITY, 2f64.powi(121)] {
+            let error = querier.closest_point(&bvh, [0.0, wrong, 0.0], f64::INFINITY);
+            assert!(matches!(error, Err(QueryError::Number { name: "point", .. })), "{error:?}");
+        }
+        for wrong in [f64::NAN, -1.0] {
+            let error = querier.closest_point(&bvh, [0.0; 3], wrong);
+            assert!(matches!(error, Err(QueryError::Number { name: "d", .. })), "{error:?}");
+        }
+        querier.set_budget(2);
+        assert_eq!(querier.closest_point(&bvh, [0.0; 3], 9.0), Err(QueryError::Budget { visits: 2 }));
+    }
+}
+
+/// From 1e-30 to 1e30 the same answers, but for the factor.
+#[test]
+fn units_do_not_matter() {
+    let random = &mut Random::new(42);
+    for exponent in [-99, 0, 99] {
+        let factor = 2f64.powi(exponent);
+        let scale = |p: [f64; 3]| p.map(|v| v * factor);
+        // Coordinates that no factor makes subnormal.
+        let coarse = |p: [f64; 3]| p.map(|v| (v * 1024.0).round() / 1024.0);
+        let plain: Vec<Triangle> = torus(16, 8).into_iter().map(|t| t.map(coarse)).collect();
+        let (one, scaled) = (baked(&plain), baked(&plain.iter().map(|t| t.map(scale)).collect::<Vec<_>>()));
+        for querier in &mut queriers() {
+            for _ in 0..20 {
+                let point = random.point().map(|v| 2.0 * v);
+                let expected = querier.closest_point(&one, point, f64::INFINITY).unwrap().unwrap();
+                let found = querier.closest_point(&scaled, scale(point), f64::INFINITY).unwrap().unwrap();
+                assert_eq!((found.distance, found.triangle), (expected.distance * factor, expected.triangle));
+            }
+        }
+    }
+}
+
+/// Four at a time and on any number of threads, a batch has the answers of the querier; and the error of the first point.
+#[test]
+#[cfg(feature = "parallel")]
+fn batches_of_points_have_the_same_answers() {
+    let random = &mut Random::new(43);
+    let bvh = baked(&torus(24, 12));
+    let mut points: Vec<[f64; 3]> = (0..999).map(|_| random.point().map(|v| 3.0 * v)).collect();
+    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+    for backend in backends {
+        let (mut querier, batch) = (Querier::with_backend(backend), ProbeBatch::with_backend(&bvh, backend));
+        for within in [f64::INFINITY, 0.4] {
+            let expected: Vec<_> =
+                points.iter().map(|point| querier.closest_point(&bvh, *point, within).unwrap()).collect();
+            assert!(expected.iter().any(Option::is_some) && (within > 1.0 || expected.contains(&None)));
+            for threads in [1, 2] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                assert_eq!(pool.install(|| batch.closest_points(&points, within)), Ok(expected.clone()));
+            }
+        }
+    }
+    let mut batch = ProbeBatch::new(&bvh).unwrap();
+    assert_eq!(batch.closest_points(&[], f64::INFINITY), Ok(vec![]));
+    (points[77][0], points[500][1]) = (2f64.powi(130), f64::NAN);
+    let error = batch.closest_points(&points, f64::INFINITY);
+    assert!(matches!(error, Err(QueryError::Number { found, .. }) if found == 2f64.powi(130)), "{error:?}");
+    batch.set_budget(3);
+    assert_eq!(batch.closest_points(&points[..10], f64::INFINITY), Err(QueryError::Budget { visits: 3 }));
+}
