@@ -134,6 +134,9 @@ fn ties_go_to_the_lowest_numbers_and_a_limit_is_exact() {
         assert_eq!((on.distance, on.triangle), (0.0, corner.triangle));
         assert_eq!(querier.closest_point(&bvh, [0.0, 0.0, 3.0], 2.0).unwrap().unwrap().distance, 2.0);
         assert_eq!(querier.closest_point(&bvh, [0.0, 0.0, 3.0], 2f64.next_down()), Ok(None));
+        // What is too small for exact arithmetic counts as 0.
+        let tiny = querier.closest_point(&bvh, [1.0, 5e-324, -1e-200], 0.0).unwrap().unwrap();
+        assert_eq!((tiny.distance, tiny.point), (0.0, [1.0, 0.0, 0.0]));
         // Far away, all is equally far in f64; and at the edge of what coordinates may be.
         for far in [1e9, 1e25, 2f64.powi(120)] {
             let found = querier.closest_point(&bvh, [far, 0.0, 0.0], f64::INFINITY).unwrap().unwrap();

@@ -30,6 +30,10 @@ use std::ops::ControlFlow;
 /// Bounded triangles kept before the nearest are measured and the rest is thinned out.
 const MAX_BOUNDED: usize = 256;
 
+/// Coordinates of points below this, 2^-213 mesh units, count as 0: all others are multiples of 2^-266, as exact arithmetic
+/// needs them (`narrow`).
+const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
+
 /// A triangle that may be the closest to a point, with bounds of its distance in mesh units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoundedTriangle {
@@ -53,7 +57,7 @@ impl Querier {
     ///
     /// The distance is that of the stored triangles, to within a few roundings of f64 at the scale of the closest triangle and
     /// of its gap. Of equally near triangles, the answer names that with the lowest numbers of object and triangle. Whether the
-    /// mesh is farther than `within` is decided exactly. It has the same bits on all backends.
+    /// mesh is farther than `within` is decided exactly. It has the same bits on all backends. A coordinate below 2^-213 counts as 0.
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120, or `within` is negative or NaN;
@@ -77,10 +81,11 @@ impl Querier {
         within: f64,
     ) -> Result<[Option<ClosestPoint>; PROBES], QueryError> {
         check_within(within)?;
-        points.iter().try_for_each(check_point)?;
+        let mut all = [[0.0; 3]; PROBES];
+        for (to, point) in all.iter_mut().zip(points) {
+            *to = check_point(point)?;
+        }
         self.start();
-        let mut all = [points[0]; PROBES];
-        all[..points.len()].copy_from_slice(points);
         let mut search = Search {
             points: all,
             within,
@@ -109,15 +114,13 @@ impl Querier {
     }
 }
 
-/// Refuses a point that no file can be near.
-pub(super) fn check_point(point: &Point) -> Result<(), QueryError> {
-    match point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-        Some(&found) => {
-            let expected = "finite coordinates of at most 2^120";
-            Err(QueryError::Number { name: "point", expected, found })
-        }
-        None => Ok(()),
+/// Refuses a point that no file can be near. Coordinates too small for exact arithmetic become 0.
+fn check_point(point: &Point) -> Result<Point, QueryError> {
+    if let Some(&found) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+        let expected = "finite coordinates of at most 2^120";
+        return Err(QueryError::Number { name: "point", expected, found });
     }
+    Ok(point.map(|x| if x.abs() < LEAST_COORDINATE { 0.0 } else { x }))
 }
 
 /// Refuses a limit that means nothing. Infinity is none.
