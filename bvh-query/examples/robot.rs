@@ -162,22 +162,26 @@ impl bvh_query::Path for LinkPath<'_> {
     }
 
     /// An eighth of the greatest acceleration times the square of the time. Joint j moves a point that is `arm` from its axis
-    /// at a rate of at most `rate * arm`, and every joint further in, i, turns that velocity: the acceleration is at most the
-    /// sum of `rate_i * rate_j * arm_j` over all pairs of joints, j being the outer one. A slide has an arm of 1.
+    /// at a rate of at most `rate * arm`, and a slide at its rate. Every joint further in that turns, i, turns that velocity:
+    /// the acceleration is at most the sum of `rate_i * rate_j * arm_j` over all pairs of joints, j being the outer one.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let mut arm = radius + length(self.robot.parts[self.part].1.translation());
         let (mut acceleration, mut outer) = (0.0, 0.0);
         for number in self.robot.chain(self.part) {
             let joint = &self.robot.joints[number];
-            let rate = (self.to[number] - self.from[number]).abs();
-            let is_slide = joint.joint_type == JointType::Prismatic;
-            let moved = rate * if is_slide { 1.0 } else { arm };
-            // With itself once, and twice with each joint further out.
-            acceleration += rate * (moved + 2.0 * outer);
-            outer += moved;
-            arm += length(*joint.origin.xyz)
-                + if is_slide { self.from[number].abs().max(self.to[number].abs()) } else { 0.0 };
+            let (from, to) = (self.from[number], self.to[number]);
+            let rate = (to - from).abs();
+            if joint.joint_type == JointType::Prismatic {
+                let axis = length(*joint.axis.xyz);
+                outer += rate * axis;
+                arm += from.abs().max(to.abs()) * axis;
+            } else {
+                // With itself once, and twice with each joint further out.
+                acceleration += rate * (rate * arm + 2.0 * outer);
+                outer += rate * arm;
+            }
+            arm += length(*joint.origin.xyz);
         }
         acceleration * (t1 - t0).powi(2) / 8.0 + 1e-12 * arm
     }

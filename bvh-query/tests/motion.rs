@@ -48,7 +48,7 @@ fn plain(
             continue;
         }
         let pose = path.pose(middle);
-        if !querier.within(a, b, &pose, clearance + reach).unwrap() {
+        if !querier.within(a, b, &pose, (clearance + reach).next_up()).unwrap() {
             continue;
         }
         if querier.within(a, b, &pose, clearance).unwrap() {
@@ -266,6 +266,28 @@ fn hard_motions_have_their_answers() {
             MotionAnswer::Hit { .. }
         ));
     }
+    // Along all of a wall of many triangles, at gaps that f32 hardly resolves: free, and few steps.
+    let wall = baked(&plate(16));
+    for (what, one) in [("block", &block), ("wall", &wall)] {
+        let height = if what == "block" { 2.0 } else { 0.0 };
+        for gap in [1e-6, 3e-6, 1e-5] {
+            let along = Motion::between(&at(-1.0, 0.0, height + gap), &at(1.0, 0.0, height + gap)).unwrap();
+            assert_eq!(
+                querier.motion(one, one, &along, &MotionOptions::new()),
+                Ok(MotionAnswer::Free),
+                "{what}"
+            );
+            let stats = querier.stats();
+            assert!(stats.node_tests < 20_000 && stats.exact_tests < 200_000, "{what} {gap}: {stats:?}");
+        }
+    }
+    // A clearance far above the size, beside which the reach of a cell all but vanishes.
+    let sheet = baked(&[[[2f64.powi(20), 0.0, 0.0], [2f64.powi(20), 1.0, 0.0], [2f64.powi(20), 0.0, 1.0]]]);
+    let spike = baked(&[[[0.0; 3], [-1.0, 0.0, 0.125], [-1.0, 0.125, 0.0]]]);
+    let nearer = Motion::between(&at(-0.5, 0.25, 0.25), &at(0.0, 0.25, 0.25)).unwrap();
+    let wide = MotionOptions::new().clearance(2f64.powi(20)).tolerance(2f64.powi(-34));
+    let answer = querier.motion(&sheet, &spike, &nearer, &wide).unwrap();
+    assert!(matches!(answer, MotionAnswer::Hit { touching_at, .. } if touching_at > 0.99), "{answer:?}");
     // A turn of 179.9 degrees beside another block: its corners come as near as its diagonal.
     let most = 179.9f64.to_radians() / 2.0;
     for (x, hits) in [(1.0 + 2f64.sqrt() + 1e-3, false), (1.0 + 2f64.sqrt() - 1e-3, true)] {

@@ -15,7 +15,8 @@ pub trait Path {
     /// origin of B's frame, is during `[t0, t1]` from where it would be if it went straight, at a constant rate, from where it
     /// is at `t0` to where it is at `t1`. That is at most an eighth of the greatest acceleration times the square of the time.
     /// It must hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as
-    /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work is a question.
+    /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work a question
+    /// takes.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
 
@@ -34,6 +35,8 @@ type Matrix = [[f64; 3]; 3];
 /// How far a computed pose may take a point from the ideal one, as a fraction of the magnitudes involved: 32 roundings, which
 /// is twice what a sine and cosine (one rounding each), Rodrigues' formula and a product of matrices amount to.
 const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+/// The same of a point on a line between two others: 2^-51, four roundings of which three occur.
+const LINE_ERROR: f64 = 1.0 / (1u64 << 51) as f64;
 /// The least cosine of half the angle between two poses, for which the shorter way between them is certain.
 const MIN_HALF_COSINE: f64 = 1e-9;
 
@@ -193,16 +196,24 @@ impl Motion {
 
     /// Returns how far rounding may take a point within `radius` of B's origin from where it ideally is.
     fn rounding(&self, radius: f64) -> f64 {
-        let (from, to) = (self.start.translation(), self.end.translation());
-        let mut magnitude = radius;
-        for k in 0..3 {
-            magnitude += from[k].abs() + to[k].abs();
-            if let Course::Screw { point, shift } = self.course {
-                magnitude += 2.0 * point[k].abs() + shift.abs();
-            }
-        }
+        let sum = |v: [f64; 3]| v.iter().map(|x| x.abs()).sum::<f64>();
+        let ends = sum(self.start.translation()) + sum(self.end.translation());
         // The angle is rounded before its sine is taken.
-        POSE_ERROR * (1.0 + self.angle.abs()) * magnitude
+        let turned = POSE_ERROR * (1.0 + self.angle.abs());
+        match self.course {
+            // Two products and a sum, however far away the line is.
+            Course::Line => turned * radius + LINE_ERROR * ends,
+            Course::Screw { point, shift } => turned * (radius + ends + 2.0 * sum(point) + 3.0 * shift.abs()),
+        }
+    }
+
+    /// Returns how far any point within `radius` of B's origin moves at most, between two poses.
+    fn way(&self, radius: f64) -> f64 {
+        let (from, to) = (self.start.translation(), self.end.translation());
+        let line = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+        let defects = difference(&self.defects[1], &self.defects[0]);
+        let defects = defects.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
+        (line + (self.angle.abs() + defects) * radius) * (1.0 + 1.0 / (1 << 17) as f64)
     }
 
     /// Returns how far a point within `radius` of B's origin is at most from the axis about which it turns.
@@ -267,6 +278,24 @@ impl Polyline {
         let number = (scaled as usize).min(self.motions.len() - 1);
         (number, scaled - number as f64)
     }
+
+    /// How far any point within `radius` of B's origin is from the straight way between two poses, in the pose that the motion
+    /// of a number starts with.
+    fn bend(&self, number: usize, radius: f64, [t0, t1]: [f64; 2], [from, to]: &[Pose; 2]) -> f64 {
+        let share = (number as f64 / self.motions.len() as f64 - t0) / (t1 - t0);
+        let between = |from: f64, to: f64, at: f64| at - (from + share * (to - from));
+        let knot = &self.motions[number].start;
+        let (mut moved, mut turned) = (0.0, 0.0);
+        for i in 0..3 {
+            let ends = (from.translation()[i], to.translation()[i]);
+            moved += between(ends.0, ends.1, knot.translation()[i]).powi(2);
+            for j in 0..3 {
+                let ends = (from.rotation()[i][j], to.rotation()[i][j]);
+                turned += between(ends.0, ends.1, knot.rotation()[i][j]).powi(2);
+            }
+        }
+        moved.sqrt() + turned.sqrt() * radius
+    }
 }
 
 impl Path for Polyline {
@@ -275,34 +304,30 @@ impl Path for Polyline {
         self.motions[number].pose(t)
     }
 
-    /// Within one motion, that of the motion; else the length of the way, since neither the point nor where it would be is
-    /// farther than that from both ends together.
+    /// The way is within the largest sagitta of its motions of the polygon through the knots, and that is farthest from the
+    /// straight way at a knot.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
-        let ((first, from), (last, to)) = (self.at(t0), self.at(t1));
+        let ((first, from), (mut last, mut to)) = (self.at(t0), self.at(t1));
+        if to == 0.0 && last > first {
+            // The end of one motion is the start of the next, to the bit.
+            (last, to) = (last - 1, 1.0);
+        }
         // The time within a motion is rounded, by less than this share of it.
         let slack = 1.0 / (1u64 << 50) as f64 * self.motions.len() as f64;
-        let speed = |motion: &Motion| {
-            let (a, b) = (motion.start.translation(), motion.end.translation());
-            let moved = [0, 1, 2].map(|k| b[k] - a[k]);
-            let line = (moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]).sqrt();
-            (line + motion.angle.abs() * radius) * (1.0 + 1.0 / (1 << 17) as f64)
+        let of_motion = |number: usize| {
+            let start = if number == first { from } else { 0.0 };
+            let end = if number == last { to } else { 1.0 };
+            let motion = &self.motions[number];
+            motion.sagitta(radius, start, end) + 4.0 * slack * motion.way(radius) + motion.rounding(radius)
         };
+        let bent = (first..=last).map(of_motion).fold(0.0, f64::max);
         if first == last {
-            let motion = &self.motions[first];
-            return motion.sagitta(radius, from, to) + 3.0 * slack * speed(motion);
+            return bent;
         }
-        let way: f64 = (first..=last)
-            .map(|number| {
-                let share = match number {
-                    _ if number == first => 1.0 - from,
-                    _ if number == last => to,
-                    _ => 1.0,
-                };
-                let motion = &self.motions[number];
-                (share + slack) * speed(motion) + 3.0 * motion.rounding(radius)
-            })
-            .sum();
-        way
+        let ends = [self.pose(t0), self.pose(t1)];
+        let knot = |number: usize| self.bend(number, radius, [t0, t1], &ends);
+        let knots = (first + 1..=last).map(knot).fold(0.0, f64::max);
+        bent + knots * (1.0 + 1.0 / (1u64 << 40) as f64)
     }
 }
 
@@ -389,6 +414,18 @@ pub(super) mod tests {
         skewed[0][1] = 0.9 / (1 << 20) as f64;
         let start = Pose::new(skewed, [0.0; 3]).unwrap();
         paths.push(Box::new(Motion::between(&start, &pose([1.0, 2.0, 3.0], 1.0, [1.0; 3])).unwrap()));
+        // A polyline on which nothing but what rotations are off by changes.
+        let mut sheared = *Pose::IDENTITY.rotation();
+        (sheared[0][1], sheared[1][0]) = (0.45 / (1 << 20) as f64, 0.45 / (1 << 20) as f64);
+        let sheared = Pose::new(sheared, [0.0; 3]).unwrap();
+        let there_and_back = [Pose::IDENTITY, sheared, Pose::IDENTITY, sheared, Pose::IDENTITY];
+        for knots in 3..=5 {
+            paths.push(Box::new(Polyline::new(&there_and_back[..knots]).unwrap()));
+        }
+        // Far from the origin.
+        let far = |x: f64| pose([0.0, 0.0, 1.0], x, [4e6, 5e6 + x, 0.0]);
+        paths.push(Box::new(Motion::between(&far(0.0), &far(1.0)).unwrap()));
+        paths.push(Box::new(Polyline::new(&[far(0.0), far(1.0), far(0.5)]).unwrap()));
         paths
     }
 

@@ -73,7 +73,8 @@ impl Querier {
     }
 
     /// Lets each query from now on visit at most this many pairs of objects and of nodes. A query that needs more ends with
-    /// [`QueryError::Budget`]. Without a budget, only the sizes of the files bound a query.
+    /// [`QueryError::Budget`]. Without a budget, only the sizes of the files bound a query, and those of a motion and its
+    /// tolerance.
     ///
     /// A visit takes some 100 ns. Queries of scans and of CAD models with 10^5 to 10^6 triangles take from some hundred
     /// visits, for separated meshes, to some 10^6, for all contacts of a deep overlap.

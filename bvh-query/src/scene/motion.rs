@@ -19,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Into how many slices the time is divided at most, so that boxes follow the paths.
 const MOST_SLICES: usize = 16;
 
-/// Whether the ways of all moving instances are free. Of a pair of which one stands still, that one is A; else the lower one
-/// is.
+/// Whether the ways of all moving instances are free. In the pairs named here, A is the one that stands still or, if both
+/// move, the lower one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SceneMotion {
     /// At no time from 0 to 1 is any pair within the clearance.
@@ -86,15 +86,16 @@ impl Scene {
     ///
     /// The answer is certain at every moment, and that of [`Querier::motion`] about each pair along its
     /// [`RelativePath`], put together: the earliest hit, before which no pair may be within the clearance. The default tolerance
-    /// is that of each pair. Of an instance that is named twice, the last path counts.
+    /// is that of each pair. Of an instance that is named twice, the last path counts. All poses of a path have to be such as
+    /// [`Scene::add`] takes.
     ///
     /// Cost: that of [`Querier::motion`] for each pair whose boxes come near each other, until the earliest hit. Where both
     /// instances turn, more intervals are looked at than where one stands still.
     ///
     /// # Errors
     /// [`SceneError::NoInstance`]; [`SceneError::Pose`] as for [`Scene::add`], of a path's start and end;
-    /// [`SceneError::Query`] for a clearance or a tolerance that means nothing; and [`SceneError::Pair`] with a pair whose question has no
-    /// answer.
+    /// [`SceneError::Query`] for a clearance or a tolerance that means nothing; and [`SceneError::Pair`] with the first pair
+    /// whose question has no answer before the earliest hit.
     pub fn motion(
         &mut self,
         paths: &[(InstanceId, WorldPath<'_>)],
@@ -104,10 +105,28 @@ impl Scene {
         let encounters = self.encounters(&ways);
         let earliest = Earliest::new();
         let answers = self.each_way(&encounters, &ways, |querier, pair, a, b, path| {
-            let answer = querier.motion_before(a, b, path, options, &earliest)?;
-            Ok((answer != MotionAnswer::Free).then_some((pair, answer)))
+            let answer = querier.motion_before(a, b, path, options, &earliest);
+            Ok((!matches!(answer, Ok(MotionAnswer::Free))).then_some((pair, answer)))
         })?;
-        Ok(together(&answers))
+        let (mut found, mut errors) = (Vec::new(), Vec::new());
+        for (pair, answer) in answers {
+            match answer {
+                Ok(answer) => found.push((pair, answer)),
+                Err(error) => errors.push((pair, error)),
+            }
+        }
+        let answer = together(&found);
+        // An error that a search meets after the earliest hit does not matter: searches may end there before they meet it.
+        let last =
+            if let SceneMotion::Hit { touching_at, .. } = answer { touching_at } else { f64::INFINITY };
+        match errors
+            .into_iter()
+            .filter(|(_, ended)| ended.decided_until <= last)
+            .min_by_key(|(pair, _)| *pair)
+        {
+            Some((pair, ended)) => Err(self.pair_error(pair, ended.error)),
+            None => Ok(answer),
+        }
     }
 
     /// Returns whether the ways are certainly free: whether [`Scene::motion`] answers [`SceneMotion::Free`], which takes less

@@ -199,7 +199,7 @@ fn what_means_nothing_is_refused() {
         error.to_string().starts_with("instance \"part\"") || error.to_string().contains("part"),
         "{error}"
     );
-    /// Somewhere on its way, nowhere.
+    /// In the middle, less rigid than a scene's poses are.
     struct Gap;
     impl Path for Gap {
         fn pose(&self, t: f64) -> Pose {
@@ -220,4 +220,67 @@ fn what_means_nothing_is_refused() {
     assert_eq!(scene.motion(&[(id, &through)], &MotionOptions::new()), Ok(SceneMotion::Free));
     let error = scene.motion(&[(still, &through)], &MotionOptions::new()).unwrap_err();
     assert_eq!(error, SceneError::NoInstance(still));
+}
+
+/// A path along x whose bound is lost from some time on.
+struct Lost {
+    from: f64,
+    until: f64,
+}
+
+impl Path for Lost {
+    fn pose(&self, t: f64) -> Pose {
+        at(self.from + t, 0.0, 0.0)
+    }
+    fn sagitta(&self, _radius: f64, _t0: f64, t1: f64) -> f64 {
+        if t1 > self.until { f64::INFINITY } else { 1e-12 }
+    }
+}
+
+/// An error after the earliest hit does not matter, in whatever order pairs are asked about; one before it does.
+#[test]
+fn an_error_matters_if_it_comes_before_the_hit() {
+    let block = shape(&cube());
+    for parallel in [false, true] {
+        for (until, is_error) in [(0.9, false), (0.25, true)] {
+            let mut scene = Scene::new().unwrap();
+            scene.set_parallel(parallel);
+            // The first pair never touches, and its boxes are near all the time; the second hits halfway.
+            let first = scene.add(block.clone(), at(0.0, 2.5, 0.0)).unwrap();
+            let mover = scene.add(block.clone(), at(0.0, 0.0, 0.0)).unwrap();
+            let wall = scene.add(block.clone(), at(2.5, 0.0, 0.0)).unwrap();
+            let groups = |bits: u32| Groups { member: bits, meets: u32::MAX };
+            scene.set_groups(first, groups(1)).unwrap();
+            scene.set_groups(wall, groups(2)).unwrap();
+            let path = Lost { from: 0.0, until };
+            let answer = scene.motion(&[(mover, &path)], &MotionOptions::new());
+            if is_error {
+                assert!(matches!(answer, Err(SceneError::Pair { .. })), "{answer:?}");
+            } else {
+                let Some((true, _, touching_at, pair, _)) = told(answer.unwrap()) else { panic!("a hit") };
+                assert!((touching_at - 0.5).abs() < 1e-6 && pair == (wall, mover));
+            }
+        }
+    }
+}
+
+/// Far from the world's origin, poses have fewer digits, and motions have answers as long as those resolve the tolerance.
+#[test]
+fn motions_far_from_the_origin_have_answers() {
+    let block = shape(&cube());
+    for far in [0.0, 1e6, 5e6] {
+        let mut scene = Scene::new().unwrap();
+        let still = scene.add(block.clone(), at(far, -far, 0.0)).unwrap();
+        let mover = scene.add(block.clone(), at(far, -far, 5.0)).unwrap();
+        let past = |x: f64| Motion::between(&at(far + x, -far, 5.0), &at(far + x, -far, -5.0)).unwrap();
+        let answer = scene.motion(&[(mover, &past(0.5))], &MotionOptions::new()).unwrap();
+        let Some((true, _, touching_at, pair, _)) = told(answer) else { panic!("{answer:?} at {far}") };
+        assert!((touching_at - 0.3).abs() < 1e-6 && pair == (still, mover));
+        assert_eq!(scene.motion(&[(mover, &past(2.1))], &MotionOptions::new()), Ok(SceneMotion::Free));
+        let turned = Pose::from_quaternion([0.0, 0.0, 0.6, 0.8], [far, -far, 0.0]).unwrap();
+        let turns = Motion::between(&at(far, -far, 0.0), &turned).unwrap();
+        let away = Motion::between(&at(far + 3.0, -far, 0.0), &at(far + 3.5, -far, 1.0)).unwrap();
+        let answer = scene.motion(&[(still, &turns), (mover, &away)], &MotionOptions::new());
+        assert_eq!(answer, Ok(SceneMotion::Free), "at {far}");
+    }
 }

@@ -2,14 +2,14 @@
 //!
 //! An answer has a definition that knows nothing of how it is found. Time is halved again and again into *cells*, until B
 //! moves by at most an eighth of the tolerance within a cell: [`motion_reach`]. A cell is *clear* if, in the pose of its
-//! middle, the meshes are farther apart than the clearance and that reach. The cells are met in the order of time:
+//! middle, the meshes are farther apart than the clearance and that reach, added and rounded up. The cells are met in the order of time:
 //!
 //! - In a clear cell nothing comes within the clearance.
 //! - In one that is not clear, the pose of the middle decides exactly: within the clearance is a hit.
 //! - Else the cell is undecided, and so is the answer, unless a later cell is a hit.
 //!
 //! The search leaves out cells that are certainly clear, many at a time: during an interval, everything that stays farther
-//! apart than the clearance and a quarter of the tolerance ([`sweep`]). Where few pairs of triangles are left,
+//! apart than the clearance and an eighth of the tolerance ([`sweep`]). Where few pairs of triangles are left,
 //! they are kept from interval to interval; all others are apart during the whole interval, so that these pairs alone decide.
 //! So what a filter sees does not show in an answer, which has the same bits on every backend.
 
@@ -101,6 +101,13 @@ pub enum MotionAnswer {
     },
 }
 
+/// A search that has no answer, and until when it has decided that there is no hit.
+#[derive(Debug)]
+pub(crate) struct EndedByError {
+    pub(crate) decided_until: f64,
+    pub(crate) error: QueryError,
+}
+
 impl Querier {
     /// Returns whether B's way is free, with B moving in A's frame along `path`, and where it ends if it is not.
     ///
@@ -109,11 +116,14 @@ impl Querier {
     /// backend and in any order of questions. As for [`Querier::collide`], meshes are surfaces.
     ///
     /// Cost: about one query of contact for each interval that has to be looked at: few where B stays apart by more than it
-    /// turns aside, some fifty for a hit.
+    /// turns aside, some thirty for a hit. Where B goes on and on at a gap below the tolerance, it takes a query for each eighth
+    /// of the tolerance that it moves by, because a hit may follow: a budget ends that, or [`Querier::is_free`], which says no
+    /// at once.
     ///
     /// # Errors
-    /// [`QueryError::Number`] for a clearance or a tolerance that means nothing, or a tolerance so small that time cannot be
-    /// halved as often as it needs; and the errors of [`Querier::within`]. A budget is for all intervals together.
+    /// [`QueryError::Number`] for a clearance or a tolerance that means nothing, or a tolerance that poses do not resolve:
+    /// because B moves by more in 2^-45 of the time, or is rounded by more; and the errors of [`Querier::within`]. A budget is
+    /// for all intervals together. Which error there is, and whether one is met before an answer, may depend on the backend.
     pub fn motion<'a>(
         &mut self,
         a: impl Into<Shape<'a>>,
@@ -121,7 +131,7 @@ impl Querier {
         path: &dyn Path,
         options: &MotionOptions,
     ) -> Result<MotionAnswer, QueryError> {
-        self.motion_before(a.into(), b.into(), path, options, &Earliest::new())
+        self.motion_before(a.into(), b.into(), path, options, &Earliest::new()).map_err(|ended| ended.error)
     }
 
     /// Answers as `motion` does, but for what is later than the earliest hit of all searches side by side.
@@ -132,17 +142,27 @@ impl Querier {
         path: &dyn Path,
         options: &MotionOptions,
         earliest: &Earliest,
-    ) -> Result<MotionAnswer, QueryError> {
-        let question = Question::new(a, b, path, options)?;
+    ) -> Result<MotionAnswer, EndedByError> {
+        let at_start = |error| EndedByError { decided_until: 0.0, error };
+        let question = Question::new(a, b, path, options).map_err(at_start)?;
         self.start();
-        match TimeSearch::new(self, &question).first(earliest)? {
+        let mut search = TimeSearch::new(self, &question);
+        let outcome = search.first(earliest);
+        let decided_until = search.decided_until;
+        let answer = outcome.and_then(|outcome| self.answer(&question, &outcome));
+        answer.map_err(|error| EndedByError { decided_until, error })
+    }
+
+    /// Adds to what a search has found how far apart the meshes are then.
+    fn answer(&mut self, question: &Question<'_>, outcome: &Outcome) -> Result<MotionAnswer, QueryError> {
+        match *outcome {
             Outcome::Free => Ok(MotionAnswer::Free),
             Outcome::Hit { free_until, touching_at } => {
-                let contact = self.distance_at(&question, &path.pose(touching_at))?;
+                let contact = self.distance_at(question, &question.path.pose(touching_at))?;
                 Ok(MotionAnswer::Hit { free_until, touching_at, contact })
             }
             Outcome::Undecided { free_until, at } => {
-                let distance = self.distance_at(&question, &path.pose(at))?;
+                let distance = self.distance_at(question, &question.path.pose(at))?;
                 Ok(MotionAnswer::Near { free_until, at, distance })
             }
         }

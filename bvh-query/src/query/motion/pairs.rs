@@ -13,6 +13,9 @@ use std::rc::Rc;
 /// How often the time of contact of a pair is improved.
 const MOST_STEPS: u32 = 12;
 
+/// Squares of directions below this, 2^-900, may have lost digits to underflow.
+const LEAST_SQUARE: f64 = f64::from_bits((1023 - 900) << 52);
+
 /// Two triangles that may meet, each in the frame of its own mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SweptPair {
@@ -51,7 +54,7 @@ impl Sweep {
     /// Returns whether two triangles are farther apart than the limit all the time, as far as can be seen: by their boxes, the
     /// normals of both, or the line between their closest points in the middle.
     #[inline(always)]
-    fn sets_apart(&self, pair: &SweptPair) -> bool {
+    pub(super) fn sets_apart(&self, pair: &SweptPair) -> bool {
         let ends = [placed(&pair.b, &self.start), placed(&pair.b, &self.end)];
         box_gap(&pair.a, ends.as_flattened()) > self.limit || {
             let middle = placed(&pair.b, &self.middle);
@@ -72,8 +75,9 @@ impl Sweep {
         let of_b = ends.each_ref().map(|end| end.each_ref().map(along));
         let of_b = of_b.as_flattened();
         let gap = (least(of_b) - most(&of_a)).max(least(&of_a) - most(of_b));
-        // Where x underflows, nothing is apart along it.
-        gap > 0.0 && gap > self.limit * dot(x, x).sqrt()
+        // Where the square of x has underflown, nothing is apart along it.
+        let squared = dot(x, x);
+        squared >= LEAST_SQUARE && gap > self.limit * squared.sqrt()
     }
 }
 
@@ -187,6 +191,7 @@ impl ContactTime<'_> {
             }
             let reached = last.place(taken_back(point_b, &pose));
             let towards = subtract(point_a, point_b);
+            // The distance exceeds the clearance, which is not negative.
             let approach = dot(subtract(reached, point_b), towards) / distance;
             let next = time + gap / approach * (end - time);
             // Also if it is no number.

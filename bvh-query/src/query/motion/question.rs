@@ -87,13 +87,13 @@ impl<'a> Question<'a> {
         Middle { at, pose, reach }
     }
 
-    /// Returns how far apart parts have to be at both ends of a stretch to be left out: farther than the clearance and a
-    /// quarter of the tolerance all the time.
+    /// Returns how far apart parts have to be at both ends of a stretch to be left out: farther than the clearance and an
+    /// eighth of the tolerance all the time, which is as far as any cell reaches.
     pub(super) fn limit(&self, stretch: &Stretch) -> f64 {
         let [t0, t1] = stretch.times;
         let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
-        let least = self.clearance + self.tolerance / 4.0 + self.sagitta(t0, t1);
+        let least = self.clearance + self.tolerance / 8.0 + self.sagitta(t0, t1);
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
     }
 

@@ -92,11 +92,13 @@ impl Earliest {
 pub(super) struct TimeSearch<'s, 'a> {
     querier: &'s mut Querier,
     question: &'s Question<'a>,
+    /// The start of the interval that is looked at in the order of time: all before has been decided.
+    pub(super) decided_until: f64,
 }
 
 impl<'s, 'a> TimeSearch<'s, 'a> {
     pub(super) fn new(querier: &'s mut Querier, question: &'s Question<'a>) -> Self {
-        Self { querier, question }
+        Self { querier, question, decided_until: 0.0 }
     }
 
     /// Returns the first hit, or the first cell that is undecided. What is later than the earliest hit of all searches side by
@@ -128,7 +130,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         let mut undecided: Option<(f64, f64)> = None;
         let mut todo = vec![interval];
         while let Some(interval) = todo.pop() {
-            if interval.stretch.times[0] > earliest.time() {
+            self.decided_until = interval.stretch.times[0];
+            if self.decided_until > earliest.time() {
                 break;
             }
             self.querier.memory.visit()?;
@@ -203,7 +206,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             Some(pairs) => Ok(self.querier.any_pair_within(pairs.left(), &middle.pose, d)),
             None => self.is_within(&middle.pose, d),
         };
-        if !is_within(clearance + middle.reach)? {
+        // Rounded up: where the reach is small beside the clearance, it must not vanish.
+        if !is_within((clearance + middle.reach).next_up())? {
             return Ok(Cell::Clear);
         }
         Ok(if is_within(clearance)? { Cell::Hit } else { Cell::Undecided })
@@ -255,7 +259,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         loop {
             let middle = self.question.middle(&interval.stretch);
             let is_fine = time.is_none() && middle.reach <= FINE * self.question.size;
-            if is_fine || self.is_cell(&middle) {
+            // An interval too deep to be halved is an error only when its turn comes.
+            if is_fine || self.is_cell(&middle) || interval.depth == MAX_DEPTH {
                 break;
             }
             let is_before = match time {
@@ -326,7 +331,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         if interval.depth == MAX_DEPTH {
             return Err(QueryError::Number {
                 name: "tolerance",
-                expected: "more than B moves in 2^-45 of the time",
+                expected: "more than B moves in 2^-45 of the time, and than its poses are rounded by",
                 found: self.question.tolerance,
             });
         }

@@ -10,7 +10,7 @@
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
-use crate::isa::Isa;
+use crate::isa::{Isa, Task};
 use crate::leaf::distance::{swept_bounds, swept_near};
 use crate::leaf::local::{Local, valid_lanes};
 use crate::leaf::placed_packet::PlacedPackets;
@@ -56,6 +56,7 @@ impl Querier {
             candidates: Candidates {
                 placed: [placed.moved(&sweep.start, &start), placed.moved(&sweep.end, &end)],
                 queues: [&mut self.queue, &mut self.at_end.queue],
+                sweep,
                 limit: (sweep.limit as f32).next_up(),
                 found,
                 room,
@@ -83,6 +84,7 @@ struct Candidates<'a> {
     /// With B at the start of the interval and at its end.
     placed: [PlacedPair<'a>; 2],
     queues: [&'a mut TriangleQueue; 2],
+    sweep: &'a Sweep,
     /// The limit of the sweep, rounded up.
     limit: f32,
     found: &'a mut Vec<SweptPair>,
@@ -125,6 +127,11 @@ impl Candidates<'_> {
                 self.keep(pair)?;
             }
         }
+        if self.found.len() > self.room.pairs {
+            // Gaps below what f32 resolves are wide enough for f64: faces that slide along each other.
+            self.stats.exact_tests += self.found.len() as u64;
+            isa.run(LeaveOut(self.sweep, self.found));
+        }
         Ok(if self.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
@@ -136,6 +143,19 @@ impl Candidates<'_> {
         let b = stored(bvh_b, object_b, pair.b, pair.lane_b)?;
         self.found.push(SweptPair { a, b });
         Ok(())
+    }
+}
+
+/// Leaves out pairs that the sweep sets apart as `f64` sees it, with the features of a backend.
+struct LeaveOut<'a>(&'a Sweep, &'a mut Vec<SweptPair>);
+
+impl Task for LeaveOut<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _isa: I) {
+        let Self(sweep, pairs) = self;
+        pairs.retain(|pair| !sweep.sets_apart(pair));
     }
 }
 
