@@ -54,7 +54,7 @@ impl Sweep {
     /// Returns whether two triangles are farther apart than the limit all the time, as far as can be seen: by their boxes, the
     /// normals of both, or the line between their closest points in the middle.
     #[inline(always)]
-    pub(super) fn sets_apart(&self, pair: &SweptPair) -> bool {
+    fn sets_apart(&self, pair: &SweptPair) -> bool {
         let ends = [placed(&pair.b, &self.start), placed(&pair.b, &self.end)];
         box_gap(&pair.a, ends.as_flattened()) > self.limit || {
             let middle = placed(&pair.b, &self.middle);
@@ -135,7 +135,7 @@ impl Querier {
 }
 
 /// Counts the pairs that a stretch sets apart before the first one that it does not.
-struct CountApart<'a>(&'a Sweep, &'a [SweptPair]);
+pub(super) struct CountApart<'a>(pub(super) &'a Sweep, pub(super) &'a [SweptPair]);
 
 impl Task for CountApart<'_> {
     type Output = usize;

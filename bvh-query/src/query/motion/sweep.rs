@@ -10,14 +10,14 @@
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
-use crate::isa::{Isa, Task};
+use crate::isa::Isa;
 use crate::leaf::distance::{swept_bounds, swept_near};
 use crate::leaf::local::{Local, valid_lanes};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::query::answers::QueryStats;
 use crate::query::exact::stored;
-use crate::query::motion::pairs::{Sweep, SweptPair};
+use crate::query::motion::pairs::{CountApart, Sweep, SweptPair};
 use crate::query::placed_pair::{PlacedPair, Walk};
 use crate::query::querier::Querier;
 use crate::traverse::node_test::Measure;
@@ -128,9 +128,11 @@ impl Candidates<'_> {
             }
         }
         if self.found.len() > self.room.pairs {
-            // Gaps below what f32 resolves are wide enough for f64: faces that slide along each other.
-            self.stats.exact_tests += self.found.len() as u64;
-            isa.run(LeaveOut(self.sweep, self.found));
+            // Gaps below what f32 resolves are wide enough for f64: faces that slide along each other. Where the first pair is
+            // not apart, the crowd is one.
+            let apart = isa.run(CountApart(self.sweep, self.found));
+            self.stats.exact_tests += apart as u64 + 1;
+            self.found.drain(..apart);
         }
         Ok(if self.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
@@ -143,19 +145,6 @@ impl Candidates<'_> {
         let b = stored(bvh_b, object_b, pair.b, pair.lane_b)?;
         self.found.push(SweptPair { a, b });
         Ok(())
-    }
-}
-
-/// Leaves out pairs that the sweep sets apart as `f64` sees it, with the features of a backend.
-struct LeaveOut<'a>(&'a Sweep, &'a mut Vec<SweptPair>);
-
-impl Task for LeaveOut<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, _isa: I) {
-        let Self(sweep, pairs) = self;
-        pairs.retain(|pair| !sweep.sets_apart(pair));
     }
 }
 
