@@ -352,6 +352,34 @@ fn a_distance_says_how_far_b_may_move() {
     assert!(safe > 20 && near > 20, "{safe} {near}");
 }
 
+/// Comes near for a moment, and then fast, on a path whose bound is lost by then.
+struct Dip;
+
+impl Path for Dip {
+    fn pose(&self, t: f64) -> Pose {
+        let dip = 1.05 * (-((t - 0.5) / 0.02).powi(2)).exp();
+        at(3.0 - dip - 40.0 * (t - 0.93).max(0.0), 0.0, 0.0)
+    }
+
+    fn sagitta(&self, _radius: f64, t0: f64, t1: f64) -> f64 {
+        // The acceleration of the dip is at most 2.1 / 0.02^2.
+        if t1 > 0.9 { f64::INFINITY } else { 5250.0 * (t1 - t0).powi(2) / 8.0 + 1e-12 }
+    }
+}
+
+/// A guess that leads to a later contact, at which there is no answer, does not hide the earlier one.
+#[test]
+fn the_first_hit_is_found_before_what_has_no_answer() {
+    let wall = baked(&[[[1.0, -1.0, -1.0], [1.0, 2.0, -1.0], [1.0, -1.0, 2.0]]]);
+    let spike = baked(&[[[-1.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]);
+    for querier in &mut queriers() {
+        let answer = querier.motion(&wall, &spike, &Dip, &MotionOptions::new());
+        let Ok(MotionAnswer::Hit { free_until, touching_at, .. }) = answer else { panic!("{answer:?}") };
+        assert!(free_until > 0.4955 && touching_at < 0.4957, "{free_until} {touching_at}");
+        assert_eq!(querier.is_free(&wall, &spike, &Dip, &MotionOptions::new()), Ok(false));
+    }
+}
+
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
     let (mut querier, block) = (Querier::new().unwrap(), baked(&cube()));

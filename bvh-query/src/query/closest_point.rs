@@ -57,7 +57,8 @@ impl Querier {
     ///
     /// The distance is that of the stored triangles, to within a few roundings of f64 at the scale of the closest triangle and
     /// of its gap. Of equally near triangles, the answer names that with the lowest numbers of object and triangle. Whether the
-    /// mesh is farther than `within` is decided exactly. It has the same bits on all backends. A coordinate below 2^-213 counts as 0.
+    /// mesh is farther than `within` is decided exactly. It has the same bits on all backends. A coordinate below 2^-213
+    /// counts as 0.
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120, or `within` is negative or NaN;

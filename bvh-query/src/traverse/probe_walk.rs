@@ -10,8 +10,8 @@
 //!         if bound <= limit of the probe: keep, the nearest child next
 //! ```
 //!
-//! A node test has four children in rows and four probes in columns: the sixteen lanes of the pair walk. It ends as the pair walk
-//! does, because a file is a tree, and has at most two frames for each level.
+//! A node test has four children in rows and four probes in columns: the sixteen lanes of the pair walk. The walk ends as that
+//! of pairs does, because a file is a tree, and has at most two frames for each level.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;

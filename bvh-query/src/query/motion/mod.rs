@@ -2,15 +2,16 @@
 //!
 //! An answer has a definition that knows nothing of how it is found. Time is halved again and again into *cells*, until B
 //! moves by at most an eighth of the tolerance within a cell: [`motion_reach`]. A cell is *clear* if, in the pose of its
-//! middle, the meshes are farther apart than the clearance and that reach, added and rounded up. The cells are met in the order of time:
+//! middle, the meshes are farther apart than the clearance and that reach, added and rounded up. The cells are met in the
+//! order of time:
 //!
 //! - In a clear cell nothing comes within the clearance.
 //! - In one that is not clear, the pose of the middle decides exactly: within the clearance is a hit.
 //! - Else the cell is undecided, and so is the answer, unless a later cell is a hit.
 //!
 //! The search leaves out cells that are certainly clear, many at a time: during an interval, everything that stays farther
-//! apart than the clearance and an eighth of the tolerance ([`sweep`]). Where few pairs of triangles are left,
-//! they are kept from interval to interval; all others are apart during the whole interval, so that these pairs alone decide.
+//! apart than the clearance and an eighth of the tolerance ([`sweep`]). Where few pairs of triangles are left, they are kept
+//! from interval to interval; all others are apart during the whole interval, so that these pairs alone decide.
 //! So what a filter sees does not show in an answer, which has the same bits on every backend.
 
 mod pairs;
