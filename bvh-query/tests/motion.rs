@@ -389,7 +389,7 @@ fn numbers_that_mean_nothing_are_refused() {
         other => panic!("{other:?}"),
     };
     for wrong in [f64::NAN, f64::INFINITY, -1.0] {
-        assert_eq!(refused(MotionOptions::new().clearance(wrong)), "d");
+        assert_eq!(refused(MotionOptions::new().clearance(wrong)), "clearance");
         assert_eq!(refused(MotionOptions::new().tolerance(wrong)), "tolerance");
     }
     assert_eq!(refused(MotionOptions::new().tolerance(0.0)), "tolerance");

@@ -51,6 +51,7 @@ pub(crate) fn check_distance(d: f64) -> Result<(), QueryError> {
     check("d", "a finite distance of at least 0", d)
 }
 
-fn check(name: &'static str, expected: &'static str, found: f64) -> Result<(), QueryError> {
+/// Refuses a number that is NaN, infinite or negative.
+pub(crate) fn check(name: &'static str, expected: &'static str, found: f64) -> Result<(), QueryError> {
     if found.is_finite() && found >= 0.0 { Ok(()) } else { Err(QueryError::Number { name, expected, found }) }
 }

@@ -27,7 +27,7 @@ use crate::file::shape::Shape;
 use crate::motion::Path;
 use crate::pose::Pose;
 use crate::query::answers::Distance;
-use crate::query::options::{DistanceOptions, check_distance};
+use crate::query::options::{DistanceOptions, check};
 use crate::query::querier::Querier;
 use crate::query::search::Search;
 use question::Question;
@@ -66,9 +66,9 @@ impl MotionOptions {
 impl MotionOptions {
     /// Refuses numbers that mean nothing.
     pub(crate) fn check(&self) -> Result<(), QueryError> {
-        check_distance(self.clearance)?;
+        check("clearance", "a finite length of at least 0", self.clearance)?;
         match self.tolerance {
-            Some(found) if !(found.is_finite() && found > 0.0) => {
+            Some(found) if !found.is_finite() || found <= 0.0 => {
                 Err(QueryError::Number { name: "tolerance", expected: "a finite length above 0", found })
             }
             _ => Ok(()),
