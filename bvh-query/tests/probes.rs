@@ -199,6 +199,7 @@ fn batches_of_points_have_the_same_answers() {
     }
     let mut batch = ProbeBatch::new(&bvh).unwrap();
     assert_eq!(batch.closest_points(&[], f64::INFINITY), Ok(vec![]));
+    assert!(batch.closest_points(&[], f64::NAN).is_err());
     (points[77][0], points[500][1]) = (2f64.powi(130), f64::NAN);
     let error = batch.closest_points(&points, f64::INFINITY);
     assert!(matches!(error, Err(QueryError::Number { found, .. }) if found == 2f64.powi(130)), "{error:?}");

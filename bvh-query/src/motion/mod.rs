@@ -1,5 +1,6 @@
 //! Motions of B in A's frame: the paths that questions about the way between two poses take.
 
+mod linear;
 mod path;
 mod relative;
 

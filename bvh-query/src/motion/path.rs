@@ -1,5 +1,6 @@
 //! Paths: where B is at each moment, and how far it is from a straight line meanwhile.
 
+use crate::motion::linear::{Matrix, difference, length, norm, transposed};
 use crate::pose::frames::{product, turn};
 use crate::pose::{Pose, PoseError};
 use bvh_format::object::MAX_COORDINATE;
@@ -29,8 +30,6 @@ impl<P: Path + ?Sized> Path for &P {
         (**self).sagitta(radius, t0, t1)
     }
 }
-
-type Matrix = [[f64; 3]; 3];
 
 /// How far a computed pose may take a point from the ideal one, as a fraction of the magnitudes involved: 32 roundings, which
 /// is twice what a sine and cosine (one rounding each), Rodrigues' formula and a product of matrices amount to.
@@ -210,9 +209,8 @@ impl Motion {
     /// Returns how far any point within `radius` of B's origin moves at most, between two poses.
     fn way(&self, radius: f64) -> f64 {
         let (from, to) = (self.start.translation(), self.end.translation());
-        let line = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
-        let defects = difference(&self.defects[1], &self.defects[0]);
-        let defects = defects.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let line = length([0, 1, 2].map(|k| to[k] - from[k]));
+        let defects = norm(&difference(&self.defects[1], &self.defects[0]));
         (line + (self.angle.abs() + defects) * radius) * (1.0 + 1.0 / (1 << 17) as f64)
     }
 
@@ -365,14 +363,6 @@ fn quaternion(r: &Matrix) -> [f64; 4] {
     let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
     let sign = if q[3] < 0.0 { -length } else { length };
     q.map(|value| value / sign)
-}
-
-fn transposed(m: &Matrix) -> Matrix {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
-}
-
-fn difference(a: &Matrix, b: &Matrix) -> Matrix {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][j] - b[i][j]))
 }
 
 #[cfg(test)]

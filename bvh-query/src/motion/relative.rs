@@ -1,6 +1,7 @@
 //! The path of B in A's frame when both move in the world.
 
 use crate::motion::Path;
+use crate::motion::linear::{difference, length, norm};
 use crate::pose::Pose;
 
 /// The path of B in A's frame, given the paths of both in the world: at each time, `Pose::relative` of their poses. This is
@@ -31,8 +32,6 @@ impl Path for Pose {
         0.0
     }
 }
-
-type Matrix = [[f64; 3]; 3];
 
 /// More than the norm of the inverse of any pose's rotation.
 const MOST: f64 = 1.0 + 1.0 / (1 << 18) as f64;
@@ -89,19 +88,6 @@ impl Path for RelativePath<'_> {
 fn between(a: &Pose, b: &Pose) -> [f64; 3] {
     let (from, to) = (a.translation(), b.translation());
     [0, 1, 2].map(|k| to[k] - from[k])
-}
-
-fn difference(x: &Matrix, y: &Matrix) -> Matrix {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| x[i][j] - y[i][j]))
-}
-
-/// The Frobenius norm, which is no less than the operator's.
-fn norm(matrix: &Matrix) -> f64 {
-    matrix.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

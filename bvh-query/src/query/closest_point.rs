@@ -125,7 +125,7 @@ fn check_point(point: &Point) -> Result<Point, QueryError> {
 }
 
 /// Refuses a limit that means nothing. Infinity is none.
-fn check_within(within: f64) -> Result<(), QueryError> {
+pub(super) fn check_within(within: f64) -> Result<(), QueryError> {
     if within == f64::INFINITY { Ok(()) } else { check_distance(within) }
 }
 

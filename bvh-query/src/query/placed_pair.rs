@@ -9,7 +9,8 @@ use crate::leaf::placed_packet::{PlacedPacket, PlacedPackets};
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
-use crate::traverse::walk::{Visitor, WalkMemory, traverse};
+use crate::traverse::walk::{Visitor, traverse};
+use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use std::cell::OnceCell;
 

@@ -8,6 +8,7 @@ use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::isa::Backend;
 use crate::query::answers::ClosestPoint;
+use crate::query::closest_point::check_within;
 use crate::query::querier::Querier;
 use crate::traverse::probe_walk::PROBES;
 use rayon::prelude::*;
@@ -52,12 +53,13 @@ impl<'a> ProbeBatch<'a> {
     /// Answers [`Querier::closest_point`] for each point.
     ///
     /// # Errors
-    /// Returns the error of the first point that fails.
+    /// [`QueryError::Number`] if `within` is negative or NaN; else the error of the first point that fails.
     pub fn closest_points(
         &self,
         points: &[[f64; 3]],
         within: f64,
     ) -> Result<Vec<Option<ClosestPoint>>, QueryError> {
+        check_within(within)?;
         let order = along_curve(points);
         let ask = |querier: &mut Querier, run: &[u32]| -> Vec<Result<Option<ClosestPoint>, QueryError>> {
             let mut answers = Vec::with_capacity(run.len());

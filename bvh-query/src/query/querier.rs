@@ -8,7 +8,7 @@ use crate::query::answers::QueryStats;
 use crate::query::closest_point::BoundedTriangle;
 use crate::query::motion::sweep::Ends;
 use crate::query::search::BoundedPair;
-use crate::traverse::walk::WalkMemory;
+use crate::traverse::walk_memory::WalkMemory;
 
 /// Asks questions about two meshes.
 ///

@@ -1,4 +1,4 @@
-//! Walks two trees together: decoding, re-alignment, node tests, order of visits.
+//! Walks two trees together, or one for points: decoding, re-alignment, node tests, order of visits.
 
 pub(crate) mod align;
 pub(crate) mod decode;
@@ -12,3 +12,4 @@ pub(crate) mod probe_walk;
 pub(crate) mod slab_memory;
 pub(crate) mod slab_test;
 pub(crate) mod walk;
+pub(crate) mod walk_memory;

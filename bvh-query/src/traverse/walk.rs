@@ -24,18 +24,14 @@
 //! deeper than its number of treelets. Nothing recurses.
 
 use crate::error::QueryError;
-use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
-use crate::traverse::frames::{Entry, Frames};
-use crate::traverse::large_leaf::LargeLeaves;
-use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
+use crate::traverse::frames::Entry;
+use crate::traverse::node_cache::{CachedNode, ChildRef};
 use crate::traverse::node_test::{Measure, NodeTest, Witness};
 use crate::traverse::placement::ObjectPair;
-use crate::traverse::probe_walk::{ProbeFrame, ProbeWalk};
-use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
-use bvh_format::object::Object;
+use crate::traverse::slab_memory::TestSlabs;
+use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -81,69 +77,6 @@ pub(crate) trait Visitor {
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError>;
 }
 
-/// The memory of a walk, kept from one query to the next, and the budget of the query.
-#[derive(Default)]
-pub(crate) struct WalkMemory {
-    /// Taken out while a walk is under way.
-    node_test: Option<Box<NodeTest>>,
-    nodes_a: NodeCache,
-    nodes_b: NodeCache,
-    /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: Aligned,
-    /// The groups of B's opened nodes along A's directions.
-    aligned_b: Aligned,
-    /// The test along turning slabs.
-    slabs: SlabMemory,
-    /// Depth-first: the pairs that node tests left.
-    stack: Frames,
-    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
-    leaf_pairs: LeafPairs,
-    /// Best-first: the entry of least bound is next.
-    list: Frames,
-    large_leaves: LargeLeaves,
-    /// What is left of the node tests of points.
-    probe_stack: Vec<ProbeFrame>,
-    /// How many visits the query may make, and how many are left.
-    budget: u64,
-    left: u64,
-}
-
-/// The groups of opened nodes along the directions of the other side, by the number of the node.
-#[derive(Default)]
-struct Aligned {
-    groups: Vec<[Group; 2]>,
-    /// The walk for which each was computed; 0 for none.
-    walks: Vec<u32>,
-    walk: u32,
-}
-
-impl Aligned {
-    /// Forgets all groups, before a walk.
-    fn start(&mut self) {
-        self.walk = self.walk.wrapping_add(1);
-        if self.walk == 0 {
-            self.walks.fill(0);
-            self.walk = 1;
-        }
-    }
-
-    /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
-    #[inline(always)]
-    fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
-        if self.walks.len() <= node {
-            self.grow(node);
-        }
-        let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
-        (&mut self.groups[node], known)
-    }
-
-    #[cold]
-    fn grow(&mut self, node: usize) {
-        self.groups.resize(node + 64, [Group::ZERO; 2]);
-        self.walks.resize(node + 64, 0);
-    }
-}
-
 /// How the next pair is found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -161,10 +94,6 @@ const MAX_LISTED_TESTS: usize = 256;
 
 /// How many pairs of leaf packets are visited together. Answers do not depend on it.
 const LEAF_PAIRS_PER_BATCH: usize = 4;
-
-/// The number of visits that a look ahead may make beyond those of the query: they cost less than finding out whether
-/// they pay.
-const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
 
 /// A node this many times larger than its partner is opened alone, so that its children meet the partner at its size.
 const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
@@ -391,35 +320,6 @@ impl Task for AlignBothEnds<'_> {
 }
 
 impl WalkMemory {
-    /// Starts a query that may visit this many pairs.
-    pub(crate) fn start(&mut self, budget: u64) {
-        (self.budget, self.left) = (budget, budget);
-    }
-
-    /// Returns a walk of one object for some probes.
-    pub(crate) fn probe_walk<'a, V>(
-        &'a mut self,
-        bvh: &'a Bvh,
-        object: &'a Object,
-        probes: usize,
-        visitor: &'a mut V,
-    ) -> ProbeWalk<'a, V> {
-        let Self { nodes_a, probe_stack, left, budget, .. } = self;
-        ProbeWalk { bvh, object, nodes: nodes_a, stack: probe_stack, left, budget: *budget, probes, visitor }
-    }
-
-    /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.
-    pub(crate) fn allow_as_much_again(&mut self) {
-        self.left = self.left.min((self.budget - self.left).saturating_add(EXTRA_LOOK_AHEAD_VISITS));
-    }
-
-    /// Counts a visit.
-    #[inline(always)]
-    pub(crate) fn visit(&mut self) -> Result<(), QueryError> {
-        self.left = self.left.checked_sub(1).ok_or(QueryError::Budget { visits: self.budget })?;
-        Ok(())
-    }
-
     /// Goes on depth-first with the frames of the list, the least bound next. The stack is empty.
     fn list_to_stack(&mut self) {
         self.list.nearest_last();

@@ -1,0 +1,111 @@
+//! The memory of walks, kept from one query to the next, and the budget of a query.
+
+use crate::error::QueryError;
+use crate::file::bvh::Bvh;
+use crate::traverse::frames::Frames;
+use crate::traverse::large_leaf::LargeLeaves;
+use crate::traverse::leaf_pairs::LeafPairs;
+use crate::traverse::node_cache::NodeCache;
+use crate::traverse::node_test::NodeTest;
+use crate::traverse::probe_walk::{ProbeFrame, ProbeWalk};
+use crate::traverse::slab_memory::SlabMemory;
+use bvh_format::object::Object;
+use bvh_format::slabs::Group;
+
+/// The number of visits that a look ahead may make beyond those of the query: they cost less than finding out whether
+/// they pay.
+const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
+
+/// What walks need, and how many visits are left to a query.
+#[derive(Default)]
+pub(crate) struct WalkMemory {
+    /// Taken out while a walk is under way.
+    pub(super) node_test: Option<Box<NodeTest>>,
+    pub(super) nodes_a: NodeCache,
+    pub(super) nodes_b: NodeCache,
+    /// The groups of A's opened nodes along B's directions, computed when they are first needed.
+    pub(super) aligned_a: Aligned,
+    /// The groups of B's opened nodes along A's directions.
+    pub(super) aligned_b: Aligned,
+    /// The test along turning slabs.
+    pub(super) slabs: SlabMemory,
+    /// Depth-first: the pairs that node tests left.
+    pub(super) stack: Frames,
+    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
+    pub(super) leaf_pairs: LeafPairs,
+    /// Best-first: the entry of least bound is next.
+    pub(super) list: Frames,
+    pub(super) large_leaves: LargeLeaves,
+    /// What is left of the node tests of points.
+    probe_stack: Vec<ProbeFrame>,
+    /// How many visits the query may make, and how many are left.
+    budget: u64,
+    left: u64,
+}
+
+impl WalkMemory {
+    /// Starts a query that may visit this many pairs.
+    pub(crate) fn start(&mut self, budget: u64) {
+        (self.budget, self.left) = (budget, budget);
+    }
+
+    /// Returns a walk of one object for some probes.
+    pub(crate) fn probe_walk<'a, V>(
+        &'a mut self,
+        bvh: &'a Bvh,
+        object: &'a Object,
+        probes: usize,
+        visitor: &'a mut V,
+    ) -> ProbeWalk<'a, V> {
+        let Self { nodes_a, probe_stack, left, budget, .. } = self;
+        ProbeWalk { bvh, object, nodes: nodes_a, stack: probe_stack, left, budget: *budget, probes, visitor }
+    }
+
+    /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.
+    pub(crate) fn allow_as_much_again(&mut self) {
+        self.left = self.left.min((self.budget - self.left).saturating_add(EXTRA_LOOK_AHEAD_VISITS));
+    }
+
+    /// Counts a visit.
+    #[inline(always)]
+    pub(crate) fn visit(&mut self) -> Result<(), QueryError> {
+        self.left = self.left.checked_sub(1).ok_or(QueryError::Budget { visits: self.budget })?;
+        Ok(())
+    }
+}
+
+/// The groups of opened nodes along the directions of the other side, by the number of the node.
+#[derive(Default)]
+pub(super) struct Aligned {
+    groups: Vec<[Group; 2]>,
+    /// The walk for which each was computed; 0 for none.
+    walks: Vec<u32>,
+    walk: u32,
+}
+
+impl Aligned {
+    /// Forgets all groups, before a walk.
+    pub(super) fn start(&mut self) {
+        self.walk = self.walk.wrapping_add(1);
+        if self.walk == 0 {
+            self.walks.fill(0);
+            self.walk = 1;
+        }
+    }
+
+    /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
+    #[inline(always)]
+    pub(super) fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
+        if self.walks.len() <= node {
+            self.grow(node);
+        }
+        let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
+        (&mut self.groups[node], known)
+    }
+
+    #[cold]
+    fn grow(&mut self, node: usize) {
+        self.groups.resize(node + 64, [Group::ZERO; 2]);
+        self.walks.resize(node + 64, 0);
+    }
+}
