@@ -80,7 +80,7 @@ pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
 pub use query::options::DistanceOptions;
 #[cfg(feature = "parallel")]
-pub use query::probe_batch::ProbeBatch;
+pub use query::probe::batch::ProbeBatch;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{

@@ -4,7 +4,6 @@ pub(crate) mod answers;
 #[cfg(feature = "parallel")]
 pub(crate) mod batch;
 mod bounding_volumes;
-mod closest_point;
 mod collide;
 mod contacts;
 pub(crate) mod displacement;
@@ -13,8 +12,7 @@ mod exact;
 pub(crate) mod motion;
 pub(crate) mod options;
 mod placed_pair;
-#[cfg(feature = "parallel")]
-pub(crate) mod probe_batch;
+pub(crate) mod probe;
 pub(crate) mod querier;
 mod search;
 pub(crate) mod tracker;

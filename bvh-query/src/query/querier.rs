@@ -5,8 +5,8 @@ use crate::isa::Backend;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
-use crate::query::closest_point::BoundedTriangle;
 use crate::query::motion::sweep::Ends;
+use crate::query::probe::closest::BoundedTriangle;
 use crate::query::search::BoundedPair;
 use crate::traverse::walk_memory::WalkMemory;
 

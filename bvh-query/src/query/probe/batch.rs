@@ -8,7 +8,7 @@ use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::isa::Backend;
 use crate::query::answers::ClosestPoint;
-use crate::query::closest_point::check_within;
+use crate::query::probe::closest::check_within;
 use crate::query::querier::Querier;
 use crate::traverse::probe_walk::PROBES;
 use rayon::prelude::*;

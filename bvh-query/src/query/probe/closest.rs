@@ -36,7 +36,7 @@ const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
 
 /// A triangle that may be the closest to a point, with bounds of its distance in mesh units.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BoundedTriangle {
+pub(in crate::query) struct BoundedTriangle {
     lower: f32,
     leaf: LeafPacket,
     lane: u8,

@@ -1,0 +1,5 @@
+//! Questions about points, rays and segments. Each is a visitor of the walk of one tree.
+
+#[cfg(feature = "parallel")]
+pub(crate) mod batch;
+pub(crate) mod closest;
