@@ -73,7 +73,7 @@ pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
 pub use pose::{Pose, PoseError};
-pub use query::answers::{ClosestPoint, Contact, Distance, QueryStats};
+pub use query::answers::{ClosestPoint, Contact, Distance, QueryStats, RayHit};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
 pub use query::displacement::displacement;
@@ -81,6 +81,8 @@ pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
 pub use query::options::DistanceOptions;
 #[cfg(feature = "parallel")]
 pub use query::probe::batch::ProbeBatch;
+pub use query::probe::placed::PlacedShape;
+pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{

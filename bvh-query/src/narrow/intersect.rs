@@ -44,7 +44,7 @@ pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
 
 /// Returns a number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
 /// counterclockwise as seen from `s`.
-fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
+pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
     let coordinate = |p: Point| Coord3D { x: p[0], y: p[1], z: p[2] };
     // `robust` returns a positive number for a point below the plane.
     -robust::orient3d(coordinate(p), coordinate(q), coordinate(r), coordinate(s))
@@ -233,7 +233,7 @@ fn are_collinear(p: Point, q: Point, r: Point) -> bool {
 }
 
 /// Returns a number with the exact sign of the area of `p, q, r` projected along `axis`.
-fn area(axis: usize, p: Point, q: Point, r: Point) -> f64 {
+pub(super) fn area(axis: usize, p: Point, q: Point, r: Point) -> f64 {
     let project = |p: Point| Coord { x: p[(axis + 1) % 3], y: p[(axis + 2) % 3] };
     robust::orient2d(project(p), project(q), project(r))
 }

@@ -17,11 +17,14 @@
 //! panics, but the answer is no longer proven.
 
 mod distance;
+mod integers;
 mod intersect;
+mod ray;
 mod within;
 
 pub(crate) use distance::{Closest, triangle_distance};
 pub(crate) use intersect::triangles_intersect;
+pub(crate) use ray::{Crossing, Ray};
 pub(crate) use within::triangles_within;
 
 #[cfg(test)]

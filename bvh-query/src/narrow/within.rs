@@ -10,6 +10,7 @@
 //! The integers cost a few hundred microseconds and some memory, but only pairs whose distance is within a few
 //! roundings of `d` need them.
 
+use super::integers::{Vector, cross, dot, exponent, integer, minus};
 use super::{Closest, Point, Triangle};
 use num_bigint::BigInt;
 
@@ -22,8 +23,6 @@ pub(crate) fn triangles_within(a: &Triangle, b: &Triangle, closest: &Closest, d:
     // Triangles that meet have an upper bound of 0.
     closest.lower <= d && any_feature_within(a, b, d)
 }
-
-type Vector = [BigInt; 3];
 
 #[cold]
 #[inline(never)]
@@ -40,34 +39,6 @@ fn any_feature_within(a: &Triangle, b: &Triangle, d: f64) -> bool {
         || edges(&a, &b, &limit)
         || corners_and_face(&a, &b, &limit)
         || corners_and_face(&b, &a, &limit)
-}
-
-/// Returns the exponent of the power of two that the last bit of a number stands for.
-fn exponent(x: f64) -> i32 {
-    ((x.to_bits() >> 52 & 0x7ff) as i32).max(1) - 1075
-}
-
-/// Converts a number, which is a multiple of 2^`unit`, to that multiple.
-fn integer(x: f64, unit: i32) -> BigInt {
-    let bits = x.to_bits();
-    let implied = u64::from(bits >> 52 & 0x7ff != 0) << 52;
-    let magnitude = BigInt::from(bits & ((1 << 52) - 1) | implied);
-    // The exponent of zero does not matter.
-    let magnitude = magnitude << (exponent(x) - unit).max(0);
-    if x < 0.0 { -magnitude } else { magnitude }
-}
-
-fn minus(p: &Vector, q: &Vector) -> Vector {
-    [&p[0] - &q[0], &p[1] - &q[1], &p[2] - &q[2]]
-}
-
-fn dot(p: &Vector, q: &Vector) -> BigInt {
-    &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
-}
-
-fn cross(p: &Vector, q: &Vector) -> Vector {
-    let component = |i: usize, j: usize| &p[i] * &q[j] - &p[j] * &q[i];
-    [component(1, 2), component(2, 0), component(0, 1)]
 }
 
 /// Returns whether a number is from 0 to `most`.

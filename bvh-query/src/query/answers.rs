@@ -56,6 +56,25 @@ pub struct ClosestPoint {
     pub triangle: u32,
 }
 
+/// Where a ray hits a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct RayHit {
+    /// The parameter, in units of the ray's direction; 0 if and only if the ray's origin is on the mesh. It is within 2^-43 of
+    /// itself of the exact one.
+    pub t: f64,
+    /// The exact parameter is at least this.
+    pub lower: f64,
+    /// The exact parameter is at most this.
+    pub upper: f64,
+    /// The point, in the frame of the ray.
+    pub point: [f64; 3],
+    /// The number that its object has in the file.
+    pub object: u32,
+    /// Its triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle: u32,
+}
+
 /// How much work the last query was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]

@@ -5,6 +5,7 @@ pub(crate) mod decode;
 pub(crate) mod frames;
 pub(crate) mod large_leaf;
 pub(crate) mod leaf_pairs;
+pub(crate) mod line_test;
 pub(crate) mod node_cache;
 pub(crate) mod node_test;
 pub(crate) mod placement;

@@ -16,6 +16,7 @@ use crate::narrow::{Closest, Point, triangles_within};
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{TriangleDistance, stored};
 use crate::query::options::check_distance;
+use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::node_test::{Measure, gaps_along};
@@ -23,16 +24,12 @@ use crate::traverse::placement::{POSE_ERROR, Placement};
 use crate::traverse::probe_walk::{PROBES, ProbeVisitor};
 use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::leaf::Packet;
-use bvh_format::object::{MAX_COORDINATE, Object};
+use bvh_format::object::Object;
 use bvh_format::slabs::{Group, row};
 use std::ops::ControlFlow;
 
 /// Bounded triangles kept before the nearest are measured and the rest is thinned out.
 const MAX_BOUNDED: usize = 256;
-
-/// Coordinates of points below this, 2^-213 mesh units, count as 0: all others are multiples of 2^-266, as exact arithmetic
-/// needs them (`narrow`).
-const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
 
 /// A triangle that may be the closest to a point, with bounds of its distance in mesh units.
 #[derive(Clone, Copy, Debug)]
@@ -113,15 +110,6 @@ impl Querier {
         }
         Ok([0, 1, 2, 3].map(|probe| search.answer(probe)))
     }
-}
-
-/// Refuses a point that no file can be near. Coordinates too small for exact arithmetic become 0.
-fn check_point(point: &Point) -> Result<Point, QueryError> {
-    if let Some(&found) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-        let expected = "finite coordinates of at most 2^120";
-        return Err(QueryError::Number { name: "point", expected, found });
-    }
-    Ok(point.map(|x| if x.abs() < LEAST_COORDINATE { 0.0 } else { x }))
 }
 
 /// Refuses a limit that means nothing. Infinity is none.

@@ -3,3 +3,8 @@
 #[cfg(feature = "parallel")]
 pub(crate) mod batch;
 pub(crate) mod closest;
+mod line;
+pub(crate) mod placed;
+mod point;
+pub(crate) mod ray;
+mod segment;

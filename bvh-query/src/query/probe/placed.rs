@@ -1,0 +1,95 @@
+//! A shape where a pose puts it: what probes are asked about.
+
+use crate::file::bvh::Bvh;
+use crate::file::owned_shape::OwnedShape;
+use crate::file::shape::Shape;
+use crate::pose::Pose;
+use crate::pose::frames::{inverse, turn};
+use bvh_format::object::Object;
+
+/// A shape and where it is: questions about points, rays and segments take one.
+///
+/// A `&Bvh` or a [`Shape`] converts into the shape in its own frame, and [`Shape::at`] places it by a pose, so that probes are
+/// given in the world. What is asked about are then the stored vertices as [`Pose::place`] places them, as in questions about
+/// pairs of meshes.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedShape<'a> {
+    pub(crate) shape: Shape<'a>,
+    /// From the shape to the frame of the probes; none if they have one frame.
+    pub(crate) pose: Option<Pose>,
+}
+
+impl<'a> Shape<'a> {
+    /// Returns the shape where a pose puts it: see [`PlacedShape`].
+    pub fn at(self, pose: &Pose) -> PlacedShape<'a> {
+        PlacedShape { shape: self, pose: Some(*pose) }
+    }
+}
+
+impl<'a> From<Shape<'a>> for PlacedShape<'a> {
+    fn from(shape: Shape<'a>) -> Self {
+        Self { shape, pose: None }
+    }
+}
+
+impl<'a> From<&'a Bvh> for PlacedShape<'a> {
+    fn from(bvh: &'a Bvh) -> Self {
+        bvh.all().into()
+    }
+}
+
+impl<'a> From<&'a OwnedShape> for PlacedShape<'a> {
+    fn from(shape: &'a OwnedShape) -> Self {
+        shape.shape().into()
+    }
+}
+
+/// The relative error of taking a probe into the frame of an object, and of the placed vertices: 2^-45 of the magnitudes of
+/// what is added. With v = 2^-53, the coordinates of a point are off by 54v, those of a translation by 64v (see
+/// `Placement::inverse`), and placed vertices by 8v.
+const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
+
+/// The way from the frame of the probes to that of an object, around its origin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct IntoObject {
+    rotation: Option<[[f64; 3]; 3]>,
+    /// What is subtracted before the object is turned back, and after.
+    translation: [f64; 3],
+    origin: [f64; 3],
+    /// The object's box around its origin.
+    pub(crate) bounds: [[f64; 3]; 2],
+    /// The sum of the magnitudes of all that.
+    magnitude: f64,
+}
+
+impl IntoObject {
+    pub(crate) fn new(pose: Option<&Pose>, object: &Object) -> Self {
+        let (record, origin) = (object.record(), object.origin());
+        let bounds = [record.box_lo, record.box_hi].map(|corner| corner.map(|v| f64::from(v.get())));
+        let translation = pose.map_or([0.0; 3], |pose| pose.translation());
+        let magnitude =
+            [origin, bounds[0], bounds[1], translation].as_flattened().iter().map(|v| v.abs()).sum();
+        Self { rotation: pose.map(|pose| inverse(pose.rotation())), translation, origin, bounds, magnitude }
+    }
+
+    /// Returns where a point is.
+    #[inline(always)]
+    pub(crate) fn point(&self, point: [f64; 3]) -> [f64; 3] {
+        let from = [0, 1, 2].map(|k| point[k] - self.translation[k]);
+        let turned = self.direction(from);
+        [0, 1, 2].map(|k| turned[k] - self.origin[k])
+    }
+
+    /// Returns what a direction is.
+    #[inline(always)]
+    pub(crate) fn direction(&self, direction: [f64; 3]) -> [f64; 3] {
+        self.rotation.as_ref().map_or(direction, |rotation| turn(rotation, direction))
+    }
+
+    /// Returns a bound on the error of points, and of placed vertices seen from the object, for probes whose coordinates have
+    /// magnitudes of this sum.
+    #[inline(always)]
+    pub(crate) fn error(&self, magnitude: f64) -> f64 {
+        ERROR * (self.magnitude + magnitude)
+    }
+}

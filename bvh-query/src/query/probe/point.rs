@@ -1,0 +1,18 @@
+//! The points that questions may be about.
+
+use crate::error::QueryError;
+use crate::narrow::Point;
+use bvh_format::object::MAX_COORDINATE;
+
+/// Coordinates of points below this, 2^-213 mesh units, count as 0: all others are multiples of 2^-266, as exact arithmetic
+/// needs them (`narrow`).
+const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
+
+/// Refuses a point that no file can be near. Coordinates too small for exact arithmetic become 0.
+pub(super) fn check_point(point: &Point) -> Result<Point, QueryError> {
+    if let Some(&found) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+        let expected = "finite coordinates of at most 2^120";
+        return Err(QueryError::Number { name: "point", expected, found });
+    }
+    Ok(point.map(|x| if x.abs() < LEAST_COORDINATE { 0.0 } else { x }))
+}
