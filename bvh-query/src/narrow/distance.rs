@@ -84,36 +84,36 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
 }
 
 /// The largest accepted ratio of `distance - lower` to `upper - distance`; beyond it a better lower bound is sought.
-const MAX_ERROR_ASYMMETRY: f64 = 8.0;
+pub(super) const MAX_ERROR_ASYMMETRY: f64 = 8.0;
 
 /// A point of a triangle: `corner + along * (next - corner) + across * (previous - corner)`.
 ///
 /// It lies in the relative interior of the feature that its nonzero weights span: both weights are at least 0, and
 /// their exact sum is below 1.
 #[derive(Clone, Copy)]
-struct Foot {
-    corner: usize,
-    along: f64,
-    across: f64,
+pub(super) struct Foot {
+    pub(super) corner: usize,
+    pub(super) along: f64,
+    pub(super) across: f64,
 }
 
 impl Foot {
-    fn corner(corner: usize) -> Self {
+    pub(super) fn corner(corner: usize) -> Self {
         Self { corner, along: 0.0, across: 0.0 }
     }
 
-    fn edge(corner: usize, along: f64) -> Self {
+    pub(super) fn edge(corner: usize, along: f64) -> Self {
         Self { corner, along, across: 0.0 }
     }
 
     /// Returns the two terms that are added to the corner. `edges[i]` leads from corner `i` to the next one.
-    fn offsets(&self, edges: &Triangle) -> [Point; 2] {
+    pub(super) fn offsets(&self, edges: &Triangle) -> [Point; 2] {
         let (next, previous) = (edges[self.corner], edges[(self.corner + 2) % 3]);
         [times(self.along, next), times(-self.across, previous)]
     }
 
     /// Returns the point in mesh units, given the edges in multiples of `unit`.
-    fn place(&self, triangle: &Triangle, edges: &Triangle, unit: f64) -> Point {
+    pub(super) fn place(&self, triangle: &Triangle, edges: &Triangle, unit: f64) -> Point {
         let [along, across] = self.offsets(edges);
         let corner = triangle[self.corner];
         [0, 1, 2].map(|k| corner[k] + (along[k] + across[k]) * unit)
@@ -257,35 +257,41 @@ impl Differences {
         (length, length * (1.0 + 8.0 * UNIT_ROUNDOFF) + 8.0 * UNIT_ROUNDOFF * magnitude)
     }
 
-    /// A certified lower bound of the distance, scaled: the width of the slab across `direction` between the
-    /// triangles, on either side, or 0.
-    ///
-    /// Any direction gives a bound, so an error of the direction does no harm. The error of a computed product
-    /// `direction · gap` is at most four roundings (one of the gap, one of the product, two of the additions),
-    /// relative to the sum of the magnitudes of its three terms. Subtracting the bound from it rounds once more.
-    /// Eight roundings also cover the rounding of the bound itself. The largest coordinate of `direction` is
-    /// scaled to [1, 2). So all underflow together is less than the smallest normal number, and the relative
-    /// error of the norm, the division and the last product is less than eight roundings.
+    /// A certified lower bound of the distance, scaled: see [`certified_gap`].
     #[inline(always)]
     fn separation(&self, direction: Point) -> f64 {
-        let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
-        // An edge without length leaves no direction.
-        if size == 0.0 || !direction.iter().all(|x| x.is_finite()) {
-            return 0.0;
-        }
-        let scale = reciprocal_exponent(size);
-        let direction = direction.map(|x| x * scale);
-        let magnitude = direction.map(f64::abs);
-        let (mut ahead, mut behind) = (f64::INFINITY, f64::INFINITY);
-        for gap in self.gaps.iter().flatten() {
-            let height = dot(direction, *gap);
-            let error = 8.0 * UNIT_ROUNDOFF * dot(magnitude, gap.map(f64::abs));
-            ahead = ahead.min(height - error);
-            behind = behind.min(-height - error);
-        }
-        let width = ahead.max(behind) - f64::MIN_POSITIVE;
-        if width > 0.0 { width / dot(direction, direction).sqrt() * (1.0 - 8.0 * UNIT_ROUNDOFF) } else { 0.0 }
+        certified_gap(direction, self.gaps.as_flattened())
     }
+}
+
+/// A certified lower bound of the distance, scaled, given the gaps between all corners: the width of the slab across
+/// `direction` between the triangles, on either side, or 0.
+///
+/// Any direction gives a bound, so an error of the direction does no harm. The error of a computed product
+/// `direction · gap` is at most four roundings (one of the gap, one of the product, two of the additions),
+/// relative to the sum of the magnitudes of its three terms. Subtracting the bound from it rounds once more.
+/// Eight roundings also cover the rounding of the bound itself. The largest coordinate of `direction` is
+/// scaled to [1, 2). So all underflow together is less than the smallest normal number, and the relative
+/// error of the norm, the division and the last product is less than eight roundings.
+#[inline(always)]
+pub(super) fn certified_gap(direction: Point, gaps: &[Point]) -> f64 {
+    let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+    // An edge without length leaves no direction.
+    if size == 0.0 || !direction.iter().all(|x| x.is_finite()) {
+        return 0.0;
+    }
+    let scale = reciprocal_exponent(size);
+    let direction = direction.map(|x| x * scale);
+    let magnitude = direction.map(f64::abs);
+    let (mut ahead, mut behind) = (f64::INFINITY, f64::INFINITY);
+    for gap in gaps {
+        let height = dot(direction, *gap);
+        let error = 8.0 * UNIT_ROUNDOFF * dot(magnitude, gap.map(f64::abs));
+        ahead = ahead.min(height - error);
+        behind = behind.min(-height - error);
+    }
+    let width = ahead.max(behind) - f64::MIN_POSITIVE;
+    if width > 0.0 { width / dot(direction, direction).sqrt() * (1.0 - 8.0 * UNIT_ROUNDOFF) } else { 0.0 }
 }
 
 impl Differences {
@@ -519,7 +525,7 @@ impl Differences {
 }
 
 /// Returns the index of the longest edge, which is projected out first.
-fn longest(edges: &Triangle) -> usize {
+pub(super) fn longest(edges: &Triangle) -> usize {
     let [p, q, r] = edges.map(|edge| dot(edge, edge));
     if p >= q && p >= r {
         0
@@ -532,28 +538,28 @@ fn longest(edges: &Triangle) -> usize {
 
 /// Returns a normal of `d` and `e`, where `d` is not too short to be squared. The normal is perpendicular to `d` up to
 /// one rounding, however small the angle between `d` and `e`.
-fn perpendicular_normal(d: Point, e: Point) -> Point {
+pub(super) fn perpendicular_normal(d: Point, e: Point) -> Point {
     cross(d, perpendicular_part(d, e))
 }
 
 /// Returns `e` without its component along `d`, where `d` is not too short to be squared.
 #[inline(always)]
-fn perpendicular_part(d: Point, e: Point) -> Point {
+pub(super) fn perpendicular_part(d: Point, e: Point) -> Point {
     add_scaled(e, -dot(d, e) / dot(d, d), d)
 }
 
 #[inline(always)]
-fn times(factor: f64, p: Point) -> Point {
+pub(super) fn times(factor: f64, p: Point) -> Point {
     [factor * p[0], factor * p[1], factor * p[2]]
 }
 
 #[inline(always)]
-fn negated(p: Point) -> Point {
+pub(super) fn negated(p: Point) -> Point {
     [-p[0], -p[1], -p[2]]
 }
 
 /// Returns the power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
-fn reciprocal_exponent(x: f64) -> f64 {
+pub(super) fn reciprocal_exponent(x: f64) -> f64 {
     let exponent = x.to_bits() >> 52 & 0x7ff;
     f64::from_bits(2046_u64.saturating_sub(exponent) << 52)
 }

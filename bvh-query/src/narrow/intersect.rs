@@ -42,6 +42,23 @@ pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     intervals_overlap(a, sides_a, b, sides_b)
 }
 
+/// Returns whether a closed triangle contains a point: what `triangles_intersect` says of the triangle and one whose corners
+/// are all that point, at the cost of one orientation unless the point is in the triangle's plane.
+#[must_use]
+pub(super) fn triangle_contains(triangle: &Triangle, point: Point) -> bool {
+    // A triangle without area has no height over it.
+    if heights(triangle, &[point]) != [0.0] {
+        return false;
+    }
+    let hull = Hull::new(triangle);
+    let point = Hull { corners: [point; 3], count: 1 };
+    if hull.count == 3 {
+        coplanar_intersect(triangle, point.corners(), area_axis(triangle))
+    } else {
+        segments_intersect(&hull, &point)
+    }
+}
+
 /// Returns a number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
 /// counterclockwise as seen from `s`.
 pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
@@ -57,7 +74,7 @@ pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
 /// the same differences, products and sums in the same order, with one vertex of the plane in the place of his
 /// point `d`, so it has the same error bound.
 #[inline(always)]
-fn heights(plane: &Triangle, points: &Triangle) -> [f64; 3] {
+fn heights<const POINTS: usize>(plane: &Triangle, points: &[Point; POINTS]) -> [f64; POINTS] {
     /// The bound of the filter's error, as a fraction of the permanent.
     const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
     let u = subtract(plane[1], plane[0]);
@@ -71,7 +88,7 @@ fn heights(plane: &Triangle, points: &Triangle) -> [f64; 3] {
         let permanent = dot(w.map(f64::abs), magnitude);
         if height.abs() > BOUND * permanent { height } else { volume(plane[0], plane[1], plane[2], point) }
     };
-    [height(points[0]), height(points[1]), height(points[2])]
+    points.map(height)
 }
 
 #[inline(always)]

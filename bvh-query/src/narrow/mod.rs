@@ -19,11 +19,13 @@
 mod distance;
 mod integers;
 mod intersect;
+mod point;
 mod ray;
 mod within;
 
 pub(crate) use distance::{Closest, triangle_distance};
 pub(crate) use intersect::triangles_intersect;
+pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
 pub(crate) use within::triangles_within;
 

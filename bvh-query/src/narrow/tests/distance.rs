@@ -2,7 +2,9 @@
 
 use super::generate::{KINDS, Random, float, pair};
 use super::oracle::{Exact, dot_triangle};
-use crate::narrow::{Closest, Point, Triangle, triangle_distance, triangles_intersect};
+use crate::narrow::{
+    Closest, Point, Triangle, add_scaled, point_distance, subtract, triangle_distance, triangles_intersect,
+};
 
 /// The largest error allowed, as a fraction of the largest difference of two coordinates.
 const TOLERANCE: f64 = 1e-14;
@@ -172,4 +174,31 @@ fn of_equal_distances_the_first_pair_of_corners_is_named() {
         let closest = check("parallel", &a, &over);
         assert_eq!((closest.point_a, closest.point_b), (a[0], over[0]));
     }
+}
+
+/// Random points, corners, and points of edges and faces or a little off them, for triangles of any kind and scale.
+#[test]
+fn a_point_has_the_bits_of_a_triangle_that_is_a_point() {
+    let random = &mut Random(77);
+    let (mut on, mut all) = (0, 0);
+    for round in 0..super::depth::rounds(20_000) {
+        let (name, t, other) = pair(round as usize % KINDS, random);
+        let scale = [1.0, 2f64.powi(-100), 2f64.powi(90)][random.below(3)];
+        // Coarse coordinates make points that are exactly on edges and faces.
+        let coarse = if random.below(2) == 0 { 4.0 } else { 2f64.powi(40) };
+        let t = t.map(|p| p.map(|x| (x * coarse).round() / coarse * scale));
+        let along = |p: Point, share: f64, q: Point| add_scaled(p, share, subtract(q, p));
+        let share = [random.below(5) as f64 / 4.0, random.unit()][random.below(2)];
+        let on_edge = along(t[0], share, t[1]);
+        let near = add_scaled(on_edge, random.small(17.0) * scale, random.point());
+        let inside = along(on_edge, [0.25, random.unit()][random.below(2)], t[2]);
+        for point in [other[0].map(|x| x * scale), t[random.below(3)], on_edge, near, inside] {
+            let expected = triangle_distance(&t, &[point; 3]);
+            let found = point_distance(&t, point);
+            assert_eq!(found, expected, "{name}: {t:?} {point:?}");
+            on += u32::from(found.distance == 0.0);
+            all += 1;
+        }
+    }
+    assert!(on > all / 10 && on < all / 2, "{on} of {all}");
 }

@@ -12,9 +12,9 @@ use crate::isa::Isa;
 use crate::leaf::local::{LocalFrame, valid_lanes};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::point::{LocalPoints, point_bounds};
-use crate::narrow::{Closest, Point, triangles_within};
+use crate::narrow::{Closest, Point, point_distance, triangles_within};
 use crate::query::answers::{ClosestPoint, QueryStats};
-use crate::query::exact::{TriangleDistance, stored};
+use crate::query::exact::stored;
 use crate::query::options::check_distance;
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
@@ -192,7 +192,7 @@ impl<'a> Nearest<'a> {
 
     /// Measures the bounded triangles that still may be the closest, nearest first.
     #[inline(always)]
-    fn settle<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
+    fn settle<I: Isa>(&mut self, _isa: I) -> Result<(), QueryError> {
         self.bounded.sort_unstable_by(|x, y| y.lower.total_cmp(&x.lower));
         while let Some(BoundedTriangle { lower, leaf, lane, probe }) = self.bounded.pop() {
             let probe = usize::from(probe) % PROBES;
@@ -201,8 +201,8 @@ impl<'a> Nearest<'a> {
             }
             self.stats.exact_tests += 1;
             let triangle = stored(self.bvh, self.object, leaf, lane)?;
-            let point = [self.search.points[probe]; 3];
-            let closest = isa.run(TriangleDistance(&triangle, &point));
+            let point = self.search.points[probe];
+            let closest = point_distance(&triangle, point);
             let settled = &mut self.search.settled_lower[probe];
             *settled = settled.min(closest.lower);
             let is_better = match &self.search.best[probe] {
@@ -212,7 +212,7 @@ impl<'a> Nearest<'a> {
                 Some(best) => closest.distance < best.closest.distance,
                 None => {
                     self.search.within == f64::INFINITY
-                        || triangles_within(&triangle, &point, &closest, self.search.within)
+                        || triangles_within(&triangle, &[point; 3], &closest, self.search.within)
                 }
             };
             if is_better {
