@@ -3,11 +3,21 @@
 mod common;
 
 #[cfg(feature = "parallel")]
+use bvh_format::leaf::TriangleEncoding;
+#[cfg(feature = "parallel")]
+use bvh_format::profile::Profile;
+#[cfg(feature = "parallel")]
 use bvh_query::ProbeBatch;
 use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
 use cbvh_testkit::depth::rounds;
+#[cfg(feature = "parallel")]
+use common::nearest::point_triangle;
 use common::shapes::{cube, moved, plate, sphere, torus};
+#[cfg(feature = "parallel")]
+use common::shapes::{dirty, soup, terrain};
 use common::{Random, Triangle, bake, mesh, note, shared};
+#[cfg(feature = "parallel")]
+use common::{backends, options, stored};
 
 fn baked(triangles: &[Triangle]) -> Bvh {
     bake(&mesh(triangles), &bvh_bake::Options::default())
@@ -177,7 +187,7 @@ fn units_do_not_matter() {
     }
 }
 
-/// Four at a time and on any number of threads, a batch has the answers of the querier; and the error of the first point.
+/// On any number of threads, a batch has the answers of the querier; and the error of the first point.
 #[test]
 #[cfg(feature = "parallel")]
 fn batches_of_points_have_the_same_answers() {
@@ -205,4 +215,53 @@ fn batches_of_points_have_the_same_answers() {
     assert!(matches!(error, Err(QueryError::Number { found, .. }) if found == 2f64.powi(130)), "{error:?}");
     batch.set_budget(3);
     assert_eq!(batch.closest_points(&points[..10], f64::INFINITY), Err(QueryError::Budget { visits: 3 }));
+}
+
+/// Points anywhere, on corners, edges and faces and a little off them, about files of every layout: one by one or in a
+/// batch, the answer is the nearest of all triangles, with the same bits on all backends.
+#[test]
+#[cfg(feature = "parallel")]
+fn no_triangle_is_nearer_than_the_answer() {
+    let random = &mut Random::new(44);
+    for (number, profile) in Profile::ALL.into_iter().enumerate() {
+        for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
+            let shape =
+                [torus(18, 9), terrain(12, 5), dirty(&sphere(2), 6), soup(150, 7)][number % 4].clone();
+            let factor = [1.0, 2f64.powi(-60), 2f64.powi(60)][number % 3];
+            let far = [0.0, 3.0, 1e4][random.below(3)];
+            let bvh = bake(&mesh(&moved(&shape, factor, [far * factor; 3])), &options(profile, encoding));
+            let stored = stored(&bvh);
+            let points: Vec<[f64; 3]> = (0..rounds(70))
+                .map(|_| {
+                    let t = stored[random.below(stored.len())].corners;
+                    let (s, u) = (random.below(5) as f64 / 4.0, random.below(3) as f64 / 2.0);
+                    let off = [0.0, 0.0, 1e-16, 1e-7, 0.1, 2.0, 1e3][random.below(7)] * factor;
+                    let away = random.point();
+                    [0, 1, 2].map(|k| {
+                        let edge = t[0][k] + s * (t[1][k] - t[0][k]);
+                        edge + u * s * (t[2][k] - edge) + off * away[k]
+                    })
+                })
+                .collect();
+            let mut answers: Option<Vec<_>> = None;
+            for backend in backends() {
+                let mut querier = Querier::with_backend(backend);
+                let ask = |point: &[f64; 3]| querier.closest_point(&bvh, *point, f64::INFINITY).unwrap();
+                let one_by_one: Vec<_> = points.iter().map(ask).collect();
+                let batch = ProbeBatch::with_backend(&bvh, backend).closest_points(&points, f64::INFINITY);
+                assert_eq!(batch.unwrap(), one_by_one, "{backend}");
+                assert_eq!(*answers.get_or_insert(one_by_one.clone()), one_by_one, "{backend}");
+            }
+            for (point, answer) in points.iter().zip(answers.unwrap()) {
+                let answer = answer.unwrap();
+                let to = |t: &common::Stored| point_triangle(*point, &t.corners);
+                let least = stored.iter().map(to).fold(f64::INFINITY, f64::min);
+                let largest = point.iter().fold(least, |most, x| most.max(x.abs()));
+                assert!((answer.distance - least).abs() <= 1e-13 * largest, "{point:?}: {answer:?}, {least}");
+                assert!(answer.lower <= answer.distance && answer.distance <= answer.upper);
+                let named = stored.iter().find(|t| t.id == answer.triangle).unwrap();
+                assert!((to(named) - least).abs() <= 1e-13 * largest, "{point:?}: {answer:?}, {least}");
+            }
+        }
+    }
 }

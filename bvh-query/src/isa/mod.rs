@@ -88,6 +88,8 @@ pub(crate) trait Isa: Copy {
     fn repeat(self, from: &[f32; 4]) -> Self::V;
     /// Lane `4 * i + j` is `from[j]`.
     fn tile(self, from: &[f32; 4]) -> Self::V;
+    /// Lane `4 * i + j` is `from[i][j]`.
+    fn quads(self, from: [&[f32; 4]; 4]) -> Self::V;
     /// Lane `4 * i + j` is lane `4 * i + column`.
     fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
     /// Prepares a group for `pick`.

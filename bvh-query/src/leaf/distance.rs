@@ -153,7 +153,7 @@ fn far_along<I: Isa>(isa: I, gap: I::V, squared: I::V, limit_squared: I::V) -> u
 #[derive(Clone, Copy)]
 pub(super) struct Guess<V> {
     squared: V,
-    direction: Vec3<V>,
+    pub(super) direction: Vec3<V>,
 }
 
 impl<V: Lanes> Guess<V> {
@@ -178,7 +178,9 @@ impl<V: Lanes> Guess<V> {
 #[inline(always)]
 pub(crate) fn bounds<I: Isa>(isa: I, queue: &TriangleQueue) -> Bounds {
     let (a, b) = queue.corners(isa);
-    certify(isa, slack_of(isa, queue), &a, &b, closest(isa, &a, &b))
+    let guess = closest(isa, &a, &b);
+    let gap = min3(project(&b, guess.direction)).sub(max3(project(&a, guess.direction)));
+    certify(isa, slack_of(isa, queue), gap, guess)
 }
 
 /// Lanes of two queues, of the same pairs in the same order, whose triangles may be closer than `limit` while B moves from
@@ -240,7 +242,7 @@ fn closest<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>) -> Guess<I::V> 
 
 /// Between 0 and 1. NaN, from edges of no length, ends as 0: `max` returns its second operand.
 #[inline(always)]
-fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
+pub(super) fn clamp<V: Lanes>(zero: V, one: V, value: V) -> V {
     value.max(zero).min(one)
 }
 
@@ -279,18 +281,12 @@ pub(super) fn points_on_face<I: Isa, const N: usize>(
     }
 }
 
+/// Bounds distances, given the gaps of the projections on the guessed directions.
 #[inline(always)]
-pub(super) fn certify<I: Isa>(
-    isa: I,
-    slack: I::V,
-    a: &Corners<I::V>,
-    b: &Corners<I::V>,
-    guess: Guess<I::V>,
-) -> Bounds {
+pub(super) fn certify<I: Isa>(isa: I, slack: I::V, gap: I::V, guess: Guess<I::V>) -> Bounds {
     let least = isa.splat(MIN_CERTIFIED_SQUARE);
     let length = guess.squared.max(least).sqrt();
     let n = guess.direction;
-    let gap = min3(project(b, n)).sub(max3(project(a, n)));
     let shrink = isa.splat(1.0 - 16.0 * U);
     let zero = isa.splat(0.0);
     let lower = gap.div(length).mul(shrink).sub(slack).max(zero);

@@ -1,63 +1,77 @@
-//! Bounds on the distances of four points from the four triangles of a packet.
+//! Bounds on the distances of a point from the triangles of up to four packets.
 //!
 //! As for pairs of triangles ([`crate::leaf::distance`]), the closest point is guessed in plain f32, and the guess is
 //! certified by projections on the line from it: a point is a triangle whose corners are the same.
 //!
-//! Error: the frame is that of [`crate::leaf::local`], around the packet's first corner. A coordinate of a point is rounded
-//! twice, and to f64 before. So with m_a and m_p bounds on the magnitudes of the packet's and the point's, each coordinate is
-//! within u (2 m_a + 5 m_p) + e_pose, as there.
+//! The point is the origin, and the unit is a power of two that makes the farthest corner of the mesh about 1 away. Each
+//! coordinate of the point is a sum of two f32, high and low, so that packets are read as they are stored.
+//!
+//! Error: let m bound the coordinates of a triangle as the point sees it. The difference from the high part is rounded to
+//! within u (m + |low|), the sum with the low part to within u m; both by less than 2^-140 more where they underflow. The low
+//! part is off by u |low| <= u^2 |p|. So each coordinate is within e = 2u m + 3u^2 |p| + 2^-140 + that of p in f64, which is
+//! at most `error`, and so is 3u^2 |p| / 4. Bounds are within 4e, as in [`crate::leaf::distance`]. Combinations of corners
+//! round by at most 14u m, and by 4u m more where rounded weights leave the triangle: 32u m is charged.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::distance::{Bounds, Guess, certify, inverse_squares, points_on_face};
-use crate::leaf::local::{LocalFrame, U, repeat, tile};
-use crate::leaf::math::{Vec3, along, dot, edges, sub};
-use crate::leaf::placed_packet::{PlacedPacket, larger};
-use crate::traverse::probe_walk::PROBES;
+use crate::leaf::distance::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
+use crate::leaf::local::U;
+use crate::leaf::math::{Vec3, along, dot, edges, largest_of, min3, project};
+use bvh_format::leaf::Packet;
 
-/// Points around the first corner of a packet, in units of the local frame.
-pub(crate) struct LocalPoints {
-    /// `[axis][point]`
-    coordinates: [[f32; PROBES]; 3],
-    /// The error of a bound of the distance of each point.
-    slack: [f32; PROBES],
+/// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
+const UNDERFLOW: f32 = f32::from_bits(1 << 9);
+
+/// A point in two parts.
+pub(crate) struct LocalPoint {
+    /// In mesh units, around the object's origin.
+    high: [f32; 3],
+    /// What the high part lacks, in the unit of bounds; negative.
+    minus_low: [f32; 3],
+    scale: f32,
+    /// A bound on what is charged whatever the triangle is.
+    slack: f32,
 }
 
-impl LocalPoints {
-    /// `points` are around the object's origin, in mesh units.
+impl LocalPoint {
+    /// `error` bounds that of the coordinates in f64, and is at least 2^-48 of their magnitudes. `scale` is the inverse of the
+    /// unit, a power of two.
     #[inline(always)]
-    pub(crate) fn new(frame: &LocalFrame, packet: &PlacedPacket, points: &[[f64; 3]; PROBES]) -> Self {
-        let mut local = Self { coordinates: [[0.0; PROBES]; 3], slack: [0.0; PROBES] };
-        for (number, point) in points.iter().enumerate() {
-            let mut magnitude = 0.0;
-            for axis in 0..3 {
-                let from = (point[axis] - packet.origin[axis]) * f64::from(frame.scale);
-                local.coordinates[axis][number] = from as f32;
-                magnitude = larger(magnitude, (from as f32).abs());
-            }
-            let error = U * (2.0 * packet.magnitude + 5.0 * magnitude) + frame.error;
-            local.slack[number] = 4.0 * error + 16.0 * U * (packet.magnitude + magnitude);
-        }
-        local
+    pub(crate) fn new(point: &[f64; 3], error: f64, scale: f32) -> Self {
+        let high = point.map(|x| x as f32);
+        let minus_low = [0, 1, 2].map(|k| ((f64::from(high[k]) - point[k]) * f64::from(scale)) as f32);
+        let error = (5.0 * error * f64::from(scale)) as f32 + UNDERFLOW;
+        Self { high, minus_low, scale, slack: 4.0 * error * (1.0 + 4.0 * U) }
     }
 }
 
-/// Bounds the distances in units of the local frame: element `4 * triangle + point`.
+/// Bounds the distances from the triangles of four packets: element `4 * packet + triangle`.
 #[inline(always)]
-pub(crate) fn point_bounds<I: Isa>(isa: I, packet: &PlacedPacket, points: &LocalPoints) -> Bounds {
-    let a =
-        [repeat(isa, &packet.corners[0]), repeat(isa, &packet.corners[1]), repeat(isa, &packet.corners[2])];
-    let p = tile(isa, &points.coordinates);
-    let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
+pub(crate) fn point_bounds<I: Isa>(isa: I, packets: [&Packet; 4], point: &LocalPoint) -> Bounds {
+    let (zero, one, scale) = (isa.splat(0.0), isa.splat(1.0), isa.splat(point.scale));
+    let mut corners = [[zero; 3]; 3];
+    for axis in 0..3 {
+        let (high, minus_low) = (isa.splat(point.high[axis]), isa.splat(point.minus_low[axis]));
+        for corner in 0..3 {
+            let [a, b, c, d] = packets;
+            let from = isa.quads([
+                &a.corners[corner][axis],
+                &b.corners[corner][axis],
+                &c.corners[corner][axis],
+                &d.corners[corner][axis],
+            ]);
+            corners[corner][axis] = from.sub(high).mul_add(scale, minus_low);
+        }
+    }
+    let slack = largest_of(&corners).mul_add(isa.splat(40.0 * U), isa.splat(point.slack));
     let mut guess = Guess::none(isa);
-    let edges = edges(&a);
+    let edges = edges(&corners);
     let inverse = inverse_squares(one, edges);
     for i in 0..3 {
-        let v = sub(p, a[i]);
-        // NaN, from an edge of no length, ends as 0: `max` returns its second operand.
-        let share = dot(v, edges[i]).mul(inverse[i]).max(zero).min(one);
-        let foot: Vec3<I::V> = along([zero; 3], share, edges[i]);
-        guess.improve(sub(v, foot));
+        let share = clamp(zero, one, zero.sub(dot(corners[i], edges[i])).mul(inverse[i]));
+        let foot: Vec3<I::V> = along(corners[i], share, edges[i]);
+        guess.improve(foot);
     }
-    points_on_face(isa, &a, &edges, &[p], &mut guess, false);
-    certify(isa, isa.tile(&points.slack), &a, &[p; 3], guess)
+    points_on_face(isa, &corners, &edges, &[[zero; 3]], &mut guess, true);
+    let gap = min3(project(&corners, guess.direction));
+    certify(isa, slack, gap, guess)
 }

@@ -9,6 +9,8 @@ pub(crate) mod line_test;
 pub(crate) mod node_cache;
 pub(crate) mod node_test;
 pub(crate) mod placement;
+pub(crate) mod point_test;
+pub(crate) mod point_walk;
 pub(crate) mod probe_walk;
 pub(crate) mod slab_memory;
 pub(crate) mod slab_test;

@@ -84,10 +84,7 @@ impl CachedNode {
     /// Returns the child, if it is a leaf packet.
     #[inline(always)]
     pub(crate) fn leaf(&self, child: usize) -> Option<LeafPacket> {
-        match self.links.child(child) {
-            Child::Leaf { packet, triangles } => Some(LeafPacket { page: self.page, packet, triangles }),
-            _ => None,
-        }
+        leaf_at(&self.links, self.page, child)
     }
 
     #[inline(always)]
@@ -98,9 +95,7 @@ impl CachedNode {
     /// Returns a bit for each of four children, set for leaf packets.
     #[inline(always)]
     pub(crate) fn leaves(&self, part: usize) -> u16 {
-        // Every fourth bit, brought together.
-        let kinds = self.links.kinds >> (16 * (part & 1) + 2) & 0x1111;
-        ((kinds | kinds >> 3 | kinds >> 6 | kinds >> 9) & 0xf) as u16
+        leaf_lanes(&self.links, part)
     }
 
     /// Computes the extents, after the slabs have been decoded.
@@ -117,6 +112,23 @@ impl CachedNode {
             }
         }
     }
+}
+
+/// Returns a child, if it is a leaf packet.
+#[inline(always)]
+pub(super) fn leaf_at(links: &Links, page: u32, child: usize) -> Option<LeafPacket> {
+    match links.child(child) {
+        Child::Leaf { packet, triangles } => Some(LeafPacket { page, packet, triangles }),
+        _ => None,
+    }
+}
+
+/// Returns a bit for each of four children, set for leaf packets.
+#[inline(always)]
+pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
+    // Every fourth bit, brought together.
+    let kinds = links.kinds >> (16 * (part & 1) + 2) & 0x1111;
+    ((kinds | kinds >> 3 | kinds >> 6 | kinds >> 9) & 0xf) as u16
 }
 
 /// The opened nodes of one side. Node 0 holds the object's root as its only child.
@@ -168,8 +180,7 @@ impl NodeCache {
             root.opened = [CLOSED; 8];
             root.count = 1;
             self.used = 1;
-            let pages = object.record().pages.get() as usize;
-            self.max_nodes = pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES);
+            self.max_nodes = max_nodes(object);
         }
         Ok(self.reach)
     }
@@ -198,7 +209,7 @@ impl NodeCache {
             return Ok(known as usize);
         }
         if self.used >= self.max_nodes {
-            return Err(self.too_many(bvh, object));
+            return Err(too_many(bvh, object, self.max_nodes));
         }
         if self.used == self.nodes.len() {
             // Not many at once, because filling them takes time in the middle of a query.
@@ -212,13 +223,20 @@ impl NodeCache {
         self.used += 1;
         Ok(number)
     }
+}
 
-    #[cold]
-    fn too_many(&self, bvh: &Bvh, object: &Object) -> QueryError {
-        let at = bvh.layout().page_offset(object.record().first_page.get());
-        let expected = format!("at most {} treelets to open", self.max_nodes - 1);
-        FormatError::new(Rule::Counts, at, expected, "more").into()
-    }
+/// Returns one more than the number of treelets that an object can have.
+#[inline(always)]
+pub(super) fn max_nodes(object: &Object) -> usize {
+    let pages = object.record().pages.get() as usize;
+    pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES)
+}
+
+#[cold]
+pub(super) fn too_many(bvh: &Bvh, object: &Object, max_nodes: usize) -> QueryError {
+    let at = bvh.layout().page_offset(object.record().first_page.get());
+    let expected = format!("at most {} treelets to open", max_nodes - 1);
+    FormatError::new(Rule::Counts, at, expected, "more").into()
 }
 
 /// Decodes an inner child of an opened node.
@@ -248,43 +266,67 @@ fn decode_node<I: Isa>(
     child: usize,
     to: &mut CachedNode,
 ) -> Result<(), QueryError> {
-    let (page, slot, anchor);
-    let (slabs, column) = match parent.links.child(child) {
-        Child::Treelet(place) => {
-            page = bvh.page(object, parent.page)?;
-            slot = place;
-            (&parent.groups[(child / 4) & 1], child % 4)
-        }
-        Child::Remote(link) => {
-            (page, slot) = cross(bvh, object, parent.page, link)?;
-            anchor = spread(isa, &page.anchor_slabs(slot));
-            (&anchor, 0)
-        }
-        Child::Leaf { .. } | Child::Empty => {
-            to.count = 0;
-            return Ok(());
-        }
+    let from = (&parent.groups, &parent.links, parent.page);
+    let Some(opened) = open_child(isa, (bvh, object), from, child, &mut to.groups)? else {
+        to.count = 0;
+        return Ok(());
     };
     let profile = object.profile();
-    let treelet = page.treelet(slot);
-    for part in 0..profile.groups() {
-        let coding = (profile, object.f16_scale());
-        decode_group(isa, coding, (treelet, part), (slabs, column), &mut to.groups[part]);
-    }
-    to.turning = match treelet.first_chunk() {
+    to.turning = match opened.treelet.first_chunk() {
         Some(treelet) if profile.has_turning_slabs() => TurningCodes::read(treelet),
         _ => TurningCodes::NONE,
     };
-    to.links = Links::read(treelet);
-    isa.prefetch(bvh.packets_to_prefetch(object, &page, &to.links));
-    if bvh.is_worth_prefetching() {
-        isa.prefetch(page.treelets_ahead(&to.links));
-    }
-    to.page = page.header().page_number.get();
+    to.links = opened.links;
+    to.page = opened.page;
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];
     to.measure(isa, profile.groups());
     Ok(())
+}
+
+/// What an opened node has besides slabs.
+pub(super) struct Opened<'a> {
+    pub(super) links: Links,
+    pub(super) page: u32,
+    pub(super) treelet: &'a [u8],
+}
+
+/// Decodes the slabs of the children of an inner child, given the slabs of its siblings, their links and their page. A leaf
+/// or an empty place has nothing to open.
+#[inline(always)]
+pub(super) fn open_child<'a, I: Isa>(
+    isa: I,
+    (bvh, object): (&'a Bvh, &Object),
+    (groups, links, page): (&[Group; 2], &Links, u32),
+    child: usize,
+    to: &mut [Group; 2],
+) -> Result<Option<Opened<'a>>, QueryError> {
+    let (at, slot, anchor);
+    let (slabs, column) = match links.child(child) {
+        Child::Treelet(place) => {
+            at = bvh.page(object, page)?;
+            slot = place;
+            (&groups[(child / 4) & 1], child % 4)
+        }
+        Child::Remote(link) => {
+            (at, slot) = cross(bvh, object, page, link)?;
+            anchor = spread(isa, &at.anchor_slabs(slot));
+            (&anchor, 0)
+        }
+        Child::Leaf { .. } | Child::Empty => return Ok(None),
+    };
+    let profile = object.profile();
+    let treelet = at.treelet(slot);
+    let links = Links::read(treelet);
+    isa.prefetch(bvh.packets_to_prefetch(object, &at, &links));
+    if bvh.is_worth_prefetching() {
+        isa.prefetch(at.treelets_ahead(&links));
+    }
+    for part in 0..profile.groups() {
+        let coding = (profile, object.f16_scale());
+        decode_group(isa, coding, (treelet, part), (slabs, column), &mut to[part]);
+    }
+    Ok(Some(Opened { links, page: at.header().page_number.get(), treelet }))
 }
 
 /// Returns the page and the root that a remote link leads to, after checking that link and root name each other.
@@ -298,7 +340,7 @@ fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page
 
 /// Returns a group with the same node in all four columns.
 #[inline(always)]
-fn spread<I: Isa>(isa: I, node: &NodeSlabs) -> Group {
+pub(super) fn spread<I: Isa>(isa: I, node: &NodeSlabs) -> Group {
     let mut group = Group::ZERO;
     let (lo, hi) = (node.lo.as_chunks::<4>().0, node.hi.as_chunks::<4>().0);
     for q in 0..4 {

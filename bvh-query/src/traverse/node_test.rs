@@ -17,7 +17,7 @@ pub(crate) enum Measure {
 }
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
-const INVERSE_LENGTHS: [f32; 13] = {
+pub(super) const INVERSE_LENGTHS: [f32; 13] = {
     const CUBE: f32 = 0.577_350_2;
     const FACE: f32 = std::f32::consts::FRAC_1_SQRT_2.next_down();
     [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]

@@ -1,4 +1,4 @@
-//! The walk of one tree on which questions about points stand: up to four probes at a time.
+//! The walk of one tree on which questions about lines stand: up to four probes at a time.
 //!
 //! ```text
 //! entries := {(root, all probes)}

@@ -7,6 +7,7 @@ use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_test::NodeTest;
+use crate::traverse::point_walk::{PointStack, PointVisitor, PointWalk};
 use crate::traverse::probe_walk::{ProbeFrame, ProbeWalk};
 use crate::traverse::slab_memory::SlabMemory;
 use bvh_format::object::Object;
@@ -36,6 +37,7 @@ pub(crate) struct WalkMemory {
     /// Best-first: the entry of least bound is next.
     pub(super) list: Frames,
     pub(super) large_leaves: LargeLeaves,
+    points: PointStack,
     /// What is left of the node tests of points.
     probe_stack: Vec<ProbeFrame>,
     /// How many visits the query may make, and how many are left.
@@ -59,6 +61,17 @@ impl WalkMemory {
     ) -> ProbeWalk<'a, V> {
         let Self { nodes_a, probe_stack, left, budget, .. } = self;
         ProbeWalk { bvh, object, nodes: nodes_a, stack: probe_stack, left, budget: *budget, probes, visitor }
+    }
+
+    /// Returns a walk of one object towards a point.
+    pub(crate) fn point_walk<'a, V: PointVisitor>(
+        &'a mut self,
+        bvh: &'a Bvh,
+        object: &'a Object,
+        visitor: &'a mut V,
+    ) -> PointWalk<'a, V> {
+        let Self { points, left, budget, .. } = self;
+        PointWalk { bvh, object, stack: points, left, budget: *budget, visitor }
     }
 
     /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.

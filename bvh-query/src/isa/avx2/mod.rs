@@ -225,6 +225,12 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
+    fn quads(self, from: [&[f32; 4]; 4]) -> Y {
+        let [a, b, c, d] =
+            [self.load4(from[0]), self.load4(from[1]), self.load4(from[2]), self.load4(from[3])];
+        with_features!(Y(_mm256_set_m128(b.0, a.0), _mm256_set_m128(d.0, c.0)))
+    }
+    #[inline(always)]
     fn quad_splat(self, value: Y, column: usize) -> Y {
         with_features!({
             let places = _mm256_set1_epi32(column as i32);
@@ -239,8 +245,8 @@ impl Isa for Avx2 {
     fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Y, Y) {
         let rows = group.rows();
         let [a, b, c, d] = four.rows.map(|row| (row & 31) as usize);
-        let ends = self.four_rows([&rows[a], &rows[b], &rows[c], &rows[d]]);
-        (ends, self.four_rows([&rows[a ^ 16], &rows[b ^ 16], &rows[c ^ 16], &rows[d ^ 16]]))
+        let ends = self.quads([&rows[a], &rows[b], &rows[c], &rows[d]]);
+        (ends, self.quads([&rows[a ^ 16], &rows[b ^ 16], &rows[c ^ 16], &rows[d ^ 16]]))
     }
     #[inline(always)]
     fn round_step_up(self, step: Y) -> Y {
@@ -319,15 +325,6 @@ impl Isa for Avx2 {
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
         unsafe { run_with_features(self, task) }
-    }
-}
-
-impl Avx2 {
-    #[inline(always)]
-    fn four_rows(self, rows: [&[f32; 4]; 4]) -> Y {
-        let [a, b, c, d] =
-            [self.load4(rows[0]), self.load4(rows[1]), self.load4(rows[2]), self.load4(rows[3])];
-        with_features!(Y(_mm256_set_m128(b.0, a.0), _mm256_set_m128(d.0, c.0)))
     }
 }
 

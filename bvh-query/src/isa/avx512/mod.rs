@@ -209,6 +209,19 @@ impl Isa for Avx512 {
         Z(with_features!(_mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()))))
     }
     #[inline(always)]
+    fn quads(self, from: [&[f32; 4]; 4]) -> Z {
+        Z(with_features!({
+            let [a, b, c, d] = [
+                _mm_loadu_ps(from[0].as_ptr()),
+                _mm_loadu_ps(from[1].as_ptr()),
+                _mm_loadu_ps(from[2].as_ptr()),
+                _mm_loadu_ps(from[3].as_ptr()),
+            ];
+            let (low, high) = (_mm256_set_m128(b, a), _mm256_set_m128(d, c));
+            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)
+        }))
+    }
+    #[inline(always)]
     fn quad_splat(self, value: Z, column: usize) -> Z {
         Z(with_features!(_mm512_permutevar_ps(value.0, _mm512_set1_epi32(column as i32))))
     }

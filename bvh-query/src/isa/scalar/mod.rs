@@ -112,6 +112,10 @@ impl Isa for Scalar {
         Array(std::array::from_fn(|i| from[i % 4]))
     }
     #[inline(always)]
+    fn quads(self, from: [&[f32; 4]; 4]) -> Array<16> {
+        Array(std::array::from_fn(|i| from[i / 4][i % 4]))
+    }
+    #[inline(always)]
     fn quad_splat(self, value: Array<16>, column: usize) -> Array<16> {
         Array(std::array::from_fn(|i| value.0[i / 4 * 4 + column % 4]))
     }

@@ -1,8 +1,7 @@
 //! Asks about many points of one mesh, on all cores.
 //!
-//! Points are sorted along a space-filling curve, so that the four which walk together go the same way, and that treelets
-//! decoded for one are there for the next. Each thread takes runs of them. Answers are placed in the order of the points, and
-//! depend neither on which points walk together nor on the number of threads.
+//! Points are sorted along a space-filling curve, so that what one touches is in the caches for the next. Each thread takes
+//! runs of them. Answers are placed in the order of the points, and do not depend on the number of threads.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -10,7 +9,6 @@ use crate::isa::Backend;
 use crate::query::answers::ClosestPoint;
 use crate::query::probe::closest::check_within;
 use crate::query::querier::Querier;
-use crate::traverse::probe_walk::PROBES;
 use rayon::prelude::*;
 
 /// Points in a run of one thread.
@@ -62,23 +60,10 @@ impl<'a> ProbeBatch<'a> {
         check_within(within)?;
         let order = along_curve(points);
         let ask = |querier: &mut Querier, run: &[u32]| -> Vec<Result<Option<ClosestPoint>, QueryError>> {
-            let mut answers = Vec::with_capacity(run.len());
-            for group in run.chunks(PROBES) {
-                let mut together = [[0.0; 3]; PROBES];
-                group.iter().zip(&mut together).for_each(|(&number, to)| *to = points[number as usize]);
-                let together = &together[..group.len()];
-                querier.set_budget(self.budget.saturating_mul(group.len() as u64));
-                match querier.closest_points(self.shape, together, within) {
-                    Ok(found) => answers.extend(found.into_iter().take(group.len()).map(Ok)),
-                    // One by one, to know whose error it is.
-                    Err(_) => {
-                        querier.set_budget(self.budget);
-                        let one = |point: &[f64; 3]| querier.closest_point(self.shape, *point, within);
-                        answers.extend(together.iter().map(one));
-                    }
-                }
-            }
-            answers
+            querier.set_budget(self.budget);
+            run.iter()
+                .map(|&number| querier.closest_point(self.shape, points[number as usize], within))
+                .collect()
         };
         let runs: Vec<Vec<Result<Option<ClosestPoint>, QueryError>>> =
             order.par_chunks(POINTS_PER_RUN).map_init(|| Querier::with_backend(self.backend), ask).collect();

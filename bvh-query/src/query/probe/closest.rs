@@ -1,17 +1,15 @@
 //! Where the closest surface to a point is.
 //!
-//! Triangles are bounded in f32, four against four points at a time. Those that may be the closest are kept, and measured in
-//! f64 at the end, nearest first. Pruning is strict, as in [`crate::query::search`]: so the answer does not depend on the
-//! order of visits, nor on which points walk together.
+//! Triangles are bounded in f32, up to sixteen at a time. Those that may be the closest are kept, and measured in f64 at the
+//! end, nearest first. Pruning is strict, as in [`crate::query::search`]: so the answer does not depend on the order of
+//! visits.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
-use crate::isa::Isa;
-use crate::leaf::local::{LocalFrame, valid_lanes};
-use crate::leaf::placed_packet::PlacedPackets;
-use crate::leaf::point::{LocalPoints, point_bounds};
+use crate::isa::{Isa, Lanes, Task};
+use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_within};
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::stored;
@@ -19,25 +17,26 @@ use crate::query::options::check_distance;
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
-use crate::traverse::node_test::{Measure, gaps_along};
-use crate::traverse::placement::{POSE_ERROR, Placement};
-use crate::traverse::probe_walk::{PROBES, ProbeVisitor};
-use bvh_format::kdop::{DirectionSet, FACTORS};
+use crate::traverse::placement::POSE_ERROR;
+use crate::traverse::point_test::PointTest;
+use crate::traverse::point_walk::PointVisitor;
+use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
-use bvh_format::slabs::{Group, row};
-use std::ops::ControlFlow;
+use bvh_format::slabs::Group;
 
 /// Bounded triangles kept before the nearest are measured and the rest is thinned out.
 const MAX_BOUNDED: usize = 256;
 
-/// A triangle that may be the closest to a point, with bounds of its distance in mesh units.
+/// A limit in `f64` is larger than what it comes from by this factor, so that no rounding of `f64` matters.
+const LIMIT_WIDENING: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+
+/// A triangle that may be the closest, with a lower bound of its distance.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct BoundedTriangle {
     lower: f32,
     leaf: LeafPacket,
     lane: u8,
-    probe: u8,
 }
 
 /// The closest triangle so far.
@@ -67,48 +66,32 @@ impl Querier {
         point: [f64; 3],
         within: f64,
     ) -> Result<Option<ClosestPoint>, QueryError> {
-        let [closest, ..] = self.closest_points(shape.into(), &[point], within)?;
-        Ok(closest)
-    }
-
-    /// Returns the closest points to up to four points, side by side.
-    pub(crate) fn closest_points(
-        &mut self,
-        shape: Shape<'_>,
-        points: &[Point],
-        within: f64,
-    ) -> Result<[Option<ClosestPoint>; PROBES], QueryError> {
         check_within(within)?;
-        let mut all = [[0.0; 3]; PROBES];
-        for (to, point) in all.iter_mut().zip(points) {
-            *to = check_point(point)?;
-        }
+        let point = check_point(&point)?;
+        let shape = shape.into();
         self.start();
         let mut search = Search {
-            points: all,
+            point,
             within,
-            limits: [round_up(within * (1.0 + 2f64.powi(-40))); PROBES],
-            best: [None; PROBES],
-            settled_lower: [f64::INFINITY; PROBES],
+            limit: within * LIMIT_WIDENING,
+            best: None,
+            settled_lower: f64::INFINITY,
         };
         for (index, object) in shape.objects().iter().enumerate() {
             self.memory.visit()?;
-            self.packets[0].start();
-            self.bounded_triangles.clear();
-            let mut visitor = Nearest::new(
-                &mut search,
-                (shape.bvh(), object),
-                &mut self.packets[0],
-                &mut self.bounded_triangles,
-            );
-            visitor.number = (shape.first() + index) as u32;
-            let walk = self.memory.probe_walk(shape.bvh(), object, points.len(), &mut visitor);
-            let tests = self.backend.run(walk)?;
-            self.backend.run(Settle(&mut visitor))?;
-            let stats = visitor.stats;
+            let (bvh, number) = (shape.bvh(), (shape.first() + index) as u32);
+            let (memory, bounded) = (&mut self.memory, &mut self.bounded_triangles);
+            let (tests, stats) = self.backend.run(SearchObject {
+                search: &mut search,
+                bvh,
+                object,
+                number,
+                memory,
+                bounded,
+            })?;
             self.stats.add(tests, stats);
         }
-        Ok([0, 1, 2, 3].map(|probe| search.answer(probe)))
+        Ok(search.answer())
     }
 }
 
@@ -117,25 +100,52 @@ pub(super) fn check_within(within: f64) -> Result<(), QueryError> {
     if within == f64::INFINITY { Ok(()) } else { check_distance(within) }
 }
 
-/// What is known of all points, over all objects.
+/// What is known of a point, over all objects.
 struct Search {
-    points: [Point; PROBES],
+    point: Point,
     within: f64,
-    /// Triangles whose lower bound exceeds the limit of a point do not matter to it.
-    limits: [f32; PROBES],
-    best: [Option<Best>; PROBES],
-    /// The least certified lower bounds of the triangles that were measured.
-    settled_lower: [f64; PROBES],
+    /// Triangles whose lower bound exceeds it do not matter.
+    limit: f64,
+    best: Option<Best>,
+    /// The least certified lower bound of the triangles that were measured.
+    settled_lower: f64,
 }
 
 impl Search {
-    fn answer(&self, probe: usize) -> Option<ClosestPoint> {
-        let Best { closest, object, triangle } = self.best[probe]?;
+    fn answer(&self) -> Option<ClosestPoint> {
+        let Best { closest, object, triangle } = self.best?;
         let Closest { distance, upper, point_a, .. } = closest;
         // Triangles that were left out are beyond the limit, which has only ever decreased.
-        let lower = self.settled_lower[probe].min(f64::from(self.limits[probe]));
-        let lower = if distance == 0.0 { 0.0 } else { lower };
+        let lower = if distance == 0.0 { 0.0 } else { self.settled_lower.min(self.limit) };
         Some(ClosestPoint { distance, lower, upper, point: point_a, object, triangle })
+    }
+}
+
+/// Searches an object.
+struct SearchObject<'a> {
+    search: &'a mut Search,
+    bvh: &'a Bvh,
+    object: &'a Object,
+    number: u32,
+    memory: &'a mut WalkMemory,
+    bounded: &'a mut Vec<BoundedTriangle>,
+}
+
+impl Task for SearchObject<'_> {
+    /// The number of node tests, and what else was done.
+    type Output = Result<(u64, QueryStats), QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        let Self { search, bvh, object, number, memory, bounded } = self;
+        bounded.clear();
+        let mut visitor = Nearest::new(search, (bvh, object, number), bounded);
+        let tests = isa.run(memory.point_walk(bvh, object, &mut visitor))?;
+        visitor.settle()?;
+        let limit = f64::from(visitor.limit) / visitor.scale;
+        let stats = visitor.stats;
+        search.limit = search.limit.min(limit);
+        Ok((tests, stats))
     }
 }
 
@@ -146,45 +156,44 @@ struct Nearest<'a> {
     object: &'a Object,
     /// The number of the object in its file.
     number: u32,
-    set: DirectionSet,
-    /// The points around the object's origin.
-    points: [Point; PROBES],
-    /// Their slabs, in columns.
-    slabs: Group,
-    frame: LocalFrame,
-    packets: &'a mut PlacedPackets,
+    /// How many units of the filters a mesh unit is, a power of two.
+    scale: f64,
+    /// The limit in the unit of filters.
+    limit: f32,
+    test: PointTest,
+    local: LocalPoint,
     bounded: &'a mut Vec<BoundedTriangle>,
     stats: QueryStats,
 }
 
 impl<'a> Nearest<'a> {
+    #[inline(always)]
     fn new(
         search: &'a mut Search,
-        (bvh, object): (&'a Bvh, &'a Object),
-        packets: &'a mut PlacedPackets,
+        (bvh, object, number): (&'a Bvh, &'a Object, u32),
         bounded: &'a mut Vec<BoundedTriangle>,
     ) -> Self {
         let origin = object.origin();
-        let points = search.points.map(|point| [0, 1, 2].map(|k| point[k] - origin[k]));
-        let [lo, hi] = object.bounding_box();
-        let magnitude = (0..3).map(|k| {
-            let farthest = points.iter().fold(0.0f64, |far, point| far.max(point[k].abs()));
-            farthest + (lo[k] - origin[k]).abs() + (hi[k] - origin[k]).abs() + origin[k].abs()
-        });
-        let error = POSE_ERROR * magnitude.sum::<f64>();
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let placement = Placement { rotation: identity, translation: [0.0; 3], error };
-        let set = object.profile().directions();
+        let ([lo, hi], mut point) = (object.bounding_box(), [0.0; 3]);
+        let (mut magnitude, mut farthest) = (0.0, 0.0f64);
+        for k in 0..3 {
+            point[k] = search.point[k] - origin[k];
+            magnitude +=
+                point[k].abs() + (lo[k] - origin[k]).abs() + (hi[k] - origin[k]).abs() + origin[k].abs();
+            farthest = farthest.max((search.point[k] - lo[k]).abs()).max((hi[k] - search.point[k]).abs());
+        }
+        let error = POSE_ERROR * magnitude;
+        let exponent = (farthest.to_bits() >> 52) as i64 - 1023;
+        let scale = f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52);
         Self {
-            search,
             bvh,
             object,
-            number: 0,
-            set,
-            points,
-            slabs: slabs_of(&points, set, error),
-            frame: LocalFrame::new(&placement, object, object),
-            packets,
+            number,
+            scale,
+            limit: round_up(search.limit * scale),
+            test: PointTest::new(&point, object.profile().directions(), error, scale as f32),
+            local: LocalPoint::new(&point, error, scale as f32),
+            search,
             bounded,
             stats: QueryStats::default(),
         }
@@ -192,41 +201,39 @@ impl<'a> Nearest<'a> {
 
     /// Measures the bounded triangles that still may be the closest, nearest first.
     #[inline(always)]
-    fn settle<I: Isa>(&mut self, _isa: I) -> Result<(), QueryError> {
+    fn settle(&mut self) -> Result<(), QueryError> {
+        let limit = self.limit;
+        self.bounded.retain(|triangle| triangle.lower <= limit);
         self.bounded.sort_unstable_by(|x, y| y.lower.total_cmp(&x.lower));
-        while let Some(BoundedTriangle { lower, leaf, lane, probe }) = self.bounded.pop() {
-            let probe = usize::from(probe) % PROBES;
-            if lower > self.search.limits[probe] {
+        while let Some(BoundedTriangle { lower, leaf, lane }) = self.bounded.pop() {
+            if lower > self.limit {
                 continue;
             }
             self.stats.exact_tests += 1;
+            let (search, point) = (&*self.search, self.search.point);
             let triangle = stored(self.bvh, self.object, leaf, lane)?;
-            let point = self.search.points[probe];
             let closest = point_distance(&triangle, point);
-            let settled = &mut self.search.settled_lower[probe];
-            *settled = settled.min(closest.lower);
-            let is_better = match &self.search.best[probe] {
+            let is_better = match &search.best {
                 Some(best) if closest.distance == best.closest.distance => {
                     (self.number, self.id(leaf, lane)?) < (best.object, best.triangle)
                 }
                 Some(best) => closest.distance < best.closest.distance,
                 None => {
-                    self.search.within == f64::INFINITY
-                        || triangles_within(&triangle, &[point; 3], &closest, self.search.within)
+                    search.within == f64::INFINITY
+                        || triangles_within(&triangle, &[point; 3], &closest, search.within)
                 }
             };
             if is_better {
                 let best = Best { closest, object: self.number, triangle: self.id(leaf, lane)? };
-                self.search.best[probe] = Some(best);
+                self.search.best = Some(best);
             }
-            let limit = round_up(closest.upper * (1.0 + 2f64.powi(-40)));
-            self.search.limits[probe] = self.search.limits[probe].min(limit);
+            self.search.settled_lower = self.search.settled_lower.min(closest.lower);
+            self.limit = self.limit.min(round_up(closest.upper * LIMIT_WIDENING * self.scale));
         }
+        self.bounded.clear();
         Ok(())
     }
-}
 
-impl Nearest<'_> {
     /// Returns the number of a triangle in the input.
     fn id(&self, leaf: LeafPacket, lane: u8) -> Result<u32, QueryError> {
         let place = TrianglePlace { page: leaf.page, packet: leaf.packet, lane };
@@ -234,71 +241,40 @@ impl Nearest<'_> {
     }
 }
 
-/// Returns the slabs of points, four in columns, along the directions of a set, rounded outward.
-fn slabs_of(points: &[Point; PROBES], set: DirectionSet, error: f64) -> Group {
-    let mut group = Group::ZERO;
-    for slab in 0..set.slabs() {
-        let at = row(slab);
-        for (column, point) in points.iter().enumerate() {
-            let along: f64 = (0..3).map(|k| FACTORS[slab][k] * point[k]).sum();
-            let lane = 4 * (at % 4) + column;
-            group.lo[at / 4][lane] = -round_up(error - along);
-            group.hi[at / 4][lane] = round_up(along + error);
+impl PointVisitor for Nearest<'_> {
+    #[inline(always)]
+    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
+        self.test.bounds(isa, children)
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
+        self.stats.packet_tests += leaves.len() as u64;
+        let mut rooms = [Packet::default(); 4];
+        let (mut packets, mut valid) = ([None; 4], 0u16);
+        for (place, (leaf, room)) in leaves.iter().zip(&mut rooms).enumerate() {
+            packets[place] = Some(self.bvh.packet(self.object, *leaf, room)?);
+            valid |= ((1 << leaf.triangles) - 1) << (4 * place);
         }
-    }
-    group
-}
-
-/// Measures what has been collected, with the features of a backend.
-struct Settle<'a, 'b>(&'a mut Nearest<'b>);
-
-impl crate::isa::Task for Settle<'_, '_> {
-    type Output = Result<(), QueryError>;
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) -> Self::Output {
-        self.0.settle(isa)
-    }
-}
-
-impl ProbeVisitor for Nearest<'_> {
-    #[inline(always)]
-    fn bound<I: Isa>(&self, isa: I, children: &Group) -> I::V {
-        gaps_along(isa, Measure::Distance, self.set, (children, &self.slabs))
-    }
-
-    #[inline(always)]
-    fn limits(&self) -> &[f32; PROBES] {
-        &self.search.limits
-    }
-
-    #[inline(always)]
-    fn leaf<I: Isa>(&mut self, isa: I, leaf: LeafPacket, probes: u16) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.packet_tests += 1;
-        let (known, packet) = self.packets.place(leaf.page, leaf.packet);
-        if !known {
-            packet.place_a(isa, &self.frame, self.bvh.packet(self.object, leaf, &mut Packet::default())?);
-        }
-        let local = LocalPoints::new(&self.frame, packet, &self.points);
-        let bounds = point_bounds(isa, packet, &local);
-        let scale = self.frame.scale;
-        let mut mask = (0x1111 * probes) & valid_lanes(leaf.triangles, PROBES as u8);
-        while mask != 0 {
-            let at = mask.trailing_zeros() as usize & 15;
-            mask &= mask - 1;
-            // A power of two: exact, unless the mesh is so tiny that it takes a last outward step.
-            let lower = (bounds.lower[at] / scale).next_down().max(0.0);
-            let upper = (bounds.upper[at] / scale).next_up();
-            let limit = &mut self.search.limits[at & 3];
-            if lower <= *limit {
-                *limit = limit.min(upper);
-                let (lane, probe) = ((at >> 2) as u8, (at & 3) as u8);
-                self.bounded.push(BoundedTriangle { lower, leaf, lane, probe });
-            }
+        let none = Packet::default();
+        let bounds = point_bounds(isa, packets.map(|packet| packet.unwrap_or(&none)), &self.local);
+        let nearest = isa.least(&bounds.upper, valid) as usize & 15;
+        self.limit = self.limit.min(bounds.upper[nearest]);
+        let mut left = valid & I::V::bits(isa.load(&bounds.lower).le(isa.splat(self.limit)));
+        while left != 0 {
+            let at = left.trailing_zeros() as usize & 15;
+            left &= left - 1;
+            let (leaf, lane) = (leaves[at / 4], (at & 3) as u8);
+            self.bounded.push(BoundedTriangle { lower: bounds.lower[at], leaf, lane });
         }
         if self.bounded.len() >= MAX_BOUNDED {
-            self.settle(isa)?;
+            self.settle()?;
         }
-        Ok(ControlFlow::Continue(()))
+        Ok(())
     }
 }

@@ -1,0 +1,104 @@
+//! The node test for a point: lower bounds of its distance from four nodes.
+//!
+//! A group has four children in columns and slabs in rows, four to a register. Against a single point, each register is
+//! one comparison of sixteen slabs, where a pair of nodes takes one for each slab.
+//!
+//! Distances are in units of 2^k mesh units, which are no less than a fraction of the farthest corner of the object's
+//! box from the point. So no square overflows.
+//!
+//! Error: the point's slabs hold its projections. A gap is one difference (u = 2^-24), times the inverse length of its
+//! direction (2u, rounded down before); the root of the sum of squares adds three products, two sums and a root. Together
+//! that is less than 2^-20, by which the result is scaled: see `gaps` in [`crate::traverse::node_test`], which says as well
+//! what becomes of squares that underflow.
+
+use crate::isa::{Isa, Lanes};
+use crate::traverse::node_test::INVERSE_LENGTHS;
+use bvh_format::kdop::{DirectionSet, FACTORS};
+use bvh_format::slabs::{Group, row};
+
+/// A point's slabs, in all four columns, and what makes a distance of a gap.
+pub(crate) struct PointTest {
+    slabs: Group,
+    /// Inverse lengths of directions, in units of the test.
+    inverse_lengths: [[f32; 16]; 4],
+    set: DirectionSet,
+}
+
+/// More than `f32` loses of a subnormal number, 2^-148.
+const UNDERFLOW: f64 = f64::from_bits((1023 - 148) << 52);
+
+impl PointTest {
+    /// Prepares the test of a point around the object's origin; `error` bounds that of its coordinates added up. `scale` is
+    /// the inverse of the unit, a power of two.
+    #[inline(always)]
+    pub(crate) fn new(point: &[f64; 3], set: DirectionSet, error: f64, scale: f32) -> Self {
+        // Rows without a slab have the whole line: their gaps are -infinity.
+        let mut test = Self {
+            slabs: Group { lo: [[f32::NEG_INFINITY; 16]; 4], hi: [[f32::INFINITY; 16]; 4] },
+            inverse_lengths: [[scale; 16]; 4],
+            set,
+        };
+        for slab in 0..set.slabs() {
+            let along =
+                FACTORS[slab][0] * point[0] + FACTORS[slab][1] * point[1] + FACTORS[slab][2] * point[2];
+            // Rounding to `f32` moves an end by half as much or less.
+            let outward = 2.0 * error + along.abs() * f64::from(f32::EPSILON) + UNDERFLOW;
+            let at = row(slab);
+            let (quad, lanes) = (at / 4, 4 * (at % 4)..4 * (at % 4) + 4);
+            test.slabs.lo[quad][lanes.clone()].fill((along - outward) as f32);
+            test.slabs.hi[quad][lanes.clone()].fill((along + outward) as f32);
+            test.inverse_lengths[quad][lanes].fill(INVERSE_LENGTHS[slab] * scale);
+        }
+        test
+    }
+
+    /// Returns lower bounds of the distances of four nodes, in units of the test. Where the point is in all slabs of a node,
+    /// the bound is negative, and tells how deep.
+    #[inline(always)]
+    pub(crate) fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
+        match self.set {
+            DirectionSet::Dop6 => self.bounds_in::<I, 1>(isa, children),
+            DirectionSet::Dop14 => self.bounds_in::<I, 2>(isa, children),
+            DirectionSet::Dop26 => self.bounds_in::<I, 4>(isa, children),
+        }
+    }
+
+    #[inline(always)]
+    fn bounds_in<I: Isa, const QUADS: usize>(&self, isa: I, children: &Group) -> I::H {
+        let axes = self.gaps(isa, children, 0);
+        // `max` returns its second operand for NaN, which rows without a slab may have: these come first.
+        let mut largest = axes;
+        if QUADS >= 2 {
+            largest = self.gaps(isa, children, 1).max(largest);
+        }
+        if QUADS == 4 {
+            largest = self.gaps(isa, children, 3).max(self.gaps(isa, children, 2)).max(largest);
+        }
+        let mut rows = [0.0; 16];
+        isa.store(largest, &mut rows);
+        let [first, second, third, fourth] = quads(isa, &rows);
+        let largest = fourth.max(third).max(first.max(second));
+        // Along the three axes gaps add up like the sides of a box.
+        let sides = axes.max(isa.splat(0.0));
+        isa.store(sides.mul(sides), &mut rows);
+        let [x, y, z, _] = quads(isa, &rows);
+        let sum = x.add(y).add(z);
+        let normal = isa.splat4(f32::MIN_POSITIVE).le(sum);
+        let apart = I::H::select(normal, sum.sqrt(), largest);
+        largest.max(apart).mul(isa.splat4(1.0 - 1.0 / (1 << 20) as f32))
+    }
+
+    /// The gaps of four children along four slabs.
+    #[inline(always)]
+    fn gaps<I: Isa>(&self, isa: I, children: &Group, quad: usize) -> I::V {
+        let (lo, hi) = (isa.load(&children.lo[quad]), isa.load(&children.hi[quad]));
+        let gap = lo.sub(isa.load(&self.slabs.hi[quad])).max(isa.load(&self.slabs.lo[quad]).sub(hi));
+        gap.mul(isa.load(&self.inverse_lengths[quad]))
+    }
+}
+
+#[inline(always)]
+fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::H; 4] {
+    let rows = rows.as_chunks::<4>().0;
+    [isa.load4(&rows[0]), isa.load4(&rows[1]), isa.load4(&rows[2]), isa.load4(&rows[3])]
+}
