@@ -76,11 +76,13 @@ pub enum SectionKind {
     Provenance = 6,
     /// Where the objects stand in the world. Optional.
     Instances = 7,
+    /// Which objects are closed, a triangle of each component, and how often duplicates count. Optional.
+    Topology = 8,
 }
 
 impl SectionKind {
     /// All kinds in the order of their numbers on disk, which start at 1.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Objects,
         Self::Nodes,
         Self::Leaves,
@@ -88,6 +90,7 @@ impl SectionKind {
         Self::Duplicates,
         Self::Provenance,
         Self::Instances,
+        Self::Topology,
     ];
 
     /// Returns the kind of a number on disk.
@@ -115,6 +118,7 @@ impl SectionKind {
             Self::Duplicates => "duplicates",
             Self::Provenance => "provenance",
             Self::Instances => "instances",
+            Self::Topology => "topology",
         }
     }
 }

@@ -10,7 +10,8 @@ use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
 use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
 use crate::rule::Rule;
-use crate::source::{Block, PageBytes, Source};
+use crate::source::{Block, PageBytes, Source, chunks};
+use crate::topology::{ObjectTopology, check_lists, read_records};
 use std::ops::Range;
 use zerocopy::FromBytes;
 use zerocopy::little_endian::U32;
@@ -31,6 +32,7 @@ pub struct Layout {
     ids: Option<Range<usize>>,
     duplicates: Option<Range<usize>>,
     instances: Option<Section>,
+    topology: Option<Section>,
 }
 
 impl Layout {
@@ -62,10 +64,8 @@ impl Layout {
         sections: Vec<Section>,
         object_table: &[u8],
     ) -> Result<Self, FormatError> {
-        let find = |kind| {
-            let section = sections.iter().find(|section: &&Section| section.kind == kind);
-            section.map(|section| section.range.clone())
-        };
+        let section = |kind| sections.iter().find(|section: &&Section| section.kind == kind).cloned();
+        let find = |kind| section(kind).map(|section| section.range);
         // `read_header` has made sure of the required sections.
         let needed = |kind| find(kind).unwrap_or(0..0);
         let (nodes, table) = (needed(SectionKind::Nodes), needed(SectionKind::Objects));
@@ -90,7 +90,8 @@ impl Layout {
             leaves: needed(SectionKind::Leaves),
             ids: find(SectionKind::Ids),
             duplicates: find(SectionKind::Duplicates),
-            instances: sections.iter().find(|section| section.kind == SectionKind::Instances).cloned(),
+            instances: section(SectionKind::Instances),
+            topology: section(SectionKind::Topology),
             sections,
         })
     }
@@ -212,6 +213,39 @@ impl Layout {
         let (bytes, at) = (source.read(section.range.clone())?, section.range.start as u64);
         require(Rule::SectionChecksum, at, hex(section.checksum), hex(checksum(&bytes)))?;
         Ok(read_instances(&bytes, at, self.objects.len())?)
+    }
+
+    /// Returns true if the file states which of its objects are closed.
+    pub fn has_topology(&self) -> bool {
+        self.topology.is_some()
+    }
+
+    /// Reads the records of the topology section, one per object, and checks them, but not the lists. Without the
+    /// section there are no records. The cost grows with the number of objects.
+    ///
+    /// # Errors
+    /// The first of rules 44 and 45 that does not hold, and the errors of the source.
+    pub fn read_topology<S: Source + ?Sized>(&self, source: &S) -> Result<Vec<ObjectTopology>, S::Error> {
+        let Some(section) = &self.topology else { return Ok(Vec::new()) };
+        read_records(source, &section.range, &self.objects)
+    }
+
+    /// Reads the records of the topology section and checks all of the section, except against the pages. The cost grows
+    /// with the section.
+    ///
+    /// # Errors
+    /// Rule 10 for this section, and rules 44 to 47; and the errors of the source.
+    pub fn check_topology<S: Source + ?Sized>(&self, source: &S) -> Result<Vec<ObjectTopology>, S::Error> {
+        let Some(section) = &self.topology else { return Ok(Vec::new()) };
+        let mut hasher = Hasher::default();
+        for chunk in chunks(section.range.clone()) {
+            hasher.update(&source.read(chunk)?);
+        }
+        let at = section.range.start as u64;
+        require(Rule::SectionChecksum, at, hex(section.checksum), hex(hasher.finish()))?;
+        let topology = read_records(source, &section.range, &self.objects)?;
+        check_lists(source, &topology, &self.objects)?;
+        Ok(topology)
     }
 
     /// Checks the section of duplicate ids: its checksum and its order.

@@ -70,6 +70,7 @@ pub mod realign;
 mod rule;
 pub mod slabs;
 pub mod source;
+pub mod topology;
 pub mod treelet;
 pub mod turning;
 pub mod validate;

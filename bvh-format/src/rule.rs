@@ -66,6 +66,11 @@ rules! {
     InstanceObject = 41, "an instance is of an object of the file";
     InstancePose = 42, "an instance's pose is rigid and within the limits";
     InstanceName = 43, "no two instances have the same name";
+    TopologyTable = 44, "the topology section has one record of 16 bytes per object and lists of the lengths that these state";
+    TopologyRecord = 45, "an object is closed or open, and lists no more than it has";
+    TopologyPlace = 46, "places in the topology section ascend and are those of triangles";
+    TopologyNet = 47, "a listed net is not 1";
+    TopologyClosed = 48, "a closed object has no boundary";
 }
 
 impl Rule {

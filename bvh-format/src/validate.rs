@@ -18,6 +18,7 @@ use crate::object::{MAX_COORDINATE, Object};
 use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source, chunks};
+use crate::topology::{ObjectTopology, boundary, check_in_pages};
 use crate::treelet::{Child, Links};
 use counts::CountsFromStart;
 use std::ops::Range;
@@ -78,24 +79,29 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
 /// [`crate::bounds::check_bounds`].
 ///
 /// The check takes two passes over all bytes, and one over the pages for their links, with one more page read per link.
-/// It needs twice the memory of the object table and of the instances, some 300 KiB for counts, and a page with its blocks for each worker:
-/// at most 1 MiB, and 64 KiB in files of `bvh-bake`.
+/// It needs twice the memory of the object table and of the instances, some 300 KiB for counts, and a page with its
+/// blocks for each worker: at most 1 MiB, and 64 KiB in files of `bvh-bake`.
 ///
 /// # Errors
 /// The first rule that does not hold, in the order of the specification, however the work is shared and wherever the
 /// bytes are; or an error of the source.
 pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> Result<Layout, S::Error> {
     let layout = Layout::read_from(source)?;
-    let pages =
-        || layout.objects.iter().try_for_each(|object| check_object(&layout, source, object, workers));
+    let pages = || {
+        // Records that break a rule break it in `check_sections` as well, whose error comes first.
+        let topology = layout.read_topology(source)?;
+        let check = |(number, object)| check_object(&layout, source, object, topology.get(number), workers);
+        layout.objects.iter().enumerate().try_for_each(check)
+    };
     workers.both(|| check_sections(&layout, source), pages)?;
     Ok(layout)
 }
 
-/// Checks the checksums of whole sections and of the content, the order of duplicate ids, and the instances.
+/// Checks the checksums of whole sections and of the content, the order of duplicate ids, the instances, and what the
+/// topology section shows by itself.
 ///
 /// # Errors
-/// The first of rules 10, 36 and 40 to 43 that does not hold, or an error of the source.
+/// The first of rules 10, 36 and 40 to 47 that does not hold, or an error of the source.
 pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(), S::Error> {
     let mut content = ContentHasher::default();
     let mut pairs = PairsInOrder::default();
@@ -121,6 +127,7 @@ pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result
     let duplicates = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
     duplicates.map_or(Ok(()), |section| pairs.check(section))?;
     layout.read_instances(source)?;
+    layout.check_topology(source)?;
     Ok(())
 }
 
@@ -128,9 +135,11 @@ fn check_object<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
     object: &Object,
+    topology: Option<&ObjectTopology>,
     workers: &impl Workers,
 ) -> Result<(), S::Error> {
     let pages = object.pages();
+    let closed = topology.is_some_and(|topology| topology.closed);
     let batches = || {
         let end = pages.end;
         pages
@@ -139,17 +148,22 @@ fn check_object<S: Source + ?Sized>(
             .map(move |start| start..end.min(start.saturating_add(PAGES_PER_BATCH)))
     };
     let mut counts = CountsFromStart::default();
+    let mut boundary = 0u64;
     for batch in batches() {
         let checked = workers.each(batch.clone(), |number| {
-            let validated = validate_page(layout, source, object, number)?;
-            Ok::<_, S::Error>(validated.counts)
+            let validated = validate_page(layout, source, object, closed, number)?;
+            Ok::<_, S::Error>((validated.counts, validated.boundary))
         })?;
-        batch.zip(&checked).for_each(|(number, page)| counts.add(layout, number, page));
+        for (number, (page, of_page)) in batch.zip(&checked) {
+            counts.add(layout, number, page);
+            boundary = boundary.wrapping_add(*of_page);
+        }
     }
     for batch in batches() {
         workers.each(batch, |number| check_links(layout, source, object, number))?;
     }
-    Ok(counts.finish(layout, object)?)
+    counts.finish(layout, object)?;
+    topology.map_or(Ok(()), |topology| check_in_pages(layout, source, object, topology, boundary))
 }
 
 /// A page that has been validated, except where its remote links lead.
@@ -160,9 +174,12 @@ pub struct ValidatedPage<'a> {
     pub leaves: Block<'a>,
     /// How many parts the page has.
     pub counts: Counts,
+    /// The sum of the [boundaries](boundary) of its triangles if the object is closed, else 0.
+    pub boundary: u64,
 }
 
-/// Reads a page and its blocks, and checks them value by value, except where the remote links lead.
+/// Reads a page and its blocks, and checks them value by value, except where the remote links lead. `closed` says whether
+/// the file states that the object is closed.
 ///
 /// # Errors
 /// The first of rules 15 to 33, 37 and 38 that does not hold, or an error of the source.
@@ -170,6 +187,7 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     layout: &Layout,
     source: &'a S,
     object: &Object,
+    closed: bool,
     number: u32,
 ) -> Result<ValidatedPage<'a>, S::Error> {
     let bytes = layout.read_page(source, number)?;
@@ -181,15 +199,16 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     layout.check_leaf_block_of(&leaves, &page, object)?;
     let ids = layout.read_id_block(source, header)?;
     layout.check_id_block_of(&ids, &page)?;
+    let (triangles, boundary) = check_values(layout, object, closed, &page, leaves.bytes(), ids.bytes())?;
     let counts = Counts {
         first_packet: header.first_packet.get().into(),
         treelets: header.treelets.into(),
         packets: header.packets.get().into(),
-        triangles: check_values(layout, object, &page, leaves.bytes(), ids.bytes())?,
+        triangles,
         roots: header.roots.into(),
         remotes: header.remotes.into(),
     };
-    Ok(ValidatedPage { bytes, leaves, counts })
+    Ok(ValidatedPage { bytes, leaves, counts, boundary })
 }
 
 /// Checks where the remote links of a page lead (rule 20), after all pages have been checked.
@@ -209,17 +228,19 @@ fn check_links<S: Source + ?Sized>(
     Ok(())
 }
 
-/// Checks the values in the leaf and id blocks of a page, and returns the number of its triangles.
+/// Checks the values in the leaf and id blocks of a page, and returns the number of its triangles and, for a closed
+/// object, the sum of their boundaries.
 fn check_values(
     layout: &Layout,
     object: &Object,
+    closed: bool,
     page: &Page,
     block: &[u8],
     ids: &[u8],
-) -> Result<u64, FormatError> {
+) -> Result<(u64, u64), FormatError> {
     let at = layout.page_offset(page.header().page_number.get());
     let origin = object.record.origin.map(|o| o.get());
-    let mut triangles = 0;
+    let (mut triangles, mut sum) = (0, 0u64);
     for (packet, count) in packets(page) {
         triangles += count as u64;
         if object.triangle_encoding != TriangleEncoding::F32 {
@@ -227,6 +248,9 @@ fn check_values(
         }
         let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
         check_vertices(&values, origin, at)?;
+        for lane in 0..if closed { count } else { 0 } {
+            sum = sum.wrapping_add(boundary(&values.triangle(lane)));
+        }
         for lane in 0..if ids.is_empty() { 0 } else { count } {
             let id = u64::from(decode_id(ids, usize::from(packet), lane));
             ensure(id < object.record.input_triangles.get(), Rule::IdRange, at + 32, || {
@@ -234,7 +258,7 @@ fn check_values(
             })?;
         }
     }
-    Ok(triangles)
+    Ok((triangles, sum))
 }
 
 fn check_indices(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError> {

@@ -16,6 +16,7 @@ use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
+use bvh_format::topology::{Net, TopologyRecord, write_topology_head};
 use bvh_format::treelet::{Child, Links};
 use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, decode_turning};
 use std::any::type_name_of_val;
@@ -99,6 +100,8 @@ fn structures() {
         duplicates, f16_exponent, profile, triangle_encoding, reserved, sphere_centre, sphere_radius,
         reserved_end);
     compare!(InstanceRecord: name_offset, name_length, object, member, meets, reserved, rotation, translation);
+    compare!(TopologyRecord: closed, components, nets, reserved);
+    compare!(Net: place, net);
     compare!(PageHeader: checksum, leaf_checksum, id_checksum, leaf_line, id_word, first_packet,
         page_number, leaf_lines, id_words, packets, roots, treelets, remotes, treelet_line, profile,
         reserved);
@@ -117,6 +120,11 @@ fn heads_of_blocks() {
     let rows = byte_table("instance-head", write_instances(&[]).len());
     let section = write_instances(&[Instance { name: "name".into(), ..Instance::of_object(0) }]);
     assert_eq!([section[offset(&rows, "instances")], section[offset(&rows, "names_length")]], [1, 4]);
+
+    let rows = byte_table("topology-head", write_topology_head(&[]).len());
+    let record = TopologyRecord { components: 2.into(), nets: 3.into(), ..TopologyRecord::new_zeroed() };
+    let section = write_topology_head(&[record]);
+    assert_eq!(["objects", "components", "nets"].map(|field| section[offset(&rows, field)]), [1, 2, 3]);
 
     // All bytes differ, so that each value is known by its first byte.
     let bytes: Vec<u8> = (1..=PACKED_HEAD_BYTES as u8).collect();

@@ -11,6 +11,7 @@ use bvh_format::leaf::{LINE, Packet, TriangleEncoding, encode_block};
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PageHeader, PageShape};
 use bvh_format::profile::{Encoding, Profile};
+use bvh_format::topology::{TopologyRecord, write_topology_head};
 use bvh_format::treelet::Links;
 use zerocopy::{FromZeros, IntoBytes};
 
@@ -114,6 +115,9 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
     if input.below(2) == 1 {
         sections.push((7, 0, write_instances(&instances(input))));
     }
+    if input.below(2) == 1 {
+        sections.push((8, 0, topology(input)));
+    }
     // Finally, a few bytes change anywhere in the sections.
     for _ in 0..input.below(4) {
         let (section, high) = (input.below(sections.len()), input.byte());
@@ -140,6 +144,31 @@ fn instances(input: &mut Input) -> Vec<Instance> {
         instance
     };
     (0..1 + input.below(4)).map(|_| instance(input)).collect()
+}
+
+/// Returns a topology section of up to three components and nets, with places that ascend for the most part.
+fn topology(input: &mut Input) -> Vec<u8> {
+    let places = |input: &mut Input| {
+        let mut place = 0;
+        [0; 3].map(|_| {
+            place += u32::from(input.byte() % 16);
+            place
+        })
+    };
+    let (closed, components, nets) = (input.below(2), input.below(4), input.below(4));
+    let record = TopologyRecord {
+        closed: (closed as u32).into(),
+        components: (components as u32).into(),
+        nets: ((closed * nets) as u32).into(),
+        reserved: 0.into(),
+    };
+    let mut section = write_topology_head(&[record]);
+    places(input).iter().take(components).for_each(|place| section.extend(place.to_le_bytes()));
+    for place in places(input).iter().take(closed * nets) {
+        section.extend(place.to_le_bytes());
+        section.extend(i32::from(input.byte() as i8).to_le_bytes());
+    }
+    section
 }
 
 /// Returns the pages with the kinds and numbers of the children of all treelets, breadth-first as in the format.

@@ -107,7 +107,7 @@ pub fn seal_sections(bytes: &mut [u8]) {
         let sum = checksum(&bytes[range.clone()]);
         put(bytes, at + 24, &sum.to_le_bytes());
         // All kinds of content; 6 is the provenance.
-        if matches!(kind, 1..=5 | 7) {
+        if matches!(kind, 1..=5 | 7 | 8) {
             content.extend(kind.to_le_bytes());
             content.extend((range.len() as u64).to_le_bytes());
             content.extend_from_slice(&bytes[range]);

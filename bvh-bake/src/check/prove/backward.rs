@@ -10,6 +10,7 @@ use bvh_format::bounds::{Inflation, Subtree, check_bounds};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef};
 use bvh_format::source::{Block, PageBytes, Source};
+use bvh_format::topology::{ObjectTopology, check_in_pages};
 use bvh_format::validate::{CountsFromEnd, Workers, check_sections, validate_page};
 use bvh_format::{FormatError, Layout, Rule};
 use std::collections::HashMap;
@@ -22,9 +23,12 @@ const PAGES_PER_WINDOW: u32 = 128;
 pub(crate) fn prove<S: Source>(source: &S, progress: &Progress) -> Result<(Layout, Inflation), S::Error> {
     let layout = Layout::read_from(source)?;
     let pages = || {
+        // Records that break a rule break it in `check_sections` as well, whose error comes first.
+        let topology = layout.read_topology(source)?;
         let mut inflation = Inflation::default();
-        for object in &layout.objects {
-            inflation.join(&prove_object(&layout, source, object, true, progress)?);
+        for (number, object) in layout.objects.iter().enumerate() {
+            let structure = Structure { topology: topology.get(number) };
+            inflation.join(&prove_object(&layout, source, object, Some(structure), progress)?);
         }
         Ok(inflation)
     };
@@ -51,12 +55,18 @@ impl Window<'_> {
     }
 }
 
+/// The checks of everything but bounds.
+pub(super) struct Structure<'a> {
+    /// What the file states about the topology of the object.
+    topology: Option<&'a ObjectTopology>,
+}
+
 /// Checks the bounds of an object and, unless the caller has done so, everything else about its pages.
 pub(super) fn prove_object<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
     object: &Object,
-    structure: bool,
+    structure: Option<Structure>,
     progress: &Progress,
 ) -> Result<Inflation, S::Error> {
     let pages = object.pages();
@@ -64,14 +74,17 @@ pub(super) fn prove_object<S: Source + ?Sized>(
     let (triangles, count) = (object.triangles(), (pages.end - pages.start).into());
     let tally = progress.tally(Step::Bake(Stage::Prove), WHOLE, triangles, count);
     let mut counts = CountsFromEnd::default();
+    let (topology, mut boundary) = (structure.as_ref().and_then(|structure| structure.topology), 0u64);
+    let closed = topology.is_some_and(|topology| topology.closed);
     let mut end = pages.end;
     while end > pages.start {
         let start = end.saturating_sub(PAGES_PER_WINDOW).max(pages.start);
-        let window = if structure {
-            let checked =
-                InParallel.each(start..end, |number| validate_page(layout, source, object, number))?;
+        let window = if structure.is_some() {
+            let validate = |number| validate_page(layout, source, object, closed, number);
+            let checked = InParallel.each(start..end, validate)?;
             for (number, page) in (start..end).zip(&checked).rev() {
                 counts.add(layout, number, &page.counts)?;
+                boundary = boundary.wrapping_add(page.boundary);
             }
             checked.into_iter().map(|page| (page.bytes, page.leaves)).collect()
         } else {
@@ -85,8 +98,11 @@ pub(super) fn prove_object<S: Source + ?Sized>(
         tally.add((end - start).into());
         end = start;
     }
-    if structure {
+    if structure.is_some() {
         counts.finish(layout, object)?;
+    }
+    if let Some(topology) = topology {
+        check_in_pages(layout, source, object, topology, boundary)?;
     }
     Ok(walk.finish()?)
 }

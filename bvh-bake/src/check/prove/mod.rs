@@ -64,7 +64,7 @@ pub fn prove_bounds<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<I
     let mut inflation = Inflation::default();
     let progress = Progress::default();
     for object in &layout.objects {
-        inflation.join(&backward::prove_object(layout, source, object, false, &progress)?);
+        inflation.join(&backward::prove_object(layout, source, object, None, &progress)?);
     }
     Ok(inflation)
 }

@@ -1,0 +1,255 @@
+//! The topology section: which objects are closed, a triangle of each of their components, and how often a triangle
+//! counts of which duplicates were left out.
+//!
+//! A head, one record per object, the components of all objects and the nets of all objects follow each other. Section
+//! 3.2 of `spec/format.md` states each byte and defines the terms.
+
+mod in_pages;
+
+pub use in_pages::check_in_pages;
+
+use crate::checksum::checksum;
+use crate::error::{FormatError, ensure};
+use crate::object::Object;
+use crate::rule::Rule;
+use crate::source::{Source, chunks};
+use std::ops::Range;
+use zerocopy::little_endian::{I32, U32};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+/// The number of bytes before the first record.
+pub const HEAD_BYTES: usize = 16;
+/// The lanes that a place counts for each packet: place 4 p + i is lane i of packet p of the object.
+pub const LANES: u64 = crate::leaf::PACKET as u64;
+
+/// The record of an object as stored.
+#[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct TopologyRecord {
+    /// 1 if the object is closed, else 0.
+    pub closed: U32,
+    /// The number of places that list its components; 0 if each triangle counts as a component.
+    pub components: U32,
+    /// The number of its nets.
+    pub nets: U32,
+    /// Zero.
+    pub reserved: U32,
+}
+
+/// How often a triangle counts whose duplicates were left out, as stored.
+#[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Net {
+    /// The place of the triangle in the object.
+    pub place: U32,
+    /// The number of equal triangles of the input with its orientation, itself included, less the number of those with
+    /// the opposite one. It is not 1.
+    pub net: I32,
+}
+
+const _: () = assert!(size_of::<TopologyRecord>() == 16 && size_of::<Net>() == 8);
+
+/// What the section says about an object: whether it is closed, and which bytes of the file are its lists.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjectTopology {
+    /// Whether the triangles have no boundary, each counted as often as its net says.
+    pub closed: bool,
+    components: Range<usize>,
+    nets: Range<usize>,
+}
+
+impl ObjectTopology {
+    /// Returns the places of a triangle of each component, ascending. The list is empty if each triangle counts as a
+    /// component.
+    pub fn components<'a>(&self, bytes: &'a [u8]) -> &'a [U32] {
+        list(bytes, &self.components)
+    }
+
+    /// Returns the nets that are not 1, by ascending places.
+    pub fn nets<'a>(&self, bytes: &'a [u8]) -> &'a [Net] {
+        list(bytes, &self.nets)
+    }
+
+    /// Returns the number of components listed.
+    pub fn component_count(&self) -> usize {
+        self.components.len() / size_of::<U32>()
+    }
+
+    /// Returns the number of nets.
+    pub fn net_count(&self) -> usize {
+        self.nets.len() / size_of::<Net>()
+    }
+}
+
+fn list<'a, T: FromBytes + KnownLayout + Immutable>(bytes: &'a [u8], range: &Range<usize>) -> &'a [T] {
+    bytes.get(range.clone()).and_then(|bytes| <[T]>::ref_from_bytes(bytes).ok()).unwrap_or(&[])
+}
+
+/// Writes the head and the records. All components follow as `u32`, and then all nets, object by object.
+pub fn write_topology_head(records: &[TopologyRecord]) -> Vec<u8> {
+    let sum = |of: fn(&TopologyRecord) -> u32| records.iter().map(of).fold(0, u32::wrapping_add);
+    let mut section = Vec::with_capacity(HEAD_BYTES + size_of_val(records));
+    let counts = [sum(|record| record.components.get()), sum(|record| record.nets.get())];
+    for number in [records.len() as u32, counts[0], counts[1], 0] {
+        section.extend_from_slice(&number.to_le_bytes());
+    }
+    section.extend_from_slice(records.as_bytes());
+    section
+}
+
+/// Reads the head and the records of the section, which is `section` of the file. It does not look at the lists.
+///
+/// # Errors
+/// The first of rules 44 and 45 that does not hold, or an error of the source.
+pub(crate) fn read_records<S: Source + ?Sized>(
+    source: &S,
+    section: &Range<usize>,
+    objects: &[Object],
+) -> Result<Vec<ObjectTopology>, S::Error> {
+    let table = HEAD_BYTES + objects.len() * size_of::<TopologyRecord>();
+    let bytes = source.read(section.start..section.start + section.len().min(table))?;
+    Ok(read_table(&bytes, section, objects)?)
+}
+
+fn read_table(
+    bytes: &[u8],
+    section: &Range<usize>,
+    objects: &[Object],
+) -> Result<Vec<ObjectTopology>, FormatError> {
+    let at = section.start as u64;
+    let refused =
+        |expected: String, found: String| FormatError::new(Rule::TopologyTable, at, expected, found);
+    let (head, rest) = <[U32; 4]>::ref_from_prefix(bytes)
+        .map_err(|_| refused(format!("a head of {HEAD_BYTES} bytes"), format!("{} bytes", bytes.len())))?;
+    let [count, components, nets] = [0, 1, 2].map(|number: usize| u64::from(head[number].get()));
+    ensure(count == objects.len() as u64, Rule::TopologyTable, at, || {
+        (format!("records of {} objects", objects.len()), count.to_string())
+    })?;
+    let lists = HEAD_BYTES as u64 + count * size_of::<TopologyRecord>() as u64;
+    let length = lists + components * size_of::<U32>() as u64 + nets * size_of::<Net>() as u64;
+    let records = <[TopologyRecord]>::ref_from_bytes(rest).ok();
+    let Some(records) =
+        records.filter(|records| records.len() == objects.len() && length == section.len() as u64)
+    else {
+        return Err(refused(format!("{length} bytes"), format!("{} bytes", section.len())));
+    };
+    let sum =
+        |of: fn(&TopologyRecord) -> u32| records.iter().map(|record| u64::from(of(record))).sum::<u64>();
+    let sums = [sum(|record| record.components.get()), sum(|record| record.nets.get())];
+    ensure(sums == [components, nets], Rule::TopologyTable, at + 4, || {
+        (format!("{} components and {} nets", sums[0], sums[1]), format!("{components} and {nets}"))
+    })?;
+    // The lists lie within the section, since their lengths add up to its length.
+    let mut component = section.start + lists as usize;
+    let mut net = component + components as usize * size_of::<U32>();
+    let mut topology = Vec::with_capacity(objects.len());
+    for (index, (record, object)) in records.iter().zip(objects).enumerate() {
+        let at = at + (HEAD_BYTES + index * size_of::<TopologyRecord>()) as u64;
+        let closed = record.closed.get();
+        ensure(closed <= 1, Rule::TopologyRecord, at, || ("0 or 1".into(), closed.to_string()))?;
+        ensure(closed == 1 || record.nets.get() == 0, Rule::TopologyRecord, at + 8, || {
+            ("no nets, because the object is not closed".into(), record.nets.to_string())
+        })?;
+        for (offset, count) in [(4, record.components), (8, record.nets)] {
+            ensure(u64::from(count.get()) <= object.triangles(), Rule::TopologyRecord, at + offset, || {
+                (format!("at most {}, one per triangle", object.triangles()), count.to_string())
+            })?;
+        }
+        let components = component..component + record.components.get() as usize * size_of::<U32>();
+        let nets = net..net + record.nets.get() as usize * size_of::<Net>();
+        (component, net) = (components.end, nets.end);
+        topology.push(ObjectTopology { closed: closed == 1, components, nets });
+    }
+    Ok(topology)
+}
+
+/// Checks the lists of all objects: the order of their places, and that nets are listed where they matter only.
+///
+/// # Errors
+/// The first of rules 46 and 47 that does not hold, or an error of the source.
+pub(crate) fn check_lists<S: Source + ?Sized>(
+    source: &S,
+    topology: &[ObjectTopology],
+    objects: &[Object],
+) -> Result<(), S::Error> {
+    for (of_object, object) in topology.iter().zip(objects) {
+        let end = object.record().packets.get() * LANES;
+        let mut next = 0;
+        visit_list(source, &of_object.components, |at, place: &U32| {
+            Ok(ascend(at, place.get(), &mut next, end)?)
+        })?;
+        let mut next = 0;
+        visit_list(source, &of_object.nets, |at, net: &Net| {
+            ascend(at, net.place.get(), &mut next, end)?;
+            Ok(ensure(net.net.get() != 1, Rule::TopologyNet, at + 4, || {
+                ("a net that is not 1".into(), "1".into())
+            })?)
+        })?;
+    }
+    Ok(())
+}
+
+/// Checks that a place is at least `next` and less than `end`, and sets `next` to the one after it.
+fn ascend(at: u64, place: u32, next: &mut u64, end: u64) -> Result<(), FormatError> {
+    ensure((*next..end).contains(&u64::from(place)), Rule::TopologyPlace, at, || {
+        (format!("a place from {next} and below {end}"), place.to_string())
+    })?;
+    *next = u64::from(place) + 1;
+    Ok(())
+}
+
+/// Visits the entries of a list, each with its byte offset in the file.
+fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable>(
+    source: &S,
+    range: &Range<usize>,
+    mut visit: impl FnMut(u64, &T) -> Result<(), S::Error>,
+) -> Result<(), S::Error> {
+    // Chunks hold whole entries, because their length is a multiple of all sizes of entries.
+    for chunk in chunks(range.clone()) {
+        let bytes = source.read(chunk.clone())?;
+        let entries = <[T]>::ref_from_bytes(&bytes).unwrap_or(&[]);
+        for (number, entry) in entries.iter().enumerate() {
+            visit((chunk.start + number * size_of::<T>()) as u64, entry)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the boundary of a triangle as one number. For each edge it adds the checksum of the edge, or subtracts it if
+/// the triangle goes along the edge from its greater end to its lesser one. An edge between equal ends adds nothing.
+///
+/// The sum over triangles without a boundary is 0, since each edge is added as often as it is subtracted. The sum over
+/// others is 0 by a chance of about 2^-64. All sums wrap around.
+pub fn boundary(corners: &[[f32; 3]; 3]) -> u64 {
+    let ends = corners.map(end_of_edge);
+    let mut sum = 0u64;
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        let [from, to]: [u128; 2] = [ends[from], ends[to]];
+        if from < to {
+            sum = sum.wrapping_add(edge_checksum(from, to));
+        } else if to < from {
+            sum = sum.wrapping_sub(edge_checksum(to, from));
+        }
+    }
+    sum
+}
+
+/// Returns the bits of a point as one number: those of x, y and z from the most significant to the least. Both zeros are
+/// the same.
+fn end_of_edge(point: [f32; 3]) -> u128 {
+    // -0.0 + 0.0 is 0.0; every other number stays as it is.
+    let [x, y, z] = point.map(|value| u128::from((value + 0.0).to_bits()));
+    x << 64 | y << 32 | z
+}
+
+/// Returns the checksum of the 24 bytes of an edge: x, y and z of its lesser end, then those of its greater end.
+fn edge_checksum(lesser: u128, greater: u128) -> u64 {
+    let mut bytes = [0; 24];
+    for (at, end) in [(0, lesser), (12, greater)] {
+        for (axis, shift) in [64, 32, 0].into_iter().enumerate() {
+            let value = ((end >> shift) as u32).to_le_bytes();
+            bytes[at + 4 * axis..][..4].copy_from_slice(&value);
+        }
+    }
+    checksum(&bytes)
+}
