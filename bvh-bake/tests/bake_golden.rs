@@ -24,9 +24,14 @@ fn cube(centre: [f64; 3]) -> Mesh {
     Mesh::from_triangles((0..8).map(corner).collect(), faces.into_iter().flat_map(halves).collect())
 }
 
+/// The options of files that were frozen before there was a topology section.
+fn without_topology(profile: Profile, triangles: TriangleEncoding) -> Options {
+    Options::default().profile(profile).triangles(triangles).topology(false)
+}
+
 /// The least that a file can hold: one object, no ids.
 fn plain() -> Vec<u8> {
-    let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::F32).ids(false);
+    let options = without_topology(Profile::Dop14U8, TriangleEncoding::F32).ids(false);
     to_bytes(&cube([0.0; 3]), &options).unwrap().0
 }
 
@@ -37,7 +42,7 @@ fn everything() -> Vec<u8> {
     let object = &mut mesh.objects[0];
     object.triangles.extend([[2, 3, 0], [0, 0, 7], [3, 0, 2]]);
     object.triangle_ids.extend([12, 13, 14]);
-    let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::Packed);
+    let options = without_topology(Profile::Dop14U8, TriangleEncoding::Packed);
     to_bytes_with(&mesh, &options, "generator=a test\ninput=a cube\n", &mut |_| ()).unwrap().0
 }
 
@@ -46,11 +51,7 @@ fn everything() -> Vec<u8> {
 fn profiles() -> Vec<u8> {
     let (mut records, mut nodes, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
     for (number, profile) in Profile::ALL.into_iter().enumerate() {
-        let options = Options::default()
-            .profile(profile)
-            .triangles(TriangleEncoding::ALL[number % 3])
-            .max_error(1e-3)
-            .ids(false);
+        let options = without_topology(profile, TriangleEncoding::ALL[number % 3]).max_error(1e-3).ids(false);
         let file = to_bytes(&cube([3.0 * number as f64, 0.0, 0.0]), &options).unwrap().0;
         let sections = seal::take_apart(&file);
         let record = *Layout::read(&file).unwrap().objects[0].record();
@@ -69,9 +70,32 @@ fn profiles() -> Vec<u8> {
 /// A ball of 48 triangles whose children have turning slabs.
 fn turning() -> Vec<u8> {
     let (positions, triangles) = cbvh_testkit::ball::ball(48);
-    let options =
-        Options::default().profile(Profile::Dop26U8Wide).triangles(TriangleEncoding::F32).ids(false);
+    let options = without_topology(Profile::Dop26U8Wide, TriangleEncoding::F32).ids(false);
     to_bytes(&Mesh::from_triangles(positions, triangles), &options).unwrap().0
+}
+
+/// Four objects: a cube, a cube without one triangle, two cubes of which the second lies in the first, is turned over and
+/// is given three times, and 65 triangles that share no edge.
+fn topology() -> Vec<u8> {
+    let whole = || cube([0.0; 3]).objects.remove(0);
+    let (mut open, mut shells, mut loose) = (whole(), whole(), whole());
+    open.triangles.pop();
+    for _ in 0..3 {
+        let first = shells.positions.len() as u32;
+        shells.positions.extend(whole().positions.iter().map(|position| position.map(|c| c / 2.0)));
+        let turned = |&[a, b, c]: &[u32; 3]| [b, a, c].map(|corner| first + corner);
+        shells.triangles.extend(whole().triangles.iter().map(turned));
+    }
+    loose.triangles = (0..65).map(|number| [3 * number, 3 * number + 1, 3 * number + 2]).collect();
+    loose.positions = (0..3 * 65).map(|corner| [f64::from(corner), f64::from(corner % 3), 0.0]).collect();
+    let mut objects = [("closed", whole()), ("open", open), ("shells", shells), ("loose", loose)];
+    for (number, (name, object)) in (0..).zip(&mut objects) {
+        object.name = (*name).to_owned();
+        object.triangle_ids = (100 * number..).take(object.triangles.len()).collect();
+    }
+    let mesh = Mesh { objects: objects.map(|(_, object)| object).to_vec(), instances: Vec::new() };
+    let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::Packed);
+    to_bytes(&mesh, &options.split_objects(true)).unwrap().0
 }
 
 fn check(name: &str, bytes: Vec<u8>) {
@@ -98,4 +122,5 @@ fn the_baker_still_makes_the_frozen_files() {
     check("everything", everything());
     check("profiles", profiles());
     check("turning", turning());
+    check("topology", topology());
 }

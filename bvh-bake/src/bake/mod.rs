@@ -13,6 +13,7 @@ use crate::options::Options;
 use crate::pages::Style;
 use crate::pages::assemble::{Contents, assemble};
 use crate::pages::brick::{EncodedObject, encode_object};
+use crate::prepare::duplicates::Found;
 use crate::prepare::layout_choice;
 use crate::prepare::quantization::{advised_error, grid_error};
 use crate::prepare::{measure, survey};
@@ -20,6 +21,7 @@ use crate::progress::{Progress, Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::resources::Resources;
+use crate::topology::{Nets, Survey, TopologyLists};
 use crate::tree::{Aabb, Bricks};
 use crate::triangles::{Gathered, Kept};
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
@@ -117,6 +119,7 @@ impl<'a> Baker<'a> {
             records: Vec::new(),
             objects: Vec::new(),
             instances: Vec::new(),
+            topology: TopologyLists::new(),
             duplicates: Sorter::of_runs(resources.sorted_at_once::<[u32; 2]>(id_count)),
             spill: resources.scratch.spill(),
         };
@@ -139,9 +142,14 @@ impl<'a> Baker<'a> {
     fn add(&mut self, prepared: Gathered, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
         let Self { options, resources, .. } = *self;
         let Gathered { name, origin, stream, moved, vertices } = prepared;
-        let Contents { duplicates, spill, .. } = &mut self.contents;
+        let Contents { duplicates, spill, topology, .. } = &mut self.contents;
         let before = duplicates.count();
-        let measured = measure(&stream, resources, |pair| duplicates.extend(&[pair], spill))?;
+        let mut nets = options.topology.then(|| Nets::new(resources));
+        let measured = measure(&stream, resources, |found| match (found, &mut nets) {
+            (Found::Pair(pair), _) => duplicates.extend(&[pair], spill),
+            (Found::Net { id, net, corners }, Some(nets)) => nets.add(id, net, corners, spill),
+            (Found::Net { .. }, None) => Ok(()),
+        })?;
         let left_out = duplicates.count() - before;
         let moved = moved.joined(measured.moved).rounded_up();
         let advised = advised_error(options, diagonal(&measured.bounds), stream.count);
@@ -154,7 +162,7 @@ impl<'a> Baker<'a> {
         begin(Stage::Build);
         let f16_exponent = f16_exponent(&measured.bounds);
         let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
-        let bricks = Bricks::divide(&kept, grid, width, options.effort, resources)?;
+        let bricks = Bricks::divide(&kept, &measured.bounds, grid, width, options.effort, resources)?;
         let triangles = kept.count();
         drop(stream);
         let style = |tree: &_, of_brick: &_| {
@@ -171,7 +179,8 @@ impl<'a> Baker<'a> {
                 choice.reason,
             )
         };
-        let encoded = encode_object(bricks, style, resources)?;
+        let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles));
+        let encoded = encode_object(bricks, style, survey, topology, resources)?;
         let EncodedObject { style, reason, pages, packets, treelets, children } = encoded;
         self.kept += triangles;
         resources.progress.reach(Step::Bake(Stage::Build), self.kept);

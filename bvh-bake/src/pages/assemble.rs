@@ -6,12 +6,14 @@ use crate::progress::{Progress, Stage, Step, Tally, WHOLE};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
+use crate::topology::TopologyLists;
 use bvh_format::checksum::Hasher;
 use bvh_format::header::{Section, SectionKind, write_header};
 use bvh_format::instances::{Instance, write_instances};
 use bvh_format::layout::ContentHasher;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PagePlace};
+use bvh_format::topology::write_topology_head;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -27,7 +29,9 @@ pub(crate) struct Contents {
     pub(crate) instances: Vec<Instance>,
     /// The pairs (kept id, id of an equal triangle that is left out).
     pub(crate) duplicates: Sorter<[u32; 2]>,
-    /// The place for records that the sorter does not hold in memory.
+    /// Which objects are closed, and so on, if the file is to state it.
+    pub(crate) topology: TopologyLists,
+    /// The place for records that the sorter and the lists do not hold in memory.
     pub(crate) spill: Spill,
 }
 
@@ -46,7 +50,7 @@ pub(crate) fn assemble(
     output: &mut Output,
     progress: &Progress,
 ) -> Result<(), BakeError> {
-    let Contents { records, objects, instances, duplicates, .. } = contents;
+    let Contents { records, objects, instances, duplicates, mut topology, spill } = contents;
     let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
     let table = write_objects(&records);
     let lengths = [
@@ -56,7 +60,9 @@ pub(crate) fn assemble(
         sum(ObjectPages::id_bytes),
     ];
     let instances = if instances.is_empty() { Vec::new() } else { write_instances(&instances) };
-    let rest = duplicates.count() as usize * 8 + provenance.len() + instances.len() + 8 * PAGE;
+    let topology_bytes = if topology.records.is_empty() { 0 } else { topology.bytes() };
+    let rest =
+        duplicates.count() as usize * 8 + provenance.len() + instances.len() + topology_bytes + 9 * PAGE;
     let expected = (lengths.iter().sum::<usize>() + rest) as u64;
     output.expect(expected);
     output.append(Arc::new(vec![0; PAGE]))?;
@@ -110,9 +116,25 @@ pub(crate) fn assemble(
     if !instances.is_empty() {
         file.section(SectionKind::Instances, instances.len(), |section| section.write(instances))?;
     }
+    if topology_bytes > 0 {
+        topology.components.finish(&spill)?;
+        topology.nets.finish(&spill)?;
+        file.section(SectionKind::Topology, topology_bytes, |section| {
+            section.write(write_topology_head(&topology.records))?;
+            for piece in topology.components.pieces() {
+                section.write(little_endian(&piece.all()?))?;
+            }
+            let nets = topology.nets.pieces();
+            nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
+        })?;
+    }
     let Sections { table, content, .. } = file;
     let header = write_header(output.length(), content.finish(), &table);
     output.replace_first(header)
+}
+
+fn little_endian(numbers: &[u32]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
 /// Takes pieces out of their storage, a batch at a time, and visits the batches in order.

@@ -7,12 +7,14 @@ use crate::pages::plan::{self, Place};
 use crate::pages::unnumbered::{ObjectPages, UnnumberedPages};
 use crate::storage::Spill;
 use crate::storage::resources::Resources;
+use crate::topology::{self, BrickTopology, Rest, Survey, TopologyLists};
 use crate::tree::arena::Arena;
 use crate::tree::treelets::{cut_brick, cut_top};
 use crate::tree::turning;
 use crate::tree::{Bricks, PacketTriangles, Tree};
 use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
+use bvh_format::leaf::PACKET;
 use std::collections::HashMap;
 
 /// A brick that has been encoded.
@@ -31,6 +33,7 @@ struct EncodedBrick {
     placed: Vec<(u32, Place)>,
     /// The number of children of all treelets.
     children: u64,
+    topology: Option<BrickTopology>,
 }
 
 /// The pages of an object and what they hold.
@@ -46,16 +49,20 @@ pub(crate) struct EncodedObject {
 }
 
 /// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. `style` chooses how, given
-/// the tree and the triangles of one brick, and says why.
+/// the tree and the triangles of one brick, and says why. The topology of the object, if there is a survey for it, is
+/// added to `lists`.
 pub(crate) fn encode_object(
     bricks: Bricks,
     style: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> (Style, String),
+    survey: Option<Survey>,
+    lists: &mut TopologyLists,
     resources: &Resources,
 ) -> Result<EncodedObject, BakeError> {
     let spill = resources.scratch.spill();
-    let ((style, reason), bricks, top) = bricks.build(resources, style, |tree, triangles, (style, _)| {
-        encode_brick(tree, triangles, *style, &spill)
-    })?;
+    let ((style, reason), bricks, top) =
+        bricks.build(resources, style, |number, tree, triangles, (style, _)| {
+            encode_brick(number, tree, triangles, *style, survey.as_ref(), &spill)
+        })?;
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut top = if top.is_leaf() {
         Arena::empty()
@@ -67,7 +74,11 @@ pub(crate) fn encode_object(
     let (packets, treelets) = (sum(|brick| brick.packets), sum(|brick| brick.treelets));
     let mut triangles = Vec::new();
     let (mut rests, mut parts, mut placed) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut topologies, mut first_places, mut next_packet) = (Vec::new(), Vec::new(), 0);
     for mut brick in bricks {
+        topologies.extend(brick.topology);
+        first_places.push(next_packet);
+        next_packet += brick.packets;
         brick.rest.renumber_triangles(triangles.len() as u32);
         triangles.append(&mut brick.triangles);
         rests.push(brick.rest);
@@ -98,6 +109,16 @@ pub(crate) fn encode_object(
     }
     let encoder = Encoder { arena: &top, pages: &pages, places: &places, triangles: &triangles, style };
     let encoded = encoder.encode();
+    if let Some(survey) = survey {
+        let mut places = vec![0; triangles.len()];
+        encoder.triangle_places().iter().for_each(|&(number, place)| places[number as usize] = place);
+        let rest = Rest { triangles: &triangles, places: &places };
+        // An object with more than 2^30 packets is refused when it is complete.
+        let first_places =
+            first_places.iter().map(|packet| ((encoded.packets + packet) * PACKET as u64) as u32);
+        let first_places: Vec<u32> = first_places.collect();
+        topology::join(survey, topologies, &first_places, &rest, lists, resources, &spill)?;
+    }
     let (packets, treelets) = (packets + encoded.packets, treelets + encoded.treelets);
     parts.insert(0, UnnumberedPages::new(encoded, &spill)?);
     let pages = ObjectPages { profile: style.profile, parts, parents };
@@ -105,9 +126,11 @@ pub(crate) fn encode_object(
 }
 
 fn encode_brick(
+    number: usize,
     tree: Tree<PacketTriangles>,
     triangles: &[Triangle],
     style: Style,
+    survey: Option<&Survey>,
     spill: &Spill,
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
@@ -123,9 +146,13 @@ fn encode_brick(
     let encoded = encoder.encode();
     let (packets, treelets, children) = (encoded.packets, encoded.treelets, arena.child_count());
     let (mut own, mut placed) = (Vec::new(), Vec::new());
-    let rest = arena.rest(&plan.taken, triangles, &mut own, |there, here| {
+    let rest = arena.rest(&plan.taken, &mut own, |there, here| {
         placed.push((here, places[there as usize]));
     });
+    let topology =
+        survey.map(|survey| survey.brick(number, triangles, &encoder.triangle_places(), &own, spill));
+    let topology = topology.transpose()?;
     let pages = UnnumberedPages::new(encoded, spill)?;
-    Ok(EncodedBrick { pages, packets, treelets, kdop, rest, triangles: own, placed, children })
+    let own = own.iter().map(|&number| triangles[number as usize]).collect();
+    Ok(EncodedBrick { pages, packets, treelets, kdop, rest, triangles: own, placed, children, topology })
 }

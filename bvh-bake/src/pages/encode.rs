@@ -7,7 +7,7 @@ use crate::pages::plan::{PagePlan, Place};
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;
-use bvh_format::leaf::TriangleEncoding;
+use bvh_format::leaf::{PACKET, TriangleEncoding};
 use bvh_format::page::{PAGE, PagePatcher, PagePlace, PageShape, PageWriter, RootRef, WrittenPage};
 use bvh_format::profile::Profile;
 use rayon::prelude::*;
@@ -44,6 +44,22 @@ pub(crate) struct Encoded {
 }
 
 impl Encoder<'_> {
+    /// Returns the number of each triangle and its place, counted from the first packet of these pages, by ascending
+    /// places.
+    pub(crate) fn triangle_places(&self) -> Vec<(u32, u32)> {
+        let mut places = Vec::with_capacity(self.triangles.len());
+        let mut first = 0;
+        for &treelet in self.pages.iter().flat_map(|page| &page.slots) {
+            for child in self.arena.children(treelet) {
+                if let ChildKind::Leaf(packet) = &child.kind {
+                    places.extend(packet.numbers().iter().copied().zip(first..));
+                    first += PACKET as u32;
+                }
+            }
+        }
+        places
+    }
+
     /// Encodes all pages. Their numbers count from the first of them, and their checksums are missing.
     pub(crate) fn encode(&self) -> Encoded {
         let parents = self.parents();

@@ -12,6 +12,7 @@ use crate::error::BakeError;
 use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
+use crate::topology::MAX_NET;
 use crate::triangles::{Corners, TRIANGLES_PER_PART, TriangleStream, Triangles};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -52,30 +53,71 @@ impl PartialOrd for Hashed {
 /// hash.
 const BITS_PER_HASH: usize = 8;
 
-/// A triangle's corners in a fixed order, then its place in the stream and its id.
-pub(crate) type DuplicateCandidate = [u32; 11];
-/// The words of the corners in a [`DuplicateCandidate`], and the positions of its place and its id.
+/// A triangle's corners in a fixed order, then its place in the stream, its id and its [`Turn`].
+pub(crate) type DuplicateCandidate = [u32; 12];
+/// The words of the corners in a [`DuplicateCandidate`], and the positions of its place, its id and its turn.
 const CORNERS: std::ops::Range<usize> = 0..9;
 const PLACE: usize = 9;
 const ID: usize = 10;
+const TURN: usize = 11;
+
+/// 1 if a triangle goes around its corners against their fixed order, else 0. Where corners are equal it is 0, because
+/// the triangle goes around them in both ways.
+type Turn = u32;
+
+/// What [`find`] finds.
+pub(crate) enum Found {
+    /// The id of a triangle that is kept, and that of an equal one.
+    Pair([u32; 2]),
+    /// A triangle that is kept, how many equal ones have its orientation, itself included, less the number of those
+    /// that have the opposite one, which makes other than 1, and the bits of its corners.
+    Net { id: u32, net: i32, corners: [[u32; 3]; 3] },
+}
 
 /// Returns the hash of the triangle at a place.
 pub(crate) fn hashed(corners: &Corners, place: u64) -> Hashed {
-    let hash = xxh3_64(bytemuck::bytes_of(&canonical(corners)));
+    let hash = xxh3_64(bytemuck::bytes_of(&canonical(corners).0));
     Hashed([(hash >> 32) as u32, hash as u32, place as u32])
 }
 
 /// Returns the bits of the corners in a fixed order.
-fn canonical(triangle: &Corners) -> [[u32; 3]; 3] {
+fn canonical(triangle: &Corners) -> ([[u32; 3]; 3], Turn) {
     // Each corner becomes one number: that takes three comparisons, where a sort takes many more instructions.
     let [mut a, mut b, mut c] = triangle.map(|corner| {
         let [x, y, z] = corner.map(|value| u128::from(value.to_bits()));
         x << 64 | y << 32 | z
     });
+    let mut turn = b < a;
     (a, b) = (a.min(b), a.max(b));
+    turn ^= c < b;
     (b, c) = (b.min(c), b.max(c));
+    turn ^= b < a;
     (a, b) = (a.min(b), a.max(b));
-    [a, b, c].map(|corner| [(corner >> 64) as u32, (corner >> 32) as u32, corner as u32])
+    turn &= a != b && b != c;
+    let corners = [a, b, c].map(|corner| [(corner >> 64) as u32, (corner >> 32) as u32, corner as u32]);
+    (corners, turn.into())
+}
+
+/// The triangle that is kept of equal ones, and the net of those seen so far.
+struct Group {
+    kept: DuplicateCandidate,
+    net: i64,
+}
+
+impl Group {
+    /// Passes the net on, after the last triangle of the group, if it is not 1.
+    fn finish(self, found: &mut impl FnMut(Found) -> Result<(), BakeError>) -> Result<(), BakeError> {
+        let Self { kept, net } = self;
+        if net == 1 {
+            return Ok(());
+        }
+        if net.abs() > MAX_NET {
+            return Err(BakeError::Limit("2^31 equal triangles".into()));
+        }
+        let [a, b, c] = [0, 3, 6].map(|at| [kept[at], kept[at + 1], kept[at + 2]]);
+        let corners = if kept[TURN] == 0 { [a, b, c] } else { [a, c, b] };
+        found(Found::Net { id: kept[ID], net: net as i32, corners })
+    }
 }
 
 /// Drops most of the hashes that occur once, namely those that are alone in their bit of the bitmap.
@@ -100,15 +142,14 @@ fn drop_single(hashes: &mut Vec<Hashed>) {
 }
 
 /// Finds the places of duplicates from the hashes of all triangles, as one bit per triangle, or no bits at all if there
-/// are no duplicates. Passes the pairs (kept id, id of an equal triangle) to `found`. Sorts `run` records at a time.
-/// `tally` counts the triangles.
+/// are no duplicates. Passes the pairs and the nets to `found`. Sorts `run` records at a time. `tally` counts the triangles.
 pub(crate) fn find(
     stream: &TriangleStream,
     mut hashes: Sorter<Hashed>,
     run: usize,
     spill: &Spill,
     tally: &Tally,
-    mut found: impl FnMut([u32; 2]) -> Result<(), BakeError>,
+    mut found: impl FnMut(Found) -> Result<(), BakeError>,
 ) -> Result<Vec<u64>, BakeError> {
     let words = stream.count.div_ceil(64) as usize;
     let mut shared: Vec<u64> = Vec::new();
@@ -144,19 +185,21 @@ pub(crate) fn find(
     let mut dropped = shared;
     dropped.fill(0);
     let mut any = false;
-    // Of equal triangles, this is the one with the first place.
-    let mut first: Option<DuplicateCandidate> = None;
-    candidates.visit(|candidate| {
-        match first.filter(|first| first[CORNERS] == candidate[CORNERS]) {
-            Some(first) => {
-                any = true;
-                set(&mut dropped, candidate[PLACE]);
-                found([first[ID], candidate[ID]])?;
-            }
-            None => first = Some(*candidate),
+    // Of equal triangles, the one with the first place is kept.
+    let mut last: Option<Group> = None;
+    candidates.visit(|candidate| match &mut last {
+        Some(Group { kept, net }) if kept[CORNERS] == candidate[CORNERS] => {
+            any = true;
+            set(&mut dropped, candidate[PLACE]);
+            *net += if kept[TURN] == candidate[TURN] { 1 } else { -1 };
+            found(Found::Pair([kept[ID], candidate[ID]]))
         }
-        Ok(())
+        _ => {
+            let next = Group { kept: *candidate, net: 1 };
+            last.replace(next).map_or(Ok(()), |group| group.finish(&mut found))
+        }
     })?;
+    last.map_or(Ok(()), |group| group.finish(&mut found))?;
     Ok(if any { dropped } else { Vec::new() })
 }
 
@@ -176,8 +219,10 @@ fn of_part(
         if words[place / 64] >> (place % 64) & 1 == 0 {
             return None;
         }
-        let mut candidate = [0; 11];
-        candidate[CORNERS].copy_from_slice(canonical(&triangle.corners).as_flattened());
+        let mut candidate = [0; 12];
+        let (corners, turn) = canonical(&triangle.corners);
+        candidate[CORNERS].copy_from_slice(corners.as_flattened());
+        candidate[TURN] = turn;
         candidate[PLACE] = (first + place) as u32;
         candidate[ID] = triangle.id;
         Some(candidate)
@@ -221,8 +266,10 @@ mod tests {
         (0..count).for_each(|place| hashes.extend(&[Hashed([7, 7, place])], &spill).unwrap());
         let tally = progress.tally(Step::Bake(Stage::Prepare), 1, count.into(), count.into());
         let mut pairs = Vec::new();
-        let dropped = find(&stream, hashes, count as usize, &spill, &tally, |pair| {
-            pairs.push(pair);
+        let dropped = find(&stream, hashes, count as usize, &spill, &tally, |found| {
+            if let Found::Pair(pair) = found {
+                pairs.push(pair);
+            }
             Ok(())
         });
         pairs.sort_unstable();

@@ -14,7 +14,7 @@ use crate::storage::resources::Resources;
 use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
 use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
-use duplicates::{DuplicateCandidate, Hashed};
+use duplicates::{DuplicateCandidate, Found, Hashed};
 use rayon::prelude::*;
 
 /// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
@@ -33,11 +33,11 @@ pub(crate) struct Measured {
     pub(crate) dropped: Vec<u64>,
 }
 
-/// Runs the first pass. Passes the pairs of ids of duplicates to `found`.
+/// Runs the first pass. Passes the pairs and the nets of duplicates to `found`.
 pub(crate) fn measure(
     stream: &TriangleStream,
     resources: &Resources,
-    found: impl FnMut([u32; 2]) -> Result<(), BakeError>,
+    found: impl FnMut(Found) -> Result<(), BakeError>,
 ) -> Result<Measured, BakeError> {
     let spill = resources.scratch.spill();
     let mut hashes = Sorter::of_runs(resources.sorted_at_once::<Hashed>(stream.count));

@@ -2,7 +2,6 @@
 
 use crate::tree::PacketTriangles;
 use crate::tree::bricks::BrickIndex;
-use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use bvh_format::page::TightBound;
 use std::ops::Range;
@@ -114,13 +113,12 @@ impl Arena {
     }
 
     /// Copies the treelets that are not `taken`, and the treelets directly below them without their children. Calls
-    /// `moved` with the number of each of the latter here and in the copy. Copies the triangles as well, to the end of
-    /// `triangles`.
+    /// `moved` with the number of each of the latter here and in the copy. Appends the numbers of the copy's triangles to
+    /// `numbers`; packets of the copy hold the positions there.
     pub(crate) fn rest(
         &self,
         taken: &[bool],
-        all: &[Triangle],
-        triangles: &mut Vec<Triangle>,
+        numbers: &mut Vec<u32>,
         mut moved: impl FnMut(TreeletIndex, TreeletIndex),
     ) -> Self {
         let mut rest = Self::empty();
@@ -140,9 +138,9 @@ impl Arena {
             }
             for child in &mut rest.children[first..] {
                 if let ChildKind::Leaf(packet) = &mut child.kind {
-                    let first = triangles.len() as u32;
-                    triangles.extend(packet.numbers().iter().map(|&number| all[number as usize]));
-                    *packet = PacketTriangles::new(first..triangles.len() as u32);
+                    let first = numbers.len() as u32;
+                    numbers.extend_from_slice(packet.numbers());
+                    *packet = PacketTriangles::new(first..numbers.len() as u32);
                 }
             }
             stack.extend(children.iter().enumerate().rev().filter_map(|(number, child)| match child.kind {

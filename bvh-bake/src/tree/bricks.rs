@@ -43,15 +43,18 @@ pub(super) struct Division<'a> {
     /// Counts each triangle once, even if it is divided again.
     pub(super) tally: &'a Tally<'a>,
     pub(super) bricks: Vec<Stream<Triangle>>,
+    /// A box of the triangles of each brick.
+    pub(super) boxes: Vec<Aabb>,
 }
 
 impl Division<'_> {
-    /// Divides `count` triangles and returns the tree above their bricks. `grid` is the grid of these triangles,
-    /// which is needed only if there are more of them than fit in a brick.
+    /// Divides `count` triangles, which `bounds` contains, and returns the tree above their bricks. `grid` is the grid of
+    /// these triangles, which is needed only if there are more of them than fit in a brick.
     pub(super) fn divide(
         &mut self,
         triangles: &impl Triangles,
         count: u64,
+        bounds: &Aabb,
         grid: Option<Grid>,
     ) -> Result<Tree<BrickIndex>, BakeError> {
         let Some(grid) = grid.filter(|_| count > self.builder.brick as u64) else {
@@ -64,18 +67,19 @@ impl Division<'_> {
                 self.tally,
             )?;
             self.bricks.append(&mut brick);
+            self.boxes.push(*bounds);
             return Ok(Tree::leaf(self.bricks.len() as u32 - 1));
         };
         let mut cells = grid.cells();
         if let [cell] = cells[..] {
             // The centres are equal, or too close to tell apart: split into halves in the order of the input.
             let mut halves = self.halves(triangles, count)?.into_iter();
-            let mut next = || self.divide_stream(halves.next());
+            let mut next = || self.divide_stream(halves.next(), &cell.bounds);
             let (left, right) = (next()?, next()?);
             return Ok(Tree::above(left, right, cell.bounds));
         }
         let mut parts =
-            Parts { of_cell: vec![0; CELLS_PER_AXIS * CELLS_PER_AXIS * CELLS_PER_AXIS], counts: Vec::new() };
+            Parts { of_cell: vec![0; CELLS_PER_AXIS.pow(3)], counts: Vec::new(), boxes: Vec::new() };
         let tree = split(&mut cells, self.builder, &mut parts, 0);
         let mut streams = self.resources.streams(&parts.counts);
         let make = |part: usize| {
@@ -85,21 +89,30 @@ impl Division<'_> {
             Ok(Grouped::new(triangles.part(part)?, parts.counts.len(), group))
         };
         distribute(triangles.parts(), make, &mut streams, self.spill, self.tally)?;
-        drop((grid, parts));
-        let mut streams = streams.into_iter();
+        let boxes = parts.boxes;
+        drop((grid, parts.of_cell));
+        let mut streams = streams.into_iter().zip(&boxes);
         // The parts are numbered in the order of the tree's leaves.
-        tree.replace_leaves(&mut |_| self.divide_stream(streams.next()))
+        tree.replace_leaves(&mut |_| match streams.next() {
+            Some((stream, bounds)) => self.divide_stream(Some(stream), bounds),
+            None => self.divide_stream(None, &Aabb::EMPTY),
+        })
     }
 
-    fn divide_stream(&mut self, stream: Option<Stream<Triangle>>) -> Result<Tree<BrickIndex>, BakeError> {
+    fn divide_stream(
+        &mut self,
+        stream: Option<Stream<Triangle>>,
+        bounds: &Aabb,
+    ) -> Result<Tree<BrickIndex>, BakeError> {
         let stream = stream.unwrap_or_else(|| Stream::of_pieces(1));
         if stream.count() <= self.builder.brick as u64 {
             self.bricks.push(stream);
+            self.boxes.push(*bounds);
             return Ok(Tree::leaf(self.bricks.len() as u32 - 1));
         }
         let triangles = InStream::new(&stream);
         let grid = Grid::of(&triangles)?;
-        self.divide(&triangles, stream.count(), Some(grid))
+        self.divide(&triangles, stream.count(), bounds, Some(grid))
     }
 
     /// Returns the first half of the triangles, and the rest.
@@ -194,6 +207,8 @@ impl Grid {
 struct Parts {
     of_cell: Vec<u32>,
     counts: Vec<u64>,
+    /// The box of the triangles of each part.
+    boxes: Vec<Aabb>,
 }
 
 impl Parts {
@@ -204,6 +219,9 @@ impl Parts {
             self.of_cell[(x * CELLS_PER_AXIS + y) * CELLS_PER_AXIS + z] = number;
         }
         self.counts.push(cells.iter().map(|cell| u64::from(cell.count)).sum());
+        let mut bounds = Aabb::EMPTY;
+        cells.iter().for_each(|cell| bounds.join(&cell.bounds));
+        self.boxes.push(bounds);
         Tree::leaf(number)
     }
 }
@@ -279,18 +297,37 @@ mod tests {
         (0..count).map(|i| small(at(i), scale * 1e-3)).collect()
     }
 
-    fn divided(triangles: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Tree<BrickIndex>) {
+    fn divided(corners: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Tree<BrickIndex>) {
         let progress = Progress::default();
         let resources = Resources::unlimited(&progress);
         let tally = progress.tally(Step::Read, 0, 0, 0);
         let spill = resources.scratch.spill();
         let mut all = Stream::of_pieces(1000);
-        let triangles = triangles.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
+        let triangles = corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
         all.append(&spill, &triangles.collect::<Vec<_>>()).unwrap();
         all.finish(&spill).unwrap();
-        let mut division =
-            Division { builder, resources: &resources, spill: &spill, tally: &tally, bricks: Vec::new() };
-        let top = division.divide_stream(Some(all)).unwrap();
+        let mut division = Division {
+            builder,
+            resources: &resources,
+            spill: &spill,
+            tally: &tally,
+            bricks: Vec::new(),
+            boxes: Vec::new(),
+        };
+        let bounds_of = |triangles: &mut dyn Iterator<Item = &Corners>| {
+            let mut bounds = Aabb::EMPTY;
+            triangles.for_each(|corners| bounds.join(&Aabb::of_triangle(corners)));
+            bounds
+        };
+        let top = division.divide_stream(Some(all), &bounds_of(&mut corners.iter())).unwrap();
+        for (brick, bounds) in division.bricks.iter().zip(&division.boxes) {
+            for piece in brick.pieces() {
+                let triangles = piece.all().unwrap();
+                let own = bounds_of(&mut triangles.iter().map(|triangle| &triangle.corners));
+                assert!((0..3).all(|a| bounds.lo(a) <= own.lo(a) && own.hi(a) <= bounds.hi(a)));
+            }
+        }
+        assert_eq!(division.bricks.len(), division.boxes.len());
         let bricks = division.bricks.into_iter().map(|brick| brick.take().unwrap());
         (bricks.map(|brick| brick.iter().map(|triangle| triangle.id).collect()).collect(), top)
     }

@@ -75,15 +75,17 @@ impl PacketTriangles {
 /// The bricks of an object and the tree above them.
 pub(crate) struct Bricks {
     bricks: Vec<Stream<Triangle>>,
+    boxes: Vec<Aabb>,
     top: Tree<BrickIndex>,
     builder: Builder,
 }
 
 impl Bricks {
-    /// Divides triangles into bricks, for treelets of `width` children. `grid` counts all of them, if they are more than
-    /// a brick holds.
+    /// Divides triangles within `bounds` into bricks, for treelets of `width` children. `grid` counts all of them, if they
+    /// are more than a brick holds.
     pub(crate) fn divide(
         triangles: &Kept,
+        bounds: &Aabb,
         grid: Option<Grid>,
         width: usize,
         effort: Effort,
@@ -92,23 +94,29 @@ impl Bricks {
         let builder = Builder::new(width, effort);
         let spill = resources.scratch.spill();
         let tally = tally(resources, DIVIDE_WEIGHT, triangles.count());
+        let (bricks, boxes) = (Vec::new(), Vec::new());
         let mut division =
-            Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks: Vec::new() };
-        let top = division.divide(triangles, triangles.count(), grid)?;
-        let bricks = division.bricks;
-        Ok(Self { bricks, top, builder })
+            Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks, boxes };
+        let top = division.divide(triangles, triangles.count(), bounds, grid)?;
+        let (bricks, boxes) = (division.bricks, division.boxes);
+        Ok(Self { bricks, boxes, top, builder })
+    }
+
+    /// Returns a box of the triangles of each brick.
+    pub(crate) fn boxes(&self) -> &[Aabb] {
+        &self.boxes
     }
 
     /// Builds the tree of each brick and passes it to `make`, several bricks at a time. The first tree goes to `settle`
-    /// before, whose result `make` gets each time. Returns that result, those of `make` by brick, and the tree above the
-    /// bricks. Packets number the triangles of their brick.
+    /// before, whose result `make` gets each time, with the number of the brick. Returns that result, those of `make` by
+    /// brick, and the tree above the bricks. Packets number the triangles of their brick.
     pub(crate) fn build<S: Sync, T: Send>(
         self,
         resources: &Resources,
         settle: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> S,
-        make: impl Fn(Tree<PacketTriangles>, &[Triangle], &S) -> Result<T, BakeError> + Sync,
+        make: impl Fn(usize, Tree<PacketTriangles>, &[Triangle], &S) -> Result<T, BakeError> + Sync,
     ) -> Result<(S, Vec<T>, Tree<BrickIndex>), BakeError> {
-        let Self { bricks, top, builder } = self;
+        let Self { bricks, top, builder, .. } = self;
         let count = bricks.len();
         let triangles = bricks.iter().map(Stream::count).sum();
         let (trees, rest) = (
@@ -137,7 +145,7 @@ impl Bricks {
                 let is_first = number == order[0];
                 let built = first.lock().ok().filter(|_| is_first).and_then(|mut first| first.take());
                 let result = built.map_or_else(|| tree_of(number), Ok).and_then(|(tree, triangles)| {
-                    let made = make(tree, &triangles, &settled)?;
+                    let made = make(number, tree, &triangles, &settled)?;
                     rest.add(triangles.len() as u64);
                     Ok(made)
                 });

@@ -108,6 +108,9 @@ pub(crate) struct BakeArguments {
     /// Leave out turning slabs, which dop26-u8-wide has; answers and sizes stay the same
     #[arg(long)]
     pub(crate) no_turning_slabs: bool,
+    /// Leave out which objects are closed; questions about what is inside a mesh need it
+    #[arg(long)]
+    pub(crate) no_topology: bool,
     /// Bake even if the output is up to date
     #[arg(long)]
     pub(crate) force: bool,

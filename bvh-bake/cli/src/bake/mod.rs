@@ -89,7 +89,8 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
         .ids(!arguments.no_ids)
-        .turning_slabs(!arguments.no_turning_slabs);
+        .turning_slabs(!arguments.no_turning_slabs)
+        .topology(!arguments.no_topology);
     let file_options = FileOptions {
         force: arguments.force,
         max_memory: arguments.max_memory,

@@ -1,0 +1,34 @@
+//! Finds out whether objects are closed, and a triangle of each of their components, on the way through a bake.
+//!
+//! An object is closed if every edge is traversed as often in one direction as in the other, by its triangles, each
+//! counted as often as its net says. Edges are counted in three steps, each of which passes on only those that do not
+//! cancel: in runs of a few hundred neighbouring triangles (`brick`), in a brick, and in the object (`joined`). The same
+//! steps join triangles that share an edge into parts, and parts into components.
+//!
+//! An edge that cancels in one step is not looked at again, even if triangles elsewhere have it too. Surfaces that meet
+//! along such an edge may therefore stay two components. An edge that does not cancel in a brick is passed on only if
+//! another brick's box contains it: only edges between bricks reach the last step, where they are sorted, in files if
+//! need be.
+//!
+//! Triangles count once in their bricks. What duplicates add, and take away where their orientation is the opposite, is
+//! counted apart (`nets`), as edges of their own.
+
+mod brick;
+mod edge;
+mod joined;
+mod nets;
+
+pub(crate) use brick::{BrickTopology, Survey};
+pub(crate) use joined::{Rest, TopologyLists, join};
+pub(crate) use nets::{MAX_NET, Nets};
+
+/// An object has at least this many triangles for each component listed, unless it has at most [`MAX_FEW_PARTS`].
+const TRIANGLES_PER_PART: u64 = 100;
+/// This many parts are listed however few triangles they have.
+const MAX_FEW_PARTS: u64 = 64;
+
+/// Returns the most parts that an object may have to get a list of components. A soup of loose triangles would need
+/// four bytes for each of them.
+fn max_parts(triangles: u64) -> u64 {
+    (triangles / TRIANGLES_PER_PART).max(MAX_FEW_PARTS)
+}
