@@ -73,6 +73,11 @@ pub enum QueryError {
         /// What became of it.
         found: String,
     },
+    /// The file does not state which of its objects are closed.
+    #[error(
+        "expected a file that states which objects are closed, found none of it; bake it again without --no-topology"
+    )]
+    NoTopology,
     /// The backend asked for is not available.
     #[error(transparent)]
     Backend(#[from] BackendError),

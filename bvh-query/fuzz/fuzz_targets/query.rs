@@ -29,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
     };
     for backend in Backend::ALL {
         let mut querier = Querier::with_backend(backend);
-        let _ = querier.collide(&a, &b, &pose);
+        let _ = (a.is_closed(0), querier.collide(&a, &b, &pose));
         let mut contacts = 0;
         let _ = querier.visit_contacts(&a, &b, &pose, |_| {
             contacts += 1;

@@ -6,13 +6,14 @@ use crate::file::place::{LeafPacket, TrianglePlace};
 use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
+use bvh_format::topology::ObjectTopology;
 use bvh_format::treelet::Links;
 use bvh_format::{FormatError, Layout, Rule, ids};
 use bytes::Bytes;
 use memmap2::Mmap;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`: share it between threads.
 ///
@@ -27,6 +28,8 @@ pub struct Bvh {
     /// What has been checked of each page.
     checked: Box<[AtomicU8]>,
     duplicates_checked: AtomicBool,
+    /// What the file states about the topology of each object, or how it breaks a rule there, once it has been needed.
+    pub(super) topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
     /// A number that no other `Bvh` of this process has or had.
     identity: u64,
 }
@@ -124,7 +127,8 @@ impl Bvh {
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
         let duplicates_checked = AtomicBool::new(false);
-        Ok(Self { bytes, advised: None, layout, checked, duplicates_checked, identity })
+        let topology = OnceLock::new();
+        Ok(Self { bytes, advised: None, layout, checked, duplicates_checked, topology, identity })
     }
 
     /// Returns where everything is in the file.
