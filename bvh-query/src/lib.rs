@@ -10,12 +10,18 @@
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
+//! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_distance`] | inside, on, outside; exact |
+//! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
+//! | is the line between two points free? | [`Querier::meets_segment`] | `bool`, exact |
+//! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
 //! | is the way free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
 //! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
 //! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
-//! all cores, as [`ProbeBatch`] does about many points. `Batch`, and scenes on all cores, need the feature `parallel`, which is on by default and brings the dependency on rayon. The feature
-//! `mint` converts matrices and quaternions of other crates to a [`Pose`].
+//! all cores, as [`ProbeBatch`] does about many points, rays and segments. Batches, and scenes on all cores, need the feature
+//! `parallel`, which is on by default and brings the dependency on rayon. The feature `mint` converts matrices and
+//! quaternions of other crates to a [`Pose`]. Points, rays and segments are given in the frame of a mesh, or in the world about
+//! a mesh that [`Shape::at`] places there.
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or
 //! portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have the same bits on
@@ -73,7 +79,9 @@ pub use file::shape::Shape;
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
 pub use pose::{Pose, PoseError};
-pub use query::answers::{ClosestPoint, Contact, Distance, QueryStats, RayHit};
+pub use query::answers::{
+    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, Side, SignedDistance,
+};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
 pub use query::displacement::displacement;
@@ -86,8 +94,8 @@ pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceId, OpenSceneError, Scene, SceneContact, SceneDistance, SceneError, SceneMotion,
-    ScenePair, SceneShape,
+    Groups, InstanceId, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance, SceneError,
+    SceneMotion, ScenePair, SceneRayHit, SceneShape,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

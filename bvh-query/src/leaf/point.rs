@@ -15,7 +15,7 @@
 use crate::isa::{Isa, Lanes};
 use crate::leaf::distance::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
 use crate::leaf::local::U;
-use crate::leaf::math::{Vec3, along, dot, edges, largest_of, min3, project};
+use crate::leaf::math::{Corners, Vec3, along, dot, edges, largest_of, min3, project};
 use bvh_format::leaf::Packet;
 
 /// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
@@ -28,8 +28,8 @@ pub(crate) struct LocalPoint {
     /// What the high part lacks, in the unit of bounds; negative.
     minus_low: [f32; 3],
     scale: f32,
-    /// A bound on what is charged whatever the triangle is.
-    slack: f32,
+    /// A bound on the error of a coordinate that does not depend on the triangle, in the unit of bounds.
+    pub(super) error: f32,
 }
 
 impl LocalPoint {
@@ -39,30 +39,38 @@ impl LocalPoint {
     pub(crate) fn new(point: &[f64; 3], error: f64, scale: f32) -> Self {
         let high = point.map(|x| x as f32);
         let minus_low = [0, 1, 2].map(|k| ((f64::from(high[k]) - point[k]) * f64::from(scale)) as f32);
-        let error = (5.0 * error * f64::from(scale)) as f32 + UNDERFLOW;
-        Self { high, minus_low, scale, slack: 4.0 * error * (1.0 + 4.0 * U) }
+        let error = ((5.0 * error * f64::from(scale)) as f32 + UNDERFLOW) * (1.0 + 4.0 * U);
+        Self { high, minus_low, scale, error }
+    }
+
+    /// Returns the triangles of four packets as the point sees them: lane `4 * packet + triangle`.
+    #[inline(always)]
+    pub(super) fn seen<I: Isa>(&self, isa: I, packets: [&Packet; 4]) -> Corners<I::V> {
+        let [a, b, c, d] = packets;
+        let (zero, scale) = (isa.splat(0.0), isa.splat(self.scale));
+        let mut corners = [[zero; 3]; 3];
+        for axis in 0..3 {
+            let (high, minus_low) = (isa.splat(self.high[axis]), isa.splat(self.minus_low[axis]));
+            for corner in 0..3 {
+                let from = isa.quads([
+                    &a.corners[corner][axis],
+                    &b.corners[corner][axis],
+                    &c.corners[corner][axis],
+                    &d.corners[corner][axis],
+                ]);
+                corners[corner][axis] = from.sub(high).mul_add(scale, minus_low);
+            }
+        }
+        corners
     }
 }
 
 /// Bounds the distances from the triangles of four packets: element `4 * packet + triangle`.
 #[inline(always)]
 pub(crate) fn point_bounds<I: Isa>(isa: I, packets: [&Packet; 4], point: &LocalPoint) -> Bounds {
-    let (zero, one, scale) = (isa.splat(0.0), isa.splat(1.0), isa.splat(point.scale));
-    let mut corners = [[zero; 3]; 3];
-    for axis in 0..3 {
-        let (high, minus_low) = (isa.splat(point.high[axis]), isa.splat(point.minus_low[axis]));
-        for corner in 0..3 {
-            let [a, b, c, d] = packets;
-            let from = isa.quads([
-                &a.corners[corner][axis],
-                &b.corners[corner][axis],
-                &c.corners[corner][axis],
-                &d.corners[corner][axis],
-            ]);
-            corners[corner][axis] = from.sub(high).mul_add(scale, minus_low);
-        }
-    }
-    let slack = largest_of(&corners).mul_add(isa.splat(40.0 * U), isa.splat(point.slack));
+    let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
+    let corners = point.seen(isa, packets);
+    let slack = largest_of(&corners).mul_add(isa.splat(40.0 * U), isa.splat(4.0 * point.error));
     let mut guess = Guess::none(isa);
     let edges = edges(&corners);
     let inverse = inverse_squares(one, edges);

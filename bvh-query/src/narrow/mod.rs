@@ -21,12 +21,14 @@ mod integers;
 mod intersect;
 mod point;
 mod ray;
+mod winding;
 mod within;
 
 pub(crate) use distance::{Closest, triangle_distance};
 pub(crate) use intersect::triangles_intersect;
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
+pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::triangles_within;
 
 #[cfg(test)]

@@ -75,6 +75,57 @@ pub struct RayHit {
     pub triangle: u32,
 }
 
+/// How two meshes lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Relation {
+    /// Their surfaces have a point in common: [`Querier::collide`](crate::Querier::collide) is true.
+    Touching,
+    /// They have nothing in common, insides included.
+    Apart,
+    /// All of A is inside B.
+    AInB,
+    /// All of B is inside A.
+    BInA,
+    /// Some connected components are inside the other mesh and some are not, or some of each mesh are.
+    Mixed,
+    /// A mesh that is not closed would have to contain something.
+    Undefined,
+}
+
+/// Where a point is with regard to a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// The surface winds around the point.
+    Inside,
+    /// The point is on the surface.
+    On,
+    /// The point is neither on the surface nor inside.
+    Outside,
+    /// The point is not on the surface, and the mesh is not closed and consistently oriented: it has no inside.
+    Undefined,
+}
+
+/// The distance of a point from a mesh, and the side that it is on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SignedDistance {
+    /// The side of the point.
+    pub side: Side,
+    /// The closest point of the surface.
+    pub closest: ClosestPoint,
+}
+
+impl SignedDistance {
+    /// Returns the distance in mesh units, negative inside, or nothing if the mesh has no inside.
+    pub fn value(&self) -> Option<f64> {
+        match self.side {
+            Side::Inside => Some(-self.closest.distance),
+            Side::On | Side::Outside => Some(self.closest.distance),
+            Side::Undefined => None,
+        }
+    }
+}
+
 /// How much work the last query was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]

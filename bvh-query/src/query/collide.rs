@@ -26,7 +26,7 @@ impl Querier {
     ///
     /// The answer is exact: that of exact predicates on the placed vertices, for all pairs of triangles. Touching
     /// counts as collision. Meshes are surfaces, so that a mesh wholly inside another one without touching it
-    /// does not collide with it.
+    /// does not collide with it: [`Querier::relation`] tells.
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not

@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::file::place::LeafPacket;
+use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::{Isa, Task};
 use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
@@ -26,6 +26,12 @@ pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: LeafPacket, lane: u8) -> 
     let corners = bvh.triangle(object, leaf, lane & 3)?;
     let origin = object.origin();
     Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
+}
+
+/// Returns the triangle at a place, in the frame of its own file.
+pub(super) fn stored_at(bvh: &Bvh, object: &Object, place: TrianglePlace) -> Result<Triangle, QueryError> {
+    let leaf = LeafPacket { page: place.page, packet: place.packet, triangles: 4 };
+    stored(bvh, object, leaf, place.lane)
 }
 
 /// Runs `triangle_distance` with the features of a backend: its 42 candidates fill vector registers.

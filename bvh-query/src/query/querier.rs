@@ -98,7 +98,7 @@ impl Querier {
     }
 
     /// Resets what belongs to one query.
-    pub(super) fn start(&mut self) {
+    pub(crate) fn start(&mut self) {
         self.stats = QueryStats::default();
         self.questions += 1;
         self.memory.start(self.budget);

@@ -119,6 +119,18 @@ impl BroadPhase {
         }
     }
 
+    /// Returns the places whose boxes have a finite key, in ascending order of the keys. The key of a box is at most that of any
+    /// box in it.
+    pub(super) fn by_key<K: Fn(&WorldBox) -> f64>(&self, key: K) -> ByKey<K> {
+        let mut order = ByKey { key, open: BinaryHeap::new() };
+        for which in [Which::Still, Which::Moving] {
+            if !self.tree(which).nodes.is_empty() {
+                order.push(self, which, 0);
+            }
+        }
+        order
+    }
+
     fn tree(&self, which: Which) -> &Tree {
         match which {
             Which::Still => &self.still,
@@ -340,6 +352,67 @@ impl NearestFirst {
             } else {
                 node_b.children.into_iter().for_each(|child| add(nodes[0], child));
             }
+        }
+        None
+    }
+}
+
+/// Places in ascending order of a key of their boxes.
+pub(super) struct ByKey<K> {
+    key: K,
+    open: BinaryHeap<Keyed>,
+}
+
+/// A node and its key.
+#[derive(Clone, Copy, Debug)]
+struct Keyed {
+    key: f64,
+    tree: Which,
+    node: u32,
+    /// The place of a leaf; 0 for an inner node.
+    place: u32,
+}
+
+impl Ord for Keyed {
+    /// The greatest has the least key; of equal keys, inner nodes come first and then the lowest place.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let rest = |of: &Self| (of.place, of.tree, of.node);
+        other.key.total_cmp(&self.key).then_with(|| rest(other).cmp(&rest(self)))
+    }
+}
+
+impl PartialOrd for Keyed {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Keyed {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Keyed {}
+
+impl<K: Fn(&WorldBox) -> f64> ByKey<K> {
+    fn push(&mut self, broad: &BroadPhase, tree: Which, number: u32) {
+        let node = &broad.tree(tree).nodes[number as usize];
+        let key = (self.key)(&node.bounds);
+        if key < f64::INFINITY {
+            let place = if node.is_leaf() { node.children[1] } else { 0 };
+            self.open.push(Keyed { key, tree, node: number, place });
+        }
+    }
+
+    /// Returns the next place and the key of its box.
+    pub(super) fn next(&mut self, broad: &BroadPhase) -> Option<(u32, f64)> {
+        while let Some(Keyed { key, tree, node, place }) = self.open.pop() {
+            let node = &broad.tree(tree).nodes[node as usize];
+            if node.is_leaf() {
+                return Some((place, key));
+            }
+            node.children.into_iter().for_each(|child| self.push(broad, tree, child));
         }
         None
     }

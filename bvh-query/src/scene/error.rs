@@ -57,6 +57,14 @@ pub enum SceneError {
         /// Why.
         source: QueryError,
     },
+    /// The question about an instance has no answer.
+    #[error("instance {instance}: {source}")]
+    Instance {
+        /// The name or the identifier of the instance.
+        instance: String,
+        /// Why.
+        source: QueryError,
+    },
     /// The question as a whole has no answer.
     #[error(transparent)]
     Query(#[from] QueryError),

@@ -10,6 +10,7 @@ mod broad_phase;
 mod error;
 mod instance;
 mod motion;
+mod probe;
 mod question;
 mod trackers;
 mod workers;
@@ -18,6 +19,7 @@ mod world_box;
 pub use error::{OpenSceneError, SceneError};
 pub use instance::{Groups, InstanceId, SceneShape};
 pub use motion::SceneMotion;
+pub use probe::{SceneClosestPoint, SceneRayHit};
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
 use crate::file::bvh::Bvh;

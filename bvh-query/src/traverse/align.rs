@@ -40,7 +40,7 @@ pub(crate) struct Alignment {
 }
 
 /// `FACTORS` by axis and row.
-const FACTORS_BY_AXIS: [[f64; 16]; 3] = {
+pub(super) const FACTORS_BY_AXIS: [[f64; 16]; 3] = {
     let mut factors = [[0.0; 16]; 3];
     let mut slab = 0;
     while slab < 13 {

@@ -1,100 +1,113 @@
-//! The node test of lines: where each of four segments enters each of four nodes, slab by slab.
+//! The node test for a line: where a segment enters each of four nodes.
 //!
 //! A segment leads from p to p + q, and its points are p + s q for s from 0 to 1. Along a direction n of a slab that is from
 //! (lo - n p) / (n q) to (hi - n p) / (n q), and within a node where it is so along all directions (T. L. Kay, J. T. Kajiya,
-//! "Ray Tracing Complex Scenes", SIGGRAPH 1986).
+//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_test`]), a register holds four slabs of
+//! four nodes.
 //!
-//! Error, with u = 2^-24: n p and n q are rounded to f32, which moves a point along n by u |n p| + u |n q| at most; their own
-//! error and that of the segment in f64 come on top. Slabs are moved outward by more than that. What is left is relative: a
+//! Error, with u = 2^-24: the ends of what is subtracted and n q are rounded to f32, which moves a point along n by a little
+//! more than u |n p| + u |n q|; their own error and that of the segment in f64 come on top. Slabs are moved outward by three
+//! times that. What is left is relative: a
 //! rounded difference, a rounded inverse and a product make an end of the interval wrong by 3u of itself, for which entries are
-//! made less by 8u and exits greater. (Their signs are right, so that making them less of themselves is not wrong before the
-//! segment's start either, where they count as 0.)
+//! made less by 8u and exits greater. Their signs are right, so that this is right for those before the segment's start as
+//! well, which count as 0.
 //!
-//! Where |n q| is less than half of what slabs are moved by, that is moved by |n q| more, and n q counts as just that half: the
-//! quotients are then beyond 0 and 1 wherever p is within the slab by more than rounding.
+//! Where |n q| is less than half of what slabs are moved by, they are moved by |n q| more, and n q counts as just that half: the
+//! quotients are then beyond 0 and 1 wherever the segment is within the slab by more than rounding.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{U, round_up};
-use crate::traverse::probe_walk::PROBES;
-use bvh_format::kdop::{DirectionSet, FACTORS};
-use bvh_format::slabs::{Group, row};
+use crate::traverse::align::{FACTORS_BY_AXIS, U};
+use crate::traverse::point_test::quads;
+use bvh_format::kdop::DirectionSet;
+use bvh_format::slabs::Group;
 
 /// A segment around an object's origin, in mesh units.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Segment {
     pub(crate) start: [f64; 3],
     pub(crate) vector: [f64; 3],
-    /// The direction, of any length: the vector may be too short to tell. 0 for a point.
-    pub(crate) direction: [f64; 3],
     /// A bound on the error of the coordinates of its points.
     pub(crate) error: f64,
 }
 
-impl Segment {
-    pub(crate) const NONE: Self = Self { start: [0.0; 3], vector: [0.0; 3], direction: [0.0; 3], error: 0.0 };
-}
-
-/// Segments as node tests need them, by slab.
+/// A segment as node tests need it, by rows of slabs, in all four columns.
 pub(crate) struct LineTest {
     set: DirectionSet,
     /// n p and what slabs are moved by: subtracted from their lower ends.
-    above: [[f32; PROBES]; 13],
+    above: [[f32; 16]; 4],
     /// n p less what slabs are moved by: subtracted from their upper ends.
-    below: [[f32; PROBES]; 13],
+    below: [[f32; 16]; 4],
     /// 1 / n q.
-    inverse: [[f32; PROBES]; 13],
+    inverse: [[f32; 16]; 4],
 }
 
 impl LineTest {
-    pub(crate) fn new(segments: &[Segment; PROBES], set: DirectionSet) -> Self {
-        let zero = [[0.0; PROBES]; 13];
-        let mut test = Self { set, above: zero, below: zero, inverse: zero };
-        for slab in 0..set.slabs() {
-            for (number, segment) in segments.iter().enumerate() {
-                let along = |v: &[f64; 3]| (0..3).map(|k| FACTORS[slab][k] * v[k]).sum::<f64>();
-                let (p, mut q) = (along(&segment.start), along(&segment.vector));
-                // Three times the error of a coordinate, and more than is rounded here.
-                let mut outward =
-                    2.0 * U * (p.abs() + q.abs()) + 4.0 * segment.error + f64::from(f32::MIN_POSITIVE);
-                let least = outward / 2.0;
-                if q.abs() < least {
-                    outward += q.abs();
-                    q = least;
-                }
-                test.above[slab][number] = round_up(p + outward);
-                test.below[slab][number] = -round_up(outward - p);
-                test.inverse[slab][number] = (1.0 / q) as f32;
-            }
+    #[inline(always)]
+    pub(crate) fn new<I: Isa>(isa: I, segment: &Segment, set: DirectionSet) -> Self {
+        let (mut above, mut below, mut inverse) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+        let [x, y, z] = &FACTORS_BY_AXIS;
+        let (start, vector) = (&segment.start, &segment.vector);
+        // Three times the error of a coordinate, and more than is rounded here.
+        let least = 4.0 * segment.error + f64::from(f32::MIN_POSITIVE);
+        for row in 0..16 {
+            let p = x[row] * start[0] + y[row] * start[1] + z[row] * start[2];
+            let q = x[row] * vector[0] + y[row] * vector[1] + z[row] * vector[2];
+            let outward = 3.0 * U * (p.abs() + q.abs()) + least;
+            let is_along = q.abs() < 0.5 * outward;
+            let q_or_least = if is_along { 0.5 * outward } else { q };
+            let outward = if is_along { outward + q.abs() } else { outward };
+            above[row] = (p + outward) as f32;
+            below[row] = (p - outward) as f32;
+            inverse[row] = (1.0 / q_or_least) as f32;
+        }
+        // Segments are in rows without a slab from -infinity to infinity.
+        let rows_without_slab: &[usize] = match set {
+            DirectionSet::Dop6 => &[3],
+            DirectionSet::Dop14 => &[7],
+            DirectionSet::Dop26 => &[7, 14, 15],
+        };
+        for &row in rows_without_slab {
+            (above[row], below[row], inverse[row]) = (f32::INFINITY, f32::NEG_INFINITY, 1.0);
+        }
+        let mut test = Self { set, above: [[0.0; 16]; 4], below: [[0.0; 16]; 4], inverse: [[0.0; 16]; 4] };
+        let rows = [above.as_chunks::<4>().0, below.as_chunks::<4>().0, inverse.as_chunks::<4>().0];
+        for quad in 0..4 {
+            isa.store(isa.repeat(&rows[0][quad]), &mut test.above[quad]);
+            isa.store(isa.repeat(&rows[1][quad]), &mut test.below[quad]);
+            isa.store(isa.repeat(&rows[2][quad]), &mut test.inverse[quad]);
         }
         test
     }
 
-    /// Returns where each segment enters each of four nodes, from 0 to 1; infinity where it does not. Element
-    /// `4 * node + segment`.
+    /// Returns where the segment enters four nodes, from 0 to 1; infinity where it does not.
     #[inline(always)]
-    pub(crate) fn entries<I: Isa>(&self, isa: I, nodes: &Group) -> I::V {
+    pub(crate) fn entries<I: Isa>(&self, isa: I, nodes: &Group) -> I::H {
         match self.set {
-            DirectionSet::Dop6 => self.entries_of::<I, 3>(isa, nodes),
-            DirectionSet::Dop14 => self.entries_of::<I, 7>(isa, nodes),
-            DirectionSet::Dop26 => self.entries_of::<I, 13>(isa, nodes),
+            DirectionSet::Dop6 => self.entries_in::<I, 1>(isa, nodes),
+            DirectionSet::Dop14 => self.entries_in::<I, 2>(isa, nodes),
+            DirectionSet::Dop26 => self.entries_in::<I, 4>(isa, nodes),
         }
     }
 
     #[inline(always)]
-    fn entries_of<I: Isa, const SLABS: usize>(&self, isa: I, nodes: &Group) -> I::V {
+    fn entries_in<I: Isa, const QUADS: usize>(&self, isa: I, nodes: &Group) -> I::H {
         /// 8u.
         const SLACK: f32 = 1.0 / (1 << 21) as f32;
-        let rows = nodes.rows();
         let (mut entry, mut exit) = (isa.splat(0.0), isa.splat(1.0));
-        for slab in 0..SLABS {
-            let inverse = isa.tile(&self.inverse[slab]);
-            let lo = isa.repeat(&rows[row(slab)]).sub(isa.tile(&self.above[slab])).mul(inverse);
-            let hi = isa.repeat(&rows[16 + row(slab)]).sub(isa.tile(&self.below[slab])).mul(inverse);
-            entry = entry.max(lo.min(hi));
-            exit = exit.min(lo.max(hi));
+        for quad in 0..QUADS {
+            let inverse = isa.load(&self.inverse[quad]);
+            let lo = isa.load(&nodes.lo[quad]).sub(isa.load(&self.above[quad])).mul(inverse);
+            let hi = isa.load(&nodes.hi[quad]).sub(isa.load(&self.below[quad])).mul(inverse);
+            // Rows without a slab may be NaN there: `max` and `min` then return their second operand.
+            entry = lo.min(hi).max(entry);
+            exit = lo.max(hi).min(exit);
         }
-        let entry = entry.mul(isa.splat(1.0 - SLACK));
-        let is_met = entry.le(exit.mul(isa.splat(1.0 + SLACK)));
-        I::V::select(is_met, entry, isa.splat(f32::INFINITY))
+        let (mut entries, mut exits) = ([0.0; 16], [0.0; 16]);
+        isa.store(entry, &mut entries);
+        isa.store(exit, &mut exits);
+        let ([a, b, c, d], [e, f, g, h]) = (quads(isa, &entries), quads(isa, &exits));
+        let entry = a.max(b).max(c.max(d)).mul(isa.splat4(1.0 - SLACK));
+        let exit = e.min(f).min(g.min(h)).mul(isa.splat4(1.0 + SLACK));
+        I::H::select(entry.le(exit), entry, isa.splat4(f32::INFINITY))
     }
 }

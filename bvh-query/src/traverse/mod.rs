@@ -11,7 +11,6 @@ pub(crate) mod node_test;
 pub(crate) mod placement;
 pub(crate) mod point_test;
 pub(crate) mod point_walk;
-pub(crate) mod probe_walk;
 pub(crate) mod slab_memory;
 pub(crate) mod slab_test;
 pub(crate) mod walk;

@@ -98,7 +98,7 @@ impl PointTest {
 }
 
 #[inline(always)]
-fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::H; 4] {
+pub(super) fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::H; 4] {
     let rows = rows.as_chunks::<4>().0;
     [isa.load4(&rows[0]), isa.load4(&rows[1]), isa.load4(&rows[2]), isa.load4(&rows[3])]
 }

@@ -8,7 +8,6 @@ use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_test::NodeTest;
 use crate::traverse::point_walk::{PointStack, PointVisitor, PointWalk};
-use crate::traverse::probe_walk::{ProbeFrame, ProbeWalk};
 use crate::traverse::slab_memory::SlabMemory;
 use bvh_format::object::Object;
 use bvh_format::slabs::Group;
@@ -38,8 +37,6 @@ pub(crate) struct WalkMemory {
     pub(super) list: Frames,
     pub(super) large_leaves: LargeLeaves,
     points: PointStack,
-    /// What is left of the node tests of points.
-    probe_stack: Vec<ProbeFrame>,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
@@ -49,18 +46,6 @@ impl WalkMemory {
     /// Starts a query that may visit this many pairs.
     pub(crate) fn start(&mut self, budget: u64) {
         (self.budget, self.left) = (budget, budget);
-    }
-
-    /// Returns a walk of one object for some probes.
-    pub(crate) fn probe_walk<'a, V>(
-        &'a mut self,
-        bvh: &'a Bvh,
-        object: &'a Object,
-        probes: usize,
-        visitor: &'a mut V,
-    ) -> ProbeWalk<'a, V> {
-        let Self { nodes_a, probe_stack, left, budget, .. } = self;
-        ProbeWalk { bvh, object, nodes: nodes_a, stack: probe_stack, left, budget: *budget, probes, visitor }
     }
 
     /// Returns a walk of one object towards a point.

@@ -1,29 +1,30 @@
-//! Asks about many points of one mesh, on all cores.
+//! Asks about many points, rays or segments and one mesh, on all cores.
 //!
-//! Points are sorted along a space-filling curve, so that what one touches is in the caches for the next. Each thread takes
-//! runs of them. Answers are placed in the order of the points, and do not depend on the number of threads.
+//! Probes are sorted along a space-filling curve, so that what one has brought into the caches is there for the next. Each thread
+//! takes runs of them. Answers are placed in the order of the probes, and do not depend on the number of threads.
 
 use crate::error::QueryError;
-use crate::file::shape::Shape;
 use crate::isa::Backend;
-use crate::query::answers::ClosestPoint;
+use crate::query::answers::{ClosestPoint, RayHit, Side, SignedDistance};
 use crate::query::probe::closest::check_within;
+use crate::query::probe::placed::PlacedShape;
+use crate::query::probe::ray::Ray;
 use crate::query::querier::Querier;
 use rayon::prelude::*;
 
-/// Points in a run of one thread.
-const POINTS_PER_RUN: usize = 256;
+/// Probes in a run of one thread.
+const PROBES_PER_RUN: usize = 256;
 
-/// Asks about many points of one mesh, on all threads of the rayon pool it is called in.
+/// Asks about many points, rays or segments and one mesh, on all threads of the rayon pool it is called in.
 ///
-/// The answers are those of [`Querier`], bit for bit and in the order of the points. A batch needs the memory of one querier
-/// per thread, of the answers, and 16 bytes per point.
+/// The answers are those of [`Querier`], bit for bit and in the order of the probes. A batch needs the memory of one querier
+/// per thread, of the answers, and 16 bytes per probe.
 ///
 /// # Errors
-/// Each method returns the error of the first point, in their order, that has no answer.
+/// Each method returns the error of the first probe, in their order, that has no answer.
 #[derive(Debug, Clone, Copy)]
 pub struct ProbeBatch<'a> {
-    shape: Shape<'a>,
+    shape: PlacedShape<'a>,
     backend: Backend,
     budget: u64,
 }
@@ -34,16 +35,16 @@ impl<'a> ProbeBatch<'a> {
     ///
     /// # Errors
     /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
-    pub fn new(shape: impl Into<Shape<'a>>) -> Result<Self, QueryError> {
+    pub fn new(shape: impl Into<PlacedShape<'a>>) -> Result<Self, QueryError> {
         Ok(Self::with_backend(shape, Backend::detect()?))
     }
 
     /// Creates a batch with a backend. The portable backend replaces one that the CPU lacks.
-    pub fn with_backend(shape: impl Into<Shape<'a>>, backend: Backend) -> Self {
+    pub fn with_backend(shape: impl Into<PlacedShape<'a>>, backend: Backend) -> Self {
         Self { shape: shape.into(), backend, budget: u64::MAX }
     }
 
-    /// Bounds the work per point, as [`Querier::set_budget`] does.
+    /// Bounds the work per probe, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
         self.budget = visits;
     }
@@ -58,27 +59,87 @@ impl<'a> ProbeBatch<'a> {
         within: f64,
     ) -> Result<Vec<Option<ClosestPoint>>, QueryError> {
         check_within(within)?;
-        let order = along_curve(points);
-        let ask = |querier: &mut Querier, run: &[u32]| -> Vec<Result<Option<ClosestPoint>, QueryError>> {
+        self.each(points, |point| *point, |querier, point| querier.closest_point(self.shape, *point, within))
+    }
+
+    /// Answers [`Querier::side`] for each point.
+    ///
+    /// # Errors
+    /// The error of the first point that fails.
+    pub fn sides(&self, points: &[[f64; 3]]) -> Result<Vec<Side>, QueryError> {
+        self.each(points, |point| *point, |querier, point| querier.side(self.shape, *point))
+    }
+
+    /// Answers [`Querier::signed_distance`] for each point.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if `within` is negative or NaN; else the error of the first point that fails.
+    pub fn signed_distances(
+        &self,
+        points: &[[f64; 3]],
+        within: f64,
+    ) -> Result<Vec<Option<SignedDistance>>, QueryError> {
+        check_within(within)?;
+        self.each(
+            points,
+            |point| *point,
+            |querier, point| querier.signed_distance(self.shape, *point, within),
+        )
+    }
+
+    /// Answers [`Querier::first_hit`] for each ray.
+    ///
+    /// # Errors
+    /// The error of the first ray that fails.
+    pub fn first_hits(&self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>, QueryError> {
+        self.each(rays, |ray| ray.origin, |querier, ray| querier.first_hit(self.shape, ray))
+    }
+
+    /// Answers [`Querier::any_hit`] for each ray.
+    ///
+    /// # Errors
+    /// The error of the first ray that fails.
+    pub fn any_hits(&self, rays: &[Ray]) -> Result<Vec<bool>, QueryError> {
+        self.each(rays, |ray| ray.origin, |querier, ray| querier.any_hit(self.shape, ray))
+    }
+
+    /// Answers [`Querier::all_hits`] for each ray.
+    ///
+    /// # Errors
+    /// The error of the first ray that fails.
+    pub fn all_hits(&self, rays: &[Ray]) -> Result<Vec<Vec<RayHit>>, QueryError> {
+        self.each(rays, |ray| ray.origin, |querier, ray| querier.all_hits(self.shape, ray))
+    }
+
+    /// Answers [`Querier::meets_segment`] for each segment, given by its ends.
+    ///
+    /// # Errors
+    /// The error of the first segment that fails.
+    pub fn meet_segments(&self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, QueryError> {
+        let middle = |[p, q]: &[[f64; 3]; 2]| [0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0);
+        self.each(segments, middle, |querier, [from, to]| querier.meets_segment(self.shape, *from, *to))
+    }
+
+    /// Asks about each probe, in the order of where they are.
+    fn each<P: Sync, R: Send>(
+        &self,
+        probes: &[P],
+        at: impl Fn(&P) -> [f64; 3],
+        ask: impl Fn(&mut Querier, &P) -> Result<R, QueryError> + Sync,
+    ) -> Result<Vec<R>, QueryError> {
+        let order = along_curve(&probes.iter().map(at).collect::<Vec<_>>());
+        let ask_run = |querier: &mut Querier, run: &[u32]| -> Vec<Result<R, QueryError>> {
             querier.set_budget(self.budget);
-            run.iter()
-                .map(|&number| querier.closest_point(self.shape, points[number as usize], within))
-                .collect()
+            run.iter().map(|&number| ask(querier, &probes[number as usize])).collect()
         };
-        let runs: Vec<Vec<Result<Option<ClosestPoint>, QueryError>>> =
-            order.par_chunks(POINTS_PER_RUN).map_init(|| Querier::with_backend(self.backend), ask).collect();
-        let mut answers = vec![None; points.len()];
-        let mut first: Option<(u32, QueryError)> = None;
+        let runs = order.par_chunks(PROBES_PER_RUN);
+        let runs: Vec<Vec<Result<R, QueryError>>> =
+            runs.map_init(|| Querier::with_backend(self.backend), ask_run).collect();
+        let mut answers: Vec<Option<Result<R, QueryError>>> = probes.iter().map(|_| None).collect();
         for (&number, answer) in order.iter().zip(runs.into_iter().flatten()) {
-            match answer {
-                Ok(found) => answers[number as usize] = found,
-                Err(error) if first.as_ref().is_none_or(|(least, _)| number < *least) => {
-                    first = Some((number, error));
-                }
-                Err(_) => {}
-            }
+            answers[number as usize] = Some(answer);
         }
-        first.map_or(Ok(answers), |(_, error)| Err(error))
+        answers.into_iter().flatten().collect()
     }
 }
 

@@ -7,17 +7,18 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
-use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
 use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_within};
+use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
-use crate::query::exact::stored;
+use crate::query::exact::{placed, stored};
 use crate::query::options::check_distance;
+use crate::query::probe::line::sum_of_magnitudes;
+use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
-use crate::traverse::placement::POSE_ERROR;
 use crate::traverse::point_test::PointTest;
 use crate::traverse::point_walk::PointVisitor;
 use crate::traverse::walk_memory::WalkMemory;
@@ -30,6 +31,10 @@ const MAX_BOUNDED: usize = 256;
 
 /// A limit in `f64` is larger than what it comes from by this factor, so that no rounding of `f64` matters.
 const LIMIT_WIDENING: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+
+/// A pose may be 2^-20 from rigid, entry by entry, so that lengths in an object's frame may differ from those in the frame of a
+/// question by 2^-19 of themselves. A bound may come from one triangle and decide about another: that counts twice.
+const MAX_STRETCH: f64 = 1.0 + 1.0 / (1 << 17) as f64;
 
 /// A triangle that may be the closest, with a lower bound of its distance.
 #[derive(Clone, Copy, Debug)]
@@ -62,33 +67,35 @@ impl Querier {
     /// suffice.
     pub fn closest_point<'a>(
         &mut self,
-        shape: impl Into<Shape<'a>>,
+        shape: impl Into<PlacedShape<'a>>,
         point: [f64; 3],
         within: f64,
     ) -> Result<Option<ClosestPoint>, QueryError> {
         check_within(within)?;
         let point = check_point(&point)?;
-        let shape = shape.into();
         self.start();
+        self.closest_point_of(&shape.into(), &point, within)
+    }
+
+    /// Returns the closest point to one that has been checked, as has `within`.
+    pub(crate) fn closest_point_of(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        point: &Point,
+        within: f64,
+    ) -> Result<Option<ClosestPoint>, QueryError> {
         let mut search = Search {
-            point,
+            point: *point,
             within,
             limit: within * LIMIT_WIDENING,
             best: None,
             settled_lower: f64::INFINITY,
         };
-        for (index, object) in shape.objects().iter().enumerate() {
+        for index in 0..placed.shape.objects().len() {
             self.memory.visit()?;
-            let (bvh, number) = (shape.bvh(), (shape.first() + index) as u32);
             let (memory, bounded) = (&mut self.memory, &mut self.bounded_triangles);
-            let (tests, stats) = self.backend.run(SearchObject {
-                search: &mut search,
-                bvh,
-                object,
-                number,
-                memory,
-                bounded,
-            })?;
+            let (tests, stats) =
+                self.backend.run(SearchObject { search: &mut search, placed, index, memory, bounded })?;
             self.stats.add(tests, stats);
         }
         Ok(search.answer())
@@ -96,7 +103,7 @@ impl Querier {
 }
 
 /// Refuses a limit that means nothing. Infinity is none.
-pub(super) fn check_within(within: f64) -> Result<(), QueryError> {
+pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
     if within == f64::INFINITY { Ok(()) } else { check_distance(within) }
 }
 
@@ -124,9 +131,8 @@ impl Search {
 /// Searches an object.
 struct SearchObject<'a> {
     search: &'a mut Search,
-    bvh: &'a Bvh,
-    object: &'a Object,
-    number: u32,
+    placed: &'a PlacedShape<'a>,
+    index: usize,
     memory: &'a mut WalkMemory,
     bounded: &'a mut Vec<BoundedTriangle>,
 }
@@ -137,12 +143,12 @@ impl Task for SearchObject<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let Self { search, bvh, object, number, memory, bounded } = self;
+        let Self { search, placed, index, memory, bounded } = self;
         bounded.clear();
-        let mut visitor = Nearest::new(search, (bvh, object, number), bounded);
-        let tests = isa.run(memory.point_walk(bvh, object, &mut visitor))?;
+        let mut visitor = Nearest::new(search, placed, index, bounded);
+        let tests = isa.run(memory.point_walk(visitor.bvh, visitor.object, &mut visitor))?;
         visitor.settle()?;
-        let limit = f64::from(visitor.limit) / visitor.scale;
+        let limit = f64::from(visitor.limit) / (visitor.scale * visitor.stretch);
         let stats = visitor.stats;
         search.limit = search.limit.min(limit);
         Ok((tests, stats))
@@ -154,10 +160,13 @@ struct Nearest<'a> {
     search: &'a mut Search,
     bvh: &'a Bvh,
     object: &'a Object,
+    pose: Option<&'a Pose>,
     /// The number of the object in its file.
     number: u32,
     /// How many units of the filters a mesh unit is, a power of two.
     scale: f64,
+    /// More than the square of how much longer a distance may be in the object's frame: 1 if that is the question's.
+    stretch: f64,
     /// The limit in the unit of filters.
     limit: f32,
     test: PointTest,
@@ -170,27 +179,27 @@ impl<'a> Nearest<'a> {
     #[inline(always)]
     fn new(
         search: &'a mut Search,
-        (bvh, object, number): (&'a Bvh, &'a Object, u32),
+        placed: &'a PlacedShape<'a>,
+        index: usize,
         bounded: &'a mut Vec<BoundedTriangle>,
     ) -> Self {
-        let origin = object.origin();
-        let ([lo, hi], mut point) = (object.bounding_box(), [0.0; 3]);
-        let (mut magnitude, mut farthest) = (0.0, 0.0f64);
-        for k in 0..3 {
-            point[k] = search.point[k] - origin[k];
-            magnitude +=
-                point[k].abs() + (lo[k] - origin[k]).abs() + (hi[k] - origin[k]).abs() + origin[k].abs();
-            farthest = farthest.max((search.point[k] - lo[k]).abs()).max((hi[k] - search.point[k]).abs());
-        }
-        let error = POSE_ERROR * magnitude;
+        let (bvh, object, pose) = (placed.shape.bvh(), &placed.shape.objects()[index], placed.pose.as_ref());
+        let into = IntoObject::new(pose, object);
+        let (point, [lo, hi]) = (into.point(search.point), &into.bounds);
+        let farthest =
+            (0..3).fold(0.0f64, |far, k| far.max((point[k] - lo[k]).abs()).max((hi[k] - point[k]).abs()));
+        let error = into.error(sum_of_magnitudes(&search.point) + sum_of_magnitudes(&point));
+        let stretch = if pose.is_some() { MAX_STRETCH } else { 1.0 };
         let exponent = (farthest.to_bits() >> 52) as i64 - 1023;
         let scale = f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52);
         Self {
             bvh,
             object,
-            number,
+            pose,
+            number: (placed.shape.first() + index) as u32,
             scale,
-            limit: round_up(search.limit * scale),
+            stretch,
+            limit: round_up(search.limit * stretch * scale),
             test: PointTest::new(&point, object.profile().directions(), error, scale as f32),
             local: LocalPoint::new(&point, error, scale as f32),
             search,
@@ -211,7 +220,10 @@ impl<'a> Nearest<'a> {
             }
             self.stats.exact_tests += 1;
             let (search, point) = (&*self.search, self.search.point);
-            let triangle = stored(self.bvh, self.object, leaf, lane)?;
+            let mut triangle = stored(self.bvh, self.object, leaf, lane)?;
+            if let Some(pose) = self.pose {
+                triangle = placed(&triangle, pose);
+            }
             let closest = point_distance(&triangle, point);
             let is_better = match &search.best {
                 Some(best) if closest.distance == best.closest.distance => {
@@ -228,7 +240,7 @@ impl<'a> Nearest<'a> {
                 self.search.best = Some(best);
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);
-            self.limit = self.limit.min(round_up(closest.upper * LIMIT_WIDENING * self.scale));
+            self.limit = self.limit.min(round_up(closest.upper * LIMIT_WIDENING * self.stretch * self.scale));
         }
         self.bounded.clear();
         Ok(())
@@ -264,7 +276,7 @@ impl PointVisitor for Nearest<'_> {
         let none = Packet::default();
         let bounds = point_bounds(isa, packets.map(|packet| packet.unwrap_or(&none)), &self.local);
         let nearest = isa.least(&bounds.upper, valid) as usize & 15;
-        self.limit = self.limit.min(bounds.upper[nearest]);
+        self.limit = self.limit.min(round_up(f64::from(bounds.upper[nearest]) * self.stretch));
         let mut left = valid & I::V::bits(isa.load(&bounds.lower).le(isa.splat(self.limit)));
         while left != 0 {
             let at = left.trailing_zeros() as usize & 15;

@@ -1,41 +1,37 @@
-//! The walk of lines: finds the triangles that up to four rays or segments may meet, nearest first.
+//! The walk of a line: finds the triangles that a ray or a segment may meet, nearest first.
 //!
-//! A line is first clipped to the box of an object, in f64. What is left is a segment as long as the object: nodes and packets
-//! are tested against it in f32, four at a time against all lines. What may be met goes to a question, which decides exactly.
+//! The line is first clipped to the box of an object, in f64. What is left is a segment as long as the object, and nodes and
+//! packets are tested against it in f32. What may be met goes to a question, which decides exactly.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
-use crate::isa::Isa;
-use crate::leaf::line::{Directions, LocalLines, crossed, directions};
-use crate::leaf::local::{LocalFrame, valid_lanes};
-use crate::leaf::placed_packet::PlacedPackets;
+use crate::isa::{Isa, Task};
+use crate::leaf::line::{crossed, direction};
+use crate::leaf::point::LocalPoint;
 use crate::narrow::{Point, Triangle};
 use crate::query::answers::QueryStats;
-use crate::query::exact::stored;
+use crate::query::exact::{placed, stored};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::line_test::{LineTest, Segment};
-use crate::traverse::placement::Placement;
-use crate::traverse::probe_walk::{PROBES, ProbeVisitor};
+use crate::traverse::point_walk::PointVisitor;
+use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 use bvh_format::slabs::Group;
-use std::ops::ControlFlow;
 
 /// A part of a line in the frame of a question: its points are `origin + t * direction` with t from 0 to a limit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
-    pub(super) origin: Point,
-    pub(super) direction: Point,
+pub(crate) struct Line {
+    pub(crate) origin: Point,
+    pub(crate) direction: Point,
     /// The sum of the magnitudes of the coordinates that it was made of.
-    pub(super) magnitude: f64,
+    magnitude: f64,
 }
 
 impl Line {
-    pub(super) const NONE: Self = Self { origin: [0.0; 3], direction: [0.0; 3], magnitude: 0.0 };
-
     pub(super) fn new(origin: Point, direction: Point) -> Self {
         Self { origin, direction, magnitude: sum_of_magnitudes(&origin) }
     }
@@ -47,25 +43,27 @@ impl Line {
     }
 }
 
-pub(super) fn sum_of_magnitudes(point: &Point) -> f64 {
-    point.iter().map(|v| v.abs()).sum()
+pub(crate) fn sum_of_magnitudes(point: &Point) -> f64 {
+    point[0].abs() + point[1].abs() + point[2].abs()
 }
 
-/// What is asked about lines.
-pub(super) trait LineQuestion {
-    /// Returns the limit of a line; a negative one if no more need be known of it.
-    fn limit(&self, line: usize) -> f64;
+/// What is asked about a line.
+pub(crate) trait LineQuestion {
+    fn line(&self) -> Line;
 
-    /// Decides about a triangle that a line may meet. All that it does meet up to the limit are named, in any order.
-    fn decide(&mut self, line: usize, candidate: &Candidate<'_>) -> Result<(), QueryError>;
+    /// Returns the limit of the parameter; a negative one if no more need be known.
+    fn limit(&self) -> f64;
+
+    /// Decides about a triangle that the line may meet. All that it does meet up to the limit are named, in any order.
+    fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError>;
 }
 
 /// A triangle that a line may meet.
-pub(super) struct Candidate<'a> {
+pub(crate) struct Candidate<'a> {
     /// In the frame of the question.
     pub(super) triangle: Triangle,
-    /// The number of its object in the file.
-    pub(super) object: u32,
+    /// The numbers of its instance in a scene and of its object in the file.
+    numbers: (u32, u32),
     bvh: &'a Bvh,
     stored_in: &'a Object,
     leaf: LeafPacket,
@@ -73,114 +71,131 @@ pub(super) struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Returns its number in the input.
-    pub(super) fn id(&self) -> Result<u32, QueryError> {
-        self.bvh.triangle_id(self.stored_in, self.place())
+    /// Returns the numbers of its instance, its object and itself.
+    pub(super) fn numbers(&self) -> Result<(u32, u32, u32), QueryError> {
+        let (instance, object) = self.numbers;
+        Ok((instance, object, self.bvh.triangle_id(self.stored_in, self.place())?))
     }
 
-    pub(super) fn place(&self) -> TrianglePlace {
+    /// Returns its place in the order of the leaves of its object.
+    pub(super) fn place_number(&self) -> Result<u32, QueryError> {
+        self.bvh.place_of(self.stored_in, self.place())
+    }
+
+    fn place(&self) -> TrianglePlace {
         TrianglePlace { page: self.leaf.page, packet: self.leaf.packet, lane: self.lane }
     }
 }
 
 impl Querier {
-    /// Asks a question about up to four lines and one object of a shape.
-    pub(super) fn walk_lines(
+    /// Asks a question about a line and all objects of a shape.
+    pub(crate) fn ask_line(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        question: &mut impl LineQuestion,
+    ) -> Result<(), QueryError> {
+        for (index, object) in placed.shape.objects().iter().enumerate() {
+            let into = IntoObject::new(placed.pose.as_ref(), object);
+            self.ask_line_of_object(placed, index, &into, question)?;
+        }
+        Ok(())
+    }
+
+    /// Asks a question about a line and one object of a shape.
+    pub(super) fn ask_line_of_object(
         &mut self,
         placed: &PlacedShape<'_>,
         index: usize,
-        lines: &[Line],
+        into: &IntoObject,
         question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
         self.memory.visit()?;
-        let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
-        let into = IntoObject::new(placed.pose.as_ref(), object);
-        let mut clipped = Clipped::NONE;
-        for (number, line) in lines.iter().take(PROBES).enumerate() {
-            clipped.clip(number, line, &into, question.limit(number));
+        if let Some(clipped) = Clipped::new(&question.line(), into, question.limit()) {
+            let memory = &mut self.memory;
+            let (tests, stats) = self.backend.run(AskObject { placed, index, clipped, question, memory })?;
+            self.stats.add(tests, stats);
         }
-        if clipped.limits.iter().all(|limit| *limit < 0.0) {
-            return Ok(());
-        }
-        self.packets[0].start();
-        let mut visitor = Lines {
-            question,
-            bvh,
-            object,
-            placed,
-            number: (placed.shape.first() + index) as u32,
-            test: LineTest::new(&clipped.segments, object.profile().directions()),
-            directions: directions(&clipped.segments),
-            clipped,
-            frame: LocalFrame::new(&Placement::NONE, object, object),
-            packets: &mut self.packets[0],
-            stats: QueryStats::default(),
-        };
-        let walk = self.memory.probe_walk(bvh, object, lines.len().min(PROBES), &mut visitor);
-        let tests = self.backend.run(walk)?;
-        let stats = visitor.stats;
-        self.stats.add(tests, stats);
         Ok(())
     }
 }
 
-/// What is left of lines in the box of an object.
+/// What is left of a line in the box of an object.
 struct Clipped {
-    segments: [Segment; PROBES],
-    /// The parameters at which they start, and how much of them they are long.
-    starts: [f64; PROBES],
-    lengths: [f64; PROBES],
-    /// The shares of the segments up to which they are asked about; negative if no more need be known.
-    limits: [f32; PROBES],
+    segment: Segment,
+    /// The direction of the line, which the segment may be too short to tell.
+    direction: Point,
+    /// The inverse of the largest side of the box, a power of two.
+    scale: f64,
+    /// The parameter at which the segment starts, and how much of it the segment is long.
+    start: f64,
+    length: f64,
 }
 
 /// What a share of a segment is enlarged by for all roundings of f64.
 const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
 
 impl Clipped {
-    const NONE: Self = Self {
-        segments: [Segment::NONE; PROBES],
-        starts: [0.0; PROBES],
-        lengths: [0.0; PROBES],
-        limits: [-1.0; PROBES],
-    };
-
-    fn clip(&mut self, number: usize, line: &Line, into: &IntoObject, limit: f64) {
+    #[inline(always)]
+    fn new(line: &Line, into: &IntoObject, limit: f64) -> Option<Self> {
         let (origin, direction) = (into.point(line.origin), into.direction(line.direction));
         // A point of the line in the box is at most twice as far along it as the magnitudes of both add up to.
         let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin)));
-        let Some([start, end]) = range_in_box(&origin, &direction, &into.bounds, error) else { return };
+        let [start, end] = range_in_box(&origin, &direction, &into.bounds, error)?;
         let (start, end) = (start.max(0.0), end.min(limit));
         if start > end {
-            return;
+            return None;
         }
+        let [lo, hi] = &into.bounds;
+        let size = (hi[0] - lo[0]).max(hi[1] - lo[1]).max(hi[2] - lo[2]);
+        let exponent = (size.to_bits() >> 52) as i64 - 1023;
         let length = end - start;
-        self.segments[number] = Segment {
-            start: [0, 1, 2].map(|k| origin[k] + start * direction[k]),
-            vector: direction.map(|v| length * v),
+        Some(Self {
+            segment: Segment {
+                start: [0, 1, 2].map(|k| origin[k] + start * direction[k]),
+                vector: direction.map(|v| length * v),
+                error: 2.0 * error,
+            },
             direction,
-            error: 2.0 * error,
-        };
-        (self.starts[number], self.lengths[number]) = (start, length);
-        // Entries may exceed 1 by rounding.
-        self.limits[number] = 2.0;
+            scale: f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52),
+            start,
+            length,
+        })
     }
 
-    /// Sets the share of a segment that is left.
+    /// Returns the share of the segment up to a limit of the parameter; negative if that is before its start.
     #[inline(always)]
-    fn set_limit(&mut self, number: usize, limit: f64) {
-        if limit < self.starts[number] {
-            self.limits[number] = -1.0;
-        } else if self.lengths[number] > 0.0 {
-            let share = (limit - self.starts[number]) / self.lengths[number];
-            self.limits[number] = round_up(share * (1.0 + SLACK)).min(self.limits[number]);
+    fn share(&self, limit: f64) -> f32 {
+        if limit < self.start {
+            -1.0
+        } else if limit - self.start < self.length {
+            round_up((limit - self.start) / self.length * (1.0 + SLACK))
+        } else {
+            // Entries may exceed 1 by rounding.
+            2.0
         }
+    }
+
+    /// Returns the point of the segment that is nearest to another one, or near that.
+    #[inline(always)]
+    fn nearest(&self, to: &[f32; 3]) -> Point {
+        let Segment { start, vector, .. } = &self.segment;
+        let from = [0, 1, 2].map(|k| f64::from(to[k]) - start[k]);
+        let squared = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
+        let along = from[0] * vector[0] + from[1] * vector[1] + from[2] * vector[2];
+        // Of finite numbers, the quotient is no NaN.
+        let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+        [0, 1, 2].map(|k| start[k] + share * vector[k])
     }
 }
 
 /// Returns the range of parameters for which a line may be in a box; nothing if it misses the box by more than an error.
 #[inline(always)]
-fn range_in_box(origin: &Point, direction: &Point, [lo, hi]: &[Point; 2], error: f64) -> Option<[f64; 2]> {
+pub(crate) fn range_in_box(
+    origin: &Point,
+    direction: &Point,
+    [lo, hi]: &[Point; 2],
+    error: f64,
+) -> Option<[f64; 2]> {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
     for k in 0..3 {
         let (below, above) = (lo[k] - origin[k] - error, hi[k] - origin[k] + error);
@@ -198,66 +213,102 @@ fn range_in_box(origin: &Point, direction: &Point, [lo, hi]: &[Point; 2], error:
     (near <= far).then_some([near, far])
 }
 
-/// Hands the triangles of an object that lines may meet to a question.
-struct Lines<'a, Q> {
+/// Asks about an object, with the features of a backend.
+struct AskObject<'a, Q> {
+    placed: &'a PlacedShape<'a>,
+    index: usize,
+    clipped: Clipped,
+    question: &'a mut Q,
+    memory: &'a mut WalkMemory,
+}
+
+impl<Q: LineQuestion> Task for AskObject<'_, Q> {
+    /// The number of node tests, and what else was done.
+    type Output = Result<(u64, QueryStats), QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        let Self { placed, index, clipped, question, memory } = self;
+        let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
+        let mut visitor = Walked {
+            bvh,
+            object,
+            placed,
+            number: (placed.shape.first() + index) as u32,
+            test: LineTest::new(isa, &clipped.segment, object.profile().directions()),
+            direction: direction(&clipped.direction),
+            limit: clipped.share(question.limit()),
+            clipped,
+            question,
+            stats: QueryStats::default(),
+        };
+        let tests = isa.run(memory.point_walk(bvh, object, &mut visitor))?;
+        Ok((tests, visitor.stats))
+    }
+}
+
+/// Hands the triangles of an object that a line may meet to a question.
+struct Walked<'a, Q> {
     question: &'a mut Q,
     bvh: &'a Bvh,
     object: &'a Object,
     placed: &'a PlacedShape<'a>,
     number: u32,
     test: LineTest,
-    directions: Directions,
+    direction: [f32; 3],
     clipped: Clipped,
-    frame: LocalFrame,
-    packets: &'a mut PlacedPackets,
+    /// The share of the segment that is left.
+    limit: f32,
     stats: QueryStats,
 }
 
-impl<Q: LineQuestion> Lines<'_, Q> {
+impl<Q: LineQuestion> Walked<'_, Q> {
     /// Lets the question decide about a triangle.
-    fn decide(&mut self, line: usize, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
+    fn decide(&mut self, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
         self.stats.exact_tests += 1;
         let Self { bvh, object, .. } = *self;
         let mut triangle = stored(bvh, object, leaf, lane)?;
         if let Some(pose) = &self.placed.pose {
-            triangle = triangle.map(|corner| pose.place(corner));
+            triangle = placed(&triangle, pose);
         }
-        let candidate = Candidate { triangle, object: self.number, bvh, stored_in: object, leaf, lane };
-        self.question.decide(line, &candidate)?;
-        self.clipped.set_limit(line, self.question.limit(line));
+        let numbers = (self.placed.instance, self.number);
+        self.question.decide(&Candidate { triangle, numbers, bvh, stored_in: object, leaf, lane })?;
+        self.limit = self.clipped.share(self.question.limit());
         Ok(())
     }
 }
 
-impl<Q: LineQuestion> ProbeVisitor for Lines<'_, Q> {
+impl<Q: LineQuestion> PointVisitor for Walked<'_, Q> {
     #[inline(always)]
-    fn bound<I: Isa>(&self, isa: I, children: &Group) -> I::V {
+    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
         self.test.entries(isa, children)
     }
 
     #[inline(always)]
-    fn limits(&self) -> &[f32; PROBES] {
-        &self.clipped.limits
+    fn limit(&self) -> f32 {
+        self.limit
     }
 
     #[inline(always)]
-    fn leaf<I: Isa>(&mut self, isa: I, leaf: LeafPacket, probes: u16) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.packet_tests += 1;
-        let (known, packet) = self.packets.place(leaf.page, leaf.packet);
-        if !known {
-            packet.place_a(isa, &self.frame, self.bvh.packet(self.object, leaf, &mut Packet::default())?);
+    fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
+        self.stats.packet_tests += leaves.len() as u64;
+        let mut rooms = [Packet::default(); 4];
+        let (mut packets, mut valid) = ([None; 4], 0u16);
+        for (place, (leaf, room)) in leaves.iter().zip(&mut rooms).enumerate() {
+            packets[place] = Some(self.bvh.packet(self.object, *leaf, room)?);
+            valid |= ((1 << leaf.triangles) - 1) << (4 * place);
         }
-        let local = LocalLines::new(&self.frame, packet, &self.clipped.segments, probes);
-        let met = crossed(isa, packet, &self.directions, &local);
-        let mut mask = met & (0x1111 * probes) & valid_lanes(leaf.triangles, PROBES as u8);
-        while mask != 0 {
-            let at = mask.trailing_zeros() as usize & 15;
-            mask &= mask - 1;
-            let line = at & 3;
-            if self.clipped.limits[line] >= 0.0 {
-                self.decide(line, leaf, (at >> 2) as u8)?;
-            }
+        let none = Packet::default();
+        let packets = packets.map(|packet| packet.unwrap_or(&none));
+        let corner = &packets[0].corners[0];
+        let near = self.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
+        let point = LocalPoint::new(&near, self.clipped.segment.error, self.clipped.scale as f32);
+        let mut left = valid & crossed(isa, packets, &point, &self.direction);
+        while left != 0 && self.limit >= 0.0 {
+            let at = left.trailing_zeros() as usize & 15;
+            left &= left - 1;
+            self.decide(leaves[at / 4], (at & 3) as u8)?;
         }
-        Ok(ControlFlow::Continue(()))
+        Ok(())
     }
 }

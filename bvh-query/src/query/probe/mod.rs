@@ -3,8 +3,10 @@
 #[cfg(feature = "parallel")]
 pub(crate) mod batch;
 pub(crate) mod closest;
-mod line;
+pub(crate) mod line;
 pub(crate) mod placed;
-mod point;
+pub(crate) mod point;
 pub(crate) mod ray;
-mod segment;
+mod relation;
+pub(crate) mod segment;
+pub(crate) mod side;

@@ -17,18 +17,20 @@ pub struct PlacedShape<'a> {
     pub(crate) shape: Shape<'a>,
     /// From the shape to the frame of the probes; none if they have one frame.
     pub(crate) pose: Option<Pose>,
+    /// The place of the instance in a scene; 0 without one.
+    pub(crate) instance: u32,
 }
 
 impl<'a> Shape<'a> {
     /// Returns the shape where a pose puts it: see [`PlacedShape`].
     pub fn at(self, pose: &Pose) -> PlacedShape<'a> {
-        PlacedShape { shape: self, pose: Some(*pose) }
+        PlacedShape { shape: self, pose: Some(*pose), instance: 0 }
     }
 }
 
 impl<'a> From<Shape<'a>> for PlacedShape<'a> {
     fn from(shape: Shape<'a>) -> Self {
-        Self { shape, pose: None }
+        Self { shape, pose: None, instance: 0 }
     }
 }
 

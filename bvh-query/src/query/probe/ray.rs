@@ -7,7 +7,6 @@ use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
-use crate::traverse::probe_walk::PROBES;
 use std::cmp::Ordering;
 
 /// A ray: all points `origin + t * direction` with `t` from 0 to `until`, both ends included.
@@ -55,8 +54,10 @@ impl Querier {
         shape: impl Into<PlacedShape<'a>>,
         ray: &Ray,
     ) -> Result<Option<RayHit>, QueryError> {
-        let [hit, ..] = self.first_hits(&shape.into(), &[*ray])?;
-        Ok(hit)
+        let mut first = First::new(ray)?;
+        self.start();
+        self.ask_line(&shape.into(), &mut first)?;
+        Ok(first.hit().map(|(_, hit)| hit))
     }
 
     /// Returns whether a ray hits a mesh at all, decided as by [`Querier::first_hit`].
@@ -64,8 +65,10 @@ impl Querier {
     /// # Errors
     /// The errors of [`Querier::first_hit`].
     pub fn any_hit<'a>(&mut self, shape: impl Into<PlacedShape<'a>>, ray: &Ray) -> Result<bool, QueryError> {
-        let [hit, ..] = self.any_hits(&shape.into(), &[*ray])?;
-        Ok(hit)
+        let mut any = Any::new(ray)?;
+        self.start();
+        self.ask_line(&shape.into(), &mut any)?;
+        Ok(any.found)
     }
 
     /// Returns all hits of a ray in the order along it. Each parameter occurs once, however many triangles are hit at exactly
@@ -79,49 +82,10 @@ impl Querier {
         shape: impl Into<PlacedShape<'a>>,
         ray: &Ray,
     ) -> Result<Vec<RayHit>, QueryError> {
-        let ray = Scaled::new(ray)?;
-        let mut all = All { ray, met: Vec::new() };
-        self.ask_lines(&shape.into(), &[ray.line()], &mut all)?;
-        Ok(all.hits())
-    }
-
-    /// Returns the first hits of up to four rays, side by side.
-    pub(super) fn first_hits(
-        &mut self,
-        shape: &PlacedShape<'_>,
-        rays: &[Ray],
-    ) -> Result<[Option<RayHit>; PROBES], QueryError> {
-        let rays = Scaled::all(rays)?;
-        let mut first = First { rays: rays.0, best: [None; PROBES] };
-        self.ask_lines(shape, &rays.lines(), &mut first)?;
-        let mut hits = [None; PROBES];
-        for ((hit, best), ray) in hits.iter_mut().zip(&first.best).zip(&rays.0) {
-            *hit = best.as_ref().map(|best| ray.hit(best));
-        }
-        Ok(hits)
-    }
-
-    /// Returns whether up to four rays hit anything.
-    pub(super) fn any_hits(
-        &mut self,
-        shape: &PlacedShape<'_>,
-        rays: &[Ray],
-    ) -> Result<[bool; PROBES], QueryError> {
-        let rays = Scaled::all(rays)?;
-        let mut any = Any { rays: rays.0, found: [false; PROBES] };
-        self.ask_lines(shape, &rays.lines(), &mut any)?;
-        Ok(any.found)
-    }
-
-    /// Asks a question about up to four lines and all objects of a shape.
-    pub(super) fn ask_lines(
-        &mut self,
-        shape: &PlacedShape<'_>,
-        lines: &[Line],
-        question: &mut impl LineQuestion,
-    ) -> Result<(), QueryError> {
+        let mut all = All::new(ray)?;
         self.start();
-        (0..shape.shape.objects().len()).try_for_each(|index| self.walk_lines(shape, index, lines, question))
+        self.ask_line(&shape.into(), &mut all)?;
+        Ok(all.hits().map(|(_, hit)| hit).collect())
     }
 }
 
@@ -141,19 +105,7 @@ struct Scaled {
     until: f64,
 }
 
-/// Up to four rays.
-struct ScaledRays([Scaled; PROBES], usize);
-
-impl ScaledRays {
-    fn lines(&self) -> Vec<Line> {
-        self.0[..self.1].iter().map(Scaled::line).collect()
-    }
-}
-
 impl Scaled {
-    const NONE: Self =
-        Self { ray: narrow::Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0] }, unit: 1.0, until: -1.0 };
-
     fn new(ray: &Ray) -> Result<Self, QueryError> {
         let origin = check_point(&ray.origin)?;
         let largest =
@@ -173,14 +125,6 @@ impl Scaled {
         Ok(Self { ray: narrow::Ray { origin, direction }, unit, until: ray.until / unit })
     }
 
-    fn all(rays: &[Ray]) -> Result<ScaledRays, QueryError> {
-        let mut all = [Self::NONE; PROBES];
-        for (to, ray) in all.iter_mut().zip(rays) {
-            *to = Self::new(ray)?;
-        }
-        Ok(ScaledRays(all, rays.len().min(PROBES)))
-    }
-
     fn line(&self) -> Line {
         Line::new(self.ray.origin, self.ray.direction)
     }
@@ -191,20 +135,22 @@ impl Scaled {
         self.ray.crossing(triangle).filter(|crossing| self.ray.is_within(triangle, crossing, self.until))
     }
 
-    /// Returns a hit as an answer.
-    fn hit(&self, met: &Met) -> RayHit {
+    /// Returns a hit as an answer, and the number of its instance.
+    fn hit(&self, met: &Met) -> (u32, RayHit) {
         let narrow::Ray { origin, direction } = self.ray;
         let crossing = &met.crossing;
         // A product with a power of two: exact, unless it underflows.
         let scaled = |t: f64| if t > 0.0 { (t * self.unit).max(f64::MIN_POSITIVE) } else { 0.0 };
-        RayHit {
+        let (instance, object, triangle) = met.numbers;
+        let hit = RayHit {
             t: scaled(crossing.t),
             lower: crossing.lower * self.unit,
             upper: scaled(crossing.upper),
             point: [0, 1, 2].map(|k| origin[k] + crossing.t * direction[k]),
-            object: met.object,
-            triangle: met.id,
-        }
+            object,
+            triangle,
+        };
+        (instance, hit)
     }
 }
 
@@ -213,99 +159,126 @@ impl Scaled {
 struct Met {
     crossing: Crossing,
     triangle: Triangle,
-    object: u32,
-    id: u32,
+    /// The numbers of its instance, its object and itself.
+    numbers: (u32, u32, u32),
 }
 
 impl Met {
     fn new(crossing: Crossing, candidate: &Candidate<'_>) -> Result<Self, QueryError> {
-        let Candidate { triangle, object, .. } = *candidate;
-        Ok(Self { crossing, triangle, object, id: candidate.id()? })
+        Ok(Self { crossing, triangle: candidate.triangle, numbers: candidate.numbers()? })
     }
 
     fn compare(&self, ray: &Scaled, other: &Self) -> Ordering {
         ray.ray.compare((&self.triangle, &self.crossing), (&other.triangle, &other.crossing))
     }
-
-    fn numbers(&self) -> (u32, u32) {
-        (self.object, self.id)
-    }
 }
 
 /// Which triangle is met first?
-struct First {
-    rays: [Scaled; PROBES],
-    best: [Option<Met>; PROBES],
+pub(crate) struct First {
+    ray: Scaled,
+    best: Option<Met>,
+}
+
+impl First {
+    pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
+        Ok(Self { ray: Scaled::new(ray)?, best: None })
+    }
+
+    /// Returns the first hit, and the number of its instance.
+    pub(crate) fn hit(&self) -> Option<(u32, RayHit)> {
+        self.best.as_ref().map(|best| self.ray.hit(best))
+    }
 }
 
 impl LineQuestion for First {
-    #[inline(always)]
-    fn limit(&self, line: usize) -> f64 {
-        self.best[line].as_ref().map_or(self.rays[line].until, |best| best.crossing.upper)
+    fn line(&self) -> Line {
+        self.ray.line()
     }
 
-    fn decide(&mut self, line: usize, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        let ray = &self.rays[line];
-        let Some(crossing) = ray.crossing(&candidate.triangle) else { return Ok(()) };
-        let best = &mut self.best[line];
-        let is_first = match best {
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.best.as_ref().map_or(self.ray.until, |best| best.crossing.upper)
+    }
+
+    fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
+        let Some(crossing) = self.ray.crossing(&candidate.triangle) else { return Ok(()) };
+        let is_first = match &self.best {
             None => true,
             Some(best) => {
-                let order =
-                    ray.ray.compare((&candidate.triangle, &crossing), (&best.triangle, &best.crossing));
-                order.is_lt() || order.is_eq() && (candidate.object, candidate.id()?) < best.numbers()
+                let (found, held) = ((&candidate.triangle, &crossing), (&best.triangle, &best.crossing));
+                let order = self.ray.ray.compare(found, held);
+                order.is_lt() || order.is_eq() && candidate.numbers()? < best.numbers
             }
         };
         if is_first {
-            *best = Some(Met::new(crossing, candidate)?);
+            self.best = Some(Met::new(crossing, candidate)?);
         }
         Ok(())
     }
 }
 
 /// Is any triangle met?
-struct Any {
-    rays: [Scaled; PROBES],
-    found: [bool; PROBES],
+pub(crate) struct Any {
+    ray: Scaled,
+    pub(crate) found: bool,
+}
+
+impl Any {
+    pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
+        Ok(Self { ray: Scaled::new(ray)?, found: false })
+    }
 }
 
 impl LineQuestion for Any {
-    #[inline(always)]
-    fn limit(&self, line: usize) -> f64 {
-        if self.found[line] { -1.0 } else { self.rays[line].until }
+    fn line(&self) -> Line {
+        self.ray.line()
     }
 
-    fn decide(&mut self, line: usize, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        self.found[line] |= self.rays[line].crossing(&candidate.triangle).is_some();
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        if self.found { -1.0 } else { self.ray.until }
+    }
+
+    fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
+        self.found |= self.ray.crossing(&candidate.triangle).is_some();
         Ok(())
     }
 }
 
 /// Which triangles are met?
-struct All {
+pub(crate) struct All {
     ray: Scaled,
     met: Vec<Met>,
 }
 
+impl All {
+    pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
+        Ok(Self { ray: Scaled::new(ray)?, met: Vec::new() })
+    }
+
+    /// Returns the hits in the order along the ray, with the numbers of their instances.
+    pub(crate) fn hits(mut self) -> impl Iterator<Item = (u32, RayHit)> {
+        let ray = self.ray;
+        self.met.sort_unstable_by(|x, y| x.compare(&ray, y).then(x.numbers.cmp(&y.numbers)));
+        self.met.dedup_by(|later, earlier| later.compare(&ray, earlier).is_eq());
+        self.met.into_iter().map(move |met| ray.hit(&met))
+    }
+}
+
 impl LineQuestion for All {
+    fn line(&self) -> Line {
+        self.ray.line()
+    }
+
     #[inline(always)]
-    fn limit(&self, _line: usize) -> f64 {
+    fn limit(&self) -> f64 {
         self.ray.until
     }
 
-    fn decide(&mut self, _line: usize, candidate: &Candidate<'_>) -> Result<(), QueryError> {
+    fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
         if let Some(crossing) = self.ray.crossing(&candidate.triangle) {
             self.met.push(Met::new(crossing, candidate)?);
         }
         Ok(())
-    }
-}
-
-impl All {
-    fn hits(mut self) -> Vec<RayHit> {
-        let ray = self.ray;
-        self.met.sort_unstable_by(|x, y| x.compare(&ray, y).then(x.numbers().cmp(&y.numbers())));
-        self.met.dedup_by(|later, earlier| later.compare(&ray, earlier).is_eq());
-        self.met.iter().map(|met| ray.hit(met)).collect()
     }
 }

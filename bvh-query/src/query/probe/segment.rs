@@ -6,7 +6,6 @@ use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
-use crate::traverse::probe_walk::PROBES;
 
 impl Querier {
     /// Returns whether the closed segment between two points meets a mesh: whether it is free to see or to go along.
@@ -23,42 +22,38 @@ impl Querier {
         from: [f64; 3],
         to: [f64; 3],
     ) -> Result<bool, QueryError> {
-        let [meets, ..] = self.meet_segments(&shape.into(), &[[from, to]])?;
-        Ok(meets)
-    }
-
-    /// Returns whether up to four segments meet a mesh, side by side.
-    pub(super) fn meet_segments(
-        &mut self,
-        shape: &PlacedShape<'_>,
-        segments: &[[Point; 2]],
-    ) -> Result<[bool; PROBES], QueryError> {
-        let mut question = Segments { ends: [[[0.0; 3]; 2]; PROBES], met: [false; PROBES] };
-        let mut lines = [Line::NONE; PROBES];
-        for ((ends, line), segment) in question.ends.iter_mut().zip(&mut lines).zip(segments) {
-            *ends = [check_point(&segment[0])?, check_point(&segment[1])?];
-            *line = Line::between(ends[0], ends[1]);
-        }
-        self.ask_lines(shape, &lines[..segments.len().min(PROBES)], &mut question)?;
+        let mut question = MeetsSegment::new(from, to)?;
+        self.start();
+        self.ask_line(&shape.into(), &mut question)?;
         Ok(question.met)
     }
 }
 
 /// Does any triangle meet the segment?
-struct Segments {
-    ends: [[Point; 2]; PROBES],
-    met: [bool; PROBES],
+pub(crate) struct MeetsSegment {
+    ends: [Point; 2],
+    pub(crate) met: bool,
 }
 
-impl LineQuestion for Segments {
-    #[inline(always)]
-    fn limit(&self, line: usize) -> f64 {
-        if self.met[line] { -1.0 } else { 1.0 }
+impl MeetsSegment {
+    pub(crate) fn new(from: Point, to: Point) -> Result<Self, QueryError> {
+        Ok(Self { ends: [check_point(&from)?, check_point(&to)?], met: false })
+    }
+}
+
+impl LineQuestion for MeetsSegment {
+    fn line(&self) -> Line {
+        Line::between(self.ends[0], self.ends[1])
     }
 
-    fn decide(&mut self, line: usize, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        let [from, to] = self.ends[line];
-        self.met[line] |= triangles_intersect(&candidate.triangle, &[from, to, to]);
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        if self.met { -1.0 } else { 1.0 }
+    }
+
+    fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
+        let [from, to] = self.ends;
+        self.met |= triangles_intersect(&candidate.triangle, &[from, to, to]);
         Ok(())
     }
 }

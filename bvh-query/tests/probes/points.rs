@@ -1,23 +1,11 @@
 //! Points: against labels from exact arithmetic, against the distance to a mesh that is a point, and where ties decide.
 
-mod common;
-
-#[cfg(feature = "parallel")]
-use bvh_format::leaf::TriangleEncoding;
-#[cfg(feature = "parallel")]
-use bvh_format::profile::Profile;
+use crate::common::shapes::{cube, moved, plate, sphere, torus};
+use crate::common::{Random, Triangle, bake, mesh, note, random_pose, shared};
 #[cfg(feature = "parallel")]
 use bvh_query::ProbeBatch;
 use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
 use cbvh_testkit::depth::rounds;
-#[cfg(feature = "parallel")]
-use common::nearest::point_triangle;
-use common::shapes::{cube, moved, plate, sphere, torus};
-#[cfg(feature = "parallel")]
-use common::shapes::{dirty, soup, terrain};
-use common::{Random, Triangle, bake, mesh, note, shared};
-#[cfg(feature = "parallel")]
-use common::{backends, options, stored};
 
 fn baked(triangles: &[Triangle]) -> Bvh {
     bake(&mesh(triangles), &bvh_bake::Options::default())
@@ -100,6 +88,19 @@ fn a_point_is_as_far_as_a_mesh_that_is_a_point() {
             f64::from(v as f32)
         });
         let one = baked(&[[point; 3]]);
+        let pose = random_pose(random, 1.0);
+        let placed = queriers[0].distance(&one, bvh, &pose).unwrap();
+        for querier in &mut queriers {
+            let found = querier.closest_point(bvh.all().at(&pose), point, f64::INFINITY).unwrap().unwrap();
+            assert_eq!(found.distance, placed.distance, "{point:?} {pose:?} {:?}", querier.backend());
+            if placed.distance > 0.0 {
+                assert_eq!((found.object, found.triangle), (placed.object_b, placed.triangle_b), "{point:?}");
+                assert_eq!((found.upper, found.point), (placed.upper, placed.point_b));
+            }
+            assert!(found.lower <= found.distance && found.lower >= placed.distance * (1.0 - 1e-5));
+            let limit = placed.upper * (1.0 + 1e-12);
+            assert_eq!(querier.closest_point(bvh.all().at(&pose), point, limit), Ok(Some(found)));
+        }
         let expected = queriers[0].distance(bvh, &one, &Pose::IDENTITY).unwrap();
         for querier in &mut queriers {
             let found = querier.closest_point(bvh, point, f64::INFINITY).unwrap().unwrap();
@@ -222,6 +223,11 @@ fn batches_of_points_have_the_same_answers() {
 #[test]
 #[cfg(feature = "parallel")]
 fn no_triangle_is_nearer_than_the_answer() {
+    use crate::common::nearest::point_triangle;
+    use crate::common::shapes::{dirty, soup, terrain};
+    use crate::common::{Stored, backends, options, stored};
+    use bvh_format::leaf::TriangleEncoding;
+    use bvh_format::profile::Profile;
     let random = &mut Random::new(44);
     for (number, profile) in Profile::ALL.into_iter().enumerate() {
         for encoding in [TriangleEncoding::F32, TriangleEncoding::Packed] {
@@ -254,7 +260,7 @@ fn no_triangle_is_nearer_than_the_answer() {
             }
             for (point, answer) in points.iter().zip(answers.unwrap()) {
                 let answer = answer.unwrap();
-                let to = |t: &common::Stored| point_triangle(*point, &t.corners);
+                let to = |t: &Stored| point_triangle(*point, &t.corners);
                 let least = stored.iter().map(to).fold(f64::INFINITY, f64::min);
                 let largest = point.iter().fold(least, |most, x| most.max(x.abs()));
                 assert!((answer.distance - least).abs() <= 1e-13 * largest, "{point:?}: {answer:?}, {least}");

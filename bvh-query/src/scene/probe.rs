@@ -1,0 +1,273 @@
+//! Questions about points, rays and segments in the world, over all instances of a scene.
+//!
+//! Instances are asked in the order in which their boxes are met, nearest first, until none can change the answer. What is
+//! asked about are the vertices as [`Pose::place`](crate::Pose::place) defines them for the pose of an instance in the world.
+//! Probes meet all instances, whatever their groups.
+
+use crate::error::QueryError;
+use crate::narrow::Point;
+use crate::query::answers::{ClosestPoint, QueryStats, RayHit, Side, SignedDistance};
+use crate::query::probe::closest::check_within;
+use crate::query::probe::line::{Line, LineQuestion, range_in_box, sum_of_magnitudes};
+use crate::query::probe::placed::PlacedShape;
+use crate::query::probe::point::check_point;
+use crate::query::probe::ray::{All, Any, First, Ray};
+use crate::query::probe::segment::MeetsSegment;
+use crate::query::probe::side::OpenObject;
+use crate::query::querier::Querier;
+use crate::scene::instance::InstanceId;
+use crate::scene::world_box::WorldBox;
+use crate::scene::{Scene, SceneError};
+use std::ops::ControlFlow;
+
+/// The closest point of a scene to a given one.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct SceneClosestPoint {
+    /// The instance. Of instances that are equally near, the first.
+    pub instance: InstanceId,
+    /// The answer of [`Querier::closest_point`] for it, in the world.
+    pub closest: ClosestPoint,
+}
+
+/// Where a ray hits a scene.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct SceneRayHit {
+    /// The instance. Of instances that are hit at exactly the same parameter, the first.
+    pub instance: InstanceId,
+    /// The hit, in the world.
+    pub hit: RayHit,
+}
+
+/// The share of the magnitudes at hand that the box of an instance is enlarged by when a line is clipped to it.
+const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
+
+impl Scene {
+    /// Returns the closest point of all instances to each of many points in the world; nothing for a point from which all are
+    /// farther than `within`.
+    ///
+    /// Of each instance the answer is that of [`Querier::closest_point`], where its pose puts it.
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] for a point or limit that [`Querier::closest_point`] refuses, and [`SceneError::Instance`] with an
+    /// instance whose question has no answer; of several points, the first one's error.
+    pub fn closest_points(
+        &mut self,
+        points: &[[f64; 3]],
+        within: f64,
+    ) -> Result<Vec<Option<SceneClosestPoint>>, SceneError> {
+        check_within(within)?;
+        self.each_probe(points, |asked, point| asked.closest_point(&check_point(point)?, within))
+    }
+
+    /// Returns on which side of the instances each of many points in the world is: inside if it is inside any instance, else
+    /// on a surface, else undefined if it is in the box of an instance that has no inside, else outside.
+    ///
+    /// # Errors
+    /// Those of [`Scene::closest_points`], and of [`Querier::side`].
+    pub fn sides(&mut self, points: &[[f64; 3]]) -> Result<Vec<Side>, SceneError> {
+        self.each_probe(points, |asked, point| asked.side(&check_point(point)?))
+    }
+
+    /// Returns the closest points and the sides that points are on: see [`Scene::closest_points`] and [`Scene::sides`].
+    ///
+    /// # Errors
+    /// Those of both.
+    pub fn signed_distances(
+        &mut self,
+        points: &[[f64; 3]],
+        within: f64,
+    ) -> Result<Vec<Option<(InstanceId, SignedDistance)>>, SceneError> {
+        check_within(within)?;
+        self.each_probe(points, |asked, point| {
+            let point = check_point(point)?;
+            let Some(SceneClosestPoint { instance, closest }) = asked.closest_point(&point, within)? else {
+                return Ok(None);
+            };
+            let side = asked.side(&point)?;
+            Ok(Some((instance, SignedDistance { side, closest })))
+        })
+    }
+
+    /// Returns where each of many rays in the world first hits an instance.
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an instance whose
+    /// question has no answer; of several rays, the first one's error.
+    pub fn first_hits(&mut self, rays: &[Ray]) -> Result<Vec<Option<SceneRayHit>>, SceneError> {
+        self.each_probe(rays, |asked, ray| {
+            let mut first = First::new(ray)?;
+            asked.line(&mut first)?;
+            Ok(first.hit().map(|(instance, hit)| asked.hit(instance, hit)))
+        })
+    }
+
+    /// Returns whether each of many rays in the world hits any instance.
+    ///
+    /// # Errors
+    /// Those of [`Scene::first_hits`].
+    pub fn any_hits(&mut self, rays: &[Ray]) -> Result<Vec<bool>, SceneError> {
+        self.each_probe(rays, |asked, ray| {
+            let mut any = Any::new(ray)?;
+            asked.line(&mut any)?;
+            Ok(any.found)
+        })
+    }
+
+    /// Returns all hits of each of many rays in the world, in the order along it: see [`Querier::all_hits`]. Each parameter
+    /// occurs once, however many instances are hit at exactly that.
+    ///
+    /// # Errors
+    /// Those of [`Scene::first_hits`].
+    pub fn all_hits(&mut self, rays: &[Ray]) -> Result<Vec<Vec<SceneRayHit>>, SceneError> {
+        self.each_probe(rays, |asked, ray| {
+            let mut all = All::new(ray)?;
+            asked.line(&mut all)?;
+            Ok(all.hits().map(|(instance, hit)| asked.hit(instance, hit)).collect())
+        })
+    }
+
+    /// Returns whether each of many closed segments in the world meets any instance: see [`Querier::meets_segment`].
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] for ends that [`Querier::meets_segment`] refuses, and [`SceneError::Instance`] with an instance
+    /// whose question has no answer; of several segments, the first one's error.
+    pub fn meet_segments(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
+        self.each_probe(segments, |asked, [from, to]| {
+            let mut question = MeetsSegment::new(*from, *to)?;
+            asked.line(&mut question)?;
+            Ok(question.met)
+        })
+    }
+
+    /// Asks about each probe, on one thread or on all.
+    fn each_probe<P: Sync, R: Send>(
+        &mut self,
+        probes: &[P],
+        ask: impl Fn(&mut Asked<'_>, &P) -> Result<R, SceneError> + Sync,
+    ) -> Result<Vec<R>, SceneError> {
+        self.start();
+        let mut stats = QueryStats::default();
+        let scene = &*self;
+        let answers = scene.workers.each(probes, &mut stats, |querier, probe| {
+            querier.start();
+            Ok(Some(ask(&mut Asked { scene, querier }, probe)))
+        });
+        self.stats = stats;
+        answers.map_err(|(_, error)| SceneError::Query(error))?.into_iter().collect()
+    }
+}
+
+/// A scene that is asked about a probe.
+struct Asked<'a> {
+    scene: &'a Scene,
+    querier: &'a mut Querier,
+}
+
+impl Asked<'_> {
+    fn closest_point(&mut self, point: &Point, within: f64) -> Result<Option<SceneClosestPoint>, SceneError> {
+        let mut best: Option<SceneClosestPoint> = None;
+        let (mut limit, mut lower) = (within, f64::INFINITY);
+        let at = WorldBox { lo: *point, hi: *point };
+        self.visit(
+            |bounds| at.squared_gap(bounds),
+            |querier, id, shape, squared_gap| {
+                if squared_gap > limit * limit {
+                    return Ok(ControlFlow::Break(()));
+                }
+                let closest = querier.closest_point_of(&shape, point, limit)?;
+                if let Some(closest) = closest {
+                    lower = lower.min(closest.lower);
+                    limit = limit.min(closest.upper);
+                    let order = |of: &SceneClosestPoint| (of.closest.distance, of.instance);
+                    let found = SceneClosestPoint { instance: id, closest };
+                    if best.is_none_or(|best| order(&found) < order(&best)) {
+                        best = Some(found);
+                    }
+                }
+                Ok(ControlFlow::Continue(()))
+            },
+        )?;
+        Ok(best.map(|best| {
+            let lower = lower.min(best.closest.lower);
+            SceneClosestPoint { closest: ClosestPoint { lower, ..best.closest }, ..best }
+        }))
+    }
+
+    fn side(&mut self, point: &Point) -> Result<Side, SceneError> {
+        let mut sides = [false; 4];
+        let at = WorldBox { lo: *point, hi: *point };
+        self.visit(
+            |bounds| if at.squared_gap(bounds) > 0.0 { f64::INFINITY } else { 0.0 },
+            |querier, _, shape, _| {
+                let side = querier.side_of(&shape, point, OpenObject::Undefined)?;
+                sides[side as usize] = true;
+                Ok(if side == Side::Inside { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+            },
+        )?;
+        let order = [Side::Inside, Side::On, Side::Undefined];
+        Ok(order.into_iter().find(|side| sides[*side as usize]).unwrap_or(Side::Outside))
+    }
+
+    /// Asks a question about a line and all instances that it may matter for.
+    fn line(&mut self, question: &mut impl LineQuestion) -> Result<(), SceneError> {
+        let (Line { origin, direction, .. }, until) = (question.line(), question.limit());
+        let entry = |bounds: &WorldBox| {
+            let magnitude =
+                sum_of_magnitudes(&origin) + sum_of_magnitudes(&bounds.lo) + sum_of_magnitudes(&bounds.hi);
+            match range_in_box(&origin, &direction, &[bounds.lo, bounds.hi], ERROR * magnitude) {
+                Some([near, far]) if far >= 0.0 && near <= until => near.max(0.0),
+                _ => f64::INFINITY,
+            }
+        };
+        self.visit(entry, |querier, _, shape, entry| {
+            if entry > question.limit() {
+                return Ok(ControlFlow::Break(()));
+            }
+            querier.ask_line(&shape, question)?;
+            Ok(ControlFlow::Continue(()))
+        })
+    }
+
+    /// Calls `visit` with each instance whose box has a finite key, in ascending order of the keys, until it breaks. The key of
+    /// a box is at most that of any box in it.
+    fn visit(
+        &mut self,
+        key: impl Fn(&WorldBox) -> f64,
+        mut visit: impl FnMut(
+            &mut Querier,
+            InstanceId,
+            PlacedShape<'_>,
+            f64,
+        ) -> Result<ControlFlow<()>, QueryError>,
+    ) -> Result<(), SceneError> {
+        let Self { scene, querier } = self;
+        let mut order = scene.broad.by_key(&key);
+        while let Some((place, key)) = order.next(&scene.broad) {
+            let Some(instance) = scene.instances.get(place as usize).and_then(Option::as_ref) else {
+                continue;
+            };
+            let id = instance.id(place);
+            let mut ask = || {
+                let shape = instance.shape.opened()?;
+                let placed = PlacedShape { instance: place, ..shape.shape().at(&instance.world) };
+                visit(querier, id, placed, key)
+            };
+            match ask() {
+                Ok(ControlFlow::Continue(())) => {}
+                Ok(ControlFlow::Break(())) => break,
+                Err(source) => {
+                    return Err(SceneError::Instance { instance: scene.describe(id), source });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn hit(&self, instance: u32, hit: RayHit) -> SceneRayHit {
+        let of = self.scene.instances.get(instance as usize).and_then(Option::as_ref);
+        let instance = of.map_or(InstanceId { place: instance, generation: 0 }, |of| of.id(instance));
+        SceneRayHit { instance, hit }
+    }
+}

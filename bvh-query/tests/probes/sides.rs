@@ -1,0 +1,65 @@
+//! Inside and outside: labels, and winding numbers of rationals where it is hard.
+
+use crate::common::{Random, Triangle, bake, mesh, note};
+use crate::hard::{in_poses, point};
+use crate::labels::{each_label, number, queriers};
+use crate::rationals::{first, winding};
+use bvh_query::Side;
+use cbvh_testkit::depth::rounds;
+
+#[test]
+fn labelled_points_are_on_their_sides() {
+    let mut queriers = queriers();
+    let mut counts = [0; 3];
+    each_label(&["ball", "dragon"], "points", |bvh, point: [f64; 3], label, line| {
+        let label = (number(label, "side") + 1.0) as usize;
+        let expected = [Side::Outside, Side::On, Side::Inside][label];
+        counts[label] += 1;
+        for querier in &mut queriers {
+            assert_eq!(querier.side(bvh, point), Ok(expected), "{line}");
+        }
+    });
+    note(&format!("{counts:?} points outside, on and inside"));
+}
+
+/// The side of a point by rationals.
+fn side(random: &mut Random, point: &[f64; 3], triangles: &[Triangle], is_closed: bool) -> Side {
+    let axis = [1.0, 0.0, 0.0];
+    let is_on = |t: &Triangle| {
+        first(point, &axis, t).is_some_and(|t| t.compare(&crate::rationals::Rational::of(0.0)).is_eq())
+    };
+    if triangles.iter().any(is_on) {
+        return Side::On;
+    }
+    if !is_closed {
+        return Side::Undefined;
+    }
+    loop {
+        if let Some(winding) = winding(point, &random.point(), triangles) {
+            return if winding == 0 { Side::Outside } else { Side::Inside };
+        }
+    }
+}
+
+#[test]
+fn hard_points_are_on_the_sides_that_rationals_say() {
+    let random = &mut Random::new(53);
+    let mut queriers = queriers();
+    let mut counts = [0; 4];
+    for (mesh_of, pose) in in_poses(random) {
+        let bvh = bake(&mesh(&mesh_of.triangles), &bvh_bake::Options::default());
+        let mesh_of = mesh_of.placed(&pose);
+        for _ in 0..rounds(60) {
+            let point = point(random, &mesh_of);
+            // Vertices keep their coordinates: they are f32 numbers around an origin. Duplicates count.
+            let expected = side(random, &point, &mesh_of.triangles, mesh_of.is_closed);
+            for querier in &mut queriers {
+                let what = format!("{} {point:?} {:?}", mesh_of.name, querier.backend());
+                assert_eq!(querier.side(bvh.all().at(&pose), point), Ok(expected), "{what}");
+            }
+            counts[expected as usize] += 1;
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 50), "{counts:?}");
+    note(&format!("{counts:?} hard points inside, on, outside and where nothing is inside"));
+}
