@@ -68,6 +68,9 @@ pub struct Packet {
 }
 
 impl Packet {
+    /// A packet of zeros: room for another one.
+    pub const NONE: Self = Self { corners: [[[0.0; PACKET]; 3]; 3] };
+
     /// Makes a packet of one to four triangles. Lanes beyond them repeat the last triangle.
     pub fn new(triangles: &[[[f32; 3]; 3]]) -> Self {
         let mut packet = Self::default();

@@ -283,6 +283,23 @@ impl Bvh {
         Ok(room)
     }
 
+    /// Returns up to four leaf packets, and a bit for each triangle that they have: bit `4 * packet + triangle`. Packets are
+    /// in place or, if they are encoded, decoded into `rooms`.
+    #[inline(always)]
+    pub(crate) fn packets<'a>(
+        &'a self,
+        object: &Object,
+        leaves: &[LeafPacket],
+        rooms: &'a mut [Packet; 4],
+    ) -> Result<([&'a Packet; 4], u16), QueryError> {
+        let (mut packets, mut triangles) = ([&Packet::NONE; 4], 0);
+        for (place, (leaf, room)) in leaves.iter().zip(rooms).enumerate() {
+            packets[place] = self.packet(object, *leaf, room)?;
+            triangles |= ((1 << leaf.triangles) - 1) << (4 * place);
+        }
+        Ok((packets, triangles))
+    }
+
     /// Returns a triangle of a leaf packet.
     pub(crate) fn triangle(
         &self,

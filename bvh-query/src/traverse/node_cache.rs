@@ -277,7 +277,11 @@ fn decode_node<I: Isa>(
         _ => TurningCodes::NONE,
     };
     to.links = opened.links;
-    to.page = opened.page;
+    isa.prefetch(bvh.packets_to_prefetch(object, &opened.page, &to.links));
+    if bvh.is_worth_prefetching() {
+        isa.prefetch(opened.page.treelets_ahead(&to.links));
+    }
+    to.page = opened.page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
     to.opened = [CLOSED; 8];
     to.measure(isa, profile.groups());
@@ -287,7 +291,7 @@ fn decode_node<I: Isa>(
 /// What an opened node has besides slabs.
 pub(super) struct Opened<'a> {
     pub(super) links: Links,
-    pub(super) page: u32,
+    pub(super) page: Page<'a>,
     pub(super) treelet: &'a [u8],
 }
 
@@ -318,15 +322,11 @@ pub(super) fn open_child<'a, I: Isa>(
     let profile = object.profile();
     let treelet = at.treelet(slot);
     let links = Links::read(treelet);
-    isa.prefetch(bvh.packets_to_prefetch(object, &at, &links));
-    if bvh.is_worth_prefetching() {
-        isa.prefetch(at.treelets_ahead(&links));
-    }
     for part in 0..profile.groups() {
         let coding = (profile, object.f16_scale());
         decode_group(isa, coding, (treelet, part), (slabs, column), &mut to[part]);
     }
-    Ok(Some(Opened { links, page: at.header().page_number.get(), treelet }))
+    Ok(Some(Opened { links, page: at, treelet }))
 }
 
 /// Returns the page and the root that a remote link leads to, after checking that link and root name each other.

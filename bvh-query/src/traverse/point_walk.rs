@@ -39,28 +39,32 @@ pub(crate) trait PointVisitor {
 #[repr(C, align(64))]
 struct PointFrame {
     groups: [Group; 2],
-    /// The order of the inner children that are left: bound and number, see [`key`]. `GONE` for the others.
-    keys: [i64; 8],
+    /// Of the inner children that are left; `GONE` for the others.
+    bounds: [f32; 8],
     links: Links,
     page: u32,
 }
 
-/// The key of a child that is not to be visited.
-const GONE: i64 = i64::MAX;
+/// The bound of a child that is not to be visited.
+const GONE: f32 = f32::INFINITY;
 
-/// Returns a number that is in the order of bounds, with the number of a child in its lowest bits.
-#[inline(always)]
-fn key(bound: f32, child: usize) -> i64 {
-    let bits = bound.to_bits() as i32;
-    // Negative numbers the other way round.
-    let ordered = bits ^ ((bits >> 31) as u32 >> 1) as i32;
-    i64::from(ordered) << 32 | child as i64
-}
+/// What makes the bounds of four children `GONE` whose bits are set, by their maximum.
+static HIDDEN: [[f32; 4]; 16] = {
+    let mut hidden = [[f32::NEG_INFINITY; 4]; 16];
+    let mut at = 0;
+    while at < 64 {
+        if (at / 4) >> (at % 4) & 1 == 1 {
+            hidden[at / 4][at % 4] = GONE;
+        }
+        at += 1;
+    }
+    hidden
+};
 
 impl PointFrame {
     const EMPTY: Self = Self {
         groups: [Group::ZERO; 2],
-        keys: [GONE; 8],
+        bounds: [GONE; 8],
         links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
         page: 0,
     };
@@ -68,18 +72,24 @@ impl PointFrame {
     /// Removes the nearest child that is left, if its bound is at most `limit`.
     #[inline(always)]
     fn take_nearest(&mut self, parts: usize, limit: f32) -> Option<usize> {
-        let [a, b, c, d, e, f, g, h] = self.keys;
-        let mut nearest = a.min(b).min(c.min(d));
+        let mut child = self.nearest_of(0);
         if parts == 2 {
-            nearest = nearest.min(e.min(f).min(g.min(h)));
+            child = self.nearer(child, self.nearest_of(4));
         }
-        let child = nearest as usize & 7;
-        // A limit is not negative.
-        if nearest > key(limit, u32::MAX as usize) {
-            return None;
-        }
-        self.keys[child] = GONE;
-        Some(child)
+        let bound = std::mem::replace(&mut self.bounds[child & 7], GONE);
+        (bound <= limit && bound != GONE).then_some(child)
+    }
+
+    /// Returns the nearest of four children.
+    #[inline(always)]
+    fn nearest_of(&self, first: usize) -> usize {
+        self.nearer(self.nearer(first, first + 1), self.nearer(first + 2, first + 3))
+    }
+
+    /// Returns the nearer of two children, the first of equal ones. No branch could be predicted here.
+    #[inline(always)]
+    fn nearer(&self, first: usize, second: usize) -> usize {
+        first + (second - first) * usize::from(self.bounds[second & 7] < self.bounds[first & 7])
     }
 }
 
@@ -109,7 +119,7 @@ impl PointStack {
             (root.links, root.page) = (Links { kinds: 1, ..Links::default() }, page);
             self.of = Some((bvh.identity(), page));
         }
-        self.frames[0].keys[0] = key(0.0, 0);
+        self.frames[0].bounds[0] = 0.0;
         Ok(())
     }
 }
@@ -155,6 +165,10 @@ impl<V: PointVisitor> Task for PointWalk<'_, V> {
             else {
                 continue;
             };
+            if bvh.is_worth_prefetching() {
+                prefetch_ahead(isa, page.treelets_ahead(&links));
+            }
+            let page = page.header().page_number.get();
             (next.links, next.page) = (links, page);
             let children = links.children().min(4 * parts);
             let mut inner = 0;
@@ -162,16 +176,13 @@ impl<V: PointVisitor> Task for PointWalk<'_, V> {
             for part in 0..parts {
                 let bounds = visitor.bounds(isa, &next.groups[part & 1]);
                 let exist = ((1u32 << children) - 1) >> (4 * part);
-                let near = u32::from(I::H::bits(bounds.le(isa.splat4(visitor.limit())))) & exist & 0xf;
+                let near = bounds.le(isa.splat4(visitor.limit()));
                 let are_leaves = u32::from(leaf_lanes(&links, part));
-                let mut values = [0.0; 4];
-                isa.store4(bounds, &mut values);
-                let inner_here = near & !are_leaves;
-                for lane in 0..4 {
-                    let key = key(values[lane], 4 * part + lane);
-                    next.keys[(4 * part + lane) & 7] = if inner_here >> lane & 1 == 1 { key } else { GONE };
-                }
-                inner |= inner_here;
+                let hidden = isa.load4(&HIDDEN[((are_leaves | !exist) & 0xf) as usize]);
+                let kept = I::H::select(near, bounds, isa.splat4(GONE)).max(hidden);
+                isa.store4(kept, &mut next.bounds.as_chunks_mut().0[part & 1]);
+                let near = u32::from(I::H::bits(near)) & exist & 0xf;
+                inner |= near & !are_leaves;
                 leaves |= (near & are_leaves) << (4 * part);
             }
             let visits = 1 + u64::from(leaves.count_ones());
@@ -190,6 +201,15 @@ impl<V: PointVisitor> Task for PointWalk<'_, V> {
             depth += usize::from(inner != 0);
         }
         Ok((opened * parts) as u64)
+    }
+}
+
+/// Prefetches the treelets of up to four children, without a branch for each.
+#[inline(always)]
+fn prefetch_ahead<I: Isa>(isa: I, treelets: &[u8]) {
+    let Some(last) = treelets.len().checked_sub(1) else { return };
+    for line in 0..8 {
+        isa.prefetch_line(&treelets[(64 * line).min(last)]);
     }
 }
 

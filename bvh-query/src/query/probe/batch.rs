@@ -153,14 +153,22 @@ fn along_curve(points: &[[f64; 3]]) -> Vec<u32> {
         }
     }
     let widest = (0..3).map(|axis| hi[axis] - lo[axis]).fold(0.0, f64::max);
+    let cells = 65535.0 / widest;
     let code = |point: &[f64; 3]| {
-        (0..3).fold(0u64, |code, axis| {
-            // A point that is no point counts as 0.
-            let cell = ((point[axis] - lo[axis]) / widest * 65535.0) as u64;
-            (0..16).fold(code, |code, bit| code | (cell >> bit & 1) << (3 * bit + axis))
-        })
+        // A point that is no point counts as 0.
+        let cell = |axis: usize| every_third_bit(((point[axis] - lo[axis]) * cells) as u16);
+        cell(0) | cell(1) << 1 | cell(2) << 2
     };
     let mut order: Vec<(u64, u32)> = points.iter().map(code).zip(0..).collect();
     order.sort_unstable();
     order.into_iter().map(|(_, number)| number).collect()
+}
+
+/// Moves bit i to place 3i.
+fn every_third_bit(bits: u16) -> u64 {
+    let bits = u64::from(bits);
+    let bits = (bits | bits << 16) & 0xff00_00ff;
+    let bits = (bits | bits << 8) & 0x00f0_0f00_f00f;
+    let bits = (bits | bits << 4) & 0x0c30_c30c_30c3;
+    (bits | bits << 2) & 0x2492_4924_9249
 }

@@ -7,6 +7,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
+use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
 use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_within};
@@ -49,7 +50,8 @@ pub(in crate::query) struct BoundedTriangle {
 struct Best {
     closest: Closest,
     object: u32,
-    triangle: u32,
+    /// Ids are read where they matter: of the answer, and of triangles that tie.
+    place: TrianglePlace,
 }
 
 impl Querier {
@@ -98,7 +100,7 @@ impl Querier {
                 self.backend.run(SearchObject { search: &mut search, placed, index, memory, bounded })?;
             self.stats.add(tests, stats);
         }
-        Ok(search.answer())
+        search.answer(placed.shape)
     }
 }
 
@@ -119,12 +121,14 @@ struct Search {
 }
 
 impl Search {
-    fn answer(&self) -> Option<ClosestPoint> {
-        let Best { closest, object, triangle } = self.best?;
+    fn answer(&self, shape: Shape<'_>) -> Result<Option<ClosestPoint>, QueryError> {
+        let Some(Best { closest, object, place }) = self.best else { return Ok(None) };
+        let of = &shape.objects()[object as usize - shape.first()];
+        let triangle = shape.bvh().triangle_id(of, place)?;
         let Closest { distance, upper, point_a, .. } = closest;
         // Triangles that were left out are beyond the limit, which has only ever decreased.
         let lower = if distance == 0.0 { 0.0 } else { self.settled_lower.min(self.limit) };
-        Some(ClosestPoint { distance, lower, upper, point: point_a, object, triangle })
+        Ok(Some(ClosestPoint { distance, lower, upper, point: point_a, object, triangle }))
     }
 }
 
@@ -171,6 +175,8 @@ struct Nearest<'a> {
     limit: f32,
     test: PointTest,
     local: LocalPoint,
+    /// Room for packets that are encoded.
+    rooms: [Packet; 4],
     bounded: &'a mut Vec<BoundedTriangle>,
     stats: QueryStats,
 }
@@ -202,6 +208,7 @@ impl<'a> Nearest<'a> {
             limit: round_up(search.limit * stretch * scale),
             test: PointTest::new(&point, object.profile().directions(), error, scale as f32),
             local: LocalPoint::new(&point, error, scale as f32),
+            rooms: [Packet::NONE; 4],
             search,
             bounded,
             stats: QueryStats::default(),
@@ -225,9 +232,11 @@ impl<'a> Nearest<'a> {
                 triangle = placed(&triangle, pose);
             }
             let closest = point_distance(&triangle, point);
+            let place = TrianglePlace { page: leaf.page, packet: leaf.packet, lane };
             let is_better = match &search.best {
+                // Objects come in the order of their numbers.
                 Some(best) if closest.distance == best.closest.distance => {
-                    (self.number, self.id(leaf, lane)?) < (best.object, best.triangle)
+                    self.number == best.object && self.id(place)? < self.id(best.place)?
                 }
                 Some(best) => closest.distance < best.closest.distance,
                 None => {
@@ -236,8 +245,7 @@ impl<'a> Nearest<'a> {
                 }
             };
             if is_better {
-                let best = Best { closest, object: self.number, triangle: self.id(leaf, lane)? };
-                self.search.best = Some(best);
+                self.search.best = Some(Best { closest, object: self.number, place });
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);
             self.limit = self.limit.min(round_up(closest.upper * LIMIT_WIDENING * self.stretch * self.scale));
@@ -247,8 +255,7 @@ impl<'a> Nearest<'a> {
     }
 
     /// Returns the number of a triangle in the input.
-    fn id(&self, leaf: LeafPacket, lane: u8) -> Result<u32, QueryError> {
-        let place = TrianglePlace { page: leaf.page, packet: leaf.packet, lane };
+    fn id(&self, place: TrianglePlace) -> Result<u32, QueryError> {
         self.bvh.triangle_id(self.object, place)
     }
 }
@@ -267,14 +274,8 @@ impl PointVisitor for Nearest<'_> {
     #[inline(always)]
     fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
         self.stats.packet_tests += leaves.len() as u64;
-        let mut rooms = [Packet::default(); 4];
-        let (mut packets, mut valid) = ([None; 4], 0u16);
-        for (place, (leaf, room)) in leaves.iter().zip(&mut rooms).enumerate() {
-            packets[place] = Some(self.bvh.packet(self.object, *leaf, room)?);
-            valid |= ((1 << leaf.triangles) - 1) << (4 * place);
-        }
-        let none = Packet::default();
-        let bounds = point_bounds(isa, packets.map(|packet| packet.unwrap_or(&none)), &self.local);
+        let (packets, valid) = self.bvh.packets(self.object, leaves, &mut self.rooms)?;
+        let bounds = point_bounds(isa, packets, &self.local);
         let nearest = isa.least(&bounds.upper, valid) as usize & 15;
         self.limit = self.limit.min(round_up(f64::from(bounds.upper[nearest]) * self.stretch));
         let mut left = valid & I::V::bits(isa.load(&bounds.lower).le(isa.splat(self.limit)));

@@ -239,6 +239,7 @@ impl<Q: LineQuestion> Task for AskObject<'_, Q> {
             direction: direction(&clipped.direction),
             limit: clipped.share(question.limit()),
             clipped,
+            rooms: [Packet::NONE; 4],
             question,
             stats: QueryStats::default(),
         };
@@ -259,6 +260,8 @@ struct Walked<'a, Q> {
     clipped: Clipped,
     /// The share of the segment that is left.
     limit: f32,
+    /// Room for packets that are encoded.
+    rooms: [Packet; 4],
     stats: QueryStats,
 }
 
@@ -292,14 +295,7 @@ impl<Q: LineQuestion> PointVisitor for Walked<'_, Q> {
     #[inline(always)]
     fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
         self.stats.packet_tests += leaves.len() as u64;
-        let mut rooms = [Packet::default(); 4];
-        let (mut packets, mut valid) = ([None; 4], 0u16);
-        for (place, (leaf, room)) in leaves.iter().zip(&mut rooms).enumerate() {
-            packets[place] = Some(self.bvh.packet(self.object, *leaf, room)?);
-            valid |= ((1 << leaf.triangles) - 1) << (4 * place);
-        }
-        let none = Packet::default();
-        let packets = packets.map(|packet| packet.unwrap_or(&none));
+        let (packets, valid) = self.bvh.packets(self.object, leaves, &mut self.rooms)?;
         let corner = &packets[0].corners[0];
         let near = self.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
         let point = LocalPoint::new(&near, self.clipped.segment.error, self.clipped.scale as f32);
