@@ -1,6 +1,6 @@
 //! The probes that are hard to decide, and meshes on which they are.
 
-use crate::common::shapes::{cube, dirty, moved, plate, soup, sphere, torus};
+use crate::common::shapes::{cube, dirty, moved, on_lattice, outward, plate, soup, sphere, torus};
 use crate::common::{Random, Stored, Triangle, placed, random_pose, stored};
 use bvh_query::{Bvh, Pose};
 
@@ -10,20 +10,6 @@ pub(crate) struct Mesh {
     pub(crate) triangles: Vec<Triangle>,
     /// It is closed and consistently oriented, its duplicates counted.
     pub(crate) is_closed: bool,
-}
-
-/// Rounds to a lattice on which middles of edges and sums are exact, and which closes seams that rounding has opened.
-pub(crate) fn on_lattice(triangles: Vec<Triangle>) -> Vec<Triangle> {
-    triangles.into_iter().map(|t| t.map(|p| p.map(|v| (v * 1024.0).round() / 1024.0))).collect()
-}
-
-/// Turns the triangles of a mesh around the origin such that all look away from it.
-pub(crate) fn outward(triangles: Vec<Triangle>) -> Vec<Triangle> {
-    let is_outward = |[a, b, c]: &Triangle| {
-        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
-        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1) > 0.0
-    };
-    triangles.into_iter().map(|t| if is_outward(&t) { t } else { [t[0], t[2], t[1]] }).collect()
 }
 
 fn reversed(triangles: &[Triangle]) -> Vec<Triangle> {

@@ -271,3 +271,37 @@ fn no_triangle_is_nearer_than_the_answer() {
         }
     }
 }
+
+/// Sides, rays and segments in batches, about a mesh in its own frame and one in the world.
+#[test]
+#[cfg(feature = "parallel")]
+fn batches_of_all_probes_have_the_same_answers() {
+    use bvh_query::Ray;
+    let random = &mut Random::new(45);
+    let bvh = baked(&torus(24, 12));
+    let pose = random_pose(random, 0.5);
+    let points: Vec<[f64; 3]> = (0..700).map(|_| random.point().map(|v| 1.5 * v)).collect();
+    let rays: Vec<Ray> = points.iter().map(|point| Ray::new(*point, random.point())).collect();
+    let segments: Vec<[[f64; 3]; 2]> = points.iter().map(|point| [*point, random.point()]).collect();
+    let mut querier = Querier::new().unwrap();
+    for shape in [bvh.all().into(), bvh.all().at(&pose)] {
+        let batch = ProbeBatch::new(shape).unwrap();
+        let q = &mut querier;
+        let expected: Vec<_> = points.iter().map(|p| q.side(shape, *p).unwrap()).collect();
+        assert_eq!(batch.sides(&points), Ok(expected));
+        let expected: Vec<_> = points.iter().map(|p| q.signed_distance(shape, *p, 0.5).unwrap()).collect();
+        assert_eq!(batch.signed_distances(&points, 0.5), Ok(expected));
+        let expected: Vec<_> = rays.iter().map(|ray| q.first_hit(shape, ray).unwrap()).collect();
+        assert_eq!(batch.first_hits(&rays), Ok(expected));
+        let expected: Vec<_> = rays.iter().map(|ray| q.any_hit(shape, ray).unwrap()).collect();
+        assert_eq!(batch.any_hits(&rays), Ok(expected));
+        let expected: Vec<_> = rays.iter().map(|ray| q.all_hits(shape, ray).unwrap()).collect();
+        assert_eq!(batch.all_hits(&rays), Ok(expected));
+        let expected: Vec<_> =
+            segments.iter().map(|[p, q_]| q.meets_segment(shape, *p, *q_).unwrap()).collect();
+        assert_eq!(batch.meet_segments(&segments), Ok(expected));
+    }
+    let mut bad = rays.clone();
+    bad[300].direction = [0.0; 3];
+    assert!(matches!(ProbeBatch::new(&bvh).unwrap().any_hits(&bad), Err(QueryError::Number { .. })));
+}

@@ -1,7 +1,8 @@
 //! Rays and segments: labels, hard cases, and every corner and edge of closed meshes seen from inside.
 
+use crate::common::shapes::on_lattice;
 use crate::common::{Random, bake, mesh, note, stored};
-use crate::hard::{direction, in_poses, on_lattice, point, stored_at};
+use crate::hard::{direction, in_poses, point, stored_at};
 use crate::labels::{each_label, number, queriers};
 use crate::rationals::{Rational, first};
 use bvh_query::{Querier, QueryError, Ray};

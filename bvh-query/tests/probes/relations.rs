@@ -1,8 +1,7 @@
 //! How two meshes lie: nested, apart, touching and mixed, in poses; and what open meshes leave undefined.
 
-use crate::common::shapes::{cube, moved, plate, sphere};
+use crate::common::shapes::{cube, moved, on_lattice, outward, plate, sphere};
 use crate::common::{Random, Triangle, bake, mesh, note, placed, random_pose, stored, translation};
-use crate::hard::{on_lattice, outward};
 use crate::labels::queriers;
 use crate::rationals::winding;
 use bvh_query::{Bvh, Pose, QueryError, Relation};

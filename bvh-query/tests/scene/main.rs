@@ -6,6 +6,7 @@
 mod common;
 mod files;
 mod motions;
+mod probes;
 mod trackers;
 
 use bvh_query::{
