@@ -1,11 +1,12 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
-//! `motion`; `scene`; `report`. They stand on `options` (what several commands accept), `process` (memory and signals) and `console` (what
-//! is printed, and how a command ends). Imports lead from the former to the latter only. What scripts may rely on is in
-//! `cbvh --help` and in the help of each command.
+//! `motion`; `scene`; `report`. They stand on `asking` (what commands that ask questions have in common), `options` (what
+//! several commands accept), `process` (memory and signals) and `console` (what is printed, and how a command ends). Imports
+//! lead from the former to the latter only. What scripts may rely on is in `cbvh --help` and in the help of each command.
 
 mod arguments;
+mod asking;
 mod assets;
 mod bake;
 mod check;

@@ -154,7 +154,11 @@ fn what_is_wrong_is_told_in_one_line_before_the_work() {
     fails(3, &["twice.txt", "--out", "o"], &["twice.txt: line 3", "again"]);
     fails(3, &["mesh.txt", "--out", "o"], &["bad.obj: line 2"]);
     fails(3, &["poses.txt", "--out", "o"], &["p.txt: line 1", "found 3"]);
-    fails(3, &["void.txt", "--out", "o"], &["empty.txt: expected poses, found none"]);
+    fails(
+        3,
+        &["void.txt", "--out", "o"],
+        &["empty.txt: expected at least one line of 12 numbers", "found no pose"],
+    );
     fails(3, &["poses.txt", "--motions", "--out", "o"], &["p.txt: line 1", "expected 24 numbers", "found 3"]);
     fails(3, &["void.txt", "--motions", "--out", "o"], &["empty.txt", "in at least one line, found none"]);
     fails(3, &["bad.txt", "--motions", "--out", "o"], &["bad.txt: line 2", "found 2 words"]);

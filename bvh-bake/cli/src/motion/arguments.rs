@@ -1,6 +1,7 @@
 //! The arguments of `cbvh motion`.
 
-use crate::options::{LayoutArguments, not_negative, positive, threads, whole};
+use crate::asking::AskingArguments;
+use crate::options::{not_negative, positive};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -30,11 +31,7 @@ pub(crate) struct MotionArguments {
     /// The second mesh, which moves
     pub(super) b: PathBuf,
     /// Files of motions, separated by commas
-    #[arg(
-        value_name = "MOTIONS[,MOTIONS...]",
-        required_unless_present = "motion",
-        conflicts_with = "motion"
-    )]
+    #[arg(value_name = "MOTIONS[,MOTIONS...]", required_unless_present = "one", conflicts_with = "one")]
     pub(super) motions: Option<String>,
     /// Meshes that come as near as this count as a hit, in mesh units
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true)]
@@ -42,37 +39,10 @@ pub(crate) struct MotionArguments {
     /// How near B may come to a hit without a certain answer, in mesh units [default: 1e-6 of the larger diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub(super) tolerance: Option<f64>,
-    /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
-    #[arg(long, value_name = "ISA", default_value = "auto")]
-    pub(super) isa: String,
-    /// The number of threads that share the motions
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true,
-          conflicts_with = "motion")]
-    pub(super) jobs: u16,
     #[command(flatten)]
-    pub(super) layout: LayoutArguments,
-    /// Query only the object of this name, in each mesh that has one
-    #[arg(long, value_name = "NAME")]
-    pub(super) object: Option<String>,
-    /// Write raw answers and times to this file; %s stands for the name of the file of motions
-    #[arg(long, value_name = "raw_%s.txt", conflicts_with = "motion")]
-    pub(super) out: Option<String>,
-    /// Stop each file after this many seconds
-    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "motion")]
-    pub(super) budget: Option<f64>,
-    /// Untimed motions before the timed ones, taken from the end of the file
-    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "motion")]
-    pub(super) warm: usize,
-    /// Ask only the first N motions of each file; 0 asks all
-    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "motion")]
-    pub(super) limit: usize,
-    /// Print one JSON object per file, as always when standard output is not a terminal
-    #[arg(long, conflicts_with = "motion")]
-    pub(super) json: bool,
+    pub(super) asking: AskingArguments,
     /// Ask about one motion, given as 24 numbers, and print the answer for a person
-    #[arg(long, value_name = "24 NUMBERS", allow_hyphen_values = true)]
+    #[arg(id = "one", long = "motion", value_name = "24 NUMBERS", allow_hyphen_values = true)]
     pub(super) motion: Option<String>,
     /// With --motion: write the closest triangles at a hit and the segment between them as OBJ
     #[arg(long, value_name = "OBJ")]

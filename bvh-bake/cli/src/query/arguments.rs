@@ -1,6 +1,7 @@
 //! The arguments of `cbvh query`.
 
-use crate::options::{LayoutArguments, not_negative, threads, whole};
+use crate::asking::AskingArguments;
+use crate::options::not_negative;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -33,7 +34,7 @@ pub(crate) struct QueryArguments {
     /// The second mesh, which the poses place
     pub(super) b: PathBuf,
     /// Pose files, separated by commas
-    #[arg(value_name = "POSES[,POSES...]", required_unless_present = "pose", conflicts_with = "pose")]
+    #[arg(value_name = "POSES[,POSES...]", required_unless_present = "one", conflicts_with = "one")]
     pub(super) poses: Option<String>,
     /// The question
     #[arg(long, value_enum, default_value = "collide")]
@@ -47,69 +48,18 @@ pub(crate) struct QueryArguments {
     /// With --mode distance: the answer may exceed the least distance by this length, in mesh units
     #[arg(long, value_name = "E", value_parser = not_negative, allow_negative_numbers = true)]
     pub(super) abs_err: Option<f64>,
-    /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
-    #[arg(long, value_name = "ISA", default_value = "auto")]
-    pub(super) isa: String,
-    /// The number of threads that share the poses
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true,
-          conflicts_with = "pose")]
-    pub(super) jobs: u16,
     #[command(flatten)]
-    pub(super) layout: LayoutArguments,
-    /// Query only the object of this name, in each mesh that has one
-    #[arg(long, value_name = "NAME")]
-    pub(super) object: Option<String>,
-    /// Write raw answers and times to this file; %s stands for the name of the pose file
-    #[arg(long, value_name = "raw_%s.txt", conflicts_with = "pose")]
-    pub(super) out: Option<String>,
-    /// Stop each pose file after this many seconds
-    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "pose")]
-    pub(super) budget: Option<f64>,
-    /// Untimed queries before the timed ones, taken from the end of the pose file
-    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "pose")]
-    pub(super) warm: usize,
-    /// Ask only the first N poses of each file; 0 asks all
-    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "pose")]
-    pub(super) limit: usize,
+    pub(super) asking: AskingArguments,
     /// Time queries of files evicted from the page cache: the system is asked to evict both files before each query, and
     /// the time includes opening them
-    #[arg(long, conflicts_with_all = ["pose", "jobs", "warm"])]
+    #[arg(long, conflicts_with_all = ["one", "jobs", "warm"])]
     pub(super) cold: bool,
-    /// How the system reads .cbvh files from the disk
-    #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
-    pub(super) read_ahead: ReadAhead,
-    /// Print one JSON object per pose file, as always when standard output is not a terminal
-    #[arg(long, conflicts_with = "pose")]
-    pub(super) json: bool,
     /// Ask about one pose, given as 12 numbers, and print the answer for a person
-    #[arg(long, value_name = "12 NUMBERS", allow_hyphen_values = true)]
+    #[arg(id = "one", long = "pose", value_name = "12 NUMBERS", allow_hyphen_values = true)]
     pub(super) pose: Option<String>,
     /// With --pose and --mode distance: write both closest triangles and the segment between them as OBJ
     #[arg(long, value_name = "OBJ")]
     pub(super) witness: Option<PathBuf>,
-}
-
-/// How the system reads a file from the disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ReadAhead {
-    /// As the system chooses: some pages around each page that is touched
-    Usual,
-    /// Only the pages that queries touch
-    Sparse,
-    /// The whole file, in the background
-    Whole,
-}
-
-impl From<ReadAhead> for bvh_query::ReadAhead {
-    fn from(how: ReadAhead) -> Self {
-        match how {
-            ReadAhead::Usual => Self::Usual,
-            ReadAhead::Sparse => Self::Sparse,
-            ReadAhead::Whole => Self::Whole,
-        }
-    }
 }
 
 /// A question about two meshes.

@@ -1,7 +1,7 @@
 //! Times queries of files evicted from the page cache.
 
 use super::question::{Answer, Question, Run};
-use super::side::{How, Side, Sides};
+use crate::asking::mesh::{How, LoadedMesh, blame};
 use crate::console::Failure;
 use crate::process::from_disk::{self, FromDisk};
 use bvh_query::{Backend, Pose, Querier, QueryStats};
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 /// The means over all queries that the JSON line has in addition.
 #[derive(Serialize)]
-pub(crate) struct Means {
+pub(super) struct Means {
     cold: bool,
     open_ns_mean: Option<f64>,
     disk_faults_mean: Option<f64>,
@@ -36,11 +36,10 @@ pub(super) fn run(
     let mut stats = QueryStats::default();
     let start = Instant::now();
     for pose in poses {
-        let ask = |a: &Side, b: &Side| {
-            let sides = Sides { a, b };
-            question.ask(&mut querier, &sides, pose).map_err(|error| sides.blame(error))
+        let ask = |a: &LoadedMesh, b: &LoadedMesh| {
+            question.ask(&mut querier, [a, b], pose).map_err(|error| blame(a, Some(b), error))
         };
-        let Some(one) = from_disk::ask(paths, |path| Side::open(path, how), ask)? else {
+        let Some(one) = from_disk::ask(paths, |path| LoadedMesh::open(path, how), ask)? else {
             let text = "--cold: this system cannot evict files from the page cache or count page faults";
             return Err(Failure::System(text.into()));
         };

@@ -1,9 +1,11 @@
 //! What a query asks about each pose, and what it answers.
 
 use super::arguments::{Mode, QueryArguments};
-use super::runner;
-use super::side::Sides;
-use crate::console::Failure;
+use crate::asking;
+use crate::asking::mesh::LoadedMesh;
+use crate::asking::runner;
+use crate::console::{Failure, plural, significant};
+use bvh_format::checksum::Hasher;
 use bvh_query::{DistanceOptions, Pose, Querier, QueryError};
 use std::ops::ControlFlow;
 
@@ -26,9 +28,6 @@ pub(super) enum Answer {
     /// A distance in mesh units.
     Length(f64),
 }
-
-/// An answer and its nanoseconds.
-pub(super) type Timed = (Answer, u64);
 
 /// The results of a file of poses.
 pub(super) type Run = runner::Run<Answer>;
@@ -67,10 +66,10 @@ impl Question {
     pub(super) fn ask(
         &self,
         querier: &mut Querier,
-        sides: &Sides<'_>,
+        meshes: [&LoadedMesh; 2],
         pose: &Pose,
     ) -> Result<Answer, QueryError> {
-        let (a, b) = sides.shapes();
+        let [a, b] = meshes.map(LoadedMesh::shape);
         Ok(match self.mode {
             Mode::Collide => Answer::Flag(querier.collide(a, b, pose)?),
             Mode::Contacts => {
@@ -80,11 +79,28 @@ impl Question {
             Mode::Within => Answer::Flag(querier.within(a, b, pose, self.within)?),
         })
     }
+
+    /// Returns an answer in words, with its unit.
+    pub(super) fn in_words(&self, answer: &Answer) -> String {
+        match *answer {
+            Answer::Flag(flag) => match (self.mode, flag) {
+                (Mode::Within, true) => format!("at most {:?} mesh units apart", self.within),
+                (Mode::Within, false) => format!("more than {:?} mesh units apart", self.within),
+                (_, true) => "touching".to_owned(),
+                (_, false) => "not touching".to_owned(),
+            },
+            Answer::Count(count) => format!("{count} {} of triangles in contact", plural(count, "pair")),
+            Answer::Length(0.0) => "0 mesh units apart, touching".to_owned(),
+            // With an allowed error, the least distance may be shorter.
+            Answer::Length(length) if !self.is_exact() => format!("at most {length:?} mesh units apart"),
+            Answer::Length(length) => format!("{length:?} mesh units apart"),
+        }
+    }
 }
 
-impl Answer {
+impl asking::Answer for Answer {
     /// Returns true for contact, and for a yes to `within`.
-    pub(super) fn is_positive(&self) -> bool {
+    fn is_positive(&self) -> bool {
         match *self {
             Self::Flag(flag) => flag,
             Self::Count(count) => count > 0,
@@ -92,12 +108,52 @@ impl Answer {
         }
     }
 
-    /// Returns the answer as a number.
-    pub(super) fn value(&self) -> f64 {
+    fn value(&self) -> f64 {
         match *self {
             Self::Flag(flag) => f64::from(u8::from(flag)),
             Self::Count(count) => count as f64,
             Self::Length(length) => length,
+        }
+    }
+
+    fn raw(&self) -> String {
+        match *self {
+            Self::Flag(flag) => u8::from(flag).to_string(),
+            Self::Count(count) => count.to_string(),
+            Self::Length(length) => significant(length),
+        }
+    }
+
+    /// Hashes a byte for yes or no, a `u64` for a count, the bits of a distance.
+    fn hash(&self, hasher: &mut Hasher) {
+        match *self {
+            Self::Flag(flag) => hasher.update(&[u8::from(flag)]),
+            Self::Count(count) => hasher.update(&count.to_le_bytes()),
+            Self::Length(length) => hasher.update(&length.to_bits().to_le_bytes()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_have_units() {
+        let question = |mode| Question { mode, within: 0.5, errors: DistanceOptions::new() };
+        let rough = Question { errors: DistanceOptions::new().rel_err(0.1), ..question(Mode::Distance) };
+        for (answer, question, words) in [
+            (Answer::Flag(true), question(Mode::Collide), "touching"),
+            (Answer::Flag(false), question(Mode::Collide), "not touching"),
+            (Answer::Flag(true), question(Mode::Within), "at most 0.5 mesh units apart"),
+            (Answer::Flag(false), question(Mode::Within), "more than 0.5 mesh units apart"),
+            (Answer::Count(1), question(Mode::Contacts), "1 pair of triangles in contact"),
+            (Answer::Count(0), question(Mode::Contacts), "0 pairs of triangles in contact"),
+            (Answer::Length(0.0), question(Mode::Distance), "0 mesh units apart, touching"),
+            (Answer::Length(0.25), question(Mode::Distance), "0.25 mesh units apart"),
+            (Answer::Length(0.25), rough, "at most 0.25 mesh units apart"),
+        ] {
+            assert_eq!(question.in_words(&answer), words);
         }
     }
 }

@@ -16,8 +16,8 @@ mod source;
 
 pub(crate) use arguments::ReportArguments;
 
+use crate::asking;
 use crate::console::{Failure, spinner};
-use crate::query;
 use document::{Report, Settings};
 use kind::{Kind, Subject};
 use layouts::Layouts;
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
 
 /// Measures one pair after another. `files` are further files of items for all pairs.
 fn run_kind<K: Kind>(arguments: &ReportArguments, files: Option<&str>) -> Result<(), Failure> {
-    let backend = query::backend(&arguments.isa)?;
+    let backend = asking::backend(&arguments.isa)?;
     let inputs = inputs::read::<K>(arguments, files)?;
     files::make_folder(&arguments.out)?;
     let spinner = spinner(false);

@@ -1,7 +1,7 @@
 //! The mesh to bake: read from a mesh file, or taken out of a `.cbvh` file.
 
+use crate::asking::mesh::{is_baked, refuse_scene};
 use crate::console::Failure;
-use crate::query::side::{is_baked, refuse_scene};
 use bvh_bake::input;
 use bvh_bake::mesh::Mesh;
 use bvh_format::ids::decode_id;

@@ -1,9 +1,9 @@
 //! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
 
+use crate::asking::mesh::{How, LoadedMesh};
+use crate::asking::poses;
 use crate::console::Failure;
 use crate::options::LayoutArguments;
-use crate::query::poses;
-use crate::query::side::{How, Side};
 use bvh_query::{Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -172,11 +172,11 @@ pub(super) fn load(
     };
     let mut shapes = Vec::new();
     for (_, _, file) in &text.meshes {
-        let mut side = Side::load(file, &how)?;
-        side.check()?;
-        loaded.triangles = loaded.triangles.saturating_add(side.triangles());
-        loaded.build_seconds += side.build_seconds;
-        shapes.push(OwnedShape::from(side.bvh));
+        let mut mesh = LoadedMesh::load(file, &how)?;
+        mesh.check()?;
+        loaded.triangles = loaded.triangles.saturating_add(mesh.triangles());
+        loaded.build_seconds += mesh.build_seconds;
+        shapes.push(OwnedShape::from(mesh.bvh));
     }
     let mut ids = Vec::new();
     for (number, name, mesh, pose) in &text.instances {

@@ -1,7 +1,7 @@
 //! Reads frames: a line has the pose of each moving instance.
 
+use crate::asking::poses::{self, NUMBERS};
 use crate::console::Failure;
-use crate::query::poses::{self, NUMBERS};
 use bvh_query::Pose;
 use std::path::Path;
 

@@ -8,16 +8,16 @@ mod record;
 
 pub(crate) use arguments::SceneArguments;
 
+use crate::asking;
+use crate::asking::mesh::is_baked;
 use crate::console::{self, Failure};
-use crate::query;
-use crate::query::side::is_baked;
 use asked::{Question, Run};
 use record::Record;
 use std::io::{IsTerminal, stdout};
 
 /// Answers the question about each frame.
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
-    let backend = query::backend(&arguments.isa)?;
+    let backend = asking::backend(&arguments.isa)?;
     let question = Question::new(arguments)?;
     let (mut scene, mut frames) = if is_baked(&arguments.scene)? {
         let mut scene = file::open(&arguments.scene, backend)?;

@@ -3,11 +3,9 @@
 use super::arguments::{Mode, SceneArguments};
 use super::asked::{Answer, Question, Run};
 use super::file::LoadedScene;
-use crate::console::{hex, plural};
+use crate::asking::{Times, stem};
+use crate::console::{hex, plural, significant};
 use crate::process::resident;
-use crate::query::number::significant;
-use crate::query::record::Times;
-use crate::query::stem;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, InstanceId};
 use serde::Serialize;

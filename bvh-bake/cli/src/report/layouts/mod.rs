@@ -14,8 +14,8 @@ mod text;
 
 use super::document::{self, Limit, Measured, Settings};
 use super::kind::{Kind, Subject};
+use crate::asking::poses;
 use crate::console::{Failure, plural};
-use crate::query::poses;
 use bvh_query::Pose;
 use cbvh_measure::plot;
 use cbvh_measure::rounds::Question;
@@ -62,11 +62,7 @@ impl Kind for Layouts {
     }
 
     fn read(file: &Path) -> Result<Vec<Pose>, Failure> {
-        let read = poses::read(file)?;
-        if read.is_empty() {
-            return Err(Failure::invalid(file, "expected poses, found none"));
-        }
-        Ok(read)
+        poses::read(file)
     }
 
     fn measure(subject: &Subject<'_>, given: Vec<Pose>) -> Result<Measured<Self>, Failure> {

@@ -13,8 +13,8 @@ mod text;
 
 use super::document::{self, Limit, Measured, Settings};
 use super::kind::{Kind, Subject};
+use crate::asking::motions;
 use crate::console::{Failure, plural};
-use crate::motion::file;
 use bvh_query::{Motion, MotionAnswer};
 use cbvh_measure::plot;
 use row::Row;
@@ -65,7 +65,7 @@ impl Kind for Motions {
     }
 
     fn read(path: &Path) -> Result<Vec<Motion>, Failure> {
-        file::read(path)
+        motions::read(path)
     }
 
     fn measure(subject: &Subject<'_>, given: Vec<Motion>) -> Result<Measured<Self>, Failure> {

@@ -1,4 +1,4 @@
-//! The two sides of a query. Each is an opened file, or a mesh baked in memory.
+//! The meshes of a question. Each is an opened file, or a mesh baked in memory.
 
 use crate::console::Failure;
 use crate::options::LayoutArguments;
@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The options for preparing the sides.
+/// The options for preparing meshes.
 #[derive(Clone, Copy)]
 pub(crate) struct How<'a> {
     /// The layout of meshes that are baked in memory.
@@ -19,17 +19,17 @@ pub(crate) struct How<'a> {
     pub(crate) read_ahead: ReadAhead,
 }
 
-/// A side that is ready to be queried.
-pub(crate) struct Side {
+/// A mesh that is ready to be queried.
+pub(crate) struct LoadedMesh {
     pub(crate) path: PathBuf,
     pub(crate) bvh: Bvh,
-    /// The object that `--object` names, if this side has it.
+    /// The object that `--object` names, if this mesh has it.
     pub(crate) object: Option<usize>,
     /// The seconds of baking the mesh, or of opening the file.
     pub(crate) build_seconds: f64,
 }
 
-impl Side {
+impl LoadedMesh {
     /// Opens a `.cbvh` file or bakes a mesh. All objects of a mesh become one tree, unless `--object` names one of them.
     pub(crate) fn load(path: &Path, how: &How) -> Result<Self, Failure> {
         if is_baked(path)? {
@@ -43,11 +43,11 @@ impl Side {
     pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
         let start = Instant::now();
         let bvh = Bvh::open_with(path, how.read_ahead)?;
-        let side = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
-        if side.object.is_none() {
-            refuse_scene(path, &side.bvh)?;
+        let mesh = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
+        if mesh.object.is_none() {
+            refuse_scene(path, &mesh.bvh)?;
         }
-        Ok(side)
+        Ok(mesh)
     }
 
     fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {
@@ -83,33 +83,45 @@ impl Side {
     }
 }
 
-/// Both sides of a query.
-#[derive(Clone, Copy)]
-pub(crate) struct Sides<'a> {
-    pub(crate) a: &'a Side,
-    pub(crate) b: &'a Side,
+/// Loads the two meshes of a question.
+pub(crate) fn load_both(a: &Path, b: &Path, how: &How) -> Result<[LoadedMesh; 2], Failure> {
+    let meshes = [LoadedMesh::load(a, how)?, LoadedMesh::load(b, how)?];
+    refuse_unknown_object(&meshes, how)?;
+    Ok(meshes)
 }
 
-impl<'a> Sides<'a> {
-    /// Returns what is queried on each side.
-    pub(crate) fn shapes(&self) -> (Shape<'a>, Shape<'a>) {
-        (self.a.shape(), self.b.shape())
-    }
+/// Refuses the name of an object that none of the meshes has.
+fn refuse_unknown_object(meshes: &[LoadedMesh], how: &How) -> Result<(), Failure> {
+    let Some(name) = how.object.filter(|_| meshes.iter().all(|mesh| mesh.object.is_none())) else {
+        return Ok(());
+    };
+    let paths: Vec<String> = meshes.iter().map(|mesh| mesh.path.display().to_string()).collect();
+    Err(Failure::Usage(format!(
+        "--object: expected an object of this name in {}, found none named {name:?}; cbvh dump lists the objects of a file",
+        paths.join(" or ")
+    )))
+}
 
-    /// Turns an error of a query into one of the file that caused it.
-    pub(crate) fn blame(&self, error: QueryError) -> Failure {
-        match error {
-            QueryError::Backend(error) => error.into(),
-            QueryError::Budget { .. } => Failure::Limit(error.to_string()),
-            QueryError::Damaged(breach) => {
-                // The error does not say which file is damaged, so that both are checked.
-                let damaged = |bvh: &Bvh| bvh_format::validate::validate(bvh.bytes()).is_err();
-                let side = if damaged(&self.a.bvh) { self.a } else { self.b };
-                Failure::invalid(&side.path, breach)
-            }
-            // A number that the command line has let through.
-            error => Failure::Usage(error.to_string()),
+/// Turns an error of a query into one of the file that caused it.
+pub(crate) fn blame(mesh_a: &LoadedMesh, mesh_b: Option<&LoadedMesh>, error: QueryError) -> Failure {
+    // The error does not say which of two files it is about.
+    let file = |is_at_fault: &dyn Fn(&LoadedMesh) -> bool| {
+        let other = mesh_b.filter(|_| !is_at_fault(mesh_a));
+        &*other.unwrap_or(mesh_a).path
+    };
+    match error {
+        QueryError::Backend(error) => error.into(),
+        QueryError::Budget { .. } => Failure::Limit(error.to_string()),
+        QueryError::Damaged(breach) => {
+            let damaged = |mesh: &LoadedMesh| bvh_format::validate::validate(mesh.bvh.bytes()).is_err();
+            Failure::invalid(file(&damaged), breach)
         }
+        QueryError::NoTopology => {
+            let lacks_it = |mesh: &LoadedMesh| !mesh.bvh.layout().has_topology();
+            Failure::invalid(file(&lacks_it), error)
+        }
+        // A number that the command line has let through.
+        error => Failure::Usage(error.to_string()),
     }
 }
 

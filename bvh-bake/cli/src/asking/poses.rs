@@ -1,5 +1,6 @@
 //! Reads poses: files with 12 numbers per line, and the pose on the command line.
 
+use super::files::{self, numbers, read_lines};
 use crate::console::Failure;
 use bvh_query::Pose;
 use std::path::Path;
@@ -9,46 +10,27 @@ pub(crate) const NUMBERS: usize = 12;
 /// The form of a pose, as messages state it.
 const EXPECTED: &str = "expected 12 numbers, the rows of the 3 by 4 matrix [R | t]";
 /// The message for a file without poses.
-pub(super) const NONE: &str =
+const NONE: &str =
     "expected at least one line of 12 numbers, the rows of the 3 by 4 matrix [R | t], found no pose";
+
 /// Reads a pose file. Each line has the 12 numbers of a 3 by 4 matrix, row by row. `#` starts a comment, and blank lines
 /// are skipped.
 pub(crate) fn read(path: &Path) -> Result<Vec<Pose>, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
-    let mut poses = Vec::new();
-    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
-        let text = String::from_utf8_lossy(line);
-        let text = text.split('#').next().unwrap_or("");
-        let pose = parse(text);
-        match pose.map_err(|text| Failure::invalid(path, format_args!("line {}: {text}", number + 1)))? {
-            Some(pose) => poses.push(pose),
-            None => continue,
-        }
-    }
-    Ok(poses)
+    read_lines(path, NONE, parse)
 }
 
 /// Parses the pose of `--pose`. Commas may separate the numbers.
 pub(crate) fn parse_one(text: &str) -> Result<Pose, Failure> {
-    match parse(&text.replace(',', " ")) {
-        Ok(Some(pose)) => Ok(pose),
-        Ok(None) => Err(Failure::Invalid(format!("--pose: {EXPECTED}, found none"))),
-        Err(text) => Err(Failure::Invalid(format!("--pose: {text}"))),
-    }
+    files::parse_one("--pose", text, EXPECTED, parse)
 }
 
 /// Parses a pose. Returns `None` if the text is blank.
 pub(crate) fn parse(text: &str) -> Result<Option<Pose>, String> {
-    let mut numbers = [0.0; NUMBERS];
-    let mut words = text.split_whitespace();
-    for (number, word) in numbers.iter_mut().zip(&mut words) {
-        let shown = || word.chars().take(40).collect::<String>();
-        *number = word.parse().map_err(|_| format!("expected a number, found {:?}", shown()))?;
-    }
-    match text.split_whitespace().count() {
-        0 => Ok(None),
-        NUMBERS => Pose::from_rows(&numbers).map(Some).map_err(|error| error.to_string()),
-        count => Err(wrong_count(count)),
+    let numbers = numbers(text)?;
+    match <&[f64; NUMBERS]>::try_from(&numbers[..]) {
+        Ok(rows) => Pose::from_rows(rows).map(Some).map_err(|error| error.to_string()),
+        Err(_) if numbers.is_empty() => Ok(None),
+        Err(_) => Err(wrong_count(numbers.len())),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Asks about every pose or motion of a file on one thread or several, and times each query by itself.
+//! Asks all questions of a file on one thread or several, and times each query by itself.
 //!
 //! First come `warm` untimed queries from the end of the file, then all items in order until the budget is spent. Each
 //! thread takes the next one. The answers are put back in order, so that a budget that ends early leaves the first ones.

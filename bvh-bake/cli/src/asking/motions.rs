@@ -1,32 +1,24 @@
 //! Reads motions: files with 24 numbers per line, and the motion on the command line.
 
+use super::files::{self, read_lines};
+use super::poses::{self, NUMBERS};
 use crate::console::Failure;
-use crate::query::poses::{self, NUMBERS};
 use bvh_query::Motion;
 use std::path::Path;
 
-/// What a motion looks like, as messages state it.
+/// The form of a motion, as messages state it.
 const EXPECTED: &str = "expected 24 numbers, two poses of 12 numbers each";
+/// The message for a file without motions.
+const NONE: &str = "expected 24 numbers, two poses of 12 numbers each, in at least one line, found none";
 
 /// Reads a file of motions. `#` starts a comment, and blank lines are skipped.
 pub(crate) fn read(path: &Path) -> Result<Vec<Motion>, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
-    let mut motions = Vec::new();
-    for (number, line) in (1..).zip(String::from_utf8_lossy(&bytes).lines()) {
-        let motion = parse(line.split('#').next().unwrap_or(""));
-        motions.extend(motion.map_err(|text| Failure::invalid(path, format_args!("line {number}: {text}")))?);
-    }
-    if motions.is_empty() {
-        return Err(Failure::invalid(path, format_args!("{EXPECTED}, in at least one line, found none")));
-    }
-    Ok(motions)
+    read_lines(path, NONE, parse)
 }
 
 /// Parses the motion of `--motion`. Commas may separate the numbers.
-pub(super) fn parse_one(text: &str) -> Result<Motion, Failure> {
-    let motion =
-        parse(&text.replace(',', " ")).map_err(|text| Failure::Invalid(format!("--motion: {text}")))?;
-    motion.ok_or_else(|| Failure::Invalid(format!("--motion: {EXPECTED}, found none")))
+pub(crate) fn parse_one(text: &str) -> Result<Motion, Failure> {
+    files::parse_one("--motion", text, EXPECTED, parse)
 }
 
 /// Parses a motion. Returns `None` if the text is blank.
