@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{backends, cbvh_in, cbvh_with_isa, cube, names, poses, torus};
+use common::{backends, cbvh_in, cbvh_with_isa, cube, cube_at, names, poses, torus};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -100,11 +100,49 @@ fn raw_lines_are_values_and_nanoseconds() {
 }
 
 #[test]
+fn a_relation_tells_what_is_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    write("cube.obj", &cube());
+    write("room.obj", &cube_at(5, 0));
+    write("two.obj", &(cube_at(1, 0) + &cube_at(1, 20)));
+    let pose = |x: f64| format!("1 0 0 {x:?} 0 1 0 0 0 0 1 0\n");
+    write("poses.txt", &[0.0, 2.5, 4.0, 5.0, 6.0, 6.5, 40.0].map(pose).concat());
+    for (a, b, expected, positives) in [
+        ("room.obj", "cube.obj", ["3", "3", "0", "0", "0", "1", "1"], 5),
+        ("cube.obj", "room.obj", ["2", "2", "0", "0", "0", "1", "1"], 5),
+        ("room.obj", "two.obj", ["4", "4", "0", "0", "0", "1", "1"], 5),
+        ("cube.obj", "cube.obj", ["0", "1", "1", "1", "1", "1", "1"], 1),
+    ] {
+        let query = ["query", a, b, "poses.txt", "--mode", "relation", "--out", "raw_%s.txt"];
+        let json = cbvh_in(directory, &query).done().json();
+        let raw = fs::read_to_string(directory.join("raw_poses.txt")).unwrap();
+        let found: Vec<&str> = raw.lines().map(|line| line.split_once(' ').unwrap().0).collect();
+        assert_eq!(found, expected, "{a} {b}");
+        assert!(json["mode"] == "relation" && json["positives"] == positives, "{json}");
+        // Surfaces alone tell less.
+        let collide = cbvh_in(directory, &["query", a, b, "poses.txt"]).done().json();
+        assert_eq!(collide["positives"], expected.iter().filter(|number| **number == "0").count());
+    }
+    for (a, b, x, words) in [
+        ("room.obj", "cube.obj", 1.0, "B inside A\n"),
+        ("cube.obj", "room.obj", 1.0, "A inside B\n"),
+        ("cube.obj", "room.obj", 4.0, "touching\n"),
+        ("cube.obj", "room.obj", 7.0, "apart\n"),
+        ("two.obj", "room.obj", 1.0, "not touching, some parts inside the other mesh and some not\n"),
+    ] {
+        let query = ["query", a, b, "--mode", "relation", "--pose", &pose(x)];
+        assert_eq!(cbvh_in(directory, &query).done().out, words);
+    }
+}
+
+#[test]
 fn answers_do_not_depend_on_how_they_are_found() {
     let folder = world();
     let directory = folder.path();
     let backends = backends(directory);
-    for mode in ["collide", "contacts", "distance", "within"] {
+    for mode in ["collide", "contacts", "distance", "within", "relation"] {
         let within: &[&str] = if mode == "within" { &["--within", "0.25"] } else { &[] };
         let hashes = |more: &[&str]| -> Vec<Value> {
             let lines = ask(directory, &[&["--mode", mode], within, more].concat());
@@ -200,6 +238,7 @@ fn on_a_terminal_each_pose_has_a_line_and_the_timing_follows() {
         ("contacts", "0 pairs of triangles in contact", "pairs of triangles in contact"),
         ("distance", "3.0 mesh units apart", "0 mesh units apart, touching"),
         ("within --within 3", "at most 3.0 mesh units apart", "at most 3.0 mesh units apart"),
+        ("relation", "apart", "touching"),
     ] {
         let Some(shown) = on_a_terminal(&format!("--mode {mode}")) else {
             return common::skip("the command `script` is missing");

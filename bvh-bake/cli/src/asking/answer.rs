@@ -1,5 +1,6 @@
 //! What every answer has, whatever the question.
 
+use crate::console::significant;
 use bvh_format::checksum::Hasher;
 
 /// An answer.
@@ -11,7 +12,9 @@ pub(crate) trait Answer {
     fn value(&self) -> f64;
 
     /// Returns the raw line, without nanoseconds.
-    fn raw(&self) -> String;
+    fn raw(&self) -> String {
+        significant(self.value())
+    }
 
     /// Hashes what the raw line tells.
     fn hash(&self, hasher: &mut Hasher);

@@ -9,13 +9,18 @@ const HELP: &str = "\
 Examples:
   cbvh query a.cbvh b.cbvh poses.txt --mode collide
   cbvh query a.obj b.obj near.txt,far.txt --mode distance --out raw_%s.txt
+  cbvh query bin.cbvh part.cbvh poses.txt --mode relation
   cbvh query a.cbvh b.cbvh --mode distance --pose \"1 0 0 2  0 1 0 0  0 0 1 0\" --witness w.obj
 
 Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that places B in the frame of A. The first three \
 numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
 
+collide is about surfaces: a mesh that is inside another without touching it does not collide. relation tells: 0 touching, \
+1 apart, 2 A inside B, 3 B inside A, 4 mixed (some parts of a mesh are inside the other and some are not, or some of each \
+mesh are), 5 undefined, because a mesh that is not closed would have to contain something. positives counts all but 1 and 5.
+
 On a terminal, the answers are printed one per line, and the timing after them. Otherwise, and with --json, one JSON \
-object is printed per pose file. --out writes one line per query: 0 or 1, a count, or a distance, then nanoseconds; %s \
+object is printed per pose file. --out writes one line per query: 0 or 1, a count, a distance, or the number of a relation, then nanoseconds; %s \
 stands for the name of the pose file. answers_xxh3 is the same for every --isa and --jobs. It is null if --budget cut \
 the run short, or if --rel-err or --abs-err leave a choice of answers.
 
@@ -65,7 +70,7 @@ pub(crate) struct QueryArguments {
 /// A question about two meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Mode {
-    /// Do they touch?
+    /// Do they touch? This is about surfaces: a mesh inside another does not touch it, and relation tells
     Collide,
     /// How many pairs of triangles touch?
     Contacts,
@@ -73,6 +78,8 @@ pub(super) enum Mode {
     Distance,
     /// Are they at most --within apart?
     Within,
+    /// Do they touch and, if not, is one inside the other?
+    Relation,
 }
 
 impl Mode {
@@ -83,6 +90,7 @@ impl Mode {
             Self::Contacts => "contacts",
             Self::Distance => "distance",
             Self::Within => "within",
+            Self::Relation => "relation",
         }
     }
 }

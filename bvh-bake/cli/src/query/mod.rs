@@ -91,7 +91,11 @@ fn tell(
     if !question.is_exact() {
         record.answers_xxh3 = None;
     }
-    let what = if question.mode == Mode::Within { "within the distance" } else { "touching" };
+    let what = match question.mode {
+        Mode::Within => "within the distance",
+        Mode::Relation => "touching or inside",
+        _ => "touching",
+    };
     let record = QueryRecord { record, cold };
     asking::tell(&arguments.asking, stem, run, &record, || {
         let counts = format!("{} {what}", record.record.positives);

@@ -1,7 +1,7 @@
 //! Answers the question about one pose for a person, and writes the witness of a distance as OBJ.
 
 use super::arguments::Mode;
-use super::question::Question;
+use super::question::{Question, relation_in_words};
 use crate::asking::mesh::{LoadedMesh, blame};
 use crate::asking::{triangle, witness, write_file};
 use crate::console::{self, Failure, plural};
@@ -44,6 +44,10 @@ pub(super) fn answer(
                 text.push_str(&format!("  and {} more\n", contacts.len() - MAX_LISTED));
             }
             text
+        }
+        Mode::Relation => {
+            let relation = querier.relation(a, b, pose).map_err(failed)?;
+            format!("{}\n", relation_in_words(relation))
         }
         Mode::Distance => {
             let distance = querier.distance_with(a, b, pose, &question.errors).map_err(failed)?;

@@ -4,9 +4,9 @@ use super::arguments::{Mode, QueryArguments};
 use crate::asking;
 use crate::asking::mesh::LoadedMesh;
 use crate::asking::runner;
-use crate::console::{Failure, plural, significant};
+use crate::console::{Failure, plural};
 use bvh_format::checksum::Hasher;
-use bvh_query::{DistanceOptions, Pose, Querier, QueryError};
+use bvh_query::{DistanceOptions, Pose, Querier, QueryError, Relation};
 use std::ops::ControlFlow;
 
 /// A question with its parameters.
@@ -27,6 +27,8 @@ pub(super) enum Answer {
     Count(u64),
     /// A distance in mesh units.
     Length(f64),
+    /// How the meshes lie.
+    Relation(Relation),
 }
 
 /// The results of a file of poses.
@@ -77,6 +79,7 @@ impl Question {
             }
             Mode::Distance => Answer::Length(querier.distance_with(a, b, pose, &self.errors)?.distance),
             Mode::Within => Answer::Flag(querier.within(a, b, pose, self.within)?),
+            Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
         })
     }
 
@@ -94,17 +97,19 @@ impl Question {
             // With an allowed error, the least distance may be shorter.
             Answer::Length(length) if !self.is_exact() => format!("at most {length:?} mesh units apart"),
             Answer::Length(length) => format!("{length:?} mesh units apart"),
+            Answer::Relation(relation) => relation_in_words(relation).to_owned(),
         }
     }
 }
 
 impl asking::Answer for Answer {
-    /// Returns true for contact, and for a yes to `within`.
+    /// Returns true for contact, for a yes to `within`, and if any part of a mesh is inside the other.
     fn is_positive(&self) -> bool {
         match *self {
             Self::Flag(flag) => flag,
             Self::Count(count) => count > 0,
             Self::Length(length) => length <= 0.0,
+            Self::Relation(relation) => !matches!(relation, Relation::Apart | Relation::Undefined),
         }
     }
 
@@ -113,24 +118,42 @@ impl asking::Answer for Answer {
             Self::Flag(flag) => f64::from(u8::from(flag)),
             Self::Count(count) => count as f64,
             Self::Length(length) => length,
+            Self::Relation(relation) => f64::from(number(relation)),
         }
     }
 
-    fn raw(&self) -> String {
-        match *self {
-            Self::Flag(flag) => u8::from(flag).to_string(),
-            Self::Count(count) => count.to_string(),
-            Self::Length(length) => significant(length),
-        }
-    }
-
-    /// Hashes a byte for yes or no, a `u64` for a count, the bits of a distance.
+    /// Hashes a byte for yes or no and for a relation, a `u64` for a count, the bits of a distance.
     fn hash(&self, hasher: &mut Hasher) {
         match *self {
             Self::Flag(flag) => hasher.update(&[u8::from(flag)]),
             Self::Count(count) => hasher.update(&count.to_le_bytes()),
             Self::Length(length) => hasher.update(&length.to_bits().to_le_bytes()),
+            Self::Relation(relation) => hasher.update(&[number(relation)]),
         }
+    }
+}
+
+/// Returns the number of a relation in raw lines.
+fn number(relation: Relation) -> u8 {
+    match relation {
+        Relation::Touching => 0,
+        Relation::Apart => 1,
+        Relation::AInB => 2,
+        Relation::BInA => 3,
+        Relation::Mixed => 4,
+        Relation::Undefined => 5,
+    }
+}
+
+/// Returns a relation in words.
+pub(super) fn relation_in_words(relation: Relation) -> &'static str {
+    match relation {
+        Relation::Touching => "touching",
+        Relation::Apart => "apart",
+        Relation::AInB => "A inside B",
+        Relation::BInA => "B inside A",
+        Relation::Mixed => "not touching, some parts inside the other mesh and some not",
+        Relation::Undefined => "not touching, undefined because a mesh is not closed",
     }
 }
 
@@ -151,6 +174,7 @@ mod tests {
             (Answer::Count(0), question(Mode::Contacts), "0 pairs of triangles in contact"),
             (Answer::Length(0.0), question(Mode::Distance), "0 mesh units apart, touching"),
             (Answer::Length(0.25), question(Mode::Distance), "0.25 mesh units apart"),
+            (Answer::Relation(Relation::AInB), question(Mode::Relation), "A inside B"),
             (Answer::Length(0.25), rough, "at most 0.25 mesh units apart"),
         ] {
             assert_eq!(question.in_words(&answer), words);

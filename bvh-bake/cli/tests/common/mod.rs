@@ -97,12 +97,18 @@ pub(crate) fn names(directory: &Path) -> Vec<String> {
 
 /// Returns the cube of side 2 around the origin.
 pub(crate) fn cube() -> String {
-    let mut text = String::from("o cube\n");
+    format!("o cube\n{}", cube_at(1, 0))
+}
+
+/// Returns a cube without a name, around a point of the x axis. Its faces look outwards. The numbers of the vertices count from
+/// the last one of the text, so that such cubes may follow each other.
+pub(crate) fn cube_at(half_side: i32, x: i32) -> String {
+    let mut text = String::new();
     for corner in 0..8 {
-        let at = |bit: u32| if corner >> bit & 1 == 1 { 1 } else { -1 };
-        text += &format!("v {} {} {}\n", at(0), at(1), at(2));
+        let at = |bit: u32| if corner >> bit & 1 == 1 { half_side } else { -half_side };
+        text += &format!("v {} {} {}\n", x + at(0), at(1), at(2));
     }
-    text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+    text + "f -8 -6 -5 -7\nf -4 -3 -1 -2\nf -8 -7 -3 -4\nf -6 -2 -1 -5\nf -8 -4 -2 -6\nf -7 -5 -1 -3\n"
 }
 
 /// Returns a torus around z of 2 * n * m triangles, with radii 2 and 0.5 and with dents.
