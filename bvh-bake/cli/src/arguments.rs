@@ -5,6 +5,7 @@ use crate::check::{ValidateArguments, VerifyArguments};
 use crate::console::{self, Failure};
 use crate::dump::DumpArguments;
 use crate::motion::MotionArguments;
+use crate::probe::ProbeArguments;
 use crate::query::QueryArguments;
 use crate::report::ReportArguments;
 use crate::scene::SceneArguments;
@@ -34,10 +35,12 @@ pub(crate) enum Command {
     Validate(ValidateArguments),
     /// Check that a .cbvh file has the triangles of a mesh and that every bound contains its triangles
     Verify(VerifyArguments),
-    /// Ask whether two meshes touch, where, and how far apart they are
+    /// Ask whether two meshes touch, where, how far apart they are, and whether one is inside the other
     Query(QueryArguments),
     /// Ask whether the way between two poses is free at every moment, and where it ends
     Motion(MotionArguments),
+    /// Ask how far a mesh is from points, which of them are inside, and what rays and segments hit
+    Probe(ProbeArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(SceneArguments),
     /// Measure speed against error on some meshes: of each layout, or of samples and certified answers about motions
@@ -62,7 +65,7 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query, motion, scene or report (see cbvh --help)"
+            "expected a command: bake, dump, validate, verify, query, motion, probe, scene or report (see cbvh --help)"
                 .into(),
         );
     }

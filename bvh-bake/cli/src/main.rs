@@ -1,7 +1,7 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
-//! `motion`; `scene`; `report`. They stand on `asking` (what commands that ask questions have in common), `options` (what
+//! `motion`; `probe`; `scene`; `report`. They stand on `asking` (what commands that ask questions have in common), `options` (what
 //! several commands accept), `process` (memory and signals) and `console` (what is printed, and how a command ends). Imports
 //! lead from the former to the latter only. What scripts may rely on is in `cbvh --help` and in the help of each command.
 
@@ -14,6 +14,7 @@ mod console;
 mod dump;
 mod motion;
 mod options;
+mod probe;
 mod process;
 mod query;
 mod report;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => check::verify(&arguments),
         Command::Query(arguments) => query::run(&arguments),
         Command::Motion(arguments) => motion::run(&arguments),
+        Command::Probe(arguments) => probe::run(&arguments),
         Command::Scene(arguments) => scene::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     });

@@ -18,7 +18,7 @@ fn help_and_version_are_no_errors() {
     let here = Path::new(".");
     assert!(cbvh_in(here, &["--version"]).done().out.starts_with("cbvh "));
     let help = cbvh_in(here, &["--help"]).done().out;
-    for command in ["bake", "dump", "validate", "verify", "query", "scene", "report"] {
+    for command in ["bake", "dump", "validate", "verify", "query", "motion", "probe", "scene", "report"] {
         assert!(help.contains(command));
         assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
     }
@@ -29,6 +29,7 @@ fn wrong_usage_is_1() {
     let folder = with_cube();
     let directory = folder.path();
     let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
+    let motion = &format!("{pose} {pose}");
     fs::write(directory.join("p.txt"), format!("{pose}\n")).unwrap();
     let cases: &[&[&str]] = &[
         &[],
@@ -66,6 +67,18 @@ fn wrong_usage_is_1() {
         &["query", "cube.obj", "cube.obj", "--pose", pose, "--witness", "w.obj"],
         &["query", "cube.obj", "cube.obj", "p.txt,p.txt", "--out", "raw.txt"],
         &["query", "cube.obj", "cube.obj", ","],
+        &["motion", "cube.obj", "cube.obj", "p.txt,p.txt", "--out", "raw.txt"],
+        &["motion", "cube.obj", "cube.obj", "--motion", motion, "--object", "sphere"],
+        &["probe"],
+        &["probe", "cube.obj"],
+        &["probe", "cube.obj", "p.txt", "--mode", "touch"],
+        &["probe", "cube.obj", "p.txt", "--probe", "0 0 0"],
+        &["probe", "cube.obj", "--probe", "0 0 0", "--json"],
+        &["probe", "cube.obj", "--probe", "0 0 0", "--jobs", "2"],
+        &["probe", "cube.obj", "--probe", "0 0 0", "--object", "sphere"],
+        &["probe", "cube.obj", "p.txt", "--isa", "neon"],
+        &["probe", "cube.obj", "p.txt,p.txt", "--out", "raw.txt"],
+        &["probe", "cube.obj", ","],
         &["report"],
         &["report", "--hard"],
         &["report", "--scaling"],

@@ -90,6 +90,13 @@ pub(crate) fn load_both(a: &Path, b: &Path, how: &How) -> Result<[LoadedMesh; 2]
     Ok(meshes)
 }
 
+/// Loads the mesh of a question about one mesh.
+pub(crate) fn load_one(path: &Path, how: &How) -> Result<LoadedMesh, Failure> {
+    let mesh = LoadedMesh::load(path, how)?;
+    refuse_unknown_object(std::slice::from_ref(&mesh), how)?;
+    Ok(mesh)
+}
+
 /// Refuses the name of an object that none of the meshes has.
 fn refuse_unknown_object(meshes: &[LoadedMesh], how: &How) -> Result<(), Failure> {
     let Some(name) = how.object.filter(|_| meshes.iter().all(|mesh| mesh.object.is_none())) else {

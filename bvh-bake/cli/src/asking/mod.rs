@@ -2,7 +2,7 @@
 
 mod answer;
 mod arguments;
-mod files;
+pub(crate) mod files;
 pub(crate) mod mesh;
 pub(crate) mod motions;
 pub(crate) mod poses;
@@ -13,11 +13,11 @@ pub(crate) mod witness;
 
 pub(crate) use answer::Answer;
 pub(crate) use arguments::AskingArguments;
-pub(crate) use files::{read_all, stem, write_file};
 pub(crate) use record::{Record, Times};
 
 use crate::console::{self, Failure};
 use bvh_query::Backend;
+use files::write_file;
 use runner::Run;
 use serde::Serialize;
 use std::io::{IsTerminal, stdout};

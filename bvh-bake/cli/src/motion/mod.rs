@@ -4,9 +4,10 @@ mod arguments;
 
 pub(crate) use arguments::MotionArguments;
 
+use crate::asking::files::{read_all, write_file};
 use crate::asking::mesh::{LoadedMesh, blame, load_both};
 use crate::asking::runner::{self, Run};
-use crate::asking::{self, Answer, AskingArguments, Record, motions, read_all, witness, write_file};
+use crate::asking::{self, Answer, AskingArguments, Record, motions, witness};
 use crate::console::{self, Failure, significant};
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, Motion, MotionAnswer, MotionOptions, Path as _, Querier};

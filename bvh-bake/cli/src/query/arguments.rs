@@ -20,9 +20,9 @@ collide is about surfaces: a mesh that is inside another without touching it doe
 mesh are), 5 undefined, because a mesh that is not closed would have to contain something. positives counts all but 1 and 5.
 
 On a terminal, the answers are printed one per line, and the timing after them. Otherwise, and with --json, one JSON \
-object is printed per pose file. --out writes one line per query: 0 or 1, a count, a distance, or the number of a relation, then nanoseconds; %s \
-stands for the name of the pose file. answers_xxh3 is the same for every --isa and --jobs. It is null if --budget cut \
-the run short, or if --rel-err or --abs-err leave a choice of answers.
+object is printed per pose file. --out writes one line per query: 0 or 1, a count, a distance, or the number of a \
+relation, then nanoseconds; %s stands for the name of the pose file. answers_xxh3 is the same for every --isa and \
+--jobs. It is null if --budget cut the run short, or if --rel-err or --abs-err leave a choice of answers.
 
 With --cold, the object also has the means over the queries of open_ns_mean, the time of opening both files; \
 disk_faults_mean, the page faults that waited for the disk; read_bytes_mean, the bytes read from the disk; \

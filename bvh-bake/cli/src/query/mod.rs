@@ -7,8 +7,9 @@ mod question;
 
 pub(crate) use arguments::QueryArguments;
 
+use crate::asking::files::read_all;
 use crate::asking::mesh::{LoadedMesh, blame, is_baked, load_both};
-use crate::asking::{self, Record, poses, read_all, runner};
+use crate::asking::{self, Record, poses, runner};
 use crate::console::Failure;
 use arguments::Mode;
 use bvh_query::{Backend, Pose, Querier};

@@ -2,8 +2,9 @@
 
 use super::arguments::Mode;
 use super::question::{Question, relation_in_words};
+use crate::asking::files::write_file;
 use crate::asking::mesh::{LoadedMesh, blame};
-use crate::asking::{triangle, witness, write_file};
+use crate::asking::{triangle, witness};
 use crate::console::{self, Failure, plural};
 use bvh_query::{Pose, Querier, QueryError};
 use std::path::Path;

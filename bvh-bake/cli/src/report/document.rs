@@ -2,7 +2,7 @@
 
 use super::arguments::ReportArguments;
 use super::kind::Kind;
-use crate::asking::stem;
+use crate::asking::files::stem;
 use bvh_query::{Backend, Bvh};
 use cbvh_measure::origin::Origin;
 use cbvh_measure::pairs::Pair;

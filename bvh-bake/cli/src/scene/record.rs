@@ -3,7 +3,8 @@
 use super::arguments::{Mode, SceneArguments};
 use super::asked::{Answer, Question, Run};
 use super::file::LoadedScene;
-use crate::asking::{Times, stem};
+use crate::asking::Times;
+use crate::asking::files::stem;
 use crate::console::{hex, plural, significant};
 use crate::process::resident;
 use bvh_format::checksum::Hasher;
