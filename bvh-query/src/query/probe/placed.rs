@@ -88,6 +88,15 @@ impl IntoObject {
         self.rotation.as_ref().map_or(direction, |rotation| turn(rotation, direction))
     }
 
+    /// Returns the axis of the probes' frame that leads most along one of the object's, and whether it leads up or down where
+    /// that does.
+    pub(super) fn nearest_axis(&self, axis: usize, ascends: bool) -> (usize, bool) {
+        let Some(rotation) = &self.rotation else { return (axis, ascends) };
+        let row = &rotation[axis];
+        let nearest = (1..3).fold(0, |best, k| if row[k].abs() > row[best].abs() { k } else { best });
+        (nearest, ascends == (row[nearest] > 0.0))
+    }
+
     /// Returns a bound on the error of points, and of placed vertices seen from the object, for probes whose coordinates have
     /// magnitudes of this sum.
     #[inline(always)]

@@ -1,13 +1,13 @@
 //! Whether points are inside a mesh, on it or outside.
 //!
-//! The winding number of each object is counted along a ray to the side of its box that is nearest along an axis:
+//! The winding number of each object is counted along a ray to the nearest side of its box:
 //! [`crate::narrow::AxisRay`] has the method. Those of all objects of a shape add up.
 
 use crate::error::QueryError;
 use crate::file::topology::Topology;
 use crate::narrow::{AxisRay, Passing, Point};
 use crate::query::answers::{Side, SignedDistance};
-use crate::query::probe::line::{Candidate, Line, LineQuestion, range_in_box, sum_of_magnitudes};
+use crate::query::probe::line::{Candidate, Line, LineQuestion, sum_of_magnitudes};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
@@ -75,7 +75,7 @@ impl Querier {
         for (index, object) in placed.shape.objects().iter().enumerate() {
             let into = IntoObject::new(placed.pose.as_ref(), object);
             let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
-            let (ray, is_in_box) = shortest_way_out(point, &into);
+            let (ray, is_in_box) = short_way_out(point, &into);
             undefined |= !topology.closed && (is_in_box || open == OpenObject::Undefined);
             let mut question = Winding { ray, topology, is_on: false, winding: 0 };
             self.ask_line_of_object(placed, index, &into, &mut question)?;
@@ -92,25 +92,26 @@ impl Querier {
     }
 }
 
-/// Returns the ray along an axis that leaves an object's box soonest, and whether its origin may be in the box.
-fn shortest_way_out(point: &Point, into: &IntoObject) -> (AxisRay, bool) {
+/// Returns a ray along an axis that leaves an object's box soon, and whether its origin may be in the box.
+fn short_way_out(point: &Point, into: &IntoObject) -> (AxisRay, bool) {
     let seen = into.point(*point);
     let error = into.error(4.0 * (sum_of_magnitudes(point) + sum_of_magnitudes(&seen)));
+    let [lo, hi] = &into.bounds;
     let mut best = (f64::INFINITY, AxisRay { origin: *point, axis: 0, ascends: true });
-    for axis in 0..3 {
-        for ascends in [true, false] {
-            let ray = AxisRay { origin: *point, axis, ascends };
-            let range = range_in_box(&seen, &into.direction(ray.direction()), &into.bounds, error);
-            let Some([near, far]) = range.filter(|[_, far]| *far >= 0.0) else { return (ray, false) };
-            if near > 0.0 {
-                return (ray, false);
+    for k in 0..3 {
+        let ways = [seen[k] - lo[k], hi[k] - seen[k]];
+        for (way, ascends) in ways.into_iter().zip([false, true]) {
+            if way < -error {
+                return (best.1, false);
             }
-            if far < best.0 {
-                best = (far, ray);
+            if way < best.0 {
+                best = (way, AxisRay { origin: *point, axis: k, ascends });
             }
         }
     }
-    (best.1, true)
+    // Where the object is turned, the axis of the question that is nearest to that of the object leads out about as soon.
+    let (axis, ascends) = into.nearest_axis(best.1.axis, best.1.ascends);
+    (AxisRay { origin: *point, axis, ascends }, true)
 }
 
 /// How often does an object wind around a point?
