@@ -59,6 +59,17 @@ pub(super) fn triangle_contains(triangle: &Triangle, point: Point) -> bool {
     }
 }
 
+/// Returns whether a closed triangle and the closed segment between two points share a point: the answer of
+/// [`triangles_intersect`] about a triangle without area, in less time.
+pub(crate) fn segment_intersects(triangle: &Triangle, p: Point, q: Point) -> bool {
+    let [first, second] = heights(triangle, &[p, q]);
+    if first == 0.0 && second == 0.0 {
+        return triangles_intersect(triangle, &[p, q, q]);
+    }
+    let is_on_one_side = (first > 0.0 && second > 0.0) || (first < 0.0 && second < 0.0);
+    !is_on_one_side && is_crossed(triangle, p, q)
+}
+
 /// Returns a number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
 /// counterclockwise as seen from `s`.
 pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
@@ -192,9 +203,12 @@ fn triangle_meets(triangle: &Triangle, other: &Hull) -> bool {
     if sides == [0.0; 3] {
         return coplanar_intersect(triangle, other.corners(), area_axis(triangle));
     }
-    // The segment's line crosses the plane in one point, which is in the triangle if the line does not pass two
-    // edges on different sides.
-    let (p, q) = (other.corners[0], other.last());
+    is_crossed(triangle, other.corners[0], other.last())
+}
+
+/// Returns whether a triangle with area meets a segment that meets its plane in one point: whether the segment's line does
+/// not pass two edges on different sides.
+fn is_crossed(triangle: &Triangle, p: Point, q: Point) -> bool {
     let passes = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| volume(p, q, triangle[i], triangle[j]));
     passes.iter().all(|side| *side >= 0.0) || passes.iter().all(|side| *side <= 0.0)
 }

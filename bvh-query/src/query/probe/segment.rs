@@ -1,7 +1,7 @@
 //! Whether a segment meets a mesh.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, triangles_intersect};
+use crate::narrow::{Point, segment_intersects};
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
@@ -53,7 +53,7 @@ impl LineQuestion for MeetsSegment {
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
         let [from, to] = self.ends;
-        self.met |= triangles_intersect(&candidate.triangle, &[from, to, to]);
+        self.met |= segment_intersects(&candidate.triangle, from, to);
         Ok(())
     }
 }
