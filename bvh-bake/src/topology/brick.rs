@@ -4,7 +4,7 @@
 //! hash table, which stays in the cache nearest to the processor, and most edges cancel there. The few that do not are
 //! sorted. Hashes only bring edges together: what is equal is decided by coordinates.
 
-use super::edge::{Edge, End, StoredEdge, end};
+use super::edge::{Edge, End, end};
 use super::max_parts;
 use super::nets::Nets;
 use crate::error::BakeError;
@@ -15,9 +15,9 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The triangles of a run. The components of surfaces that meet along an edge depend on this number.
-const TRIANGLES_PER_RUN: usize = 256;
+const TRIANGLES_PER_RUN: usize = 512;
 /// The places of a run's hash table, which is at most three eighths full.
-const TABLE: usize = 1 << 11;
+const TABLE: usize = 1 << 12;
 const _: () = assert!(3 * TRIANGLES_PER_RUN * 8 <= 3 * TABLE);
 const _: () = assert!(3 * TRIANGLES_PER_RUN < NO_EDGE as usize);
 /// The content of an empty place of the hash table.
@@ -52,7 +52,7 @@ pub(crate) struct BrickTopology {
     /// Whether there is an edge that does not cancel and cannot be one of another brick.
     pub(super) open: bool,
     /// The edges that do not cancel but may be those of other bricks, each with its part.
-    pub(super) edges: Piece<StoredEdge>,
+    pub(super) edges: Piece<Edge>,
     /// Pairs of the id and the place of triangles in the pages of the brick that may have nets.
     pub(super) netted: Piece<[u32; 2]>,
 }
@@ -87,29 +87,28 @@ impl Survey {
             let first = (run * TRIANGLES_PER_RUN) as u32;
             run_of_triangles(order.iter().map(|&number| &triangles[number as usize]), parents, first)
         });
-        let mut open = open.collect::<Vec<_>>().concat();
+        let open = open.collect::<Vec<_>>().concat();
         let mut parents = Sets(parents);
-        count_together(&mut open, |edges| edges.iter().for_each(|edge| parents.join(edges[0].of, edge.of)));
-        let edges: Vec<Edge> = open.into_iter().filter(|edge| edge.count != 0).collect();
+        let mut edges = count_together(&open, |a, b| parents.join(a, b));
         // The sets are numbered by their first triangles, which have the least places.
         let (mut of_first, mut least, mut parts) = (vec![0; order.len()], Vec::new(), 0);
-        for triangle in 0..order.len() as u32 {
-            if parents.first(triangle) == triangle {
-                of_first[triangle as usize] = parts;
+        for (triangle, parent) in parents.0.iter().enumerate() {
+            if *parent as usize == triangle {
+                of_first[triangle] = parts;
                 parts += 1;
-                least.push(placed.get(triangle as usize).map_or(NO_PLACE, |(_, place)| *place));
+                least.push(placed.get(triangle).map_or(NO_PLACE, |(_, place)| *place));
             }
         }
         let mut part_of = |triangle: u32| of_first[parents.first(triangle) as usize];
         let rest = (placed.len()..order.len()).map(|triangle| part_of(triangle as u32)).collect();
-        let near = self.near(number);
-        let all = edges.len();
-        let edges =
-            edges.into_iter().filter(|edge| self.nets.any() || near.iter().any(|b| contains(b, edge)));
-        let edges: Vec<StoredEdge> =
-            edges.map(|edge| StoredEdge::new(&Edge { of: part_of(edge.of), ..edge })).collect();
-        let netted = placed.iter().map(|&(number, place)| [triangles[number as usize].id, place]);
-        let netted = netted.filter(|[id, _]| self.nets.may_have(*id)).collect();
+        let (near, all) = (self.near(number), edges.len());
+        edges.retain(|edge| self.nets.any() || near.iter().any(|bounds| contains(bounds, edge)));
+        edges.iter_mut().for_each(|edge| edge.of = part_of(edge.of));
+        let mut netted = Vec::new();
+        if self.nets.any() {
+            let all = placed.iter().map(|&(number, place)| [triangles[number as usize].id, place]);
+            netted.extend(all.filter(|[id, _]| self.nets.may_have(*id)));
+        }
         let before = self.parts.fetch_add(u64::from(parts), Ordering::Relaxed);
         if before + u64::from(parts) > self.max_parts {
             least = Vec::new();
@@ -137,7 +136,7 @@ impl Survey {
 /// Returns whether a box contains both ends of an edge.
 fn contains([lo, hi]: &Bounds, edge: &Edge) -> bool {
     edge.ends.iter().all(|end| {
-        let corner = [64, 32, 0].map(|shift| f32::from_bits((end >> shift) as u32));
+        let corner = end.map(f32::from_bits);
         (0..3).all(|axis| lo[axis] <= corner[axis] && corner[axis] <= hi[axis])
     })
 }
@@ -152,22 +151,26 @@ fn run_of_triangles<'a>(
     let mut table = [NO_EDGE; TABLE];
     let mut edges: Vec<Edge> = Vec::with_capacity(3 * parents.len());
     parents.iter_mut().zip(0..).for_each(|(parent, number)| *parent = number);
-    for (number, triangle) in (0..).zip(triangles) {
+    for (of, triangle) in (0..).zip(triangles) {
         let ends = triangle.corners.map(end);
         let hashes = ends.map(hash);
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let Some(edge) = Edge::new(ends[from], ends[to], number) else { continue };
+            let (start, end) = (ends[from], ends[to]);
+            if start == end {
+                continue;
+            }
             // The hash is the same for both directions.
             let mut place = hashes[from].wrapping_add(hashes[to]) as usize % TABLE;
             loop {
                 let Some(found) = edges.get_mut(usize::from(table[place])) else {
                     table[place] = edges.len() as u16;
-                    edges.push(edge);
+                    edges.push(Edge { ends: [start, end], count: 1, of });
                     break;
                 };
-                if found.ends == edge.ends {
-                    found.count += edge.count;
-                    join(parents, found.of, number);
+                let opposite = found.ends == [end, start];
+                if opposite || found.ends == [start, end] {
+                    found.count += if opposite { -1 } else { 1 };
+                    join(parents, found.of, of);
                     break;
                 }
                 place = (place + 1) % TABLE;
@@ -175,37 +178,37 @@ fn run_of_triangles<'a>(
         }
     }
     parents.iter_mut().for_each(|parent| *parent += first);
-    edges.retain(|edge| edge.count != 0);
-    edges.iter_mut().for_each(|edge| edge.of += first);
-    edges
+    let open = edges.iter().filter(|edge| edge.count != 0);
+    open.map(|edge| Edge { of: edge.of + first, ..*edge }.sorted()).collect()
 }
 
 /// Returns a hash, whose bits all depend on all coordinates.
-fn hash(end: End) -> u64 {
-    let mixed = ((end as u64) ^ 0x9e37_79b9_7f4a_7c15) as u128
-        * u128::from((end >> 64) as u64 ^ 0xd1b5_4a32_d192_ed03);
+#[inline(always)]
+fn hash([x, y, z]: End) -> u64 {
+    let low = (u64::from(x) << 32 | u64::from(y)) ^ 0x9e37_79b9_7f4a_7c15;
+    let mixed = u128::from(low) * u128::from(u64::from(z) ^ 0xd1b5_4a32_d192_ed03);
     (mixed >> 64) as u64 ^ mixed as u64
 }
 
-/// Brings equal edges together, passes them to `equal`, and adds their counts to the first of them. Those of the others
-/// become 0.
-fn count_together(edges: &mut Vec<Edge>, mut equal: impl FnMut(&[Edge])) {
+/// Brings equal edges together and passes the triangles of each two of them to `join`. Returns those that do not cancel,
+/// each once.
+fn count_together(edges: &[Edge], mut join: impl FnMut(u32, u32)) -> Vec<Edge> {
     // Sorting short keys takes a fraction of the time that sorting edges takes.
     let key = |edge: &Edge| hash(edge.ends[0]).wrapping_add(hash(edge.ends[1]));
     let mut order: Vec<(u64, u32)> = edges.iter().map(key).zip(0..).collect();
     order.sort_unstable();
-    let mut same: Vec<Edge> = Vec::new();
-    let mut counted = Vec::with_capacity(edges.len());
+    let (mut same, mut open) = (Vec::new(), Vec::new());
     for of_hash in order.chunk_by(|a, b| a.0 == b.0) {
         same.clear();
         same.extend(of_hash.iter().map(|(_, number)| edges[*number as usize]));
         same.sort_unstable();
         for same in same.chunk_by(|a, b| a.ends == b.ends) {
-            equal(same);
-            counted.push(Edge { count: same.iter().map(|edge| edge.count).sum(), ..same[0] });
+            same.iter().for_each(|edge| join(same[0].of, edge.of));
+            let count = same.iter().map(|edge| edge.count).sum();
+            open.extend((count != 0).then_some(Edge { count, ..same[0] }));
         }
     }
-    *edges = counted;
+    open
 }
 
 /// Sets of numbers. Each number has a parent in its set, which is less, or is the first number of its set and its own

@@ -1,7 +1,7 @@
 //! Joins the parts of all bricks of an object, and keeps the lists of the topology section until it is written.
 
 use super::brick::{BrickTopology, NO_PLACE, Sets, Survey};
-use super::edge::StoredEdge;
+use super::edge::Edge;
 use super::nets::{NO_PART, run};
 use crate::error::BakeError;
 use crate::storage::external_sort::Sorter;
@@ -66,7 +66,7 @@ pub(crate) fn join(
     let mut first_part = 0;
     for (brick, first_place) in bricks.into_iter().zip(first_places) {
         let own = brick.edges.take()?;
-        let own = own.into_iter().map(|edge| edge.of_part(first_part + edge.part()));
+        let own = own.into_iter().map(|edge| Edge { of: first_part + edge.of, ..edge });
         edges.extend(&own.collect::<Vec<_>>(), spill)?;
         let own = brick.netted.take()?.into_iter().map(|[id, place]| [id, place.wrapping_add(*first_place)]);
         netted.extend(&own.collect::<Vec<_>>(), spill)?;
@@ -74,18 +74,18 @@ pub(crate) fn join(
     }
     let mut closed = !open;
     // The last edge, and how often those equal to it are traversed.
-    let mut last: Option<(StoredEdge, i64)> = None;
+    let mut last: Option<(Edge, i64)> = None;
     edges.visit(|edge| {
-        let (mut part, mut count) = (edge.part(), 0);
+        let (mut part, mut count) = (edge.of, 0);
         if let Some((last, of_last)) = last.take() {
-            if last.ends() == edge.ends() {
+            if last.ends == edge.ends {
                 count = of_last;
-                part = parts.as_mut().map_or(NO_PART, |parts| parts.join(last.part(), part));
+                part = parts.as_mut().map_or(NO_PART, |parts| parts.join(last.of, part));
             } else {
                 closed &= of_last == 0;
             }
         }
-        last = Some((edge.of_part(part), count + i64::from(edge.count())));
+        last = Some((Edge { of: part, ..*edge }, count + i64::from(edge.count)));
         Ok(())
     })?;
     closed &= last.is_none_or(|(_, count)| count == 0);

@@ -1,6 +1,6 @@
 //! Collects how often the triangles of an object count that have duplicates.
 
-use super::edge::{Edge, StoredEdge, end_of_bits};
+use super::edge::{Edge, End};
 use crate::error::BakeError;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
@@ -20,7 +20,7 @@ pub(crate) struct Nets {
     /// Pairs of an id and a net.
     pub(super) of_ids: Sorter<[u32; 2]>,
     /// The edges of the triangles with nets, counted as often as the net exceeds 1, and later those of bricks.
-    pub(super) edges: Sorter<StoredEdge>,
+    pub(super) edges: Sorter<Edge>,
     /// Has a bit set for each id with a net, and for some others; empty if there are no nets.
     filter: Vec<u64>,
 }
@@ -32,26 +32,24 @@ pub(super) fn run<T>(resources: &Resources) -> usize {
 
 impl Nets {
     pub(crate) fn new(resources: &Resources) -> Self {
-        let (of_ids, edges) = (Sorter::of_runs(run::<[u32; 2]>(resources)), run::<StoredEdge>(resources));
+        let (of_ids, edges) = (Sorter::of_runs(run::<[u32; 2]>(resources)), run::<Edge>(resources));
         Self { of_ids, edges: Sorter::of_runs(edges), filter: Vec::new() }
     }
 
-    /// Adds the net of a triangle, which is not 1. `corners` are the bits of its corners.
+    /// Adds the net of a triangle, which is not 1, and whose corners have these bits.
     pub(crate) fn add(
         &mut self,
         id: u32,
         net: i32,
-        corners: [[u32; 3]; 3],
+        [a, b, c]: [End; 3],
         spill: &Spill,
     ) -> Result<(), BakeError> {
         self.filter.resize(FILTER_BITS / 64, 0);
         self.filter[word(id)] |= bit(id);
         self.of_ids.extend(&[[id, net as u32]], spill)?;
-        let [a, b, c] = corners.map(end_of_bits);
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if let Some(edge) = Edge::new(from, to, NO_PART) {
-                let missing = Edge { count: edge.count * (net - 1), ..edge };
-                self.edges.extend(&[StoredEdge::new(&missing)], spill)?;
+        for ends in [[a, b], [b, c], [c, a]] {
+            if ends[0] != ends[1] {
+                self.edges.extend(&[Edge { ends, count: net - 1, of: NO_PART }.sorted()], spill)?;
             }
         }
         Ok(())
