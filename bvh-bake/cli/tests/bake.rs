@@ -112,6 +112,7 @@ fn a_bake_is_skipped_only_if_nothing_changed() {
         &["--triangles", "quantized", "--max-error", "0.001"],
         &["--split-objects"],
         &["--no-turning-slabs"],
+        &["--no-topology"],
         &[],
     ] {
         assert!(!skipped(options), "{options:?}");

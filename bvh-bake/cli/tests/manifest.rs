@@ -112,7 +112,8 @@ fn run_counts(directory: &Path, done: u64, skipped: u64) -> Vec<Value> {
 fn bytes_are_those_of_single_bakes() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
-    let options: [(Value, &[&str]); 7] = [
+    let options: [(Value, &[&str]); 8] = [
+        (json!({"topology": false}), &["--no-ids", "--no-topology"]),
         (json!({}), &["--no-ids"]),
         (json!({"ids": true}), &[]),
         (json!({"scene": true}), &["--no-ids", "--scene"]),

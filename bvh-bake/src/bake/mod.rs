@@ -235,9 +235,10 @@ impl<'a> Baker<'a> {
         progress.reach(Step::Bake(Stage::Encode), self.kept);
         begin(Stage::Prove);
         let (layout, inflation) = prove(&target.source(), progress)?;
+        let topology = layout.read_topology(&target.source())?;
         progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
-            file: FileSummary::new(&layout, target.length(), instances),
+            file: FileSummary::new(&layout, target.length(), instances, &topology),
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             vertices: self.vertices,

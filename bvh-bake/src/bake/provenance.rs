@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// The revision of the baker. It is raised whenever a bake of the same mesh with the same options gives other bytes, so
 /// that files of an earlier revision do not count as up to date.
-const REVISION: u32 = 3;
+const REVISION: u32 = 4;
 
 /// The lines `key=value` of the provenance section.
 pub(super) struct Provenance {
@@ -91,7 +91,8 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
         return None;
     }
     let instances = layout.read_instances(&source).ok()?.len() as u64;
-    Some(FileSummary::new(&layout, length, instances))
+    let topology = layout.read_topology(&source).ok()?;
+    Some(FileSummary::new(&layout, length, instances, &topology))
 }
 
 /// The most bytes of a provenance text that are read.

@@ -4,6 +4,7 @@ use bvh_format::Layout;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
+use bvh_format::topology::ObjectTopology;
 
 /// Counts and sizes of a file, from its header and object table.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +27,8 @@ pub struct FileSummary {
     pub objects: u64,
     /// The number of instances; 0 if the file is no scene.
     pub instances: u64,
+    /// The number of closed objects; `None` if the file does not state which are.
+    pub closed: Option<u64>,
     /// The bytes of the file.
     pub file_bytes: u64,
     /// The bytes of the treelet pages.
@@ -43,9 +46,9 @@ pub struct FileSummary {
 }
 
 impl FileSummary {
-    /// Makes the summary from the header and the object table, given the length of the file and the number of its
-    /// instances.
-    pub fn new(layout: &Layout, file_bytes: u64, instances: u64) -> Self {
+    /// Makes the summary from the header and the object table, given the length of the file, the number of its instances and
+    /// the records of its topology.
+    pub fn new(layout: &Layout, file_bytes: u64, instances: u64, topology: &[ObjectTopology]) -> Self {
         let records = || layout.objects.iter().map(|object| object.record());
         let bytes = |kinds: &[SectionKind]| {
             let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
@@ -62,6 +65,9 @@ impl FileSummary {
             duplicates: records().map(|record| record.duplicates.get()).fold(0, u64::saturating_add),
             objects: layout.objects.len() as u64,
             instances,
+            closed: layout
+                .has_topology()
+                .then(|| topology.iter().filter(|object| object.closed).count() as u64),
             file_bytes,
             node_bytes: bytes(&[SectionKind::Nodes]),
             triangle_bytes: bytes(&[SectionKind::Leaves]),

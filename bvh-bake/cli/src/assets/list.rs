@@ -25,6 +25,7 @@ struct Line {
     split_objects: Option<bool>,
     scene: Option<bool>,
     ids: Option<bool>,
+    topology: Option<bool>,
 }
 
 /// Returns all assets of a manifest, in order. Paths are relative to its folder. Empty lines are skipped, but counted.
@@ -93,6 +94,7 @@ impl Line {
         options.split_objects = self.split_objects.unwrap_or(options.split_objects);
         options.scene = self.scene.unwrap_or(options.scene);
         options.ids = self.ids.unwrap_or(options.ids);
+        options.topology = self.topology.unwrap_or(options.topology);
         Ok(options)
     }
 }

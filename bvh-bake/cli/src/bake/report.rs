@@ -23,6 +23,8 @@ pub(crate) struct Report {
     vertices: Option<u64>,
     objects: u64,
     instances: u64,
+    /// The number of closed objects, or null if the file does not state which are.
+    closed: Option<u64>,
     pub(crate) file_bytes: u64,
     node_bytes: u64,
     triangle_bytes: u64,
@@ -86,6 +88,7 @@ impl Report {
             vertices: baked.map(|baked| baked.vertices),
             objects: file.objects,
             instances: file.instances,
+            closed: file.closed,
             file_bytes: file.file_bytes,
             node_bytes: file.node_bytes,
             triangle_bytes: file.triangle_bytes,
@@ -131,6 +134,13 @@ impl Report {
         line("vertices", format!("{vertices} in {} {}", self.objects, plural(self.objects, "object")));
         if self.instances > 0 {
             line("instances", self.instances.to_string());
+        }
+        match (self.closed, self.objects) {
+            (None, _) => {}
+            (Some(closed), 1) => line("surface", if closed == 1 { "closed" } else { "open" }.to_owned()),
+            (Some(closed), objects) => {
+                line("surfaces", format!("{closed} closed, {} open", objects - closed))
+            }
         }
         let because = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
         line("layout", format!("{}, triangles {}{because}", self.profile, self.triangle_encoding));

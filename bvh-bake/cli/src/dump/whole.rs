@@ -8,6 +8,7 @@ use bvh_format::header::SectionKind;
 use bvh_format::instances::Instance;
 use bvh_format::object::Object;
 use bvh_format::source::Source;
+use bvh_format::topology::ObjectTopology;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -63,6 +64,12 @@ struct ObjectDump {
     triangles: u64,
     degenerate: u64,
     duplicates: u64,
+    /// Whether the surface is closed; this and the next two fields are null if the file does not state it.
+    closed: Option<bool>,
+    /// The number of components listed; 0 if each triangle counts as one.
+    components: Option<usize>,
+    /// The number of triangles that count other than once, because of duplicates.
+    nets: Option<usize>,
     max_vertex_rounding: f64,
     max_quantization_error: f64,
     treelets: u64,
@@ -106,7 +113,9 @@ impl FileDump {
     pub(super) fn new(file: String, contents: &Contents) -> Result<Self, FileError> {
         let layout = &contents.layout;
         let objects = layout.objects.iter().enumerate();
-        let dumps = objects.map(|(number, object)| ObjectDump::new(contents, number, object));
+        let topology = layout.check_topology(&contents.file)?;
+        let dumps =
+            objects.map(|(number, object)| ObjectDump::new(contents, number, object, topology.get(number)));
         let dumps: Vec<_> = dumps.collect::<Result<_, _>>()?;
         let bytes = |kinds: &[SectionKind]| -> u64 {
             let sections = layout.sections.iter().filter(|section| kinds.contains(&section.kind));
@@ -216,7 +225,12 @@ fn provenance(contents: &Contents) -> Result<BTreeMap<String, String>, FileError
 }
 
 impl ObjectDump {
-    fn new(contents: &Contents, number: usize, object: &Object) -> Result<Self, FileError> {
+    fn new(
+        contents: &Contents,
+        number: usize,
+        object: &Object,
+        topology: Option<&ObjectTopology>,
+    ) -> Result<Self, FileError> {
         let statistics = Statistics::gather(contents, object)?;
         let record = object.record();
         let whole = statistics.levels.iter().fold(Level::default(), |sum, level| sum.joined(level));
@@ -235,6 +249,9 @@ impl ObjectDump {
             triangles: record.triangles.get(),
             degenerate: record.degenerate.get(),
             duplicates: record.duplicates.get(),
+            closed: topology.map(|topology| topology.closed),
+            components: topology.map(ObjectTopology::component_count),
+            nets: topology.map(ObjectTopology::net_count),
             max_vertex_rounding: record.max_vertex_rounding.get(),
             max_quantization_error: record.max_quantization_error.get(),
             treelets: record.treelets.get(),
@@ -275,6 +292,18 @@ impl ObjectDump {
                 self.triangles, self.input_triangles, self.degenerate, self.duplicates
             ),
         );
+        if let (Some(closed), Some(components), Some(nets)) = (self.closed, self.components, self.nets) {
+            let components = match components {
+                0 => "components not listed".to_owned(),
+                count => format!("{count} {}", plural(count as u64, "component")),
+            };
+            let nets = match nets {
+                0 => String::new(),
+                1 => ", 1 triangle counts other than once".to_owned(),
+                count => format!(", {count} triangles count other than once"),
+            };
+            line("surface", format!("{}, {components}{nets}", if closed { "closed" } else { "open" }));
+        }
         line("origin", format!("{:?}", self.origin));
         line("box", format!("{:?} to {:?}", self.box_lo, self.box_hi));
         line("sphere", format!("{:?}, radius {:?}", self.sphere_centre, self.sphere_radius));
