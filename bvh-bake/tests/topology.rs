@@ -10,6 +10,7 @@ use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
 use bvh_format::validate::{packets, validate};
 use cbvh_testkit::ball::ball;
+use cbvh_testkit::seal::{put_together, take_apart};
 use cbvh_testkit::{Random, Triangle};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -336,6 +337,33 @@ fn threads_do_not_matter() {
         pool.install(|| bake(&mesh, &Options::default()))
     };
     assert!(with(1) == with(3));
+}
+
+/// `verify` finds what no rule does: statements that do not follow from the mesh.
+#[test]
+fn statements_about_another_mesh_are_found() {
+    let sphere = ball_of(200, ORIGIN, 1.0);
+    let mesh = mesh(&[sphere.clone(), sphere.clone()].concat());
+    for ids in [true, false] {
+        let bytes = bake(&mesh, &Options::default().ids(ids));
+        bvh_bake::verify(&bytes, &mesh).unwrap();
+        let places: Vec<u32> = stated(&bytes, 0).nets.into_keys().collect();
+        let refused = |closed: u32, net: i32, count: usize| {
+            let mut section = vec![1, 1, count as u32, 0, closed, 1, count as u32, 0, 0];
+            places.iter().take(count).for_each(|&place| section.extend([place, net as u32]));
+            let mut sections = take_apart(&bytes);
+            sections.last_mut().unwrap().2 = section.iter().flat_map(|number| number.to_le_bytes()).collect();
+            let bytes = put_together(&sections);
+            validate(&bytes).unwrap();
+            bvh_bake::verify(&bytes, &mesh).unwrap_err().to_string()
+        };
+        assert_eq!(refused(0, 0, 0), "the surface of object 0: expected closed, found open");
+        assert_eq!(refused(1, 0, 0), "the nets of object 0: expected 2 at place 0, found no further net");
+        assert_eq!(
+            refused(1, 3, places.len()),
+            "the nets of object 0: expected 2 at place 0, found 3 at place 0"
+        );
+    }
 }
 
 /// A stored file is checked a piece at a time, with the same outcome.

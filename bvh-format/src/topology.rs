@@ -70,6 +70,18 @@ impl ObjectTopology {
         list(bytes, &self.nets)
     }
 
+    /// Visits the nets of a file whose bytes are read piece by piece.
+    ///
+    /// # Errors
+    /// The errors of `visit` and of the source.
+    pub fn visit_nets<S: Source + ?Sized, E: From<S::Error>>(
+        &self,
+        source: &S,
+        mut visit: impl FnMut(&Net) -> Result<(), E>,
+    ) -> Result<(), E> {
+        visit_list(source, &self.nets, |_, net| visit(net))
+    }
+
     /// Returns the number of components listed.
     pub fn component_count(&self) -> usize {
         self.components.len() / size_of::<U32>()
@@ -176,14 +188,16 @@ pub(crate) fn check_lists<S: Source + ?Sized>(
         let end = object.record().packets.get() * LANES;
         let mut next = 0;
         visit_list(source, &of_object.components, |at, place: &U32| {
-            Ok(ascend(at, place.get(), &mut next, end)?)
+            ascend(at, place.get(), &mut next, end)?;
+            Ok::<_, S::Error>(())
         })?;
         let mut next = 0;
         visit_list(source, &of_object.nets, |at, net: &Net| {
             ascend(at, net.place.get(), &mut next, end)?;
-            Ok(ensure(net.net.get() != 1, Rule::TopologyNet, at + 4, || {
+            ensure(net.net.get() != 1, Rule::TopologyNet, at + 4, || {
                 ("a net that is not 1".into(), "1".into())
-            })?)
+            })?;
+            Ok::<_, S::Error>(())
         })?;
     }
     Ok(())
@@ -199,11 +213,11 @@ fn ascend(at: u64, place: u32, next: &mut u64, end: u64) -> Result<(), FormatErr
 }
 
 /// Visits the entries of a list, each with its byte offset in the file.
-fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable>(
+fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable, E: From<S::Error>>(
     source: &S,
     range: &Range<usize>,
-    mut visit: impl FnMut(u64, &T) -> Result<(), S::Error>,
-) -> Result<(), S::Error> {
+    mut visit: impl FnMut(u64, &T) -> Result<(), E>,
+) -> Result<(), E> {
     // Chunks hold whole entries, because their length is a multiple of all sizes of entries.
     for chunk in chunks(range.clone()) {
         let bytes = source.read(chunk.clone())?;

@@ -57,6 +57,34 @@ fn memory_stays_within_the_budget() {
     refused.failed(4, &["sheet.stl", "67108864 bytes of memory", "2000000 triangles", "at least"]);
 }
 
+/// A sheet and its back: all triangles have duplicates, and only with them is the surface closed.
+#[test]
+fn memory_stays_within_the_budget_where_all_triangles_have_duplicates() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    write_sheet(&directory.join("sheet.stl"), 600);
+    let front = fs::read(directory.join("sheet.stl")).unwrap();
+    let triangles = front[84..].as_chunks::<50>().0;
+    let mut both = front.clone();
+    both[80..84].copy_from_slice(&(2 * triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        both.extend([&triangle[..12], &triangle[24..36], &triangle[12..24], &triangle[36..]].concat());
+    }
+    fs::write(directory.join("both.stl"), both).unwrap();
+    let free = bake(directory, "both.stl", &[]);
+    assert_eq!((&free["closed"], &free["triangles"]), (&1.into(), &triangles.len().into()));
+    for jobs in ["1", "2"] {
+        let baked =
+            bake(directory, "both.stl", &["--max-memory", "132MiB", "--jobs", jobs, "--scratch", "."]);
+        let peak = baked["peak_rss_bytes"].as_u64().unwrap();
+        assert!(peak <= 132 << 20, "{peak} bytes");
+        assert_eq!(baked["content_xxh3"], free["content_xxh3"]);
+    }
+    let checked = ["verify", "out.cbvh", "both.stl", "--json", "--max-memory", "48MiB"];
+    assert_eq!(cbvh_in(directory, &checked).done().json()["valid"], true);
+    assert_eq!(bake(directory, "sheet.stl", &[])["closed"], 0);
+}
+
 #[test]
 fn memory_of_checks_stays_within_the_budget() {
     let folder = tempfile::tempdir().unwrap();

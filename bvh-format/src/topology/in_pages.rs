@@ -28,14 +28,14 @@ pub fn check_in_pages<S: Source + ?Sized>(
     let mut pages = Cursor { layout, source, object, held: None };
     visit_list(source, &topology.components, |at, place: &U32| {
         pages.triangle(at, place.get())?;
-        Ok(())
+        Ok::<_, S::Error>(())
     })?;
     let mut pages = Cursor { layout, source, object, held: None };
     visit_list(source, &topology.nets, |at, net: &Net| {
         let corners = pages.triangle(at, net.place.get())?;
         let missing = i64::from(net.net.get()) - 1;
         sum = sum.wrapping_add(boundary(&corners).wrapping_mul(missing as u64));
-        Ok(())
+        Ok::<_, S::Error>(())
     })?;
     let at = layout.page_offset(object.pages().start);
     ensure(!topology.closed || sum == 0, Rule::TopologyClosed, at, || {

@@ -16,7 +16,7 @@ Example:
 Give the meshes in the same order as to bake. Any difference exits with code 3.
 
 File and mesh are read piece by piece; glTF meshes are read whole. What does not fit into 1.5 GiB of memory, or into \
---max-memory, goes to scratch files: up to 240 bytes per triangle. They have no names and vanish however the process \
+--max-memory, goes to scratch files: up to 350 bytes per triangle. They have no names and vanish however the process \
 ends. --max-memory SIZE keeps the whole process within SIZE; a SIZE that is too small exits with code 4.";
 
 /// What `verify` accepts.

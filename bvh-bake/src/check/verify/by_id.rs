@@ -5,6 +5,7 @@
 //! order of the leaves.
 
 use super::input::{Input, InputCorners};
+use super::surfaces::Surfaces;
 use super::{Stored, VerifyError, distance, each_triangle, place, tolerance};
 use crate::storage::Spill;
 use crate::storage::external_sort::{Merge, Sorted, Sorter};
@@ -29,6 +30,8 @@ struct Claim {
     turn: u32,
     /// The id of the stored triangle.
     kept: u32,
+    /// The place of the stored triangle in its object.
+    place: u32,
     /// The bits of the stored corners.
     corners: [[u32; 3]; 3],
 }
@@ -38,13 +41,14 @@ impl Claim {
         // A packet has four lanes.
         let leaf = [number, triangle.page, u32::from(triangle.packet) << 2 | triangle.lane as u32];
         let corners = triangle.corners.map(|corner| corner.map(f32::to_bits));
-        Self { id, leaf, turn: 0, kept: id, corners }
+        Self { id, leaf, turn: 0, kept: id, place: triangle.place, corners }
     }
 
     /// Returns the stored triangle.
     fn stored(&self) -> Stored {
         let [_, page, lane] = self.leaf;
         Stored {
+            place: self.place,
             page,
             packet: (lane >> 2) as u16,
             lane: (lane & 3) as usize,
@@ -59,11 +63,13 @@ impl Claim {
 }
 
 /// Checks that every triangle of the mesh is, exactly once, either stored or a duplicate of a stored one. Returns the
-/// largest distance between a corner and the place where it is stored, and the number of duplicates.
+/// largest distance between a corner and the place where it is stored, and the number of duplicates. Adds all triangles
+/// to the surfaces.
 pub(super) fn compare<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
     input: &impl Input,
+    surfaces: &mut Surfaces,
     resources: &Resources,
 ) -> Result<(f64, u64), VerifyError>
 where
@@ -80,7 +86,13 @@ where
         loop {
             let claims = if stored.first_of(id) <= dropped.first_of(id) { &mut stored } else { &mut dropped };
             let Some(claim) = claims.take(id)? else { break };
-            verdict.judge(&claim, Some((number, corners)), any);
+            if let Some(way) = verdict.judge(&claim, Some((number, corners)), any) {
+                let ([object, ..], corners) = (claim.leaf, claim.stored().corners);
+                match claim.turn {
+                    0 => surfaces.add(object, &corners, way)?,
+                    _ => surfaces.add_duplicates(object, claim.place, &corners, way)?,
+                }
+            }
             any = true;
         }
         if !any {
@@ -200,29 +212,32 @@ impl<'a> Verdict<'a> {
     }
 
     /// Compares a claim with the triangle of the mesh that has its id, if there is one, and with the number of that
-    /// triangle's object. `taken` says that an earlier claim had the same id.
-    fn judge(&mut self, claim: &Claim, triangle: Option<(u32, &InputCorners)>, taken: bool) {
+    /// triangle's object. `taken` says that an earlier claim had the same id. Returns 1 if the triangle of the mesh has the
+    /// orientation of the stored one, -1 if it has the opposite one, and nothing if the claim is wrong.
+    fn judge(&mut self, claim: &Claim, triangle: Option<(u32, &InputCorners)>, taken: bool) -> Option<i32> {
         match self.check(claim, triangle, taken) {
-            Ok(moved) => {
+            Ok((moved, way)) => {
                 self.max_move = self.max_move.max(moved);
                 self.duplicates += u64::from(claim.turn > 0);
+                Some(way)
             }
             Err(error) => {
                 let at = (claim.leaf, claim.turn);
                 if self.first.as_ref().is_none_or(|(first, _)| at < *first) {
                     self.first = Some((at, error));
                 }
+                None
             }
         }
     }
 
-    /// Returns the largest distance between a corner and the place where it is stored.
+    /// Returns the largest distance between a corner and the place where it is stored, and the orientation.
     fn check(
         &self,
         claim: &Claim,
         triangle: Option<(u32, &InputCorners)>,
         taken: bool,
-    ) -> Result<f64, VerifyError> {
+    ) -> Result<(f64, i32), VerifyError> {
         let what = || format!("triangle {}", claim.id);
         let Some((number, corners)) = triangle else {
             let expected = format!("an id below {}", self.count);
@@ -238,16 +253,18 @@ impl<'a> Verdict<'a> {
             return Err(VerifyError::differs(what(), expected, format!("in object {own}")));
         }
         // Every claim has the number of an object, so this never happens.
-        let Some(object) = self.layout.objects.get(own as usize) else { return Ok(0.0) };
+        let Some(object) = self.layout.objects.get(own as usize) else { return Ok((0.0, 1)) };
         let stored = claim.stored();
         if claim.turn > 0 {
             return check_duplicate(object, &stored, claim.kept, claim.id, *corners);
         }
-        (0..3).try_fold(0.0f64, |most, corner| {
+        let mut most = 0.0f64;
+        for corner in 0..3 {
             let moved =
                 check_corner(object, &stored, claim.id, corner, corners[corner], stored.corners[corner])?;
-            Ok(most.max(moved))
-        })
+            most = most.max(moved);
+        }
+        Ok((most, 1))
     }
 
     fn finish(self) -> Result<(f64, u64), VerifyError> {
@@ -289,21 +306,26 @@ fn check_corner(
     ))
 }
 
-/// Checks that a triangle that was left out has the same corners as the stored one, in any order.
+/// Checks that a triangle that was left out has the same corners as the stored one, in any order. Returns how far they
+/// moved, and 1 or -1 for the same orientation or the opposite one.
 fn check_duplicate(
     object: &Object,
     kept: &Stored,
     kept_id: u32,
     id: u32,
     corners: [[f64; 3]; 3],
-) -> Result<f64, VerifyError> {
+) -> Result<(f64, i32), VerifyError> {
+    // The first three keep the orientation.
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let stored = kept.corners.map(|corner| place(object, corner));
     let moved =
         |order: &[usize; 3]| (0..3).map(|i| distance(corners[i], stored[order[i]])).fold(0.0, f64::max);
-    let least = ORDERS.iter().map(moved).fold(f64::INFINITY, f64::min);
+    let [same, opposite] =
+        [&ORDERS[..3], &ORDERS[3..]].map(|orders| orders.iter().map(moved).fold(f64::INFINITY, f64::min));
+    let least = same.min(opposite);
     if least <= tolerance(object) {
-        return Ok(least);
+        // With two equal corners, both are as far away.
+        return Ok((least, if same <= opposite { 1 } else { -1 }));
     }
     let what = format!("triangle {id}, left out as a duplicate of {kept_id}");
     Err(VerifyError::differs(what, format!("{corners:?}"), format!("{stored:?}")))

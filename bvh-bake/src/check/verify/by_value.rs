@@ -3,6 +3,7 @@
 //! The triangles of both are sorted by object and corners and then compared in that order.
 
 use super::input::{Input, InputCorners};
+use super::surfaces::Surfaces;
 use super::{VerifyError, distance, each_triangle, place, source_of, tolerance};
 use crate::storage::external_sort::{Merge, Sorter};
 use crate::storage::resources::Resources;
@@ -22,22 +23,35 @@ type Key = [[u32; 3]; 3];
 struct Keyed {
     object: u32,
     key: Key,
+    /// 1 if the triangle goes around its corners in the order of the key, -1 if against it. 1 where corners are equal.
+    way: i32,
+    /// The place of a stored triangle in its object.
+    place: u32,
 }
 
 impl Keyed {
-    fn new(object: u32, corners: &[[f32; 3]; 3]) -> Self {
-        let mut key = corners.map(|corner| corner.map(f32::to_bits));
+    fn new(object: u32, corners: &[[f32; 3]; 3], place: u32) -> Self {
+        let bits = corners.map(|corner| corner.map(f32::to_bits));
+        let mut key = bits;
         key.sort_unstable();
-        Self { object, key }
+        let [a, b, c] = key;
+        let along = [[a, b, c], [b, c, a], [c, a, b]].contains(&bits);
+        Self { object, key, way: if along { 1 } else { -1 }, place }
+    }
+
+    /// Returns whether another triangle has the same corners and is of the same object.
+    fn equals(&self, other: &Self) -> bool {
+        (self.object, self.key) == (other.object, other.key)
     }
 }
 
 /// Checks each object of the file against the mesh objects from which it was made. Returns the largest distance
-/// between a corner and the place where it is stored, and the number of duplicates.
+/// between a corner and the place where it is stored, and the number of duplicates. Adds all triangles to the surfaces.
 pub(super) fn compare<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
     input: &impl Input,
+    surfaces: &mut Surfaces,
     resources: &Resources,
 ) -> Result<(f64, u64), VerifyError>
 where
@@ -49,7 +63,7 @@ where
     let mut roundings: Vec<Rounding> = layout.objects.iter().map(Rounding::new).collect();
     for (number, object) in (0..).zip(&layout.objects) {
         each_triangle(layout, source, object, |triangle| {
-            let keyed = Keyed::new(number, &triangle.corners);
+            let keyed = Keyed::new(number, &triangle.corners, triangle.place);
             roundings[number as usize].add_stored(&keyed.key);
             Ok(stored.extend(&[keyed], &spill)?)
         })?;
@@ -76,7 +90,7 @@ where
             }
             Err(_) => {}
         }
-        Ok(expected.extend(&[Keyed::new(number as u32, &rounded)], &spill)?)
+        Ok(expected.extend(&[Keyed::new(number as u32, &rounded, 0)], &spill)?)
     })?;
     let (stored, expected) = (stored.finish(), expected.finish());
     let (mut stored, mut expected) = (Keys::new(stored.merge())?, Keys::new(expected.merge())?);
@@ -85,7 +99,7 @@ where
         if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
             return Err(error);
         }
-        duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored)?;
+        duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored, surfaces)?;
     }
     Ok((max_move, duplicates))
 }
@@ -127,20 +141,23 @@ impl<'a> Keys<'a> {
     }
 
     /// Returns the next triangle of an object.
-    fn next_of(&mut self, object: u32) -> Result<Option<Key>, VerifyError> {
+    fn next_of(&mut self, object: u32) -> Result<Option<Keyed>, VerifyError> {
         let Some(now) = self.first.filter(|first| first.object == object) else { return Ok(None) };
         self.first = self.merge.next()?;
-        Ok(Some(now.key))
+        Ok(Some(now))
     }
 
-    /// Returns the next triangle of an object and skips all that are equal to it. Returns also how many it skipped.
-    fn next_distinct_of(&mut self, object: u32) -> Result<(Option<Key>, u64), VerifyError> {
-        let (now, mut others) = (self.next_of(object)?, 0);
-        while now.is_some_and(|key| self.first == Some(Keyed { object, key })) {
+    /// Returns the next triangle of an object and skips all that are equal to it. Returns also how many these are, itself
+    /// included, and the sum of their ways.
+    fn next_distinct_of(&mut self, object: u32) -> Result<(Option<Keyed>, u64, i32), VerifyError> {
+        let Some(now) = self.next_of(object)? else { return Ok((None, 0, 0)) };
+        let (mut count, mut ways) = (1, now.way);
+        while let Some(same) = self.first.filter(|first| first.equals(&now)) {
             self.next_of(object)?;
-            others += 1;
+            count += 1;
+            ways += same.way;
         }
-        Ok((now, others))
+        Ok((Some(now), count, ways))
     }
 }
 
@@ -150,22 +167,31 @@ fn compare_sorted(
     number: u32,
     expected: &mut Keys,
     stored: &mut Keys,
+    surfaces: &mut Surfaces,
 ) -> Result<u64, VerifyError> {
-    let place = |key: Option<Key>| match key {
-        Some(key) => format!("{:?}", key.map(|corner| place(object, corner.map(f32::from_bits)))),
+    let place = |keyed: Option<Keyed>| match keyed {
+        Some(keyed) => format!("{:?}", keyed.key.map(|corner| place(object, corner.map(f32::from_bits)))),
         None => "no more".to_owned(),
     };
     let mut duplicates = 0;
     for index in 0u64.. {
-        let (wanted, others) = expected.next_distinct_of(number)?;
+        let (wanted, count, ways) = expected.next_distinct_of(number)?;
         let found = stored.next_of(number)?;
-        duplicates += others;
-        if wanted != found {
-            let what = format!("the triangles in order of their corners, number {index}");
-            return Err(VerifyError::differs(what, place(wanted), place(found)));
-        }
-        if wanted.is_none() {
-            break;
+        match (wanted, found) {
+            (None, None) => break,
+            (Some(wanted), Some(found)) if wanted.equals(&found) => {
+                duplicates += count - 1;
+                let [a, b, c] = found.key.map(|corner| corner.map(f32::from_bits));
+                let corners = if found.way == 1 { [a, b, c] } else { [b, a, c] };
+                surfaces.add(number, &corners, 1)?;
+                if count > 1 {
+                    surfaces.add_duplicates(number, found.place, &corners, ways * found.way - 1)?;
+                }
+            }
+            _ => {
+                let what = format!("the triangles in order of their corners, number {index}");
+                return Err(VerifyError::differs(what, place(wanted), place(found)));
+            }
         }
     }
     Ok(duplicates)

@@ -12,6 +12,7 @@ mod by_id;
 mod by_value;
 mod input;
 mod second_reading;
+mod surfaces;
 
 use crate::check::prove::{prove_bounds, validate_in_parallel};
 use crate::error::BakeError;
@@ -25,13 +26,14 @@ use bvh_format::FormatError;
 use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
+use bvh_format::leaf::{PACKET, decode_packet};
 use bvh_format::object::Object;
 use bvh_format::source::Source;
 use bvh_format::validate::packets;
 use input::{InMemory, Input};
 use second_reading::SecondReading;
 use std::path::{Path, PathBuf};
+use surfaces::Surfaces;
 
 /// The figures of a successful verification.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,10 +98,11 @@ impl VerifyError {
 
 /// Verifies that a file is a faithful bake of a mesh: the file is valid; every bound contains what is below it; the
 /// triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones; no corner has moved
-/// farther than the file states; and the instances are those of the mesh.
+/// farther than the file states; the surfaces that the file states to be closed are those of the mesh that are; and the
+/// instances are those of the mesh.
 ///
-/// Cost: about that of reading the mesh. Memory: 8 bytes per triangle of the mesh; in addition, 60 bytes per stored
-/// triangle with ids, or 40 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
+/// Cost: about that of reading the mesh. Memory: 104 bytes per triangle of the mesh; in addition, 64 bytes per stored
+/// triangle with ids, or 48 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
 ///
 /// # Errors
 /// Returns the first difference or broken rule that was found.
@@ -146,7 +149,7 @@ const USUAL_MEMORY: u64 = 3 << 29;
 /// have to agree: the first is that of the bake, whose mistakes it would share. Files that `tobj` is known to read
 /// differently are read once.
 ///
-/// Cost: reading the meshes once and the file five times, and up to 240 bytes of scratch per triangle, which are
+/// Cost: reading the meshes once and the file five times, and up to 350 bytes of scratch per triangle, which are
 /// written and read once or twice.
 ///
 /// # Errors
@@ -208,11 +211,13 @@ where
         check_counts(object, own, all)?;
         check_hull(layout, source, object)?;
     }
+    let mut surfaces = Surfaces::new(layout, source, resources)?;
     let (max_move, duplicates) = if layout.has_ids() {
-        by_id::compare(layout, source, &input, resources)?
+        by_id::compare(layout, source, &input, &mut surfaces, resources)?
     } else {
-        by_value::compare(layout, source, &input, resources)?
+        by_value::compare(layout, source, &input, &mut surfaces, resources)?
     };
+    surfaces.compare(source)?;
     Ok(VerifyReport {
         triangles: layout.objects.iter().map(|object| object.triangles()).sum(),
         duplicates,
@@ -331,6 +336,8 @@ where
 
 /// A stored triangle.
 struct Stored {
+    /// Its place in the object.
+    place: u32,
     page: u32,
     packet: u16,
     lane: usize,
@@ -367,9 +374,11 @@ where
         let (block, ids) = (leaves.bytes(), ids.bytes());
         for (packet, count) in packets(&page) {
             let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
+            let first = PACKET as u32 * (page.header().first_packet.get() + u32::from(packet));
             for lane in 0..count {
                 let id = layout.has_ids().then(|| decode_id(ids, usize::from(packet), lane));
-                visit(&Stored { page: number, packet, lane, id, corners: values.triangle(lane) })?;
+                let (place, corners) = (first + lane as u32, values.triangle(lane));
+                visit(&Stored { place, page: number, packet, lane, id, corners })?;
             }
         }
     }
