@@ -82,6 +82,9 @@ INSTANCE_RECORD = np.dtype(
         ("translation", "<f8", 3),
     ]
 )
+TOPOLOGY_HEAD = np.dtype([("objects", "<u4"), ("components", "<u4"), ("nets", "<u4"), ("reserved", "u1", 4)])
+TOPOLOGY_RECORD = np.dtype([("closed", "<u4"), ("components", "<u4"), ("nets", "<u4"), ("reserved", "<u4")])
+NET = np.dtype([("place", "<u4"), ("net", "<i4")])
 PAGE_HEADER = np.dtype(
     [
         ("checksum", "<u8"),
@@ -120,9 +123,9 @@ ID_HEAD = np.dtype([("base", "<u4"), ("bits", "u1"), ("reserved", "u1", 3)])
 LINKS = np.dtype([("first_treelet", "u1"), ("first_remote", "u1"), ("first_leaf", "<u2")])
 
 # 2.1
-OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE, INSTANCES = KINDS = range(1, 8)
+OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE, INSTANCES, TOPOLOGY = KINDS = range(1, 9)
 NEEDED = (OBJECTS, NODES, LEAVES)
-CONTENT = (OBJECTS, NODES, LEAVES, IDS, DUPLICATES, INSTANCES)
+CONTENT = (OBJECTS, NODES, LEAVES, IDS, DUPLICATES, INSTANCES, TOPOLOGY)
 
 # 3: the head and the records of sections with named records
 TABLES = {OBJECTS: (OBJECT_HEAD, OBJECT_RECORD), INSTANCES: (INSTANCE_HEAD, INSTANCE_RECORD)}
@@ -219,6 +222,7 @@ class File:
         self.sections = {}  # entries of known kinds
         self.objects = []
         self.instances = []
+        self.topology = []
 
     def read_header(self):
         self.header = Record(HEADER, self.data, 0)
@@ -292,6 +296,24 @@ class Object(NamedRecord):
     def ids(self):
         return self.lanes_of(Page.ids)
 
+    def places(self):
+        """The places of all triangles (12), in ascending order."""
+        return self.lanes_of(Page.places)
+
+    def traversals(self):
+        """The edges that the triangles traverse (3.2): of each the place in `triangles_f32` of its triangle, a number of
+        the edge, and 1 if it is traversed from the lesser vertex to the greater one, else -1.
+        """
+        bits = (self.triangles_f32() + np.float32(0)).reshape(-1, 3).view(np.uint32)  # -0 + 0 is 0
+        vertices = np.unique(bits, axis=0, return_inverse=True)[1].reshape(-1, 3)
+        start, end = vertices.ravel(), np.roll(vertices, -1, axis=1).ravel()
+        triangle = np.arange(len(start)) // 3
+        between = start != end
+        start, end, triangle = start[between], end[between], triangle[between]
+        edges = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
+        number = np.unique(edges, axis=0, return_inverse=True)[1].ravel() if len(edges) else start
+        return triangle, number, np.where(start < end, 1, -1)
+
 
 class Instance(NamedRecord):
     """An object with a pose, groups and a name (3.1)."""
@@ -302,6 +324,35 @@ class Instance(NamedRecord):
     def rows(self):
         """The three rows of the rotation."""
         return self.rotation.reshape(3, 3).tolist()
+
+
+class Topology(Record):
+    """What a file states about the surface of an object (3.2): the record, and its part of the lists."""
+
+    def __init__(self, file, number):
+        start = file.sections[TOPOLOGY].offset
+        super().__init__(TOPOLOGY_RECORD, file.data, start + TOPOLOGY_HEAD.itemsize + TOPOLOGY_RECORD.itemsize * number)
+        head = Record(TOPOLOGY_HEAD, file.data, start)
+        table = start + TOPOLOGY_HEAD.itemsize
+        records = np.frombuffer(file.data, TOPOLOGY_RECORD, head.objects, table)
+        before = {field: records[field][:number].sum(dtype=int) for field in ("components", "nets")}
+        lists = table + TOPOLOGY_RECORD.itemsize * head.objects
+        self.places_at = lists + 4 * int(before["components"])
+        self.nets_at = lists + 4 * head.components + NET.itemsize * int(before["nets"])
+        self.number, self.data = number, file.data
+
+    def component_places(self):
+        return np.frombuffer(self.data, "<u4", self.components, self.places_at)
+
+    def net_list(self):
+        return np.frombuffer(self.data, NET, self.nets, self.nets_at)
+
+    def nets_of(self, places):
+        """The net of each triangle at the given places, all of which have triangles."""
+        nets = np.ones(len(places), np.int64)
+        listed = self.net_list()
+        nets[np.searchsorted(places, listed["place"])] = listed["net"]
+        return nets
 
 
 class Page(Record):
@@ -377,6 +428,10 @@ class Page(Record):
         """Which lanes of each packet hold triangles: [packet, lane]."""
         counts = [kind - 3 for slot in range(self.treelets) for kind in self.kinds(slot) if kind >= LEAF]
         return np.arange(PACKET) < np.array(counts, int).reshape(-1, 1)
+
+    def places(self):
+        """The place of each lane: [packet, lane]."""
+        return PACKET * self.first_packet + np.arange(PACKET * self.packets).reshape(-1, PACKET)
 
     def codes(self):
         """The codes of lower and upper ends as they are stored, each [slot, child, slab]."""

@@ -18,6 +18,7 @@ def violations(file):
     yield from of_sections(file)
     yield from of_object_table(file)
     yield from of_instances(file)
+    yield from of_topology(file)
     lines = words = 0
     for one in file.objects:
         yield from of_object(one)
@@ -76,6 +77,52 @@ def of_instances(file):
         numbers = np.concatenate([one.rotation, one.translation])
         if ((numbers == 0) & np.signbit(numbers)).any():
             yield f"(3.1) instance {one.number}: -0"
+
+
+def of_topology(file):
+    if cbvh.TOPOLOGY not in file.sections:
+        return
+    head = cbvh.Record(cbvh.TOPOLOGY_HEAD, file.data, file.sections[cbvh.TOPOLOGY].offset)
+    if head.reserved.any():
+        yield "(3.2) nonzero reserved bytes in the head of the topology"
+    duplicates = dict(zip(*np.unique(file.duplicates()[:, 0], return_counts=True)))
+    for one, topology in zip(file.objects, file.topology):
+        where = f"(3.2) object {one.number}"
+        if topology.reserved:
+            yield f"{where}: nonzero reserved bytes"
+        listed = set(topology.component_places().tolist())
+        if len(listed) > max(64, one.triangles // 100):
+            yield f"{where}: {len(listed)} components listed of {one.triangles} triangles"
+        triangle, edge, way = one.traversals()
+        least = least_of_components(one.places(), triangle, edge)
+        if listed and not least <= listed:
+            yield f"{where}: places {least - listed} start components, but are not listed"
+        if listed and np.bincount(edge, minlength=1).max() <= 2 and listed != least:
+            yield f"{where}: places {listed - least} are listed, but are not the least of components"
+        if cbvh.IDS in file.sections and topology.closed:
+            # Each duplicate adds 1 to the net or takes 1 away.
+            for number, net in zip(one.ids().tolist(), topology.nets_of(one.places()).tolist()):
+                count = int(duplicates.get(number, 0))
+                if abs(net - 1) > count or (net - 1 - count) % 2:
+                    yield f"{where}: triangle {number} with {count} duplicates has the net {net}"
+
+
+def least_of_components(places, triangle, edge):
+    """The least place of each component: all places that no chain of shared edges joins to a lesser one."""
+    parent = list(range(len(places)))
+
+    def first(number):
+        while parent[number] != number:
+            parent[number] = number = parent[parent[number]]
+        return number
+
+    order = np.argsort(edge, kind="stable")
+    triangle, edge = triangle[order].tolist(), edge[order].tolist()
+    for number in range(1, len(edge)):
+        if edge[number] == edge[number - 1]:
+            a, b = first(triangle[number]), first(triangle[number - 1])
+            parent[max(a, b)] = min(a, b)
+    return {int(places[number]) for number in range(len(places)) if parent[number] == number}
 
 
 def of_names(file, kind, records, where):

@@ -34,7 +34,7 @@ def places(data):
     sorts["bytes in use"] += np.flatnonzero(np.frombuffer(data, "u1")).tolist()
     sorts["anywhere"] += range(len(data))
     for kind, entry in file.sections.items():
-        if kind in (cbvh.OBJECTS, cbvh.DUPLICATES, cbvh.INSTANCES):
+        if kind in (cbvh.OBJECTS, cbvh.DUPLICATES, cbvh.INSTANCES, cbvh.TOPOLOGY):
             sorts[kind] += range(entry.offset, entry.offset + entry.length)
     for one in file.objects:
         for page in one.pages_read:

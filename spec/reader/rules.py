@@ -1,4 +1,4 @@
-"""Checks the rules R01 to R43 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R48 of spec/format.md, section 16, in the order in which a reader reports them.
 
 Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
 exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
@@ -9,7 +9,7 @@ from collections import namedtuple
 import numpy as np
 
 import cbvh
-from cbvh import DUPLICATES, IDS, INSTANCES, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TREELET
+from cbvh import DUPLICATES, IDS, INSTANCES, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TOPOLOGY, TREELET
 from xxh3 import xxh3_64
 
 MAX_COORDINATE = 2.0**120  # R12, R30
@@ -345,6 +345,50 @@ def check_pose(one):
     need_field("rotation", dot(cross, z) >= 0, "no reflection")
 
 
+# Topology
+
+
+def check_topology(file):
+    """Checks the topology section, if there is one, without looking at pages."""
+    if TOPOLOGY not in file.sections:
+        return
+    entry = file.sections[TOPOLOGY]
+    check_section_checksum(file, entry)
+    table = cbvh.TOPOLOGY_HEAD.itemsize
+    need(entry.length >= table, 44, entry.place("length"), "a head", f"{entry.length} bytes")
+    head = cbvh.Record(cbvh.TOPOLOGY_HEAD, file.data, entry.offset)
+    need(head.objects == len(file.objects), 44, head.place("objects"), len(file.objects), head.objects)
+    lists = table + cbvh.TOPOLOGY_RECORD.itemsize * head.objects
+    length = lists + 4 * head.components + cbvh.NET.itemsize * head.nets
+    need(entry.length == length, 44, entry.place("length"), length, entry.length)
+    records = np.frombuffer(file.data, cbvh.TOPOLOGY_RECORD, head.objects, entry.offset + table)
+    for field in ("components", "nets"):
+        total = int(records[field].sum(dtype=np.uint64))
+        need(getattr(head, field) == total, 44, head.place(field), total, getattr(head, field))
+    file.topology = [cbvh.Topology(file, number) for number in range(head.objects)]
+    for topology, one in zip(file.topology, file.objects):
+        need(topology.closed <= 1, 45, topology.place("closed"), "0 or 1", topology.closed)
+        need(topology.closed or not topology.nets, 45, topology.place("nets"), "no nets of an open object", topology.nets)
+        for field in ("components", "nets"):
+            count = getattr(topology, field)
+            need(count <= one.triangles, 45, topology.place(field), f"at most {one.triangles}", count)
+    for topology, one in zip(file.topology, file.objects):
+        next_place = 0
+        for number, place in enumerate(topology.component_places().tolist()):
+            next_place = check_order(topology.places_at + 4 * number, place, next_place, one)
+        next_place = 0
+        for number, (place, net) in enumerate(topology.net_list().tolist()):
+            at = topology.nets_at + cbvh.NET.itemsize * number
+            next_place = check_order(at, place, next_place, one)
+            need(net != 1, 47, at + 4, "a net that is not 1", net)
+
+
+def check_order(at, place, least, one):
+    end = PACKET * one.packets
+    need(least <= place < end, 46, at, f"a place from {least} and below {end}", place)
+    return place + 1
+
+
 # Validate
 
 
@@ -358,9 +402,30 @@ def validate(data):
     need(stated == actual, 10, file.header.place("content_checksum"), f"content {stated:016x}", f"{actual:016x}")
     check_duplicates(file)
     check_scene(file)
+    check_topology(file)
     for one in file.objects:
         validate_object(one)
+        if file.topology:
+            check_surface(one, file.topology[one.number])
     return file
+
+
+def check_surface(one, topology):
+    """Checks R46 and R48 against the triangles."""
+    places = one.places()
+    for listed, at, size in (
+        (topology.component_places(), topology.places_at, 4),
+        (topology.net_list()["place"], topology.nets_at, cbvh.NET.itemsize),
+    ):
+        missing = ~np.isin(listed, places)
+        if missing.any():
+            first = int(missing.argmax())
+            raise Broken(46, at + size * first, "the place of a triangle", listed[first])
+    if topology.closed:
+        triangle, edge, way = one.traversals()
+        sums = np.zeros(edge.max(initial=-1) + 1, np.int64)
+        np.add.at(sums, edge, way * topology.nets_of(places)[triangle])
+        need(not sums.any(), 48, topology.place("closed"), "no boundary", f"{np.count_nonzero(sums)} edges")
 
 
 def validate_object(one):

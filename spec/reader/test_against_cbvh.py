@@ -24,7 +24,7 @@ import musts
 import mutate
 import query
 import rules
-from test_reader import instances, with_instances
+from test_reader import instances, with_section
 
 COMMAND = os.environ.get("CBVH")
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
@@ -32,6 +32,7 @@ TESTDATA = os.path.join(ROOT, "testdata")
 SHARED = os.path.join(ROOT, "..", "shared")
 ROBOT, ROOM = (os.path.join(TESTDATA, name) for name in ("fclrob.obj", "fclenv.obj"))
 IDENTITY = np.eye(3, 4)
+ORDERS = list(itertools.permutations(range(3)))
 
 
 def read_obj(path):
@@ -131,13 +132,30 @@ class AgainstCbvh(unittest.TestCase):
             here = np.isin(kept, one.ids())
             originals = stored[[places[triangle] for triangle in kept[here].tolist()]]
             left_out = expected[dropped[here]]
-            orders = [distances(originals, left_out[:, order]).max(1) for order in itertools.permutations(range(3))]
+            orders = [distances(originals, left_out[:, order]).max(1) for order in ORDERS]
             self.assertLessEqual(np.min(orders, axis=0).max(initial=0), limit)
+            self.check_topology(file, one, [places[triangle] for triangle in kept[here].tolist()], orders)
             if cbvh.ENCODINGS[one.triangle_encoding] == "quantized":
                 continue
             self.assertLessEqual(one.max_vertex_rounding, moved * (1 + 2.0**-47))
             if not one.origin.any():
                 self.assertEqual((given.astype(np.float32) + np.float32(0)).tobytes(), corners.tobytes())
+
+    def check_topology(self, file, one, of_duplicates, orders):
+        """Recomputes nets and the boundary from the duplicates in the input, of which `orders` has the distance to each
+        order of the corners of the stored triangle."""
+        even = [sum(a > b for a, b in itertools.combinations(order, 2)) % 2 == 0 for order in ORDERS]
+        same, turned = (np.min([o for o, e in zip(orders, even) if e == way], axis=0) for way in (True, False))
+        nets = np.ones(len(one.places()), np.int64)
+        np.add.at(nets, of_duplicates, np.where(same <= turned, 1, -1))
+        triangle, edge, way = one.traversals()
+        boundary = np.zeros(edge.max(initial=-1) + 1, np.int64)
+        np.add.at(boundary, edge, way * nets[triangle])
+        topology = file.topology[one.number]
+        self.assertEqual(bool(topology.closed), not boundary.any())
+        if topology.closed:
+            self.assertEqual(topology.nets_of(one.places()).tolist(), nets.tolist())
+            self.assertEqual(topology.nets, np.count_nonzero(nets != 1))
 
     def check_facts(self, file, path):
         validated, dumped = (json.loads(run(verb, path, "--json")) for verb in ("validate", "dump"))
@@ -156,6 +174,10 @@ class AgainstCbvh(unittest.TestCase):
             self.assertEqual(facts["origin"], one.origin.tolist())
             for field in ("box_lo", "box_hi", "sphere_centre", "sphere_radius"):
                 self.assertTrue(same_f32(facts[field], np.float32(getattr(one, field))), field)
+            topology = file.topology[one.number] if file.topology else None
+            for field in ("components", "nets"):
+                self.assertEqual(facts[field], getattr(topology, field, None), field)
+            self.assertEqual(facts["closed"], bool(topology.closed) if topology else None)
             for field in (
                 *("input_triangles", "triangles", "degenerate", "duplicates", "treelets", "packets", "first_page"),
                 *("pages", "max_vertex_rounding", "max_quantization_error"),
@@ -240,6 +262,24 @@ class AgainstCbvh(unittest.TestCase):
             self.check_bake(self.bake(mesh, profile, triangles), mesh)
         self.check_queries(path, self.bake(ROBOT), [IDENTITY, np.eye(3, 4) * [1, 1, 1, 0] + np.eye(3, 4, 3) * 80])
 
+    def test_closed_and_open_surfaces(self):
+        robot = read_obj(ROBOT)
+        turned, mesh = robot[:, [1, 0, 2]], os.path.join(self.folder, "surfaces.obj")
+        around = np.array([[-99, -99, -99], [200, 0, 0], [0, 200, 0], [0, 0, 200]])
+        shell = around[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]].astype(float)
+        for parts, triangles in itertools.product(
+            (
+                [("closed", shell)],
+                [("turned", shell[:, ::-1]), ("open", shell[1:])],
+                [("all", np.concatenate([robot, turned, robot, shell])), ("most", np.concatenate([robot, turned[1:]]))],
+                [("both", np.concatenate([shell, shell[:, [1, 2, 0]], shell[:2, ::-1], shell[:2]]))],
+            ),
+            cbvh.ENCODINGS,
+        ):
+            write_obj(mesh, parts)
+            self.check_bake(self.bake(mesh, "auto", triangles, "--split-objects"), mesh)
+            self.check_bake(self.bake(mesh, "auto", triangles), mesh)
+
     def test_without_ids(self):
         path = self.bake(ROBOT, "dop26-u8-wide", "packed", "--no-ids")
         file = load(path)
@@ -268,7 +308,7 @@ class AgainstCbvh(unittest.TestCase):
             }
             for number in range(50)
         ]
-        path = self.written("scene.cbvh", with_instances(data, instances(*changes)))
+        path = self.written("scene.cbvh", with_section(data, instances(*changes)))
         file = load(path)
         self.assertEqual(list(musts.violations(file)), [])
         self.check_facts(file, path)
@@ -281,7 +321,7 @@ class AgainstCbvh(unittest.TestCase):
             scales = [self.chance.choice((2.0**-24, -(2.0**-24), 0)) - 2.0**-49 for _ in range(3)]
             change = np.diag(scales) + self.chance.choice((0, 0, 1e-12, 2.0**-25)) * random_rotation(self.chance)
             rotation = (np.eye(3) + change) @ random_rotation(self.chance)
-            scene = with_instances(data, instances({"rotation": rotation}))
+            scene = with_section(data, instances({"rotation": rotation}))
             ours = mutate.verdict(scene)
             self.assertEqual(ours, mutate.verdict_of_command(COMMAND, self.written("near.cbvh", scene)), rotation)
             verdicts.add(ours)
@@ -422,8 +462,8 @@ class AgainstCbvh(unittest.TestCase):
                 self.check_queries(*paths, query.read_poses(stream.read())[:8])
 
     def test_damaged_files(self):
-        names = "ok-everything.cbvh", "ok-plain.cbvh", "ok-profiles.cbvh", "ok-scene.cbvh"
-        meshes = [os.path.join(TESTDATA, name) for name in names]
+        names = "everything", "plain", "profiles", "scene", "topology"
+        meshes = [os.path.join(TESTDATA, f"ok-{name}.cbvh") for name in names]
         for profile, triangles in (
             ("dop14-u8", "f32"),
             ("dop6-f16", "packed"),

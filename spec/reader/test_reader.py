@@ -117,14 +117,14 @@ def instances(*changes, count=None, names=None, **head):
     return first.tobytes() + records.tobytes() + texts
 
 
-def with_instances(data, section, required=0, before=0):
-    """Returns a file with an instances section of these bytes, behind all sections but the last `before` ones."""
+def with_section(data, section, required=0, before=0, kind=cbvh.INSTANCES):
+    """Returns a file with a section of these bytes, behind all sections but the last `before` ones."""
     file, last = rules.open_file(data), len(data)
     entries = [tuple(getattr(entry, field) for field in cbvh.SECTION_ENTRY.names) for entry in file.entries]
     later, entries = entries[len(entries) - before :], entries[: len(entries) - before]
     start = later[0][2] if later else last
     room = cbvh.PAGE * cbvh.ceil_div(len(section), cbvh.PAGE)
-    entries.append((cbvh.INSTANCES, required, start, len(section), 0))
+    entries.append((kind, required, start, len(section), 0))
     entries += [(kind, need, at + room, length, 0) for kind, need, at, length, _ in later]
     data = bytearray(data[:start] + section.ljust(room, b"\0") + data[start:])
     data[12:16] = len(entries).to_bytes(4, "little")
@@ -149,6 +149,9 @@ class Tables(unittest.TestCase):
             "ObjectRecord": cbvh.OBJECT_RECORD,
             "instance-head": cbvh.INSTANCE_HEAD,
             "InstanceRecord": cbvh.INSTANCE_RECORD,
+            "topology-head": cbvh.TOPOLOGY_HEAD,
+            "TopologyRecord": cbvh.TOPOLOGY_RECORD,
+            "Net": cbvh.NET,
             "PageHeader": cbvh.PAGE_HEADER,
             "PackedHead": cbvh.PACKED_HEAD,
             "id-head": cbvh.ID_HEAD,
@@ -344,7 +347,7 @@ class Instances(unittest.TestCase):
 
     def verdict(self, *changes, data=None, **head):
         """The rule that a file breaks to which these instances are added, or 0."""
-        return mutate.verdict(with_instances(data or self.everything, instances(*changes, **head)))
+        return mutate.verdict(with_section(data or self.everything, instances(*changes, **head)))
 
     def assert_rotations(self, rule, *rotations):
         for rotation in rotations:
@@ -355,7 +358,7 @@ class Instances(unittest.TestCase):
         changes = [{"text": name.encode()} for name in names]
         changes[1] |= {"object": 6, "member": 1, "meets": 1 << 31, "rotation": turn, "translation": [1.5, -2, 3]}
         changes[2] |= {"object": 6, "member": 0, "meets": 0}
-        file = rules.validate(with_instances(self.profiles, instances(*changes)))
+        file = rules.validate(with_section(self.profiles, instances(*changes)))
         rules.verify(file)
         self.assertEqual(list(musts.violations(file)), [])
         self.assertEqual([one.name for one in file.instances], names)
@@ -370,9 +373,9 @@ class Instances(unittest.TestCase):
 
     def test_checksums(self):
         """The section is content. R10 comes before the rules of the section, and also holds for its bytes."""
-        scene = with_instances(self.everything, instances({}))
+        scene = with_section(self.everything, instances({}))
         file = rules.validate(scene)
-        moved = rules.validate(with_instances(self.everything, instances({"translation": [0, 0, 1]})))
+        moved = rules.validate(with_section(self.everything, instances({"translation": [0, 0, 1]})))
         contents = {one.header.content_checksum for one in (file, moved, rules.validate(self.everything))}
         self.assertEqual(len(contents), 3)
         at = file.sections[cbvh.INSTANCES].offset
@@ -396,8 +399,8 @@ class Instances(unittest.TestCase):
         self.assertEqual(self.verdict(*two, names_length=3 + 128, count=1), 0)  # the second record counts as names
         section = instances({})
         for length in (0, 1, 15, 16, len(section) - 1):
-            self.assertEqual(mutate.verdict(with_instances(self.everything, section[:length])), 40, length)
-        self.assertEqual(mutate.verdict(with_instances(self.everything, section + b"\0")), 40)
+            self.assertEqual(mutate.verdict(with_section(self.everything, section[:length])), 40, length)
+        self.assertEqual(mutate.verdict(with_section(self.everything, section + b"\0")), 40)
 
     def test_names(self):
         def verdict(names, *spans):
@@ -535,16 +538,16 @@ class Instances(unittest.TestCase):
     def test_opening(self):
         """A file with a broken scene can be opened, and the section is known: `required` and R09 are as for others."""
         broken = instances({"object": 1})
-        self.assertEqual(rules.open_file(with_instances(self.everything, broken)).instances, [])
-        scene = with_instances(self.everything, instances({}), required=1)
+        self.assertEqual(rules.open_file(with_section(self.everything, broken)).instances, [])
+        scene = with_section(self.everything, instances({}), required=1)
         self.assertEqual(len(rules.validate(scene).instances), 1)
-        self.assertEqual(mutate.verdict(with_instances(scene, instances({}))), 9)
+        self.assertEqual(mutate.verdict(with_section(scene, instances({}))), 9)
 
     def test_what_binds_writers(self):
         good = {"text": b"ab"}, {"text": b"c"}
 
         def count(*changes, required=0, before=0, **head):
-            file = rules.validate(with_instances(self.everything, instances(*changes, **head), required, before))
+            file = rules.validate(with_section(self.everything, instances(*changes, **head), required, before))
             return len(list(musts.violations(file)))
 
         self.assertEqual(count(*good), 0)
@@ -562,6 +565,95 @@ class Instances(unittest.TestCase):
         self.assertEqual(count(good[0], {"translation": [1, -0.0, 2]}), 1)
         self.assertEqual(count({"rotation": [[1, 0, 0], [0, 1, 0], [0, -0.0, 1]]}, good[1]), 1)
         self.assertEqual(count({"member": 0, "meets": 7, "rotation": [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]}), 0)
+
+
+class Topology(unittest.TestCase):
+    """The cube has 13 triangles, one of them without area, at the places 0 and 4 to 15."""
+
+    def setUp(self):
+        ((_, self.everything),) = golden("ok-everything.cbvh")
+        file = rules.validate(self.everything)
+        one = file.objects[0]
+        ids = dict(zip(one.ids().tolist(), one.places().tolist()))
+        self.flat, self.doubled = ids[13], ids[0]  # two duplicates of triangle 0 are left out
+
+    def with_topology(self, closed=1, components=(0,), nets=None, head=None, more=b"", **fields):
+        nets = nets or []
+        record = np.zeros((), cbvh.TOPOLOGY_RECORD)
+        record["closed"], record["components"], record["nets"] = closed, len(components), len(nets)
+        for field, value in fields.items():
+            record[field] = value
+        first = np.array((1, len(components), len(nets), [0] * 4), cbvh.TOPOLOGY_HEAD)
+        for field, value in (head or {}).items():
+            first[field] = value
+        lists = np.array(components, "<u4").tobytes() + np.array(nets, cbvh.NET).tobytes()
+        section = first.tobytes() + record.tobytes() + lists + more
+        return with_section(self.everything, section, kind=cbvh.TOPOLOGY)
+
+    def verdict(self, *arguments, **fields):
+        return mutate.verdict(self.with_topology(*arguments, **fields))
+
+    def test_lengths(self):
+        self.assertEqual(self.verdict(), 0)
+        self.assertEqual(self.verdict(0, ()), 0)
+        for field in ("objects", "components", "nets"):
+            for value in (0, 2, (1 << 32) - 1):
+                if (field, value) != ("nets", 0):
+                    self.assertEqual(self.verdict(head={field: value}), 44, (field, value))
+        self.assertEqual(self.verdict(more=bytes(4)), 44)
+        self.assertEqual(self.verdict(more=bytes(4), components=[0], head={"components": 2}), 44)
+        self.assertEqual(mutate.verdict(with_section(self.everything, bytes(12), kind=cbvh.TOPOLOGY)), 44)
+
+    def test_records(self):
+        self.assertEqual(self.verdict(2), 45)
+        self.assertEqual(self.verdict(0, (), [(self.doubled, 3)]), 45)
+        self.assertEqual(self.verdict(components=range(4, 17)), 46)
+        self.assertEqual(self.verdict(components=range(4, 18)), 45)
+
+    def test_places(self):
+        for places, rule in (([0, 4, 15], 0), ([4, 4], 46), ([5, 4], 46), ([16], 46), ([1], 46), ([0, 3], 46)):
+            self.assertEqual(self.verdict(components=places), rule, places)
+            self.assertEqual(self.verdict(0, places), rule, places)
+            nets = [(place, 0) for place in places]
+            self.assertEqual(self.verdict(nets=nets), rule or 48, places)
+
+    def test_nets_and_boundaries(self):
+        self.assertEqual(self.verdict(nets=[(self.flat, 1)]), 47)
+        everywhere = [0, *range(4, 16)]
+        for net in (0, 2, 7, -1, 1 - (1 << 31)):
+            self.assertEqual(self.verdict(nets=[(self.flat, net)]), 0)
+            self.assertEqual(self.verdict(nets=[(self.doubled, net)]), 48)
+            self.assertEqual(self.verdict(nets=[(place, net) for place in everywhere]), 0)
+            self.assertEqual(self.verdict(nets=[(place, net) for place in everywhere if place != self.flat]), 0)
+            self.assertEqual(self.verdict(nets=[(place, net) for place in everywhere if place != self.doubled]), 48)
+
+    def test_order_of_rules(self):
+        self.assertEqual(self.verdict(2, [5, 4], head={"objects": 2}), 44)
+        self.assertEqual(self.verdict(2, [5, 4]), 45)
+        self.assertEqual(self.verdict(components=[5, 4], nets=[(4, 1)]), 46)
+        self.assertEqual(self.verdict(nets=[(4, 1), (3, 0)]), 47)
+        self.assertEqual(self.verdict(components=[1], nets=[(self.doubled, 3)]), 46)
+        file = rules.validate(self.everything)
+        for kind, offset, rule in ((cbvh.DUPLICATES, 3, 36), (cbvh.NODES, 44, 16)):
+            data = bytearray(self.with_topology(components=[1]))
+            data[file.sections[kind].offset + offset] = 0xFF
+            mutate.seal(data)
+            self.assertEqual(mutate.verdict(data), rule)
+
+    def test_what_binds_writers(self):
+        def count(*arguments, **fields):
+            return len(list(musts.violations(rules.validate(self.with_topology(*arguments, **fields)))))
+
+        least = sorted((self.flat, min({0, *range(4, 16)} - {self.flat})))
+        self.assertEqual(count(0, least), 0)
+        self.assertEqual(count(0, least, reserved=1), 1)
+        self.assertEqual(count(0, least, head={"reserved": [0, 0, 0, 1]}), 1)
+        self.assertEqual(count(0, least[1:]), 2)  # one is missing, and the others are not all
+        self.assertEqual(count(0, sorted({*least, 9})), 1)
+        # The two duplicates of triangle 0 make its net 3, 1 or -1. The other triangles have none.
+        others = [(place, -1) for place in (0, *range(4, 16))]
+        self.assertEqual(count(1, least, others), 12)
+        self.assertEqual(count(1, least, [(place, -2) for place, _ in others]), 13)
 
 
 class Golden(unittest.TestCase):
@@ -584,8 +676,8 @@ class Golden(unittest.TestCase):
                 with self.assertRaises(rules.Broken) as broken:
                     rules.validate(data)
                 self.assertEqual(broken.exception.rule, rule)
-        self.assertEqual([row[0] for row in table("rules")], [f"R{rule:02}" for rule in range(1, 44)])
-        self.assertEqual(seen, set(range(1, 44)) - {35, 39})
+        self.assertEqual([row[0] for row in table("rules")], [f"R{rule:02}" for rule in range(1, 49)])
+        self.assertEqual(seen, set(range(1, 49)) - {35, 39})
 
     def test_bounds_that_cut(self):
         """R35 has no golden file. Here, codes of ok-plain are raised so that bounds cut, without new checksums."""
@@ -677,14 +769,19 @@ class Golden(unittest.TestCase):
         page = ball.objects[0].pages_read[0]
         self.assertTrue(all(page.turning_codes()[slot, : page.children(slot)].any() for slot in range(page.treelets)))
         rules.verify(ball)
+        others = {"ok-turning.cbvh", "ok-topology.cbvh"}
         for name, file in files.items():
-            for one in file.objects if file is not ball else ():
+            for one in file.objects if name not in others else ():
                 corners = one.triangles_f32()
                 cube = (corners - (one.box_lo + one.box_hi) / 2).reshape(-1, 3)
                 self.assertTrue((np.abs(cube) == 1).all(), name)  # corners of a cube of side 2
         everything = files["ok-everything.cbvh"]
         self.assertEqual(sorted(everything.sections), list(range(1, 7)))
         self.assertEqual([name for name, file in files.items() if file.instances], ["ok-scene.cbvh"])
+        self.assertEqual([name for name, file in files.items() if file.topology], ["ok-topology.cbvh"])
+        surfaces = [(one.closed, one.components, one.nets) for one in files["ok-topology.cbvh"].topology]
+        self.assertEqual(surfaces, [(1, 1, 0), (0, 1, 0), (1, 2, 12), (0, 0, 0)])
+        self.assertTrue((files["ok-topology.cbvh"].topology[2].net_list()["net"] == 3).all())
         self.assertEqual(everything.provenance(), {"generator": "a test", "input": "a cube"})
         self.assertEqual(query.weights(everything).sum(), everything.objects[0].input_triangles)
         names = [one.name for one in files["ok-profiles.cbvh"].objects]
