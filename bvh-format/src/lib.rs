@@ -22,6 +22,7 @@
 //!    child is: in the same page, in a later page, or a packet of triangles.
 //! 4. [`decode::decode_child`] turns the bounds of a child into [slabs], given the slabs of its parent.
 //! 5. The [leaf] block of a page holds its triangles, and the [ids] block their numbers in the input.
+//! 6. A file may also say where its objects stand ([instances]), and which of them are closed ([topology]).
 //!
 //! [`validate::validate`] checks a whole file against all [rules](Rule) but R35, and [`bounds::check_bounds`] proves that
 //! bounds contain their triangles (R35). A breach is a [`FormatError`]: it names the rule, the byte, what was expected,

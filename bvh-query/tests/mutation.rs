@@ -9,7 +9,7 @@ mod common;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes, verify};
 use bvh_format::validate::validate;
-use bvh_query::{Bvh, Pose};
+use bvh_query::{Bvh, Pose, QueryError};
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::forge::{Input, forge};
 use cbvh_testkit::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
@@ -208,6 +208,8 @@ fn forged_pairs_do_no_harm() {
         let (a, b) = (forged(&mut random), forged(&mut random));
         let (a_valid, b_valid) = (validate(&a).is_ok(), validate(&b).is_ok());
         let Ok(b) = Bvh::from_bytes(b) else { continue };
+        let closed = b.is_closed(0);
+        assert!(matches!(closed, Ok(_) | Err(QueryError::NoTopology)) || !b_valid, "valid, but {closed:?}");
         let pose = random_pose(&mut random, 4.0);
         let backend = random.below(queriers.len());
         let start = Instant::now();
