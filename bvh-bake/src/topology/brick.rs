@@ -151,9 +151,13 @@ fn run_of_triangles<'a>(
     let mut table = [NO_EDGE; TABLE];
     let mut edges: Vec<Edge> = Vec::with_capacity(3 * parents.len());
     parents.iter_mut().zip(0..).for_each(|(parent, number)| *parent = number);
-    for (of, triangle) in (0..).zip(triangles) {
+    // Reading ahead of the branches below keeps many reads from far memory under way.
+    let read = |triangle: &Triangle| {
         let ends = triangle.corners.map(end);
-        let hashes = ends.map(hash);
+        (ends, ends.map(hash))
+    };
+    let triangles: Vec<_> = triangles.map(read).collect();
+    for (of, (ends, hashes)) in (0..).zip(&triangles) {
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
             let (start, end) = (ends[from], ends[to]);
             if start == end {
