@@ -140,7 +140,7 @@ fn bytes_are_those_of_single_bakes() {
     write_assets(directory, options.len(), line);
     for more in [&["--no-ids"][..], &["--no-ids", "--force", "--max-memory", "64MiB", "--jobs", "3"]] {
         let summary = bake(directory, "out.jsonl", more).done().json();
-        counts(&summary, 7, 7, 0, 0);
+        counts(&summary, 8, 8, 0, 0);
         for (number, (_, arguments)) in options.iter().enumerate() {
             let input = format!("meshes/{number}.obj");
             let single = [&["bake", &input, "-o", "single.cbvh", "--json", "-q"], *arguments].concat();
