@@ -1,7 +1,7 @@
 //! Checks that a warm query allocates nothing. The allocator itself counts.
 
 use bvh_bake::mesh::Mesh;
-use bvh_query::{Bvh, Pose, Querier, Tracker};
+use bvh_query::{Bvh, Pose, Querier, Ray, Tracker};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -67,6 +67,12 @@ fn warm_queries_allocate_nothing() {
             answers += f64::from(u8::from(querier.within(&bvh, &bvh, pose, 0.1).unwrap()));
             answers +=
                 querier.visit_contacts(&bvh, &bvh, pose, |_| ControlFlow::Continue(())).unwrap() as f64;
+            let (at, point) = (bvh.all().at(pose), [0.3, 0.2, 0.7]);
+            answers += querier.closest_point(at, point, f64::INFINITY).unwrap().unwrap().distance;
+            answers += f64::from(querier.side(at, point).unwrap() as u8);
+            answers +=
+                querier.first_hit(at, &Ray::new(point, [0.1, 0.2, -0.9])).unwrap().map_or(0.0, |hit| hit.t);
+            answers += f64::from(u8::from(querier.meets_segment(at, point, [0.9, -0.7, -0.8]).unwrap()));
             answers += f64::from(u8::from(tracker.collide(&mut querier, &bvh, &bvh, pose).unwrap()));
             answers += tracker.distance(&mut querier, &bvh, &bvh, pose).unwrap().distance;
             answers += f64::from(u8::from(tracker.within(&mut querier, &bvh, &bvh, pose, 0.1).unwrap()));

@@ -1,7 +1,7 @@
 //! Asks two forged files every query in any pose, on every backend, and a forged scene the questions over its pairs. Answers may be wrong, but each query must end.
 #![no_main]
 
-use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, Scene};
+use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, Ray, Scene};
 use cbvh_testkit::forge::{Input, forge};
 use libfuzzer_sys::fuzz_target;
 use std::ops::ControlFlow;
@@ -23,6 +23,7 @@ fuzz_target!(|bytes: &[u8]| {
     if let Some(mut scene) = forged.and_then(|bvh| Scene::of_file(bvh).ok()) {
         scene.set_budget(1 << 16);
         let _ = (scene.pairs_in_contact(), scene.distance(), scene.pairs_within(near));
+        let _ = (scene.closest_points(&[[near; 3]], f64::INFINITY), scene.sides(&[[near; 3]]));
     }
     let (Ok(a), Ok(b)) = (Bvh::from_bytes(forge(&mut input)), Bvh::from_bytes(forge(&mut input))) else {
         return;
@@ -39,5 +40,9 @@ fuzz_target!(|bytes: &[u8]| {
         let options = DistanceOptions::new().rel_err(allowed).abs_err(allowed);
         let _ = querier.distance_with(&a, &b, &pose, &options);
         let _ = querier.within(&a, &b, &pose, near);
+        let _ = querier.relation(&a, &b, &pose);
+        let (shape, point, away) = (a.all().at(&pose), [near, 0.0, allowed], pose.translation());
+        let _ = (querier.closest_point(shape, point, f64::INFINITY), querier.side(shape, point));
+        let _ = (querier.all_hits(shape, &Ray::new(point, away)), querier.meets_segment(shape, point, away));
     }
 });

@@ -5,7 +5,9 @@ use super::{mesh, options};
 use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_query::{Bvh, Contact, Distance, Pose, Querier, QueryError};
+use bvh_query::{
+    Bvh, ClosestPoint, Contact, Distance, Pose, Querier, QueryError, Ray, RayHit, Relation, Side,
+};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -16,11 +18,23 @@ pub(crate) struct Answers {
     pub(crate) contacts: Result<Vec<Contact>, QueryError>,
     pub(crate) distance: Result<Distance, QueryError>,
     pub(crate) within: Result<bool, QueryError>,
+    pub(crate) relation: Result<Relation, QueryError>,
+    /// About a point, a ray and a segment, and B.
+    pub(crate) closest: Result<Option<ClosestPoint>, QueryError>,
+    pub(crate) side: Result<Side, QueryError>,
+    pub(crate) hits: Result<Vec<RayHit>, QueryError>,
+    pub(crate) segment: Result<bool, QueryError>,
 }
 
 impl Answers {
+    /// Returns whether any answer was refused. That a file does not state what is closed is no refusal.
     pub(crate) fn is_refused(&self) -> bool {
-        self.collide.is_err() || self.contacts.is_err() || self.distance.is_err() || self.within.is_err()
+        let is_told =
+            |error: Option<&QueryError>| error.is_some_and(|error| *error != QueryError::NoTopology);
+        let of_pairs = self.collide.is_err() || self.contacts.is_err() || self.distance.is_err();
+        let of_probes = self.closest.is_err() || self.hits.is_err() || self.segment.is_err();
+        let of_sides = is_told(self.side.as_ref().err()) || is_told(self.relation.as_ref().err());
+        of_pairs || of_probes || of_sides || self.within.is_err()
     }
 
     /// Returns whether each answer either was refused or is that of the undamaged file.
@@ -29,6 +43,11 @@ impl Answers {
             && (self.distance.is_err() || self.distance == other.distance)
             && (self.within.is_err() || self.within == other.within)
             && (self.contacts.is_err() || self.contacts == other.contacts)
+            && (self.relation.is_err() || self.relation == other.relation)
+            && (self.closest.is_err() || self.closest == other.closest)
+            && (self.side.is_err() || self.side == other.side)
+            && (self.hits.is_err() || self.hits == other.hits)
+            && (self.segment.is_err() || self.segment == other.segment)
     }
 }
 
@@ -43,11 +62,17 @@ pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) 
             if contacts.len() < 5000 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         contacts.sort_unstable();
+        let (at, point) = (b.all().at(pose), [0.25, -0.5, 0.125]);
         Answers {
             collide: querier.collide(a, b, pose),
             contacts: visited.map(|_| contacts),
             distance: querier.distance(a, b, pose),
             within: querier.within(a, b, pose, 0.25),
+            relation: querier.relation(a, b, pose),
+            closest: querier.closest_point(at, point, f64::INFINITY),
+            side: querier.side(at, point),
+            hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
+            segment: querier.meets_segment(at, point, [0.1, 0.2, -0.3]),
         }
     };
     Some([ask(&bvh, good), ask(good, &bvh)])
