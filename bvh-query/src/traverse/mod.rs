@@ -1,4 +1,4 @@
-//! Walks two trees together, or one for points: decoding, re-alignment, node tests, order of visits.
+//! Walks two trees together, or one for a probe: decoding, re-alignment, node tests, order of visits.
 
 pub(crate) mod align;
 pub(crate) mod decode;
@@ -10,7 +10,7 @@ pub(crate) mod node_cache;
 pub(crate) mod node_test;
 pub(crate) mod placement;
 pub(crate) mod point_test;
-pub(crate) mod point_walk;
+pub(crate) mod probe_walk;
 pub(crate) mod slab_memory;
 pub(crate) mod slab_test;
 pub(crate) mod walk;

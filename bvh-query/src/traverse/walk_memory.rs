@@ -7,7 +7,7 @@ use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_test::NodeTest;
-use crate::traverse::point_walk::{PointStack, PointVisitor, PointWalk};
+use crate::traverse::probe_walk::{ProbeStack, ProbeVisitor, ProbeWalk};
 use crate::traverse::slab_memory::SlabMemory;
 use bvh_format::object::Object;
 use bvh_format::slabs::Group;
@@ -36,7 +36,7 @@ pub(crate) struct WalkMemory {
     /// Best-first: the entry of least bound is next.
     pub(super) list: Frames,
     pub(super) large_leaves: LargeLeaves,
-    points: PointStack,
+    probes: ProbeStack,
     /// How many visits the query may make, and how many are left.
     budget: u64,
     left: u64,
@@ -48,15 +48,15 @@ impl WalkMemory {
         (self.budget, self.left) = (budget, budget);
     }
 
-    /// Returns a walk of one object towards a point.
-    pub(crate) fn point_walk<'a, V: PointVisitor>(
+    /// Returns a walk of one object for a probe.
+    pub(crate) fn probe_walk<'a, V: ProbeVisitor>(
         &'a mut self,
         bvh: &'a Bvh,
         object: &'a Object,
         visitor: &'a mut V,
-    ) -> PointWalk<'a, V> {
-        let Self { points, left, budget, .. } = self;
-        PointWalk { bvh, object, stack: points, left, budget: *budget, visitor }
+    ) -> ProbeWalk<'a, V> {
+        let Self { probes, left, budget, .. } = self;
+        ProbeWalk { bvh, object, stack: probes, left, budget: *budget, visitor }
     }
 
     /// Lets what follows make as many visits as have been made since `start` and a few more, but none beyond the budget.

@@ -21,7 +21,7 @@ use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::point_test::PointTest;
-use crate::traverse::point_walk::PointVisitor;
+use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
@@ -150,7 +150,7 @@ impl Task for SearchObject<'_> {
         let Self { search, placed, index, memory, bounded } = self;
         bounded.clear();
         let mut visitor = Nearest::new(search, placed, index, bounded);
-        let tests = isa.run(memory.point_walk(visitor.bvh, visitor.object, &mut visitor))?;
+        let tests = isa.run(memory.probe_walk(visitor.bvh, visitor.object, &mut visitor))?;
         visitor.settle()?;
         let limit = f64::from(visitor.limit) / (visitor.scale * visitor.stretch);
         let stats = visitor.stats;
@@ -260,7 +260,7 @@ impl<'a> Nearest<'a> {
     }
 }
 
-impl PointVisitor for Nearest<'_> {
+impl ProbeVisitor for Nearest<'_> {
     #[inline(always)]
     fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
         self.test.bounds(isa, children)

@@ -16,7 +16,7 @@ use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::line_test::{LineTest, Segment};
-use crate::traverse::point_walk::PointVisitor;
+use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
@@ -243,7 +243,7 @@ impl<Q: LineQuestion> Task for AskObject<'_, Q> {
             question,
             stats: QueryStats::default(),
         };
-        let tests = isa.run(memory.point_walk(bvh, object, &mut visitor))?;
+        let tests = isa.run(memory.probe_walk(bvh, object, &mut visitor))?;
         Ok((tests, visitor.stats))
     }
 }
@@ -281,7 +281,7 @@ impl<Q: LineQuestion> Walked<'_, Q> {
     }
 }
 
-impl<Q: LineQuestion> PointVisitor for Walked<'_, Q> {
+impl<Q: LineQuestion> ProbeVisitor for Walked<'_, Q> {
     #[inline(always)]
     fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
         self.test.entries(isa, children)

@@ -1,16 +1,17 @@
-//! The walk of one tree towards a point: nearest child first, four children in the lanes of a register.
+//! The walk of one tree for a point or a line: nearest child first, four children in the lanes of a register.
 //!
 //! ```text
 //! stack := [the root]
 //! while frame := top(stack):
 //!     child := nearest child of the frame that is left; if none or bound(child) > limit: pop, next
-//!     decode the children of the child, and bound their distances
+//!     decode the children of the child, and bound where the probe meets them
 //!     visitor.leaves(leaf packets among them within the limit)
 //!     push the others within the limit as a frame, if there are any
 //! ```
 //!
 //! Unlike a pair walk, it meets each node once, so it decodes nodes where it needs them, into the frames of its stack, and
-//! keeps none. Lanes are slabs and children, so that one point fills them ([`crate::traverse::point_test`]). The walk ends
+//! keeps none. Lanes are slabs and children, so that one probe fills them ([`crate::traverse::point_test`],
+//! [`crate::traverse::line_test`]). The walk ends
 //! because a file is a tree, and has at most one frame for each level.
 
 use crate::error::QueryError;
@@ -23,8 +24,8 @@ use bvh_format::slabs::Group;
 use bvh_format::treelet::Links;
 
 /// What a question does with the nodes and leaf packets that a walk meets.
-pub(crate) trait PointVisitor {
-    /// Returns lower bounds of the distances of four nodes.
+pub(crate) trait ProbeVisitor {
+    /// Returns lower bounds of what is to be least in four nodes: a distance, or the share of a line.
     fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H;
 
     /// Returns the limit: what has a larger bound is not visited.
@@ -37,7 +38,7 @@ pub(crate) trait PointVisitor {
 /// The children of an opened node.
 #[derive(Clone)]
 #[repr(C, align(64))]
-struct PointFrame {
+struct ProbeFrame {
     groups: [Group; 2],
     /// Of the inner children that are left; `GONE` for the others.
     bounds: [f32; 8],
@@ -61,7 +62,7 @@ static HIDDEN: [[f32; 4]; 16] = {
     hidden
 };
 
-impl PointFrame {
+impl ProbeFrame {
     const EMPTY: Self = Self {
         groups: [Group::ZERO; 2],
         bounds: [GONE; 8],
@@ -95,8 +96,8 @@ impl PointFrame {
 
 /// The stack of a walk, kept from one walk to the next.
 #[derive(Default)]
-pub(crate) struct PointStack {
-    frames: Vec<PointFrame>,
+pub(crate) struct ProbeStack {
+    frames: Vec<ProbeFrame>,
     /// The file and the first page of the object whose root the first frame holds.
     of: Option<(u64, u32)>,
 }
@@ -104,7 +105,7 @@ pub(crate) struct PointStack {
 /// Frames made at once.
 const FRAMES: usize = 16;
 
-impl PointStack {
+impl ProbeStack {
     /// Puts the root of an object on an empty stack.
     #[inline(always)]
     fn start<I: Isa>(&mut self, isa: I, bvh: &Bvh, object: &Object) -> Result<(), QueryError> {
@@ -112,7 +113,7 @@ impl PointStack {
         if self.of != Some((bvh.identity(), page)) {
             let slabs = bvh.page(object, page)?.anchor_slabs(0);
             if self.frames.is_empty() {
-                self.frames.resize(FRAMES, PointFrame::EMPTY);
+                self.frames.resize(FRAMES, ProbeFrame::EMPTY);
             }
             let root = &mut self.frames[0];
             root.groups[0] = spread(isa, &slabs);
@@ -125,17 +126,17 @@ impl PointStack {
 }
 
 /// A walk of an object.
-pub(crate) struct PointWalk<'a, V> {
+pub(crate) struct ProbeWalk<'a, V> {
     pub(crate) bvh: &'a Bvh,
     pub(crate) object: &'a Object,
-    pub(crate) stack: &'a mut PointStack,
+    pub(crate) stack: &'a mut ProbeStack,
     /// The visits that may still be made.
     pub(crate) left: &'a mut u64,
     pub(crate) budget: u64,
     pub(crate) visitor: &'a mut V,
 }
 
-impl<V: PointVisitor> Task for PointWalk<'_, V> {
+impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
     /// The number of node tests.
     type Output = Result<u64, QueryError>;
 
@@ -147,7 +148,7 @@ impl<V: PointVisitor> Task for PointWalk<'_, V> {
         let (mut opened, mut depth) = (0, 1);
         while depth > 0 {
             if depth == stack.frames.len() {
-                stack.frames.resize(depth + FRAMES, PointFrame::EMPTY);
+                stack.frames.resize(depth + FRAMES, ProbeFrame::EMPTY);
             }
             let (above, below) = stack.frames.split_at_mut(depth);
             let (frame, next) = (&mut above[depth - 1], &mut below[0]);
@@ -219,7 +220,7 @@ struct VisitLeaves<'a, V> {
     leaves: &'a [LeafPacket],
 }
 
-impl<V: PointVisitor> Task for VisitLeaves<'_, V> {
+impl<V: ProbeVisitor> Task for VisitLeaves<'_, V> {
     type Output = Result<(), QueryError>;
 
     #[inline(always)]
