@@ -13,7 +13,7 @@ use crate::file::shape::Shape;
 use crate::isa::Backend;
 use crate::motion::Path;
 use crate::pose::Pose;
-use crate::query::answers::{Contact, Distance};
+use crate::query::answers::{Contact, Distance, Relation};
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
@@ -113,6 +113,15 @@ impl<'a> Batch<'a> {
     pub fn within(&self, poses: &[Pose], d: f64) -> Result<Vec<bool>, QueryError> {
         check_distance(d)?;
         self.each(poses, |querier, tracker, pose| tracker.within(querier, self.a, self.b, pose, d))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::relation`] for each pose.
+    ///
+    /// # Errors
+    /// Returns the error of the first pose that fails.
+    pub fn relation(&self, poses: &[Pose]) -> Result<Vec<Relation>, QueryError> {
+        self.each(poses, |querier, _, pose| querier.relation(self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
 

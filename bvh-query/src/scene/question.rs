@@ -3,7 +3,7 @@
 use crate::error::QueryError;
 use crate::file::owned_shape::OwnedShape;
 use crate::pose::Pose;
-use crate::query::answers::{Contact, Distance};
+use crate::query::answers::{Contact, Distance, Relation};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
@@ -121,6 +121,20 @@ impl Scene {
     pub fn pairs_within(&mut self, d: f64) -> Result<Vec<ScenePair>, SceneError> {
         check_distance(d)?;
         self.all(d, |querier, pair| pair.within(querier, d))
+    }
+
+    /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, and how they lie. Pairs that have
+    /// nothing in common are left out: all pairs whose boxes in the world are apart, and those for which
+    /// [`Querier::relation`] says so.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
+    pub fn relations(&mut self) -> Result<Vec<(ScenePair, Relation)>, SceneError> {
+        let candidates = self.near(0.0);
+        self.each(&candidates, |querier, pair| {
+            let relation = querier.relation(pair.a, pair.b, &pair.pose)?;
+            Ok((relation != Relation::Apart).then_some((pair.ids, relation)))
+        })
     }
 
     /// Returns all pairs of triangles in contact.

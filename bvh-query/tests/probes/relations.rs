@@ -57,6 +57,20 @@ fn what_is_inside_what_is_told() {
     }
 }
 
+#[test]
+#[cfg(feature = "parallel")]
+fn a_batch_has_the_relations_of_its_poses() {
+    let (cube, ball) =
+        (baked(&outward(cube())), baked(&moved(&outward(on_lattice(sphere(2))), 0.25, [0.0; 3])));
+    let poses: Vec<Pose> = (0..200).map(|i| translation(f64::from(i) / 100.0, 0.1, 0.0)).collect();
+    let mut querier = bvh_query::Querier::new().unwrap();
+    let expected: Vec<_> = poses.iter().map(|pose| querier.relation(&cube, &ball, pose).unwrap()).collect();
+    assert!(
+        [Relation::BInA, Relation::Touching, Relation::Apart].iter().all(|found| expected.contains(found))
+    );
+    assert_eq!(bvh_query::Batch::new(&cube, &ball).unwrap().relation(&poses), Ok(expected));
+}
+
 /// Random poses of closed meshes: of those that do not touch, rationals tell for one corner of each component.
 #[test]
 fn relations_in_poses_are_those_of_rationals() {

@@ -3,7 +3,7 @@
 use crate::common::Random;
 use crate::common::shapes::{moved, on_lattice, outward, plate, sphere, torus};
 use crate::{place, shape};
-use bvh_query::{Backend, InstanceId, OwnedShape, Pose, Querier, Ray, Scene, SceneError, Side};
+use bvh_query::{Backend, InstanceId, OwnedShape, Pose, Querier, Ray, Relation, Scene, SceneError, Side};
 use cbvh_testkit::depth::rounds;
 
 /// A scene of instances in random places, and the instances.
@@ -114,6 +114,41 @@ fn probes_of_a_scene_are_those_of_its_instances() {
             assert!(inside > 0 && hit > 10, "{inside} {hit}");
         }
     }
+}
+
+#[test]
+fn relations_of_a_scene_are_those_of_its_pairs() {
+    let backend = Backend::ALL.into_iter().find(|backend| backend.is_available()).unwrap();
+    let (mut scene, instances) = scene(backend, 9);
+    let ball = shape(&moved(&outward(on_lattice(sphere(2))), 0.25, [0.0; 3]));
+    // A ball in the middle of each instance, inside it where that is a ball.
+    let mut all = instances;
+    for (_, _, world) in all.clone() {
+        let world = Pose::new(*Pose::IDENTITY.rotation(), world.translation()).unwrap();
+        all.push((scene.add(ball.clone(), world).unwrap(), ball.clone(), world));
+    }
+    // The lower one of a pair is A.
+    all.sort_by_key(|(id, ..)| *id);
+    let mut querier = Querier::with_backend(backend);
+    let mut counts = [0; 6];
+    for parallel in [false, true] {
+        scene.set_parallel(parallel);
+        let found = scene.relations().unwrap();
+        for (number, (a, shape_a, world_a)) in all.iter().enumerate() {
+            for (b, shape_b, world_b) in &all[number + 1..] {
+                let pose = Pose::relative(world_a, world_b).unwrap();
+                let expected = querier.relation(shape_a, shape_b, &pose).unwrap();
+                let found = found.iter().find(|(pair, _)| (pair.a, pair.b) == (*a, *b));
+                match found {
+                    Some((_, relation)) => assert_eq!(*relation, expected),
+                    // Apart by their boxes in the world.
+                    None => assert!(matches!(expected, Relation::Apart | Relation::Undefined)),
+                }
+                counts[expected as usize] += 1;
+            }
+        }
+    }
+    assert!(counts[0] > 0 && counts[1] > 0 && counts[3] > 0, "{counts:?}");
 }
 
 #[test]
