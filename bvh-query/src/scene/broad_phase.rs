@@ -399,7 +399,8 @@ impl<K: Fn(&WorldBox) -> f64> ByKey<K> {
     fn push(&mut self, broad: &BroadPhase, tree: Which, number: u32) {
         let node = &broad.tree(tree).nodes[number as usize];
         let key = (self.key)(&node.bounds);
-        if key < f64::INFINITY {
+        // What has moved left an empty box in the tree of what stands still.
+        if key < f64::INFINITY && !node.bounds.is_empty() {
             let place = if node.is_leaf() { node.children[1] } else { 0 };
             self.open.push(Keyed { key, tree, node: number, place });
         }

@@ -231,7 +231,7 @@ impl Asked<'_> {
     }
 
     /// Calls `visit` with each instance whose box has a finite key, in ascending order of the keys, until it breaks. The key of
-    /// a box is at most that of any box in it.
+    /// a box is at most that of any box in it, but for rounding.
     fn visit(
         &mut self,
         key: impl Fn(&WorldBox) -> f64,

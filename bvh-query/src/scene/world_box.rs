@@ -60,6 +60,11 @@ impl WorldBox {
         bounds
     }
 
+    /// Returns whether it contains nothing.
+    pub(super) fn is_empty(&self) -> bool {
+        self.lo[0] > self.hi[0]
+    }
+
     /// Returns the smallest box around both.
     pub(super) fn union(&self, other: &Self) -> Self {
         let (lo, hi) = (|k: usize| self.lo[k].min(other.lo[k]), |k: usize| self.hi[k].max(other.hi[k]));

@@ -5,15 +5,14 @@
 //! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_test`]), a register holds four slabs of
 //! four nodes.
 //!
-//! Error, with u = 2^-24: the ends of what is subtracted and n q are rounded to f32, which moves a point along n by a little
-//! more than u |n p| + u |n q|; their own error and that of the segment in f64 come on top. Slabs are moved outward by three
-//! times that. What is left is relative: a
-//! rounded difference, a rounded inverse and a product make an end of the interval wrong by 3u of itself, for which entries are
-//! made less by 8u and exits greater. Their signs are right, so that this is right for those before the segment's start as
-//! well, which count as 0.
+//! Error, with u = 2^-24: what is subtracted and n q are rounded to f32, which moves a point along n by at most
+//! 1.01 u (|n p| + |n q|), and the segment's own error by 3 E along a direction of three entries. Slabs are moved outward by
+//! w = 3 u (|n p| + |n q|) + 8 E, more than twice as much. What is left is relative: a rounded difference, a rounded inverse and
+//! a product make an end of the interval wrong by 3u of itself, for which entries are made less by 8u and exits greater. Their
+//! signs are right, so that this is right for those before the segment's start as well, which count as 0.
 //!
-//! Where |n q| is less than half of what slabs are moved by, they are moved by |n q| more, and n q counts as just that half: the
-//! quotients are then beyond 0 and 1 wherever the segment is within the slab by more than rounding.
+//! Where |n q| is less than w / 2, slabs are moved by |n q| more, and n q counts as w / 2. Wherever the segment meets the slab,
+//! both ends are then at least w - w / 2 away, and the quotients beyond 0 and 1.
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{FACTORS_BY_AXIS, U};
@@ -47,8 +46,8 @@ impl LineTest {
         let (mut above, mut below, mut inverse) = ([0.0; 16], [0.0; 16], [0.0; 16]);
         let [x, y, z] = &FACTORS_BY_AXIS;
         let (start, vector) = (&segment.start, &segment.vector);
-        // Three times the error of a coordinate, and more than is rounded here.
-        let least = 4.0 * segment.error + f64::from(f32::MIN_POSITIVE);
+        // A projection is off by up to three times the error of a coordinate, for which less than half is needed.
+        let least = 8.0 * segment.error + f64::from(f32::MIN_POSITIVE);
         for row in 0..16 {
             let p = x[row] * start[0] + y[row] * start[1] + z[row] * start[2];
             let q = x[row] * vector[0] + y[row] * vector[1] + z[row] * vector[2];
@@ -98,8 +97,9 @@ impl LineTest {
             let inverse = isa.load(&self.inverse[quad]);
             let lo = isa.load(&nodes.lo[quad]).sub(isa.load(&self.above[quad])).mul(inverse);
             let hi = isa.load(&nodes.hi[quad]).sub(isa.load(&self.below[quad])).mul(inverse);
-            // Rows without a slab may be NaN there: `max` and `min` then return their second operand.
-            entry = lo.min(hi).max(entry);
+            // In rows without a slab lo is -infinity or NaN, and hi infinity or NaN. `max` and `min` return their second
+            // operand for NaN, so that in this order neither changes what was found.
+            entry = hi.min(lo).max(entry);
             exit = lo.max(hi).min(exit);
         }
         let (mut entries, mut exits) = ([0.0; 16], [0.0; 16]);

@@ -57,6 +57,33 @@ fn what_is_inside_what_is_told() {
     }
 }
 
+/// A closed mesh that reaches out of the box of an open one: whichever corner stands for it, the answer is the same.
+#[test]
+fn an_open_mesh_leaves_undefined_what_may_be_in_its_box() {
+    let open = baked(&[[[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 4.0]]]);
+    let corners = [[0.1, 0.2, 3.0], [0.1, 0.2, 9.0], [0.3, 0.2, 9.0], [0.1, 0.4, 9.0]];
+    for turn in 0..4 {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(i + turn) % 4]);
+        let closed = baked(&outward_of([0.15, 0.25, 7.0], &[[a, b, c], [a, c, d], [a, d, b], [b, d, c]]));
+        for querier in &mut queriers() {
+            assert_eq!(querier.relation(&open, &closed, &Pose::IDENTITY), Ok(Relation::Undefined));
+            assert_eq!(querier.relation(&closed, &open, &Pose::IDENTITY), Ok(Relation::Undefined));
+            assert_eq!(querier.relation(&open, &closed, &translation(0.0, 0.0, 2.0)), Ok(Relation::Apart));
+        }
+    }
+}
+
+/// Turns triangles around a point such that all look away from it.
+fn outward_of(middle: [f64; 3], triangles: &[Triangle]) -> Vec<Triangle> {
+    let minus = moved(triangles, 1.0, middle.map(|v| -v));
+    let turned = outward(minus.clone());
+    triangles
+        .iter()
+        .zip(minus.iter().zip(&turned))
+        .map(|(t, (old, new))| if old == new { *t } else { [t[0], t[2], t[1]] })
+        .collect()
+}
+
 #[test]
 #[cfg(feature = "parallel")]
 fn a_batch_has_the_relations_of_its_poses() {

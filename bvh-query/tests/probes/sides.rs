@@ -1,5 +1,6 @@
 //! Inside and outside: labels, and winding numbers of rationals where it is hard.
 
+use crate::common::shapes::{on_lattice, outward, sphere};
 use crate::common::{Random, Triangle, bake, mesh, note};
 use crate::hard::{in_poses, point};
 use crate::labels::{each_label, number, queriers};
@@ -39,6 +40,23 @@ fn side(random: &mut Random, point: &[f64; 3], triangles: &[Triangle], is_closed
             return if winding == 0 { Side::Outside } else { Side::Inside };
         }
     }
+}
+
+#[test]
+fn a_point_outside_the_box_costs_no_walk() {
+    let ball = outward(on_lattice(sphere(3)));
+    let bvh = bake(&mesh(&ball), &bvh_bake::Options::default());
+    let mut querier = bvh_query::Querier::new().unwrap();
+    for axis in 0..3 {
+        for far in [-2.0, 2.0, -1e6] {
+            let mut point = [0.01, 0.02, 0.03];
+            point[axis] = far;
+            assert_eq!(querier.side(&bvh, point), Ok(Side::Outside));
+            assert_eq!(querier.stats().node_tests, 0, "{point:?}");
+        }
+    }
+    assert_eq!(querier.side(&bvh, [0.01, 0.02, 0.03]), Ok(Side::Inside));
+    assert!(querier.stats().node_tests > 0);
 }
 
 #[test]

@@ -116,6 +116,20 @@ fn probes_of_a_scene_are_those_of_its_instances() {
     }
 }
 
+/// What has moved is asked about once, where it is now.
+#[test]
+fn instances_that_moved_cost_no_more() {
+    let ball = shape(&outward(on_lattice(sphere(2))));
+    let mut scene = Scene::with_backend(Backend::Scalar);
+    let at = |x: usize| Pose::new(*Pose::IDENTITY.rotation(), [3.0 * x as f64, 0.0, 0.0]).unwrap();
+    let ids: Vec<InstanceId> = (0..40).map(|x| scene.add(ball.clone(), at(x)).unwrap()).collect();
+    let ray = Ray::new([-5.0, 0.1, 0.2], [1.0, 0.0, 0.0]);
+    let expected = (scene.all_hits(&[ray]).unwrap(), scene.stats());
+    assert_eq!(expected.0[0].len(), 80);
+    ids.iter().step_by(2).zip((0..).step_by(2)).for_each(|(id, x)| scene.set_pose(*id, at(x)).unwrap());
+    assert_eq!((scene.all_hits(&[ray]).unwrap(), scene.stats()), expected);
+}
+
 #[test]
 fn relations_of_a_scene_are_those_of_its_pairs() {
     let backend = Backend::ALL.into_iter().find(|backend| backend.is_available()).unwrap();

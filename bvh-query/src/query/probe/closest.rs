@@ -126,8 +126,8 @@ impl Search {
         let of = &shape.objects()[object as usize - shape.first()];
         let triangle = shape.bvh().triangle_id(of, place)?;
         let Closest { distance, upper, point_a, .. } = closest;
-        // Triangles that were left out are beyond the limit, which has only ever decreased.
-        let lower = if distance == 0.0 { 0.0 } else { self.settled_lower.min(self.limit) };
+        // Triangles that were left out are certainly farther than one that was measured.
+        let lower = if distance == 0.0 { 0.0 } else { self.settled_lower };
         Ok(Some(ClosestPoint { distance, lower, upper, point: point_a, object, triangle }))
     }
 }
@@ -238,13 +238,10 @@ impl<'a> Nearest<'a> {
                 Some(best) if closest.distance == best.closest.distance => {
                     self.number == best.object && self.id(place)? < self.id(best.place)?
                 }
-                Some(best) => closest.distance < best.closest.distance,
-                None => {
-                    search.within == f64::INFINITY
-                        || triangles_within(&triangle, &[point; 3], &closest, search.within)
-                }
+                best => best.as_ref().is_none_or(|best| closest.distance < best.closest.distance),
             };
-            if is_better {
+            let is_within = |within| triangles_within(&triangle, &[point; 3], &closest, within);
+            if is_better && (search.within == f64::INFINITY || is_within(search.within)) {
                 self.search.best = Some(Best { closest, object: self.number, place });
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);

@@ -182,7 +182,7 @@ impl Clipped {
         let from = [0, 1, 2].map(|k| f64::from(to[k]) - start[k]);
         let squared = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
         let along = from[0] * vector[0] + from[1] * vector[1] + from[2] * vector[2];
-        // Of finite numbers, the quotient is no NaN.
+        // NaN, which only the packets of a forged file can give, does no harm.
         let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
         [0, 1, 2].map(|k| start[k] + share * vector[k])
     }

@@ -144,7 +144,11 @@ impl Scaled {
         let (instance, object, triangle) = met.numbers;
         let hit = RayHit {
             t: scaled(crossing.t),
-            lower: crossing.lower * self.unit,
+            lower: if crossing.lower * self.unit < f64::MIN_POSITIVE {
+                0.0
+            } else {
+                crossing.lower * self.unit
+            },
             upper: scaled(crossing.upper),
             point: [0, 1, 2].map(|k| origin[k] + crossing.t * direction[k]),
             object,

@@ -6,10 +6,12 @@ use crate::file::place::TrianglePlace;
 use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::{Relation, Side};
+use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::stored_at;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
 use crate::query::querier::Querier;
+use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::object::Object;
 use bvh_format::validate::packets;
 
@@ -20,8 +22,9 @@ impl Querier {
     /// triangles touch, each connected component of a mesh is on one side of the other mesh, and one point of each component
     /// tells which. Decided exactly; the answer has the same bits on all backends.
     ///
-    /// A mesh that is not closed contains nothing outside of its box. What is inside its box, but not on a known side, leaves the
-    /// answer undefined, unless the other mesh contains all of it.
+    /// An object that is not closed contains nothing that is certainly apart from its box. About an object of the other mesh
+    /// whose box may meet that box, nothing is known, and that leaves the answer undefined where it matters: an open mesh
+    /// inside a closed one is inside it.
     ///
     /// Cost: that of `collide`, and about a microsecond per connected component.
     ///
@@ -39,23 +42,42 @@ impl Querier {
             return Ok(Relation::Touching);
         }
         let (own, placed) = (PlacedShape::from(a), b.at(pose));
-        Ok(relation(self.components_in(&own, &placed)?, self.components_in(&placed, &own)?))
+        let may_contain = |of_a: usize, of_b: usize| {
+            let (object_a, object_b) = (&a.objects()[of_a], &b.objects()[of_b]);
+            let placement = &Placement::new(pose, object_a, object_b);
+            let (bvh_a, bvh_b) = (a.bvh(), b.bvh());
+            !surely_apart(&ObjectPair { bvh_a, object_a, bvh_b, object_b, placement, end: placement })
+        };
+        let a_in_b = self.components_in(&own, &placed, may_contain)?;
+        let b_in_a = self.components_in(&placed, &own, |of_b, of_a| may_contain(of_a, of_b))?;
+        Ok(relation(a_in_b, b_in_a))
     }
 
-    /// Counts the components of a mesh that are inside another.
+    /// Counts the components of a mesh that are inside another. `may_contain` tells of an object of each whether their boxes
+    /// may meet.
     fn components_in(
         &mut self,
         mesh: &PlacedShape<'_>,
         container: &PlacedShape<'_>,
+        may_contain: impl Fn(usize, usize) -> bool,
     ) -> Result<Components, QueryError> {
         let mut components = Components::default();
         let bvh = mesh.shape.bvh();
         for (index, object) in mesh.shape.objects().iter().enumerate() {
             let topology = bvh.topology(mesh.shape.first() + index)?;
+            let mut is_known = true;
+            for other in 0..container.shape.objects().len() {
+                let number = container.shape.first() + other;
+                is_known &= container.shape.bvh().topology(number)?.closed || !may_contain(index, other);
+            }
             let mut ask = |place: TrianglePlace| -> Result<(), QueryError> {
+                if !is_known {
+                    components.undefined += 1;
+                    return Ok(());
+                }
                 let corner = stored_at(bvh, object, place)?[0];
                 let point = mesh.pose.map_or(corner, |pose| pose.place(corner));
-                components.count(self.side_of(container, &point, OpenObject::UndefinedInBox)?);
+                components.count(self.side_of(container, &point, OpenObject::Empty)?);
                 Ok(())
             };
             if topology.components().len() != 0 {
@@ -103,6 +125,10 @@ impl Components {
         }
     }
 
+    fn are_divided(&self) -> bool {
+        self.inside > 0 && self.outside > 0
+    }
+
     fn are_all_inside(&self) -> bool {
         self.outside == 0 && self.undefined == 0
     }
@@ -113,7 +139,7 @@ fn relation(a_in_b: Components, b_in_a: Components) -> Relation {
         Relation::AInB
     } else if b_in_a.are_all_inside() && a_in_b.inside == 0 {
         Relation::BInA
-    } else if a_in_b.inside + b_in_a.inside > 0 {
+    } else if a_in_b.are_divided() || b_in_a.are_divided() || a_in_b.inside > 0 && b_in_a.inside > 0 {
         Relation::Mixed
     } else if a_in_b.undefined + b_in_a.undefined > 0 {
         Relation::Undefined

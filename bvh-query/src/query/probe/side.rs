@@ -17,8 +17,8 @@ use crate::query::querier::Querier;
 pub(crate) enum OpenObject {
     /// It leaves undefined what is inside.
     Undefined,
-    /// It contains nothing outside its box, and leaves the rest undefined.
-    UndefinedInBox,
+    /// It contains nothing.
+    Empty,
 }
 
 impl Querier {
@@ -46,7 +46,8 @@ impl Querier {
     }
 
     /// Returns the closest point of a mesh to `point` and the side that `point` is on. Nothing if the mesh is farther than
-    /// `within`. So the signed distance is that of the surface, negative inside.
+    /// `within`. So the signed distance is that of the surface, negative inside. These are two questions, and the budget
+    /// holds for each of them.
     ///
     /// # Errors
     /// The errors of [`Querier::closest_point`] and [`Querier::side`].
@@ -75,8 +76,8 @@ impl Querier {
         for (index, object) in placed.shape.objects().iter().enumerate() {
             let into = IntoObject::new(placed.pose.as_ref(), object);
             let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
-            let (ray, is_in_box) = short_way_out(point, &into);
-            undefined |= !topology.closed && (is_in_box || open == OpenObject::Undefined);
+            undefined |= !topology.closed && open == OpenObject::Undefined;
+            let Some(ray) = short_way_out(point, &into) else { continue };
             let mut question = Winding { ray, topology, is_on: false, winding: 0 };
             self.ask_line_of_object(placed, index, &into, &mut question)?;
             if question.is_on {
@@ -92,26 +93,25 @@ impl Querier {
     }
 }
 
-/// Returns a ray along an axis that leaves an object's box soon, and whether its origin may be in the box.
-fn short_way_out(point: &Point, into: &IntoObject) -> (AxisRay, bool) {
+/// Returns a ray along an axis that leaves an object's box soon; nothing if the point is not in the box.
+fn short_way_out(point: &Point, into: &IntoObject) -> Option<AxisRay> {
     let seen = into.point(*point);
     let error = into.error(4.0 * (sum_of_magnitudes(point) + sum_of_magnitudes(&seen)));
     let [lo, hi] = &into.bounds;
-    let mut best = (f64::INFINITY, AxisRay { origin: *point, axis: 0, ascends: true });
+    let mut best = (f64::INFINITY, 0, true);
     for k in 0..3 {
-        let ways = [seen[k] - lo[k], hi[k] - seen[k]];
-        for (way, ascends) in ways.into_iter().zip([false, true]) {
+        for (way, ascends) in [(seen[k] - lo[k], false), (hi[k] - seen[k], true)] {
             if way < -error {
-                return (best.1, false);
+                return None;
             }
             if way < best.0 {
-                best = (way, AxisRay { origin: *point, axis: k, ascends });
+                best = (way, k, ascends);
             }
         }
     }
     // Where the object is turned, the axis of the question that is nearest to that of the object leads out about as soon.
-    let (axis, ascends) = into.nearest_axis(best.1.axis, best.1.ascends);
-    (AxisRay { origin: *point, axis, ascends }, true)
+    let (axis, ascends) = into.nearest_axis(best.1, best.2);
+    Some(AxisRay { origin: *point, axis, ascends })
 }
 
 /// How often does an object wind around a point?
