@@ -46,10 +46,7 @@ impl LocalFrame {
                 m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
             })
         };
-        // A power of two near 1 / size, by its exponent; a point against a point has no size, and any
-        // unit will do.
-        let exponent = (size(a).max(size(b)).to_bits() >> 52) as i64 - 1023;
-        let scale = f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52);
+        let scale = scale_of(size(a).max(size(b)));
         let rotation32 = placement.rotation.map(|row| row.map(|r| (r * scale) as f32));
         Self {
             rotation: placement.rotation,
@@ -59,6 +56,13 @@ impl LocalFrame {
             error: ((placement.error * scale) as f32).next_up() + UNDERFLOW,
         }
     }
+}
+
+/// Returns a power of two near 1 / size, by its exponent, from 2^-120 to 2^120; what has no size takes any unit.
+#[inline(always)]
+pub(crate) fn scale_of(size: f64) -> f64 {
+    let exponent = (size.to_bits() >> 52) as i64 - 1023;
+    f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52)
 }
 
 /// A packet of A and one of B in one frame, whose origin is the first corner of A's.

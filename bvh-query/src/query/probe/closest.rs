@@ -9,15 +9,15 @@ use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
+use crate::leaf::local::scale_of;
 use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_within};
 use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
 use crate::query::options::check_distance;
-use crate::query::probe::line::sum_of_magnitudes;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
-use crate::query::probe::point::check_point;
+use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::point_test::PointTest;
@@ -196,8 +196,7 @@ impl<'a> Nearest<'a> {
             (0..3).fold(0.0f64, |far, k| far.max((point[k] - lo[k]).abs()).max((hi[k] - point[k]).abs()));
         let error = into.error(sum_of_magnitudes(&search.point) + sum_of_magnitudes(&point));
         let stretch = if pose.is_some() { MAX_STRETCH } else { 1.0 };
-        let exponent = (farthest.to_bits() >> 52) as i64 - 1023;
-        let scale = f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52);
+        let scale = scale_of(farthest);
         Self {
             bvh,
             object,

@@ -8,11 +8,13 @@ use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::{Isa, Task};
 use crate::leaf::line::{crossed, direction};
+use crate::leaf::local::scale_of;
 use crate::leaf::point::LocalPoint;
 use crate::narrow::{Point, Triangle};
 use crate::query::answers::QueryStats;
 use crate::query::exact::{placed, stored};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
+use crate::query::probe::point::sum_of_magnitudes;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::line_test::{LineTest, Segment};
@@ -41,10 +43,6 @@ impl Line {
         let direction = [0, 1, 2].map(|k| to[k] - from[k]);
         Self { origin: from, direction, magnitude: sum_of_magnitudes(&from) + sum_of_magnitudes(&to) }
     }
-}
-
-pub(crate) fn sum_of_magnitudes(point: &Point) -> f64 {
-    point[0].abs() + point[1].abs() + point[2].abs()
 }
 
 /// What is asked about a line.
@@ -147,7 +145,6 @@ impl Clipped {
         }
         let [lo, hi] = &into.bounds;
         let size = (hi[0] - lo[0]).max(hi[1] - lo[1]).max(hi[2] - lo[2]);
-        let exponent = (size.to_bits() >> 52) as i64 - 1023;
         let length = end - start;
         Some(Self {
             segment: Segment {
@@ -156,7 +153,7 @@ impl Clipped {
                 error: 2.0 * error,
             },
             direction,
-            scale: f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52),
+            scale: scale_of(size),
             start,
             length,
         })

@@ -16,3 +16,9 @@ pub(crate) fn check_point(point: &Point) -> Result<Point, QueryError> {
     }
     Ok(point.map(|x| if x.abs() < LEAST_COORDINATE { 0.0 } else { x }))
 }
+
+/// Returns the sum of the magnitudes of the coordinates.
+#[inline(always)]
+pub(crate) fn sum_of_magnitudes(point: &Point) -> f64 {
+    point[0].abs() + point[1].abs() + point[2].abs()
+}

@@ -7,9 +7,9 @@ use crate::error::QueryError;
 use crate::file::topology::Topology;
 use crate::narrow::{AxisRay, Passing, Point};
 use crate::query::answers::{Side, SignedDistance};
-use crate::query::probe::line::{Candidate, Line, LineQuestion, sum_of_magnitudes};
+use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
-use crate::query::probe::point::check_point;
+use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
 
 /// What an object that is not closed means for points that are not on it.
