@@ -180,8 +180,8 @@ impl Scene {
         self.trackers.on = tracking;
     }
 
-    /// Lets the question about each pair visit at most this many pairs of nodes, as
-    /// [`Querier::set_budget`](crate::Querier::set_budget) does.
+    /// Lets the question about each pair visit at most this many pairs of nodes, and that about each point, ray or segment so
+    /// many nodes over all instances, as [`Querier::set_budget`](crate::Querier::set_budget) does.
     pub fn set_budget(&mut self, visits: u64) {
         self.workers.budget = visits;
     }
