@@ -302,18 +302,12 @@ impl Layout {
         let sum = header.leaf_checksum.get();
         require(Rule::LeafChecksum, at + 8, hex(sum), hex(block.checksum()))?;
         if object.triangle_encoding != TriangleEncoding::F32 && packets > 0 {
-            let head = PackedHead::read(block.bytes()).filter(|head| {
-                let vertex_bytes = (usize::from(head.vertices) * head.stride()).div_ceil(8);
-                head.bits.iter().all(|&bits| bits <= 32)
-                    && head.index_bits <= 16
-                    && head.vertices > 0
-                    && head.indices_at as usize == 32 + vertex_bytes
-            });
+            let head = PackedHead::read(block.bytes()).filter(|head| head.is_consistent(packets));
             let head = head.ok_or_else(|| {
                 let found = format!("{:?}", PackedHead::read(block.bytes()));
                 FormatError::new(Rule::PackedHeader, at + 24, "a consistent head", found)
             })?;
-            there(head.block_bytes(packets))?;
+            there(head.block_bytes())?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ pub fn to_ordered(value: f32) -> i32 {
 
 /// Returns the float of an ordered integer.
 #[inline]
-pub(crate) fn from_ordered(ordered: i32) -> f32 {
+pub fn from_ordered(ordered: i32) -> f32 {
     f32::from_bits(flip(ordered) as u32)
 }
 

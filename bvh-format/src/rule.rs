@@ -51,7 +51,7 @@ rules! {
     LeafPlace = 26, "a leaf block lies within the leaf section and has the size its packets need";
     LeafChecksum = 27, "a leaf block has the checksum that its page states";
     PackedHeader = 28, "a packed leaf block's bit widths are within the limits and its parts within the block";
-    PackedIndex = 29, "a packed vertex index is below the block's vertex count";
+    PackedRecord = 29, "a packed packet's slots are those of vertices in the block's pool";
     VertexFinite = 30, "a vertex coordinate is finite and at most 2^120 in magnitude";
     IdPlace = 31, "an id block lies within the id section and has the size its packets need";
     IdChecksum = 32, "an id block has the checksum that its page states";

@@ -13,7 +13,7 @@ use crate::error::{FormatError, ensure, require};
 use crate::header::SectionKind;
 use crate::ids::decode_id;
 use crate::layout::{ContentHasher, Layout, PairsInOrder};
-use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, decode_packet};
+use crate::leaf::{PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
 use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
@@ -244,7 +244,7 @@ fn check_values(
     for (packet, count) in packets(page) {
         triangles += count as u64;
         if object.triangle_encoding != TriangleEncoding::F32 {
-            check_indices(block, usize::from(packet), at)?;
+            check_record(block, usize::from(packet), at)?;
         }
         let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
         check_vertices(&values, origin, at)?;
@@ -261,15 +261,16 @@ fn check_values(
     Ok((triangles, sum))
 }
 
-fn check_indices(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError> {
+fn check_record(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError> {
     let Some(head) = PackedHead::read(block) else { return Ok(()) };
-    for place in 0..3 * PACKET {
-        let index = head.index(block, packet, place);
-        ensure(index < u32::from(head.vertices), Rule::PackedIndex, at + 24, || {
-            (format!("a vertex index below {}", head.vertices), index.to_string())
-        })?;
-    }
-    Ok(())
+    let record = head.record(block, packet);
+    ensure(record.is_valid(head.vertices, head.further), Rule::PackedRecord, at + 24, || {
+        let expected = format!(
+            "rotations of at most 2, slots below {} and further slots among {}",
+            head.vertices, head.further
+        );
+        (expected, format!("{record:?}"))
+    })
 }
 
 fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), FormatError> {

@@ -138,7 +138,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     vec![
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
-        (2, "major-3", header(|f| f.header(8, &[3]))),
+        (2, "major-4", header(|f| f.header(8, &[4]))),
         (3, "short", change(&[], |f| f.bytes.truncate(100))),
         (4, "flipped-bit", change(&[], |f| f.bytes[4000] ^= 1)),
         (5, "truncated", change(&[1], |f| f.bytes.truncate(4096 + 100))),
@@ -267,27 +267,29 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
                 seal_header(&mut f.bytes);
             }),
         ),
-        (28, "33-bits", block(|f| f.leaves(4, &[33]))),
+        (28, "33-bits", block(|f| f.leaves(5, &[33]))),
+        (28, "kind-3", block(|f| f.leaves(20, &[3]))),
+        (28, "16-decimals", block(|f| f.leaves(20, &[2, 16]))),
+        (28, "a-further-slot", block(|f| f.leaves(2, &[1]))),
         (
             29,
             "fewer-vertices",
             block(|f| {
-                // The pool and the array stay where they are, because the bits of one vertex less fill the same
-                // number of bytes.
+                // One vertex of no bits, to which all slots but zeros do not lead.
                 f.leaves(0, &[1, 0]);
-                f.leaves(4, &[0; 3]);
-                let bits = f.bytes[section(&f.bytes, 3).start + 2];
-                let needed = 32 + (12 * 4 * usize::from(bits)).div_ceil(8) + 8;
-                f.leaves(24, &[32, 0, 0, 0]);
-                f.leaves(32, &[0xff; 24]);
-                f.page(48, &[needed.div_ceil(64) as u8]);
+                f.leaves(5, &[0; 3]);
+                let pool_at = f.bytes[section(&f.bytes, 3).start + 28];
+                f.page(48, &[(pool_at + 8).div_ceil(64)]);
             }),
         ),
+        (29, "rotation-3", block(|f| f.leaves(32, &[f.bytes[section(&f.bytes, 3).start + 32] | 0xc0]))),
+        // The pattern with most slots, of which the further ones start at the 15th of 12.
+        (29, "beyond-further-slots", block(|f| f.leaves(32, &[63, 0, 0, 0, 15 << 2]))),
         (
             30,
             "infinite",
             sealed(&LEAVES, |f| {
-                f.leaves(3, &[0]);
+                f.leaves(20, &[0; 4]);
                 f.leaves(8, &infinite);
             }),
         ),

@@ -10,7 +10,10 @@ use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry
 use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
 use bvh_format::instances::{Instance, InstanceRecord, MAX_RIGID_ERROR, MAX_WORLD, write_instances};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
-use bvh_format::leaf::{F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PackedHead, TriangleEncoding};
+use bvh_format::leaf::{
+    F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PATTERNS, PackedHead, RECORD_HEAD_BITS,
+    TriangleEncoding, decode_packet,
+};
 use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
 use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter, TightBound};
 use bvh_format::profile::{Encoding, Profile};
@@ -134,8 +137,9 @@ fn heads_of_blocks() {
             [$((stringify!($field), type_name_of_val(&head.$field), $first as u8)),*]
         };
     }
-    let fields = fields![vertices head.vertices, index_bits head.index_bits, fixed head.fixed,
-        bits head.bits[0], base head.base[0], exponent head.exponent[0], indices_at head.indices_at];
+    let fields = fields![vertices head.vertices, further head.further, index_bits head.index_bits,
+        bits head.bits[0], base head.base[0], kinds head.kinds, exponent head.exponent[0],
+        further_at head.further_at, pool_at head.pool_at];
     let rows = byte_table("PackedHead", PACKED_HEAD_BYTES);
     let named: Vec<_> = rows.iter().filter(|row| !row.3.starts_with("reserved")).collect();
     assert_eq!(named.len(), fields.len());
@@ -247,6 +251,8 @@ fn constants() {
         PACKET,
         F32_PACKET_BYTES,
         PACKED_HEAD_BYTES,
+        RECORD_HEAD_BITS,
+        PATTERNS,
         ID_HEAD_BYTES,
         LOG2_MAX_COORDINATE,
         TURNING_TRIANGLES,
@@ -264,6 +270,42 @@ fn constants() {
     let magic = MAGIC.map(|byte| format!("{byte:02x}")).join(" ");
     assert_eq!(text.matches(&magic).count(), 2);
     assert!(text.contains(&format!("`{:#018x}`", checksum(&[]))));
+}
+
+/// Decodes a packet of each pattern, in a block whose slots are the vertices of their numbers.
+#[test]
+fn patterns() {
+    let rows = table("format.md", "patterns");
+    for (first, row) in (0..).step_by(4).zip(&rows) {
+        assert_eq!(number(&row[0]), first);
+    }
+    let patterns: Vec<&str> = rows.iter().flat_map(|row| row[1].split(' ')).collect();
+    assert_eq!(patterns.len(), PATTERNS);
+    for (number, pattern) in patterns.into_iter().enumerate() {
+        let digits: Vec<u8> = pattern.chars().map(|digit| digit.to_digit(16).unwrap() as u8).collect();
+        let slots = usize::from(*digits.iter().max().unwrap()) + 1;
+        // Vertex v is (v, 0, 0). The record takes 14 + 6 * 4 bits, and the seven further slots 28.
+        let mut record = number as u64;
+        for slot in 0..6 {
+            // The number of the first further slot is 0, if there are any.
+            let held = if slot < slots.min(5) || slots == 6 { slot as u64 } else { 0 };
+            record |= held << (RECORD_HEAD_BITS + 4 * slot);
+        }
+        let further = (0..7).fold(0u32, |bits, slot| bits | (5 + slot) << (4 * slot));
+        let pool = (0..12).fold(0u64, |bits, vertex| bits | vertex << (4 * vertex));
+        let mut block = vec![12, 0, 7, 0, 4, 4, 0, 0];
+        block.extend([0; 12]);
+        block.extend([0b01_01_01, 0, 0, 0, 37, 0, 0, 0, 41, 0, 0, 0]);
+        block.extend(&record.to_le_bytes()[..5]);
+        block.extend(further.to_le_bytes());
+        block.extend(&pool.to_le_bytes()[..6]);
+        block.extend([0; 8]);
+        let packet = decode_packet(TriangleEncoding::Packed, &block, 0);
+        for (place, digit) in digits.into_iter().enumerate() {
+            let corner = packet.triangle(place / 3)[place % 3];
+            assert_eq!(corner, [f32::from(digit), 0.0, 0.0], "{pattern}");
+        }
+    }
 }
 
 /// Writes one code at the place that the table states, and expects that exactly one end of one child changes.

@@ -13,12 +13,13 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR = 2
+MAJOR = 3
 MAX_SECTIONS = 64
 NO_PARENT = 0xFFFFFFFF
 PACKET = 4
 F32_PACKET_BYTES = 144
 PACKED_HEAD_BYTES = 32
+RECORD_HEAD_BITS = 14
 ID_HEAD_BYTES = 8
 TURNING_TRIANGLES = 1024
 LOG2_MAX_WORLD, RIGID_BITS = 118, 23
@@ -108,15 +109,14 @@ PAGE_HEADER = np.dtype(
 PACKED_HEAD = np.dtype(
     [
         ("vertices", "<u2"),
+        ("further", "<u2"),
         ("index_bits", "u1"),
-        ("fixed", "u1"),
         ("bits", "u1", 3),
-        ("reserved", "u1"),
         ("base", "<i4", 3),
+        ("kinds", "u1"),
         ("exponent", "i1", 3),
-        ("reserved_2", "u1"),
-        ("indices_at", "<u4"),
-        ("reserved_3", "u1", 4),
+        ("further_at", "<u4"),
+        ("pool_at", "<u4"),
     ]
 )
 ID_HEAD = np.dtype([("base", "<u4"), ("bits", "u1"), ("reserved", "u1", 3)])
@@ -169,6 +169,29 @@ ENCODINGS = ["f32", "packed", "quantized"]
 # 7.2: kinds of children; 4 to 7 are packets of 1 to 4 triangles
 TREELET, REMOTE, LEAF = 1, 2, 4
 
+# 11.2: kinds of axes, and the slots that patterns state [pattern, lane, corner]
+ORDERED, BINARY, DECIMAL = range(3)
+PATTERNS = """
+    012012012012 012013024034 012013024035 012013024043
+    012013024045 012013024152 012013024153 012013024156
+    012013024254 012013024256 012013024567 012013142153
+    012013142154 012013142245 012013142253 012013142456
+    012013142567 012023023023 012023031132 012023031134
+    012023034034 012023034041 012023034045 012023034056
+    012023034145 012023034152 012023034156 012023034253
+    012023034254 012023034256 012023034354 012023034356
+    012023034456 012023034567 012023045045 012023045056
+    012023045067 012023045156 012023045167 012023045267
+    012023045364 012023045367 012023045465 012023045467
+    012023045567 012023045678 012023145145 012023145167
+    012023145354 012023145367 012023145465 012023145467
+    012023145567 012023145678 012023456456 012023456467
+    012023456478 012023456789 012034034034 012034567589
+    01203456789a 012345345345 012345678678 0123456789ab
+""".split()
+PATTERNS = np.array([[int(digit, 16) for digit in pattern] for pattern in PATTERNS]).reshape(-1, PACKET, 3)
+RECORD_SLOTS = 6
+
 
 def ceil_div(a, b):
     return -(-a // b)
@@ -177,6 +200,16 @@ def ceil_div(a, b):
 def records_of(head):
     """The number of records that the head of a section with named records states, in its first field."""
     return getattr(head, head.dtype.names[0])
+
+
+def kinds_of_axes(head):
+    """The kinds of the axes of a packed leaf block; each of them is 0 to 3 (11.2)."""
+    return [head.kinds >> 2 * axis & 3 for axis in range(3)]
+
+
+def slots_of(pattern):
+    """The number of slots of each pattern."""
+    return 1 + PATTERNS[pattern].max(axis=(1, 2))
 
 
 def row_of(slab):
@@ -484,25 +517,54 @@ class Page(Record):
     def packed_head(self):
         return Record(PACKED_HEAD, self.data, self.leaf_block_at())
 
-    def indices_at(self, head):
-        """The offset in the block at which the index array must start (11.2)."""
-        return PACKED_HEAD_BYTES + ceil_div(head.vertices * int(head.bits.sum(dtype=int)), 8)
+    def packed_arrays(self, head):
+        """The bits that the three bit arrays of the block take: records, further slots and pool (11.2)."""
+        record = RECORD_HEAD_BITS + RECORD_SLOTS * head.index_bits
+        return self.packets * record, head.further * head.index_bits, head.vertices * int(head.bits.sum(dtype=int))
+
+    def packed_places(self, head):
+        """The offsets in the block at which the three arrays must start, and that at which the last one ends."""
+        return np.cumsum([PACKED_HEAD_BYTES, *(ceil_div(bits, 8) for bits in self.packed_arrays(head))]).tolist()
 
     def leaf_bytes_needed(self):
         if not self.is_packed():
             return F32_PACKET_BYTES * self.packets
-        head = self.packed_head()
-        return self.indices_at(head) + ceil_div(12 * self.packets * head.index_bits, 8) + 8
+        return self.packed_places(self.packed_head())[-1] + 8
 
-    def packed_indices(self, head):
-        """The pool indices in the order of the array: [packet, corner, lane]."""
-        at = self.leaf_block_at() + head.indices_at
-        values = bit_values(self.data, at, 0, head.index_bits, head.index_bits, 12 * self.packets)
-        return values.astype(np.intp).reshape(-1, 3, PACKET)
+    def packed_records(self, head):
+        """The patterns [packet], the rotations of lanes [packet, lane], and the slots of records [packet, slot]."""
+        width, at = head.index_bits, self.leaf_block_at() + PACKED_HEAD_BYTES
+        stride = RECORD_HEAD_BITS + RECORD_SLOTS * width
+        fields = [(0, 6), *((6 + 2 * lane, 2) for lane in range(PACKET))]
+        fields += [(RECORD_HEAD_BITS + width * slot, width) for slot in range(RECORD_SLOTS)]
+        values = [bit_values(self.data, at, first, stride, bits, self.packets) for first, bits in fields]
+        values = np.stack(values, axis=1).astype(np.intp)
+        return values[:, 0], values[:, 1 : 1 + PACKET], values[:, 1 + PACKET :]
+
+    def packed_slots(self, head):
+        """The slots of each packet [packet, slot], and the numbers of those that are further slots, -1 for others.
+        Slots that the pattern lacks are 0, and so are those beyond the further ones (R29).
+        """
+        pattern, _, held = self.packed_records(head)
+        slot, last, count = np.arange(3 * PACKET), RECORD_SLOTS - 1, slots_of(pattern)[:, None]
+        is_further = (count > RECORD_SLOTS) & (last <= slot) & (slot < count)
+        number = np.where(is_further, held[:, last:] + slot - last, -1)
+        at = self.leaf_block_at() + head.further_at
+        further = bit_values(self.data, at, 0, head.index_bits, head.index_bits, head.further).astype(np.intp)
+        held = np.pad(held, ((0, 0), (0, len(slot) - RECORD_SLOTS)))
+        slots = np.where(is_further, np.append(further, 0).take(number, mode="clip"), held)
+        return np.where(slot < count, slots, 0), number
+
+    def packed_corners(self, head):
+        """The place in the pool of each corner: [packet, lane, corner]."""
+        pattern, rotation, _ = self.packed_records(head)
+        turned = (np.arange(3) + rotation[..., None]) % 3
+        places = np.take_along_axis(PATTERNS[pattern], turned, axis=2).reshape(-1, 3 * PACKET)
+        return np.take_along_axis(self.packed_slots(head)[0], places, axis=1).reshape(-1, PACKET, 3)
 
     def packed_numbers(self, head):
         """The number n of each vertex and axis, as i32 (11.2)."""
-        at = self.leaf_block_at() + PACKED_HEAD_BYTES
+        at = self.leaf_block_at() + head.pool_at
         first_bit, stride = 0, int(head.bits.sum(dtype=int))
         numbers = np.empty((head.vertices, 3), np.int32)
         for axis, width in enumerate(head.bits.tolist()):
@@ -515,14 +577,15 @@ class Page(Record):
         """The vertices of the block [vertex, axis], in f32."""
         numbers = self.packed_numbers(head)
         pool = np.empty(numbers.shape, np.float32)
-        for axis, exponent in enumerate(head.exponent.tolist()):
+        for axis, (kind, exponent) in enumerate(zip(kinds_of_axes(head), head.exponent.tolist())):
             n = numbers[:, axis]
-            if head.fixed >> axis & 1:
-                power = np.float32(0) if exponent < -126 else np.ldexp(np.float32(1), exponent)
-                with np.errstate(over="ignore"):  # R30 finds what overflows
-                    pool[:, axis] = n.astype(np.float32) * power
-            else:
+            if kind == ORDERED:
                 pool[:, axis] = np.where(n >= 0, n, n ^ np.int32(0x7FFFFFFF)).view(np.float32)
+            else:
+                # Parsing a number rounds to nearest, but 10.0**-exponent need not.
+                power = 2.0**exponent if kind == BINARY else float(f"1e-{exponent}")
+                with np.errstate(over="ignore"):  # R30 finds what overflows
+                    pool[:, axis] = (n * np.float64(power)).astype(np.float32)
         return pool
 
     def triangles(self):
@@ -531,8 +594,8 @@ class Page(Record):
             return np.empty((0, PACKET, 3, 3), np.float32)
         if self.is_packed():
             head = self.packed_head()
-            indices = self.packed_indices(head).transpose(0, 2, 1)
-            return self.packed_pool(head).take(indices, axis=0, mode="clip")  # also safe before R29 is checked
+            corners = self.packed_corners(head)
+            return self.packed_pool(head).take(corners, axis=0, mode="clip")  # also safe before R29 is checked
         rows = np.frombuffer(self.data, "<f4", 36 * self.packets, self.leaf_block_at())
         return rows.reshape(-1, 3, 3, PACKET).transpose(0, 3, 1, 2)
 

@@ -256,23 +256,17 @@ def of_leaf_block(page, lines):
             yield f"{where}: the end of the block is not zero"
         return
     head = page.packed_head()
-    if head.reserved or head.reserved_2 or head.reserved_3.any() or head.fixed > 7:
-        yield f"{where}: nonzero reserved bytes or bits in the head"
-    pool_bits = head.vertices * int(head.bits.sum(dtype=int))
-    index_bits = 12 * page.packets * head.index_bits
-    pool = int.from_bytes(block[cbvh.PACKED_HEAD_BYTES : head.indices_at], "little")
-    rest = int.from_bytes(block[head.indices_at :], "little")
-    if pool >> pool_bits or rest >> index_bits:
-        yield f"{where}: bits after an array are not zero"
-    for axis in range(3):
-        exponent, fixed = int(head.exponent[axis]), head.fixed >> axis & 1
-        if (exponent < -126) if fixed else exponent:
-            yield f"{where}: exponent {exponent} of axis {axis}"
-        if fixed:
-            numbers = page.packed_numbers(head)[:, axis].astype(np.float64)
-            exact = numbers * 2.0**exponent == page.packed_pool(head)[:, axis]
-            if not exact.all() or (np.abs(numbers) > 2.0**30).any():
-                yield f"{where}: fixed-point coordinates of axis {axis} are rounded, or too large"
+    starts = [cbvh.PACKED_HEAD_BYTES, head.further_at, head.pool_at, len(block)]
+    for start, end, bits in zip(starts, starts[1:], page.packed_arrays(head)):
+        if int.from_bytes(block[start:end], "little") >> bits:
+            yield f"{where}: bits after an array are not zero"
+    pattern, _, held = page.packed_records(head)
+    if held[np.arange(cbvh.RECORD_SLOTS) >= cbvh.slots_of(pattern)[:, None]].any():
+        yield f"{where}: slots of a record that its pattern lacks are not zero"
+    for axis, kind in enumerate(cbvh.kinds_of_axes(head)):
+        exact = page.packed_numbers(head)[:, axis] * 2.0 ** int(head.exponent[axis])
+        if kind == cbvh.BINARY and (exact != page.packed_pool(head)[:, axis]).any():
+            yield f"{where}: binary coordinates of axis {axis} are rounded"
 
 
 def of_id_block(page, words):

@@ -49,7 +49,10 @@ def places(data):
                 for offset in (one.layout.kinds_at, one.layout.links_at):
                     sorts["links"] += range(at + offset, at + offset + 4)
             if page.packets:
-                sorts["leaf heads"] += range(page.leaf_block_at(), page.leaf_block_at() + 40)
+                at = page.leaf_block_at()
+                sorts["leaf heads"] += range(at, at + 40)
+                if page.is_packed():
+                    sorts["records"] += range(at + cbvh.PACKED_HEAD_BYTES, at + page.packed_head().pool_at)
             if page.id_words:
                 sorts["id heads"] += range(page.id_block_at(), page.id_block_at() + 16)
     return [sort for sort in sorts.values() if sort]

@@ -284,8 +284,14 @@ def check_leaf_block(page):
         need(bool((head.bits <= 32).all()), 28, head.place("bits"), "at most 32", head.bits)
         need(head.index_bits <= 16, 28, head.place("index_bits"), "at most 16", head.index_bits)
         need(head.vertices >= 1, 28, head.place("vertices"), "at least 1", 0)
-        indices_at = page.indices_at(head)
-        need(head.indices_at == indices_at, 28, head.place("indices_at"), indices_at, head.indices_at)
+        kinds = cbvh.kinds_of_axes(head)
+        need(head.kinds < 64 and max(kinds) <= cbvh.DECIMAL, 28, head.place("kinds"), "known kinds", head.kinds)
+        for kind, exponent in zip(kinds, head.exponent.tolist()):
+            least, most = {cbvh.ORDERED: (0, 0), cbvh.BINARY: (-128, 127), cbvh.DECIMAL: (0, 15)}[kind]
+            need(least <= exponent <= most, 28, head.place("exponent"), f"{least} to {most}", exponent)
+        _, further_at, pool_at, _ = page.packed_places(head)
+        need(head.further_at == further_at, 28, head.place("further_at"), further_at, head.further_at)
+        need(head.pool_at == pool_at, 28, head.place("pool_at"), pool_at, head.pool_at)
         check_place()
 
 
@@ -442,12 +448,13 @@ def validate_object(one):
 
 
 def check_packets(page):
-    """Checks each packet of a page in turn: indices (R29), each coordinate (R30 and R37), and ids (R33)."""
-    bad_index = np.zeros((page.packets, 12), bool)
+    """Checks each packet of a page in turn: its record (R29), each coordinate (R30 and R37), and ids (R33)."""
+    bad_record = np.zeros(page.packets, bool)
     if page.is_packed() and page.packets:
         head = page.packed_head()
-        indices = page.packed_indices(head).reshape(-1, 12)
-        bad_index = indices >= head.vertices
+        _, rotation, _ = page.packed_records(head)
+        slots, number = page.packed_slots(head)
+        bad_record = ((slots >= head.vertices) | (number >= head.further)).any(axis=1) | (rotation > 2).any(axis=1)
     values = page.triangles().transpose(0, 2, 3, 1)  # packet, corner, axis, lane: the order of the block
     origin = np.broadcast_to(page.owner.origin[:, None], values.shape)
     too_large = ~(np.abs(values) <= MAX_COORDINATE)
@@ -456,15 +463,15 @@ def check_packets(page):
     ids = page.ids()
     bad_id = (ids >= page.owner.input_triangles) & page.lanes_used() & (page.id_words > 0)
 
-    bad = bad_index.any(axis=1) | bad_value.any(axis=(1, 2, 3)) | bad_id.any(axis=1)
+    bad = bad_record | bad_value.any(axis=(1, 2, 3)) | bad_id.any(axis=1)
     if not bad.any():
         return
     packet = int(bad.argmax())
     block = page.leaf_block_at()
-    if bad_index[packet].any():
-        place = int(bad_index[packet].argmax())
-        at = block + head.indices_at + (12 * packet + place) * head.index_bits // 8
-        raise Broken(29, at, f"an index below {head.vertices}", indices[packet, place])
+    if bad_record[packet]:
+        expected = f"rotations up to 2, slots below {head.vertices} and further ones below {head.further}"
+        found = f"{rotation[packet]}, {slots[packet]} and {number[packet].max()} in packet {packet}"
+        raise Broken(29, block, expected, found)
     if bad_value[packet].any():
         place = (packet, *np.argwhere(bad_value[packet])[0])
         need(not too_large[place], 30, block, "a finite coordinate of at most 2^120", values[place])

@@ -172,6 +172,9 @@ class Tables(unittest.TestCase):
         turning = [[profile.name, *profile.turning] for profile in cbvh.PROFILES if profile.turning]
         self.assertEqual(table("turning"), [[row[0], *(f"{first} + c" for first in row[1:])] for row in turning])
         self.assertEqual([row[1] for row in table("triangle-encodings")], cbvh.ENCODINGS)
+        self.assertEqual([int(row[0]) for row in table("patterns")], list(range(0, len(cbvh.PATTERNS), 4)))
+        ours = ["".join(f"{slot:x}" for slot in pattern) for pattern in cbvh.PATTERNS.reshape(-1, 12).tolist()]
+        self.assertEqual(" ".join(row[1] for row in table("patterns")).split(), ours)
         kinds = {int(row[0]): (row[2] == "yes", row[3] == "yes") for row in table("sections")}
         self.assertEqual(kinds, {kind: (kind in cbvh.NEEDED, kind in cbvh.CONTENT) for kind in cbvh.KINDS})
 
@@ -181,6 +184,7 @@ class Tables(unittest.TestCase):
         self.assertEqual(rules.MAX_WORLD, 2.0 ** stated["LOG2_MAX_WORLD"])
         self.assertEqual(rules.MAX_RIGID_ERROR, 2.0 ** -stated["RIGID_BITS"])
         self.assertEqual((stated.pop("MINOR"), stated.pop("PAGE_HEADER_BYTES")), (0, cbvh.PAGE_HEADER.itemsize))
+        self.assertEqual(stated.pop("PATTERNS"), len(cbvh.PATTERNS))
         for name, parts in (("STEP_U8", 255), ("STEP_U4", 15)):
             self.assertEqual(getattr(cbvh, name).view(np.uint32), stated.pop(name))
             self.assertEqual(getattr(cbvh, name), np.float32(1) / np.float32(parts))
@@ -338,6 +342,178 @@ class Arithmetic(unittest.TestCase):
         ):
             found = query.least_distance(flat, np.array([other], np.float64))
             self.assertAlmostEqual(found, expected, delta=1e-15 * expected)
+
+
+def bit_array(fields):
+    """The bytes of a bit array of values, given as pairs of a value and its width (1.4)."""
+    whole = at = 0
+    for value, width in fields:
+        whole |= value << at
+        at += width
+    return whole.to_bytes(cbvh.ceil_div(at, 8), "little")
+
+
+class Block(cbvh.Page):
+    """A page of which there is only a packed leaf block (11.2), with four triangles in each packet.
+
+    Records are (pattern, rotations, slots), and the pool has the offsets of each vertex. `fields` are further fields of
+    the head, or replace some. `more` are bytes at the end, and bit 7 of the byte at `filled` is set.
+    """
+
+    def __init__(self, records, further, pool, index_bits, bits, more=b"", filled=None, **fields):
+        arrays = [
+            bit_array(
+                field
+                for pattern, rotations, slots in records
+                for field in [(pattern, 6), *((turn, 2) for turn in rotations), *((slot, index_bits) for slot in slots)]
+            ),
+            bit_array((slot, index_bits) for slot in further),
+            bit_array(field for vertex in pool for field in zip(vertex, bits)),
+        ]
+        head = np.zeros((), cbvh.PACKED_HEAD)
+        fields = {
+            **{"vertices": len(pool), "further": len(further), "index_bits": index_bits, "bits": bits},
+            **{"further_at": 32 + len(arrays[0]), "pool_at": 32 + len(arrays[0]) + len(arrays[1])},
+            **fields,
+        }
+        for field, value in fields.items():
+            head[field] = value
+        data = bytearray(head.tobytes() + b"".join(arrays) + bytes(8))
+        data += bytes(-len(data) % 64) + more
+        if filled is not None:
+            data[filled] |= 0x80
+        section = types.SimpleNamespace(offset=0, length=len(data))
+        file = types.SimpleNamespace(sections={cbvh.LEAVES: section})
+        self.owner = types.SimpleNamespace(file=file, triangle_encoding=1, origin=np.zeros(3), input_triangles=1)
+        self.data, self.packets, self.number, self.id_words = bytes(data), len(records), 0, 0
+        self.leaf_line, self.leaf_lines, self.leaf_checksum = 0, len(data) // 64, xxh3_64(bytes(data))
+
+    def place(self, field):
+        return 0
+
+    def lanes_used(self):
+        return np.ones((self.packets, 4), bool)
+
+    def verdict(self):
+        """The rule that the block breaks, or 0. Coordinates are read even if a rule about slots is broken."""
+        try:
+            rules.check_leaf_block(self)
+            self.triangles()
+            rules.check_packets(self)
+        except rules.Broken as broken:
+            return broken.rule
+        return 0
+
+
+class LeafBlocks(unittest.TestCase):
+    TURNS = 0, 1, 2, 0
+    LAST = 0, TURNS, (5, 6, 7, 0, 0, 0)  # pattern 0 has 3 slots
+    GOOD = {
+        "records": [(63, TURNS, (0, 1, 2, 3, 4, 2)), LAST],  # pattern 63 has 12 slots, of which 7 are further slots
+        "further": [12, 12, 5, 6, 7, 8, 9, 10, 11],
+        "pool": [(v, 0, v % 2) for v in range(13)],
+        "index_bits": 4,
+        "bits": (7, 0, 2),
+    }
+
+    def test_reading_one_number_at_a_time(self):
+        chance, seen = random.Random(5), set()
+        patterns = " ".join(row[1] for row in table("patterns")).split()
+        for _ in range(300):
+            index_bits = chance.choice((0, 1, 4, 7, 16))
+            vertices = chance.randint(1, min(40, 1 << index_bits))
+            bits = [chance.choice((0, 1, 8, 17, 32)) for _ in range(3)]
+            pool = [[chance.getrandbits(width) for width in bits] for _ in range(vertices)]
+            further = [chance.randrange(vertices) for _ in range(chance.randrange(7, 20))]
+            kinds = [chance.randrange(3) for _ in range(3)]
+            bounds = {cbvh.ORDERED: (0, 0), cbvh.BINARY: (-128, 80), cbvh.DECIMAL: (0, 15)}
+            exponents = [chance.randint(*bounds[kind]) for kind in kinds]
+            base = [chance.choice((0, -3, chance.randrange(-(1 << 31), 1 << 31))) for _ in range(3)]
+            records, corners = [], []
+            for pattern in (chance.randrange(64) for _ in range(chance.randint(1, 9))):
+                digits = [int(digit, 16) for digit in patterns[pattern]]
+                count, turns = 1 + max(digits), [chance.randrange(3) for _ in range(4)]
+                slots = [chance.randrange(vertices) for _ in range(min(count, 6))]
+                held = slots + [0] * (6 - len(slots))
+                if count > 6:
+                    held[5] = chance.randint(0, min(len(further) - (count - 5), (1 << index_bits) - 1))
+                    slots = slots[:5] + further[held[5] : held[5] + count - 5]
+                records.append((pattern, turns, held))
+                corners.append([[slots[digits[3 * i + (k + turns[i]) % 3]] for k in range(3)] for i in range(4)])
+                seen.add(pattern)
+            packed = sum(kind << 2 * axis for axis, kind in enumerate(kinds))
+            page = Block(records, further, pool, index_bits, bits, base=base, kinds=packed, exponent=exponents)
+            self.assertIn(page.verdict(), (0, 30))  # an ordered coordinate may be infinite or NaN
+            self.assertEqual(page.packed_corners(page.packed_head()).tolist(), corners)
+            found = page.packed_pool(page.packed_head())
+            for offsets, vertex in zip(pool, found):
+                for axis in range(3):
+                    n = (base[axis] + offsets[axis] + (1 << 31)) % (1 << 32) - (1 << 31)
+                    if kinds[axis] == cbvh.ORDERED:
+                        expected = (n if n >= 0 else n ^ 0x7FFFFFFF) % (1 << 32)
+                        self.assertEqual(int(vertex[axis].view(np.uint32)), expected)
+                    else:
+                        power = (Fraction(2) if kinds[axis] == cbvh.BINARY else Fraction(1, 10)) ** exponents[axis]
+                        product = Fraction(float(n * Fraction(float(power))))
+                        self.assertEqual(Fraction(float(vertex[axis])), nearest_f32(product), (n, exponents[axis]))
+            self.assertTrue((page.triangles().view(np.uint32) == found[np.array(corners)].view(np.uint32)).all())
+        self.assertEqual(len(seen), 64)
+
+    def test_rules(self):
+        def axes(kinds, *exponents):
+            return {"kinds": kinds, "exponent": exponents, "base": (1, 1, 1)}
+
+        def record(pattern, *slots, turns=self.TURNS, **fields):
+            return {"records": [(pattern, turns, slots), self.LAST], **fields}
+
+        for rule, fields in (
+            (0, {}),
+            (0, axes(0b100100, 0, -128, 15)),
+            (0, axes(0b000110, 0, 100, 0)),
+            (30, axes(0b010101, 0, 127, 0)),
+            (28, axes(0b100001, 0, 1, 0)),  # of an ordered axis
+            (28, axes(0b000110, -1, 0, 0)),  # of a decimal one
+            (28, axes(0b100001, 0, 0, 16)),
+            (28, axes(0b001100, 0, 0, 0)),
+            (28, axes(1 << 6, 0, 0, 0)),
+            (28, axes(1 << 7, 0, 0, 0)),
+            (28, {"vertices": 0}),
+            (28, {"index_bits": 17}),
+            (28, {"bits": (7, 0, 33)}),
+            (28, {"further_at": 41}),
+            (28, {"pool_at": 1 << 31}),
+            (26, {"more": bytes(64)}),
+            (29, record(63, 0, 1, 2, 3, 4, 2, turns=(0, 3, 0, 0))),
+            (29, record(63, 0, 1, 2, 3, 4, 3)),
+            (29, record(63, 0, 1, 2, 3, 4, 15)),
+            (29, record(63, 0, 1, 2, 3, 13, 2)),
+            (29, {"further": [12] * 8 + [13]}),
+            (0, {"further": [13] + [12] * 8}),  # no packet has the slot
+            (0, record(40, 0, 1, 2, 3, 4, 0, further=[12, 12])),  # 7 slots
+            (29, record(40, 0, 1, 2, 3, 4, 0, further=[12])),
+            (29, record(40, 0, 1, 2, 3, 4, 0, further=[])),
+            (0, record(22, 0, 1, 2, 3, 4, 12, further=[])),  # 6 slots
+            (29, record(22, 0, 1, 2, 3, 4, 13, further=[])),
+            (0, record(20, 0, 1, 2, 3, 4, 13, further=[])),  # 5 slots
+        ):
+            self.assertEqual(Block(**self.GOOD | fields).verdict(), rule, fields)
+
+    def test_what_binds_writers(self):
+        def count(**fields):
+            page = Block(**self.GOOD | fields)
+            self.assertEqual(page.verdict(), 0)
+            return len(list(musts.of_leaf_block(page, 0)))
+
+        self.assertEqual(count(), 0)
+        self.assertEqual(count(records=[self.LAST, (0, self.TURNS, (5, 6, 7, 0, 0, 1))]), 1)
+        self.assertEqual(count(records=[(0, self.TURNS, (5, 6, 7, 1, 0, 0)), self.LAST]), 1)
+        page = Block(**self.GOOD)
+        for end in (*page.packed_places(page.packed_head())[1:], len(page.data)):
+            self.assertEqual(count(filled=end - 1), 1, end)
+        for n, found in ((1 << 24, 0), ((1 << 24) + 1, 1), ((1 << 24) + 2, 0)):
+            pool = {"pool": [(0, 0, 0)] * 13, "base": (n, 0, 0)}
+            self.assertEqual(count(**pool, kinds=1, exponent=(3, 0, 0)), found, n)
+            self.assertEqual(count(**pool, kinds=2, exponent=(3, 0, 0)), 0, n)
 
 
 class Instances(unittest.TestCase):

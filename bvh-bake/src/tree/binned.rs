@@ -77,7 +77,7 @@ impl Builder {
         bins[0].iter().for_each(|(_, bin)| bounds.join(bin));
         let mut best: Option<(f32, usize, usize)> = None;
         if depth < MAX_COSTED_DEPTH {
-            let cost = Cost::within(&bounds);
+            let cost = Cost::within(&bounds, self.treelet);
             for axis in 0..3 {
                 if let Some((cost, plane)) = Self::best_of(&bins[axis], cost)
                     && best.is_none_or(|(least, ..)| cost < least)

@@ -4,6 +4,10 @@ use crate::triangles::Corners;
 use bvh_format::leaf::PACKET;
 use wide::f32x4;
 
+/// The share of whole treelets in the weight of triangles; whole packets have the rest. At this share treelets are full
+/// enough, and queries make no more tests than at 0.
+const TREELET_SHARE: f32 = 0.4;
+
 /// A box: the lower ends along three axes and the negated upper ends, each with a lane to spare, so that two boxes are
 /// joined by taking the lesser of all lanes. The spare lanes mean nothing.
 #[derive(Clone, Copy)]
@@ -158,12 +162,14 @@ impl<const BINS: usize> Binning<BINS> {
 pub(super) struct Cost {
     /// One over the parent's largest extent. Scaled sums are then from 1 to 4, for which `f32` is wide enough.
     scale: f32,
+    /// The triangles in a full treelet of leaves, a power of two.
+    treelet: usize,
 }
 
 impl Cost {
-    pub(super) fn within(parent: &Aabb) -> Self {
+    pub(super) fn within(parent: &Aabb, treelet: usize) -> Self {
         let largest = parent.extent(parent.longest());
-        Self { scale: (1.0 / largest).min(f32::MAX) }
+        Self { scale: (1.0 / largest).min(f32::MAX), treelet }
     }
 
     #[inline(always)]
@@ -175,13 +181,14 @@ impl Cost {
     #[inline(always)]
     pub(super) fn of_girth(self, girth: f32, triangles: usize) -> f32 {
         let girth = girth * self.scale + 1.0;
-        weight(triangles) * (girth * girth)
+        self.weight(triangles) * (girth * girth)
     }
-}
 
-/// Returns the weight of `count` triangles, which counts whole packets. This fills the packets; without it, a fifth
-/// of their places stay empty.
-#[inline(always)]
-fn weight(count: usize) -> f32 {
-    count.next_multiple_of(PACKET) as f32
+    /// Returns the weight of `count` triangles, which counts whole packets and whole treelets of leaves. Either fills
+    /// what it counts; otherwise a fifth of the places there stay empty.
+    #[inline(always)]
+    fn weight(self, count: usize) -> f32 {
+        let whole = |unit: usize| ((count + unit - 1) & !(unit - 1)) as f32;
+        (1.0 - TREELET_SHARE) * whole(PACKET) + TREELET_SHARE * whole(self.treelet)
+    }
 }

@@ -234,7 +234,7 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
     }
     let mut bounds = Aabb::EMPTY;
     cells.iter().for_each(|cell| bounds.join(&cell.bounds));
-    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds) } else { None };
+    let plane = if depth < MAX_COSTED_DEPTH { best_plane(cells, &bounds, builder.treelet) } else { None };
     let middle = match plane {
         Some((axis, plane)) => {
             // The sort is stable, but the order of the cells would not matter, because each has a place of its own.
@@ -258,7 +258,7 @@ fn split(cells: &mut [Cell], builder: &Builder, parts: &mut Parts, depth: usize)
 }
 
 /// Returns the axis and the first cell of the right side of the cheapest split that leaves cells on both sides.
-fn best_plane(cells: &[Cell], parent: &Aabb) -> Option<(usize, u8)> {
+fn best_plane(cells: &[Cell], parent: &Aabb, treelet: usize) -> Option<(usize, u8)> {
     let mut bins = [[(0usize, Aabb::EMPTY); CELLS_PER_AXIS]; 3];
     for cell in cells {
         for axis in 0..3 {
@@ -267,7 +267,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb) -> Option<(usize, u8)> {
             bounds.join(&cell.bounds);
         }
     }
-    let cost = Cost::within(parent);
+    let cost = Cost::within(parent, treelet);
     let best =
         (0..3).filter_map(|axis| Builder::best_of(&bins[axis], cost).map(|(c, plane)| (c, axis, plane)));
     let least = best.reduce(|best, other| if other.0 < best.0 { other } else { best });

@@ -33,7 +33,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The number of triangles in a full leaf packet.
-const PACKET: usize = bvh_format::leaf::PACKET;
+use bvh_format::leaf::{PACKET, order_of_lanes};
 
 /// The shares of two passes over the triangles in the stage's work, in parts of [`WHOLE`]: dividing them into bricks,
 /// and building the bricks' trees. The rest is the encoding.
@@ -48,7 +48,7 @@ pub(crate) fn is_one_brick(triangles: u64) -> bool {
 /// The most children of a treelet in any profile.
 pub(crate) const MAX_CHILDREN: usize = 8;
 
-/// The triangles of a leaf packet, by number, ascending.
+/// The triangles of a leaf packet, by number: ascending in a tree, and in the order of lanes in treelets.
 #[derive(Clone, Copy)]
 pub(crate) struct PacketTriangles {
     numbers: [u32; PACKET],
@@ -65,6 +65,16 @@ impl PacketTriangles {
         }
         packet.numbers[..usize::from(packet.count)].sort_unstable();
         packet
+    }
+
+    /// The same triangles in the order in which the packet takes the fewest bytes.
+    fn in_order_of_lanes(self, triangles: &[Triangle]) -> Self {
+        let mut corners = [[[0.0; 3]; 3]; PACKET];
+        for (corners, &number) in corners.iter_mut().zip(self.numbers()) {
+            *corners = triangles[number as usize].corners;
+        }
+        let order = order_of_lanes(&corners[..self.numbers().len()]);
+        Self { numbers: order.map(|lane| self.numbers[usize::from(lane)]), ..self }
     }
 
     pub(crate) fn numbers(&self) -> &[u32] {

@@ -77,7 +77,7 @@ impl Sweep<'_> {
     /// Returns the axis of the cheapest split and the length of its first side.
     fn best_position(&self, orders: &[&mut [u8]; 3], bounds: &Aabb) -> (usize, usize) {
         let builder = self.builder;
-        let cost = Cost::within(bounds);
+        let cost = Cost::within(bounds, builder.treelet);
         let count = orders[0].len();
         // A part that fits in one treelet of leaves is split only where that takes no extra packet.
         let packets = if count <= builder.treelet { count.div_ceil(PACKET) } else { usize::MAX };

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 const CHILDREN_PER_TASK: usize = 2048;
 
 /// The fixed cost of a treelet, in mean sizes of nodes with two leaves.
-const TREELET_COST: f64 = 0.5;
+const TREELET_COST: f64 = 1.0;
 
 /// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child.
 pub(crate) fn cut_brick(
@@ -34,7 +34,8 @@ pub(crate) fn cut_brick(
     let mut arena = cut(tree, width, leaf);
     arena.children_mut().par_chunks_mut(CHILDREN_PER_TASK).for_each(|children| {
         for child in children {
-            if let ChildKind::Leaf(packet) = &child.kind {
+            if let ChildKind::Leaf(packet) = &mut child.kind {
+                *packet = packet.in_order_of_lanes(triangles);
                 child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
             }
         }

@@ -3,7 +3,11 @@
 use crate::error::{OpenError, QueryError};
 use crate::file::mapped::{self, ReadAhead};
 use crate::file::place::{LeafPacket, TrianglePlace};
-use bvh_format::leaf::{F32_PACKET_BYTES, Packet, TriangleEncoding, decode_packet, decode_triangle};
+use crate::file::unpack::unpack;
+use crate::isa::Isa;
+use bvh_format::leaf::{
+    F32_PACKET_BYTES, PackedHead, Packet, TriangleEncoding, decode_packet, decode_triangle,
+};
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
 use bvh_format::topology::ObjectTopology;
@@ -268,8 +272,9 @@ impl Bvh {
 
     /// Returns a leaf packet: in place or, if it is encoded, decoded into `room`.
     #[inline(always)]
-    pub(crate) fn packet<'a>(
+    pub(crate) fn packet<'a, I: Isa>(
         &'a self,
+        isa: I,
         object: &Object,
         leaf: LeafPacket,
         room: &'a mut Packet,
@@ -279,22 +284,30 @@ impl Bvh {
         if let Some(packet) = plain_packet(object, block, leaf.packet) {
             return Ok(packet);
         }
-        *room = decode_packet(object.triangle_encoding(), block, usize::from(leaf.packet));
+        match object.triangle_encoding() {
+            TriangleEncoding::F32 => {
+                *room = decode_packet(TriangleEncoding::F32, block, usize::from(leaf.packet))
+            }
+            TriangleEncoding::Packed | TriangleEncoding::Quantized => {
+                unpack(isa, block, usize::from(leaf.packet), room);
+            }
+        }
         Ok(room)
     }
 
     /// Returns up to four leaf packets, and a bit for each triangle that they have: bit `4 * packet + triangle`. Packets are
     /// in place or, if they are encoded, decoded into `rooms`.
     #[inline(always)]
-    pub(crate) fn packets<'a>(
+    pub(crate) fn packets<'a, I: Isa>(
         &'a self,
+        isa: I,
         object: &Object,
         leaves: &[LeafPacket],
         rooms: &'a mut [Packet; 4],
     ) -> Result<([&'a Packet; 4], u16), QueryError> {
         let (mut packets, mut triangles) = ([&Packet::NONE; 4], 0);
         for (place, (leaf, room)) in leaves.iter().zip(rooms).enumerate() {
-            packets[place] = self.packet(object, *leaf, room)?;
+            packets[place] = self.packet(isa, object, *leaf, room)?;
             triangles |= ((1 << leaf.triangles) - 1) << (4 * place);
         }
         Ok((packets, triangles))
@@ -315,13 +328,20 @@ impl Bvh {
     /// Returns the bytes of a treelet's leaf packets, which are adjacent; none if the packets are encoded.
     #[inline(always)]
     pub(crate) fn packets_to_prefetch(&self, object: &Object, page: &Page, links: &Links) -> &[u8] {
-        if object.triangle_encoding() != TriangleEncoding::F32 {
+        let count = links.leaves().count_ones() as usize;
+        if count == 0 {
             return &[];
         }
         let block = self.layout.leaf_block(&self.bytes, page.header());
-        let start = usize::from(links.first_leaf) * F32_PACKET_BYTES;
-        let end = start + links.leaves().count_ones() as usize * F32_PACKET_BYTES;
-        block.get(start..end).unwrap_or(&[])
+        let first = usize::from(links.first_leaf);
+        let range = match object.triangle_encoding() {
+            TriangleEncoding::F32 => first * F32_PACKET_BYTES..(first + count) * F32_PACKET_BYTES,
+            TriangleEncoding::Packed | TriangleEncoding::Quantized => match PackedHead::read(block) {
+                Some(head) => head.records(first..first + count),
+                None => 0..0,
+            },
+        };
+        block.get(range).unwrap_or(&[])
     }
 
     /// Returns the id of a triangle: its number in the input or, in a file without ids, its place in the order of the

@@ -9,3 +9,4 @@ pub(crate) mod place;
 pub(crate) mod shape;
 #[allow(dead_code, reason = "questions about what is inside a mesh use the rest of it")]
 pub(crate) mod topology;
+pub(crate) mod unpack;

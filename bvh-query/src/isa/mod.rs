@@ -111,6 +111,11 @@ pub(crate) trait Isa: Copy {
     /// Reads 16 little-endian `f32`.
     fn codes_f32(self, from: &[u8; 64]) -> Self::V;
 
+    /// The coordinates for which the integers of a packed leaf block stand: in this unit, or as the bits of ordered `f32`.
+    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Self::V;
+    /// Lane i is lane `places[i]`, modulo 16, of `value`.
+    fn permute(self, value: Self::V, places: &[u8; 16]) -> Self::V;
+
     fn splat4(self, value: f32) -> Self::H;
     fn load4(self, from: &[f32; 4]) -> Self::H;
     fn store4(self, value: Self::H, to: &mut [f32; 4]);

@@ -1,8 +1,11 @@
-//! Tests that backends agree: they decode every profile to the bits of the reference, and find the same least lane.
+//! Tests that backends agree: they decode every profile and packed packets to the bits of the reference, and find the
+//! same least lane.
 
 use super::{Backend, Isa, Task};
+use crate::file::unpack::unpack;
 use crate::traverse::decode::decode_group;
 use bvh_format::decode::decode_child;
+use bvh_format::leaf::{Packet, TriangleEncoding, decode_packet, encode_block};
 use bvh_format::profile::Profile;
 use bvh_format::slabs::row;
 use bvh_format::slabs::{Group, NodeSlabs};
@@ -72,6 +75,70 @@ fn every_backend_decodes_to_the_bits_of_the_reference() {
                             assert_eq!(bits(&found), bits(&expected), "{backend} {} {slab}", profile.name());
                         }
                     }
+                }
+            }
+        }
+    }
+}
+
+struct Unpack<'a>(&'a [u8], usize);
+
+impl Task for Unpack<'_> {
+    type Output = Packet;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Packet {
+        let mut packet = Packet::NONE;
+        unpack(isa, self.0, self.1, &mut packet);
+        packet
+    }
+}
+
+/// Blocks of ordered, binary and decimal coordinates, with and without further slots, as they are and with bytes changed.
+#[test]
+fn every_backend_unpacks_to_the_bits_of_the_reference() {
+    let mut state = 7u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize
+    };
+    let kinds: [fn(usize) -> f32; 4] = [
+        |r| f32::from_bits(r as u32 & 0x7bff_ffff),
+        |r| (r % 4096) as f32 / 64.0 - 30.0,
+        |r| ((r % 20_000) as f64 / 1e5 - 0.1) as f32,
+        |r| (r % 3) as f32,
+    ];
+    let bits = |packet: &Packet| packet.corners.map(|corner| corner.map(|axis| axis.map(f32::to_bits)));
+    for (kind, make) in kinds.into_iter().enumerate() {
+        for round in 0..60 {
+            let pool: Vec<[f32; 3]> =
+                (0..1 + random() % 200).map(|_| [(); 3].map(|()| make(random()))).collect();
+            let packets: Vec<Packet> = (0..1 + random() % 100)
+                .map(|_| {
+                    let near = random();
+                    let corner = |reach: usize| pool[(near + reach) % pool.len()];
+                    let triangles: Vec<[[f32; 3]; 3]> = (0..1 + random() % 4)
+                        .map(|_| [(); 3].map(|()| corner(random() % (4 + round % 9))))
+                        .collect();
+                    Packet::new(&triangles)
+                })
+                .collect();
+            let block = encode_block(TriangleEncoding::Packed, &packets);
+            let mut changed = block.clone();
+            for _ in 0..1 + random() % 4 {
+                let at = random() % changed.len();
+                changed[at] = random() as u8;
+            }
+            for (bytes, index) in
+                (0..packets.len()).map(|i| (&block, i)).chain((0..packets.len() + 2).map(|i| (&changed, i)))
+            {
+                let expected = decode_packet(TriangleEncoding::Packed, bytes, index);
+                if std::ptr::eq(bytes, &block) {
+                    assert_eq!(bits(&expected), bits(&packets[index]), "kind {kind}");
+                }
+                for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                    let found = backend.run(Unpack(bytes, index));
+                    assert_eq!(bits(&found), bits(&expected), "{backend}, kind {kind}, packet {index}");
                 }
             }
         }

@@ -65,7 +65,7 @@ impl PlacedPair<'_> {
         let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
             let ObjectPair { bvh_a, object_a, .. } = self.pair;
-            placed.place_a(isa, self.frame(), bvh_a.packet(object_a, leaf, &mut Packet::default())?);
+            placed.place_a(isa, self.frame(), bvh_a.packet(isa, object_a, leaf, &mut Packet::default())?);
         }
         Ok(placed)
     }
@@ -81,7 +81,7 @@ impl PlacedPair<'_> {
         let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
             let ObjectPair { bvh_b, object_b, .. } = self.pair;
-            placed.place_b(isa, self.frame(), bvh_b.packet(object_b, leaf, &mut Packet::default())?);
+            placed.place_b(isa, self.frame(), bvh_b.packet(isa, object_b, leaf, &mut Packet::default())?);
         }
         Ok(placed)
     }

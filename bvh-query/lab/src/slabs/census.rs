@@ -52,7 +52,7 @@ impl Census {
         "empty lines of pages",
         "leaf heads",
         "vertices",
-        "indices",
+        "records",
         "ends of leaf blocks",
         "ids, duplicates",
         "all",
@@ -127,8 +127,8 @@ impl Census {
             (TriangleEncoding::F32, _) | (_, None) => [0, 144 * packets, 0],
             (_, Some(head)) => {
                 let bits: usize = head.bits.iter().map(|&bits| usize::from(bits)).sum();
-                let indices = (12 * packets * usize::from(head.index_bits)).div_ceil(8);
-                [PACKED_HEAD_BYTES, (usize::from(head.vertices) * bits).div_ceil(8), indices]
+                let records = head.pool_at as usize - PACKED_HEAD_BYTES;
+                [PACKED_HEAD_BYTES, (usize::from(head.vertices) * bits).div_ceil(8), records]
             }
         };
         for (kind, bytes) in (9..12).zip(parts) {

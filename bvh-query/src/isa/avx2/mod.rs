@@ -285,6 +285,18 @@ impl Isa for Avx2 {
         ))
     }
     #[inline(always)]
+    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Y {
+        let halves = integers.as_chunks::<8>().0;
+        Y(coordinates_of_eight(&halves[0], unit), coordinates_of_eight(&halves[1], unit))
+    }
+    #[inline(always)]
+    fn permute(self, value: Y, places: &[u8; 16]) -> Y {
+        with_features!({
+            let places = _mm_loadu_si128(places.as_ptr().cast());
+            Y(pick_eight(value, places), pick_eight(value, _mm_unpackhi_epi64(places, places)))
+        })
+    }
+    #[inline(always)]
     fn splat4(self, value: f32) -> X {
         X(with_features!(_mm_set1_ps(value)))
     }
@@ -343,4 +355,37 @@ fn bytes_to_lanes(bytes: __m128i) -> Y {
     let low = _mm256_cvtepu8_epi32(bytes);
     let high = _mm256_cvtepu8_epi32(_mm_srli_si128::<8>(bytes));
     Y(_mm256_cvtepi32_ps(low), _mm256_cvtepi32_ps(high))
+}
+
+/// The lanes of a value at the places in the first eight bytes of `places`.
+#[inline(always)]
+fn pick_eight(value: Y, places: __m128i) -> __m256 {
+    with_features!({
+        let places = _mm256_cvtepu8_epi32(places);
+        let low = _mm256_permutevar8x32_ps(value.0, places);
+        let high = _mm256_permutevar8x32_ps(value.1, places);
+        // Bit 3 of a place chooses the register. The blend looks at signs.
+        _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places)))
+    })
+}
+
+/// What `coordinates` returns for eight integers.
+#[inline(always)]
+fn coordinates_of_eight(integers: &[i32; 8], unit: Option<f64>) -> __m256 {
+    with_features!({
+        let integers = _mm256_loadu_si256(integers.as_ptr().cast());
+        match unit {
+            None => {
+                let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
+                _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
+            }
+            Some(unit) => {
+                let unit = _mm256_set1_pd(unit);
+                let low = _mm256_cvtepi32_pd(_mm256_castsi256_si128(integers));
+                let high = _mm256_cvtepi32_pd(_mm256_extracti128_si256::<1>(integers));
+                let low = _mm256_cvtpd_ps(_mm256_mul_pd(low, unit));
+                _mm256_set_m128(_mm256_cvtpd_ps(_mm256_mul_pd(high, unit)), low)
+            }
+        }
+    })
 }

@@ -286,6 +286,22 @@ impl Isa for Avx512 {
         Z(with_features!(_mm512_loadu_ps(from.as_ptr().cast())))
     }
     #[inline(always)]
+    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Z {
+        with_features!({
+            let integers = _mm512_loadu_si512(integers.as_ptr().cast());
+            let low = coordinates_of_eight(_mm512_castsi512_si256(integers), unit);
+            let high = coordinates_of_eight(_mm512_extracti64x4_epi64::<1>(integers), unit);
+            Z(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+        })
+    }
+    #[inline(always)]
+    fn permute(self, value: Z, places: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let places = _mm512_cvtepu8_epi32(_mm_loadu_si128(places.as_ptr().cast()));
+            _mm512_permutexvar_ps(places, value.0)
+        }))
+    }
+    #[inline(always)]
     fn splat4(self, value: f32) -> X {
         X(with_features!(_mm_set1_ps(value)))
     }
@@ -341,4 +357,16 @@ impl Avx512 {
             (Z(_mm512_permutex2var_ps(lo.0, at, hi.0)), Z(_mm512_permutex2var_ps(hi.0, at, lo.0)))
         })
     }
+}
+
+/// What `coordinates` returns for eight integers.
+#[inline(always)]
+fn coordinates_of_eight(integers: __m256i, unit: Option<f64>) -> __m256 {
+    with_features!(match unit {
+        None => {
+            let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
+            _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
+        }
+        Some(unit) => _mm512_cvtpd_ps(_mm512_mul_pd(_mm512_cvtepi32_pd(integers), _mm512_set1_pd(unit))),
+    })
 }

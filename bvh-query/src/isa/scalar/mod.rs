@@ -1,6 +1,7 @@
 //! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
 use super::{FourRows, Isa, Lanes, Part, Task};
+use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
 use bvh_format::slabs::Group;
 use half::f16;
@@ -157,6 +158,17 @@ impl Isa for Scalar {
     fn codes_f32(self, from: &[u8; 64]) -> Array<16> {
         let lane = |i: usize| [from[4 * i], from[4 * i + 1], from[4 * i + 2], from[4 * i + 3]];
         Array(std::array::from_fn(|i| f32::from_le_bytes(lane(i))))
+    }
+    #[inline(always)]
+    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Array<16> {
+        match unit {
+            None => Array(integers.map(from_ordered)),
+            Some(unit) => Array(integers.map(|integer| (f64::from(integer) * unit) as f32)),
+        }
+    }
+    #[inline(always)]
+    fn permute(self, value: Array<16>, places: &[u8; 16]) -> Array<16> {
+        Array(places.map(|place| value.0[usize::from(place & 15)]))
     }
     #[inline(always)]
     fn splat4(self, value: f32) -> Array<4> {

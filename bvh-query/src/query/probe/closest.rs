@@ -270,7 +270,7 @@ impl ProbeVisitor for Nearest<'_> {
     #[inline(always)]
     fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
         self.stats.packet_tests += leaves.len() as u64;
-        let (packets, valid) = self.bvh.packets(self.object, leaves, &mut self.rooms)?;
+        let (packets, valid) = self.bvh.packets(isa, self.object, leaves, &mut self.rooms)?;
         let bounds = point_bounds(isa, packets, &self.local);
         let nearest = isa.least(&bounds.upper, valid) as usize & 15;
         self.limit = self.limit.min(round_up(f64::from(bounds.upper[nearest]) * self.stretch));

@@ -292,7 +292,7 @@ impl<Q: LineQuestion> ProbeVisitor for Walked<'_, Q> {
     #[inline(always)]
     fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
         self.stats.packet_tests += leaves.len() as u64;
-        let (packets, valid) = self.bvh.packets(self.object, leaves, &mut self.rooms)?;
+        let (packets, valid) = self.bvh.packets(isa, self.object, leaves, &mut self.rooms)?;
         let corner = &packets[0].corners[0];
         let near = self.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
         let point = LocalPoint::new(&near, self.clipped.segment.error, self.clipped.scale as f32);
