@@ -6,6 +6,12 @@
 /// Reads `width` bits (at most 32) from bit `at`. Bits beyond the end read as zero.
 #[inline]
 pub(crate) fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
+    (load_bits(bytes, at) & ((1u64 << width) - 1)) as u32
+}
+
+/// Reads at least 57 bits from bit `at` on. Bits beyond the end read as zero.
+#[inline]
+pub(crate) fn load_bits(bytes: &[u8], at: usize) -> u64 {
     let word = match bytes.get(at / 8..at / 8 + 8) {
         Some(eight) => {
             let mut word = [0; 8];
@@ -14,7 +20,7 @@ pub(crate) fn read_bits(bytes: &[u8], at: usize, width: u32) -> u32 {
         }
         None => read_tail(bytes, at / 8),
     };
-    ((word >> (at % 8)) & ((1u64 << width) - 1)) as u32
+    word >> (at % 8)
 }
 
 /// Reads the last bytes of an array, fewer than eight, as a number.
@@ -44,6 +50,11 @@ impl BitWriter {
             self.pending >>= 8;
             self.pending_bits -= 8;
         }
+    }
+
+    /// The number of bits so far.
+    pub(crate) fn bits(&self) -> usize {
+        8 * self.bytes.len() + self.pending_bits as usize
     }
 
     /// Returns the bytes. Zeros fill the last one.

@@ -4,7 +4,7 @@ use crate::checksum::hex;
 use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
 use crate::header::{Header, Section, SectionKind, read_header};
-use crate::ids::{ID_HEAD_BYTES, WORD, id_block_bytes};
+use crate::ids::{WORD, id_block_bytes};
 use crate::instances::{Instance, read_instances};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
 use crate::object::{Object, read_objects};
@@ -331,12 +331,13 @@ impl Layout {
         if !self.has_ids() || header.packets.get() == 0 {
             return require(Rule::IdPlace, at + 52, 0, words);
         }
-        let bits = block.bytes().get(4).copied().unwrap_or(0);
         let length = block.length();
-        let needed = id_block_bytes(usize::from(header.packets.get()), bits);
-        let whole = length / WORD == words && length == needed && bits <= 32;
-        ensure(whole && length >= ID_HEAD_BYTES, Rule::IdPlace, at + 32, || {
-            (format!("a block of {needed} bytes"), format!("{length} bytes, stated as {words} words"))
+        let needed = id_block_bytes(block.bytes(), usize::from(header.packets.get()));
+        let holds = length / WORD == words && needed == Some(length);
+        ensure(holds, Rule::IdPlace, at + 32, || {
+            let groups = "whose groups follow each other".to_owned();
+            let expected = needed.map_or(groups, |needed| format!("of {needed} bytes"));
+            (format!("a block {expected}"), format!("{length} bytes, stated as {words} words"))
         })?;
         let sum = header.id_checksum.get();
         require(Rule::IdChecksum, at + 16, hex(sum), hex(block.checksum()))

@@ -17,11 +17,12 @@ const CHUNK_BYTES: usize = 1 << 16;
 /// The most bytes of a block that keeps the rules.
 const MAX_BLOCK_BYTES: usize = 1 << 20;
 
-/// The most leaf packets of a page: by rule 17 it has at most 62 treelets, which have at most 8 children.
-const MAX_PACKETS_PER_PAGE: usize = 62 * 8;
-/// The most bytes of a packed block: a head, 65535 vertices of 96 bits, 12 indices of 16 bits per packet, spare bytes
-/// and the rest of a line.
-const MAX_PACKED_BLOCK_BYTES: usize = 32 + 65535 * 12 + MAX_PACKETS_PER_PAGE * 24 + 2 * 8 + LINE;
+/// The most leaf packets of a page: by rule 17 it has at most 62 treelets, which have at most 8 children, of which 61 are
+/// treelets.
+const MAX_PACKETS_PER_PAGE: usize = 62 * 8 - 61;
+/// The most bytes of a packed block: a head, 110 bits per packet, 65535 further slots of 16 bits, 65535 vertices of 96 bits,
+/// spare bytes and the rest of a line.
+const MAX_PACKED_BLOCK_BYTES: usize = 32 + MAX_PACKETS_PER_PAGE * 14 + 65535 * 2 + 65535 * 12 + 8 + LINE;
 const _: () = assert!(MAX_PACKED_BLOCK_BYTES <= MAX_BLOCK_BYTES);
 const _: () = assert!(MAX_PACKETS_PER_PAGE * F32_PACKET_BYTES + LINE <= MAX_BLOCK_BYTES);
 
@@ -127,7 +128,7 @@ impl<'a> Block<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ids::id_block_bytes;
+    use crate::ids::{ID_ENTRY_BYTES, ID_GROUP, ID_GROUP_HEAD_BITS};
 
     #[test]
     fn chunks_cover_a_range() {
@@ -151,6 +152,10 @@ mod tests {
             assert_eq!((block.length(), block.checksum()), (length, checksum(whole)));
             assert!(whole.starts_with(block.bytes()) && block.bytes().len() <= MAX_BLOCK_BYTES);
         }
-        assert!(id_block_bytes(MAX_PACKETS_PER_PAGE, u8::MAX) <= MAX_BLOCK_BYTES);
+        // Of each packet, the least id, the lane that has it, and three offsets, all as wide as can be.
+        let groups = MAX_PACKETS_PER_PAGE.div_ceil(ID_GROUP);
+        let bits =
+            groups * (8 * ID_ENTRY_BYTES + ID_GROUP_HEAD_BITS) + MAX_PACKETS_PER_PAGE * (32 + 2 + 3 * 32);
+        assert!(bits <= usize::from(u16::MAX) && bits / 8 + 16 <= MAX_BLOCK_BYTES);
     }
 }

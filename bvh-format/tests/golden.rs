@@ -239,6 +239,12 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
 fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
     let block = |edit: fn(&mut Change)| sealed(&LEAVES, edit);
     let infinite = (f32::INFINITY.to_bits() as i32).to_le_bytes();
+    let ids = |edit: fn(&mut Change, usize)| {
+        sealed(&IDS, |f| {
+            let at = section(&f.bytes, 4).start;
+            edit(f, at);
+        })
+    };
     let pairs = |file: &mut Change, pairs: [[u32; 2]; 2]| {
         let start = section(&file.bytes, 5).start;
         let ids: Vec<u8> = pairs.into_iter().flatten().flat_map(u32::to_le_bytes).collect();
@@ -294,6 +300,8 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
             }),
         ),
         (31, "without-section", block(|f| f.page(52, &[1]))),
+        (31, "a-bit-later", ids(|f, at| f.bytes[at + 4] += 1)),
+        (31, "33-bits", ids(|f, at| f.bytes[at + 6] = f.bytes[at + 6] & 0xc0 | 33)),
         (
             32,
             "flipped-bit",

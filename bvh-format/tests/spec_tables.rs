@@ -7,7 +7,7 @@ use bvh_format::Rule;
 use bvh_format::checksum::checksum;
 use bvh_format::decode::decode_child;
 use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind};
-use bvh_format::ids::{ID_HEAD_BYTES, WORD, decode_id};
+use bvh_format::ids::{ID_ENTRY_BYTES, ID_GROUP, ID_GROUP_HEAD_BITS, WORD, decode_id};
 use bvh_format::instances::{Instance, InstanceRecord, MAX_RIGID_ERROR, MAX_WORLD, write_instances};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::leaf::{
@@ -148,11 +148,15 @@ fn heads_of_blocks() {
         assert!(kind.contains(&row.2), "type of {name}: {kind} is not {}", row.2);
     }
 
-    let rows = byte_table("id-head", ID_HEAD_BYTES);
-    let mut block = [0; 24];
-    (block[offset(&rows, "base")], block[offset(&rows, "bits")]) = (100, 8);
-    block[ID_HEAD_BYTES + 5] = 7;
-    assert_eq!(decode_id(&block, 1, 1), 107);
+    // One group of two packets, whose widths are 6 for least ids and 9 for the offsets of the second packet.
+    let rows = byte_table("id-entry", ID_ENTRY_BYTES);
+    let mut block = vec![0; ID_ENTRY_BYTES];
+    (block[offset(&rows, "base")], block[offset(&rows, "start")]) = (100, 8 * ID_ENTRY_BYTES as u8);
+    let second = ID_GROUP_HEAD_BITS + 6 + 2;
+    let group = 6 | 9 << (6 + 6) | 40 << second | 2 << (second + 6) | 511u128 << (second + 8 + 9);
+    block.extend(group.to_le_bytes());
+    let ids = |packet: usize| [0, 1, 2, 3].map(|lane| decode_id(&block, packet, lane));
+    assert_eq!((ids(0), ids(1)), ([100; 4], [140, 651, 140, 140]));
 
     let rows = byte_table("links", 4);
     let mut treelet = [0; 64];
@@ -253,7 +257,9 @@ fn constants() {
         PACKED_HEAD_BYTES,
         RECORD_HEAD_BITS,
         PATTERNS,
-        ID_HEAD_BYTES,
+        ID_GROUP,
+        ID_ENTRY_BYTES,
+        ID_GROUP_HEAD_BITS,
         LOG2_MAX_COORDINATE,
         TURNING_TRIANGLES,
         LOG2_MAX_WORLD,

@@ -10,6 +10,7 @@ mod common;
 use bvh_bake::to_bytes;
 use bvh_format::Layout as FileLayout;
 use bvh_format::Rule;
+use bvh_format::ids::encode_ids;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::page::Page;
 use bvh_format::profile::Profile;
@@ -187,10 +188,12 @@ fn contacts_without_number_are_refused() {
     let mut sections = take_apart(&plain);
     sections.retain(|section| section.0 < 4);
     let nodes = sections.iter_mut().find(|section| section.0 == 2).unwrap();
-    // The file has one page. All its lanes get id 0, which takes no bits.
+    // The file has one page. All its lanes get id 0.
+    let packets = usize::from(u16::from_le_bytes([nodes.2[56], nodes.2[57]]));
+    let ids = encode_ids(&vec![[0; 4]; packets]);
     put(&mut nodes.2, 32, &0u64.to_le_bytes());
-    put(&mut nodes.2, 52, &2u32.to_le_bytes());
-    sections.push((4, 0, vec![0; 16]));
+    put(&mut nodes.2, 52, &(ids.len() as u32 / 8).to_le_bytes());
+    sections.push((4, 0, ids));
     sections.push((5, 0, duplicates));
     let forged = Bvh::from_bytes(put_together(&sections)).unwrap();
     let mut querier = Querier::new().unwrap();

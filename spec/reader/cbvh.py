@@ -20,7 +20,9 @@ PACKET = 4
 F32_PACKET_BYTES = 144
 PACKED_HEAD_BYTES = 32
 RECORD_HEAD_BITS = 14
-ID_HEAD_BYTES = 8
+ID_GROUP = 8
+ID_ENTRY_BYTES = 6
+ID_GROUP_HEAD_BITS = 54
 TURNING_TRIANGLES = 1024
 LOG2_MAX_WORLD, RIGID_BITS = 118, 23
 STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
@@ -119,7 +121,7 @@ PACKED_HEAD = np.dtype(
         ("pool_at", "<u4"),
     ]
 )
-ID_HEAD = np.dtype([("base", "<u4"), ("bits", "u1"), ("reserved", "u1", 3)])
+ID_ENTRY = np.dtype([("base", "<u4"), ("start", "<u2")])
 LINKS = np.dtype([("first_treelet", "u1"), ("first_remote", "u1"), ("first_leaf", "<u2")])
 
 # 2.1
@@ -227,10 +229,16 @@ def bit_values(data, at, first_bit, stride, width, count):
     """Reads `count` values of `width` bits, `stride` bits apart, from the little-endian number at byte `at` (1.4)."""
     if width == 0 or count == 0:
         return np.zeros(count, np.uint64)
-    bits = first_bit + stride * np.arange(count, dtype=np.uint64)
-    end = at + int(bits[-1]) // 8 + 8
-    words = np.ndarray(end - at - 7, "<u8", bytes(data[at:end]).ljust(end - at, b"\0"), strides=(1,))
-    return words[(bits >> np.uint64(3)).astype(np.intp)] >> (bits & np.uint64(7)) & np.uint64((1 << width) - 1)
+    return bits_at(data, at, first_bit + stride * np.arange(count), width)
+
+
+def bits_at(data, at, bits, widths):
+    """Reads values of up to 57 bits at any places: bit 0 is the lowest of byte `at`. Bits beyond `data` are 0."""
+    bits, widths = np.asarray(bits, np.uint64), np.asarray(widths, np.uint64)
+    size = int(bits.max(initial=0)) // 8 + 8
+    words = np.ndarray(size - 7, "<u8", bytes(data[at : at + size]).ljust(size, b"\0"), strides=(1,))
+    masks = (np.uint64(1) << widths) - np.uint64(1)
+    return words[(bits >> np.uint64(3)).astype(np.intp)] >> (bits & np.uint64(7)) & masks
 
 
 class Record:
@@ -605,20 +613,50 @@ class Page(Record):
         entry = self.owner.file.sections.get(IDS)
         return entry.offset + WORD * self.id_word if entry else None
 
-    def id_head(self):
-        return Record(ID_HEAD, self.data, self.id_block_at())
+    def id_block(self):
+        at = self.id_block_at()
+        return self.data[at : at + WORD * self.id_words]
 
-    def id_bytes_needed(self, head):
-        return ID_HEAD_BYTES + ceil_div(PACKET * self.packets * head.bits, 8) + 8
+    def id_table_bytes(self):
+        return ID_ENTRY_BYTES * ceil_div(self.packets, ID_GROUP)
+
+    def id_groups(self):
+        """The entry of each group, the widths in its head [group, 9] with v as the first, and the bits at which its
+        packets start and the last of them ends [group, packet + 1]. The block holds the table, but groups may start
+        anywhere (R31): bits beyond the block are 0. Packets that a group does not have take no bits.
+        """
+        block = self.id_block()
+        table = np.frombuffer(block[: self.id_table_bytes()], ID_ENTRY)
+        start = table["start"].astype(np.intp)[:, None]
+        widths = bits_at(block, 0, start + np.arange(0, ID_GROUP_HEAD_BITS, 6), 6).astype(np.intp)
+        present = np.arange(ID_GROUP * len(table)).reshape(-1, ID_GROUP) < self.packets
+        sizes = np.where(present, widths[:, :1] + 2 + 3 * widths[:, 1:], 0)
+        ends = start + ID_GROUP_HEAD_BITS + np.cumsum(sizes, axis=1)
+        return table, widths, np.concatenate([start + ID_GROUP_HEAD_BITS, ends], axis=1)
+
+    def id_bytes_needed(self):
+        return ceil_div(int(self.id_groups()[2][-1, -1]), 8) + 8
+
+    def id_packets(self):
+        """The least id of each packet, the lane stated [packet], and the offsets of the other three lanes."""
+        block, (table, widths, bits) = self.id_block(), self.id_groups()
+        base, width = (np.repeat(column, ID_GROUP)[: self.packets] for column in (table["base"], widths[:, 0]))
+        offset = widths[:, 1:].reshape(-1, 1)[: self.packets]
+        at = bits[:, :-1].ravel()[: self.packets]
+        least = base + bits_at(block, 0, at, width).astype(np.uint32)
+        lane = bits_at(block, 0, at + width, 2).astype(np.intp)
+        offsets = bits_at(block, 0, (at + width + 2)[:, None] + offset * np.arange(PACKET - 1), offset)
+        return least, lane, offsets.astype(np.uint32)
 
     def ids(self):
         """The ids in all lanes of all packets: [packet, lane]. Without an id section they are all 0."""
         if self.id_words == 0:
             return np.zeros((self.packets, PACKET), np.uint32)
-        head = self.id_head()
-        at = self.id_block_at() + ID_HEAD_BYTES
-        values = bit_values(self.data, at, 0, head.bits, head.bits, PACKET * self.packets)
-        return (values + np.uint64(head.base)).astype(np.uint32).reshape(-1, PACKET)
+        least, lane, offsets = self.id_packets()
+        lanes, lane = np.arange(PACKET), lane[:, None]
+        # The lane stated has the offset 0. Those before it have offsets 0, 1, ..., and those after it are one behind.
+        number = np.where(lanes == lane, 0, lanes + (lanes < lane))
+        return least[:, None] + np.take_along_axis(np.pad(offsets, ((0, 0), (1, 0))), number, axis=1)
 
 
 def round_up_to_16_bits(t):

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 import cbvh
-from cbvh import LEAF, LINE, PACKET, PAGE, WORD
+from cbvh import LEAF, LINE, PAGE, WORD
 from query import minus, outer
 
 
@@ -272,15 +272,21 @@ def of_leaf_block(page, lines):
 def of_id_block(page, words):
     if page.id_words == 0:
         return
-    where, head = f"page {page.number}", page.id_head()
+    where = f"(12) page {page.number}"
     if page.id_word != words:
-        yield f"(12) {where}: id block at word {page.id_word}, expected {words}"
-    at = page.id_block_at() + cbvh.ID_HEAD_BYTES
-    array = int.from_bytes(page.data[at : page.id_block_at() + WORD * page.id_words], "little")
-    if head.reserved.any() or array >> PACKET * page.packets * head.bits:
-        yield f"(12) {where}: nonzero reserved bytes, or nonzero bits after the array"
-    if (page.ids()[~page.lanes_used()] != head.base).any():
-        yield f"(12) {where}: nonzero values in lanes after the last triangle"
+        yield f"{where}: id block at word {page.id_word}, expected {words}"
+    _, widths, bits = page.id_groups()
+    if int.from_bytes(page.id_block(), "little") >> int(bits[-1, -1]):
+        yield f"{where}: nonzero bits after the last group"
+    if widths[:, 1:].ravel()[page.packets :].any():
+        yield f"{where}: nonzero widths of packets that the last group does not have"
+    (least, lane, _), ids, used = page.id_packets(), page.ids(), page.lanes_used()
+    if not used[np.arange(page.packets), lane].all():
+        yield f"{where}: a least id of a lane after the last triangle"
+    if (ids < least[:, None])[used].any():
+        yield f"{where}: an id below the least id of its packet"
+    if (ids != least[:, None])[~used].any():
+        yield f"{where}: nonzero offsets of lanes after the last triangle"
 
 
 def of_ids(file):

@@ -26,8 +26,10 @@ LEAF_SUMS, ID_SUMS, PAGE_SUMS, ALL = 1, 2, 4, 7  # what `seal` corrects besides 
 EXTREMES = (0, 1, 0x7F800000, 0x7FC00000, 0x80000000, (1 << 64) - 1)
 
 
-def places(data):
-    """Offsets of bytes worth damaging in a valid file, by what they hold; each group is drawn equally often."""
+def places(data, only=""):
+    """Offsets of bytes worth damaging in a valid file, by what they hold; each group is drawn equally often. `only` is
+    the start of the names of the groups to damage.
+    """
     file = rules.validate(data)
     sorts = collections.defaultdict(list)
     sorts["table"] += range(cbvh.LINE + 32 * len(file.entries) + 32)
@@ -54,8 +56,12 @@ def places(data):
                 if page.is_packed():
                     sorts["records"] += range(at + cbvh.PACKED_HEAD_BYTES, at + page.packed_head().pool_at)
             if page.id_words:
-                sorts["id heads"] += range(page.id_block_at(), page.id_block_at() + 16)
-    return [sort for sort in sorts.values() if sort]
+                at, length = page.id_block_at(), cbvh.WORD * page.id_words
+                sorts["id tables"] += range(at, at + page.id_table_bytes())
+                for start in page.id_groups()[0]["start"].tolist():
+                    sorts["id groups"] += range(at + start // 8, at + start // 8 + 7)
+                sorts["ids"] += range(at + page.id_table_bytes(), at + length)
+    return [sort for name, sort in sorts.items() if sort and str(name).startswith(only)]
 
 
 def mutant(chance, data, sorts):
@@ -143,14 +149,14 @@ def verdict_of_command(command, path, *meshes):
     return 0 if found["valid"] else found["rule"]
 
 
-def compare(command, count, seed, paths, folder):
+def compare(command, count, seed, paths, folder, only=""):
     """Counts how often each rule was broken, and lists (file, mutant, this verdict, that verdict) where they differ."""
     chance = random.Random(seed)
     originals = []
     for path in paths:
         with open(path, "rb") as stream:
             data = stream.read()
-        originals.append((path, data, places(data)))
+        originals.append((path, data, places(data, only)))
     broken, different = collections.Counter(), []
     for number in range(count):
         path, data, sorts = chance.choice(originals)

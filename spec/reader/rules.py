@@ -302,13 +302,17 @@ def check_id_block(page):
         return
     end = cbvh.WORD * (page.id_word + page.id_words)
     need(end <= section.length, 31, page.place("id_word"), f"an end within {section.length} bytes", end)
-    need(page.id_words >= 1, 31, page.place("id_words"), "a head", 0)
-    head = page.id_head()
-    need(head.bits <= 32, 31, head.place("bits"), "at most 32", head.bits)
-    words = cbvh.ceil_div(page.id_bytes_needed(head), cbvh.WORD)
+    block, table, at = page.id_block(), page.id_table_bytes(), page.id_block_at()
+    need(len(block) >= table, 31, page.place("id_words"), f"a table of {table} bytes", f"{len(block)} bytes")
+    entries, widths, bits = page.id_groups()
+    end = 8 * table
+    for group, start in enumerate(entries["start"].tolist()):
+        need(start == end, 31, at + cbvh.ID_ENTRY_BYTES * group + 4, f"a start at bit {end}", start)
+        need(bool((widths[group] <= 32).all()), 31, at + start // 8, "widths of at most 32", widths[group])
+        end = int(bits[group, -1])
+    words = cbvh.ceil_div(page.id_bytes_needed(), cbvh.WORD)
     need(page.id_words == words, 31, page.place("id_words"), words, page.id_words)
-    at = page.id_block_at()
-    need_checksum(32, page.place("id_checksum"), page.id_checksum, page.data[at : at + cbvh.WORD * words])
+    need_checksum(32, page.place("id_checksum"), page.id_checksum, block)
 
 
 # Scene

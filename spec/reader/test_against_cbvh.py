@@ -478,6 +478,14 @@ class AgainstCbvh(unittest.TestCase):
         self.assertEqual(different, [])
         self.assertGreater(len(broken), min(count // 20, 20))
 
+    def test_damaged_ids(self):
+        meshes = [os.path.join(TESTDATA, "ok-everything.cbvh"), self.bake(ROBOT, "dop14-u8", "packed")]
+        count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 2
+        broken, different = mutate.compare(COMMAND, count, 5, meshes, self.folder, only="id")
+        self.assertEqual(different, [])
+        if count >= 100:
+            self.assertLessEqual({0, 31, 32, 33}, set(broken))
+
 
 def random_rotation(chance):
     w, x, y, z = np.random.default_rng(chance.randrange(1 << 32)).standard_normal(4)

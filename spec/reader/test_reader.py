@@ -154,7 +154,7 @@ class Tables(unittest.TestCase):
             "Net": cbvh.NET,
             "PageHeader": cbvh.PAGE_HEADER,
             "PackedHead": cbvh.PACKED_HEAD,
-            "id-head": cbvh.ID_HEAD,
+            "id-entry": cbvh.ID_ENTRY,
             "links": cbvh.LINKS,
         }
         for name, dtype in structures.items():
@@ -514,6 +514,130 @@ class LeafBlocks(unittest.TestCase):
             pool = {"pool": [(0, 0, 0)] * 13, "base": (n, 0, 0)}
             self.assertEqual(count(**pool, kinds=1, exponent=(3, 0, 0)), found, n)
             self.assertEqual(count(**pool, kinds=2, exponent=(3, 0, 0)), 0, n)
+
+
+class IdBlock(cbvh.Page):
+    """A page of which there is only an id block (12), between bytes 0xff.
+
+    Groups are (base, v, packets), and packets (triangles, w, m, lane, three offsets). `absent` is the w of packets that
+    the last group does not have. `moved` are numbers to add to the starts of groups, `more` are bytes
+    to add at the end, or -8, and `filled` is a bit to set, counted from the end of the last group.
+    """
+
+    def __init__(self, groups, absent=0, moved=(), more=0, filled=None):
+        self.packets = sum(len(packets) for _, _, packets in groups)
+        self.triangles_of = [packet[0] for _, _, packets in groups for packet in packets]
+        fields, table, start = [], b"", 48 * len(groups)
+        for number, (base, v, packets) in enumerate(groups):
+            here = [(v, 6), *((w, 6) for _, w, *_ in packets), *[(absent, 6)] * (8 - len(packets))]
+            for _, w, m, lane, offsets in packets:
+                here += [(m, v), (lane, 2), *((value, w) for value in offsets)]
+            stated = start + dict(enumerate(moved)).get(number, 0)
+            table += base.to_bytes(4, "little") + stated.to_bytes(2, "little")
+            fields += here
+            start += sum(size for _, size in here)
+        self.end = start
+        block = int.from_bytes(table + bit_array(fields), "little")
+        if filled is not None:
+            block |= 1 << start + filled
+        size = cbvh.WORD * cbvh.ceil_div(cbvh.ceil_div(start, 8) + 8, cbvh.WORD)
+        block = (block.to_bytes(size, "little") + b"\xff" * 8)[: size + more]
+        data = b"\xff" * 80 + block + b"\xff" * 8
+        section = types.SimpleNamespace(offset=72, length=len(data) - 72)
+        self.owner = types.SimpleNamespace(file=types.SimpleNamespace(sections={cbvh.IDS: section}))
+        self.data, self.number, self.id_word, self.id_words = data, 0, 1, len(block) // 8
+        self.id_checksum = xxh3_64(block)
+
+    def place(self, field):
+        return 0
+
+    def lanes_used(self):
+        return np.arange(4) < np.array(self.triangles_of)[:, None]
+
+    def verdict(self):
+        try:
+            rules.check_id_block(self)
+        except rules.Broken as broken:
+            return broken.rule
+        return 0
+
+
+class IdBlocks(unittest.TestCase):
+    FULL = 7, 3, [(4, 4, p % 8, p % 4, (p, 1, 15)) for p in range(8)]
+    LAST = 90, 0, [(2, 5, 0, 1, (31, 0, 0)), (1, 0, 0, 0, (0, 0, 0))]
+
+    def test_reading_one_number_at_a_time(self):
+        chance, seen = random.Random(6), set()
+        for _ in range(200):
+            groups, expected = [], []
+            sizes = [8] * chance.choice((0, 0, 1, 3, 20)) + [chance.randint(1, 8)]
+            for size in sizes:
+                base, width, packets = chance.choice((0, 9, chance.getrandbits(32))), chance.randint(0, 32), []
+                for _ in range(size):
+                    w, lane, least = chance.randrange(33), chance.randrange(4), chance.getrandbits(width)
+                    offsets = [chance.getrandbits(w) for _ in range(3)]
+                    packets.append((4, w, least, lane, offsets))
+                    ids = [base + least + offset for offset in offsets]
+                    ids.insert(lane, base + least)
+                    expected.append([number % (1 << 32) for number in ids])
+                    seen.add(w)
+                groups.append((base, width, packets))
+            page = IdBlock(groups, absent=chance.randrange(33))
+            self.assertEqual(page.verdict(), 0)
+            self.assertEqual(page.ids().dtype, np.uint32)
+            self.assertEqual(page.ids().tolist(), expected)
+        self.assertEqual(len(seen), 33)
+
+    def test_rules(self):
+        two = [self.FULL, self.LAST]
+        for rule, groups, fields in (
+            (0, two, {}),
+            (0, [(0, 32, [(4, 32, 5, 3, (0, 1, 2))])], {}),
+            (31, [(0, 33, [(4, 32, 5, 3, (0, 1, 2))])], {}),
+            (31, [(0, 32, [(4, 33, 5, 3, (0, 1, 2))])], {}),
+            (31, [(0, 32, [*self.FULL[2][:7], (4, 63, 5, 3, (0, 1, 2))])], {}),
+            (31, [(0, 63, self.FULL[2])] * 9, {}),
+            (0, two, {"absent": 32}),
+            (31, two, {"absent": 33}),
+            (31, two, {"moved": (1,)}),
+            (31, two, {"moved": (0, -1)}),
+            (31, two, {"moved": (-96, 0)}),
+            (31, two, {"moved": (0, 60000)}),
+            (31, two, {"moved": (0, 8)}),
+            (31, two, {"more": 8}),
+            (31, two, {"more": -8}),
+            (31, two, {"more": -1000}),  # no bytes
+            (0, two, {"filled": 0}),
+        ):
+            page = IdBlock(groups, **fields)
+            self.assertEqual(page.verdict(), rule, (groups, fields))
+        page = IdBlock(two)
+        for id_word, id_words in ((1, 0), (1, 1), (1, 1 << 31), (1 << 63, page.id_words), (2, page.id_words + 1)):
+            page.id_word, page.id_words = id_word, id_words
+            self.assertEqual(page.verdict(), 31)
+        page = IdBlock(two)
+        page.id_checksum ^= 1
+        self.assertEqual(page.verdict(), 32)
+
+    def test_what_binds_writers(self):
+        def count(last, **fields):
+            page = IdBlock([self.FULL, (90, 3, last)], **fields)
+            self.assertEqual(page.verdict(), 0)
+            return len(list(musts.of_id_block(page, 1)))
+
+        good = (2, 5, 7, 1, (31, 0, 0))
+        self.assertEqual(count([good]), 0)
+        self.assertEqual(count([good], absent=1), 1)
+        end = IdBlock([self.FULL, (90, 3, [good])]).end
+        for filled in (0, -end % 8, -end % 8 + 63):
+            self.assertEqual(count([good], filled=filled), 1)
+        self.assertEqual(count([good, (2, 5, 7, 0, (1, 1, 0))]), 1)  # an offset of lane 2
+        self.assertEqual(count([good, (2, 5, 7, 0, (1, 0, 1))]), 1)
+        self.assertEqual(count([(2, 5, 7, 2, (0, 3, 0))]), 1)  # lane 2 has no triangle
+        self.assertEqual(count([(2, 32, 7, 1, ((1 << 32) - 1, 0, 0))]), 1)  # an id less than the least
+        self.assertEqual(count([(2, 32, 7, 1, ((1 << 32) - 97, 0, 0))]), 1)  # id 0
+        page = IdBlock([self.FULL])
+        self.assertEqual(len(list(musts.of_id_block(page, 0))), 1)
 
 
 class Instances(unittest.TestCase):
