@@ -36,7 +36,7 @@ const COMPACT_PROFILES: [(Profile, f64); 3] =
 /// wider bounds: 111 to 78 for bunny poses 1e-6 apart.
 const U4_TESTS: f64 = 1.4;
 /// The bytes of nodes and plain triangles beyond which reading the file costs more than unpacking it. With warm caches,
-/// packed triangles take 1.03 to 1.17 times as long as plain ones. This also holds where the caches are too small for
+/// packed triangles take up to 1.21 times as long as plain ones. This also holds where the caches are too small for
 /// them, because the vertices of a packed packet take as many lines as a plain packet.
 const MAX_PLAIN_BYTES: u64 = 256 << 20;
 /// Bytes of nodes and plain lanes per triangle.

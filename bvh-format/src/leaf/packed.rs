@@ -155,7 +155,7 @@ impl PackedHead {
 
     /// Bits of one vertex in the pool.
     #[inline]
-    pub fn stride(&self) -> usize {
+    fn stride(&self) -> usize {
         self.bits.iter().map(|&b| usize::from(b.min(32))).sum()
     }
 
@@ -166,7 +166,7 @@ impl PackedHead {
 
     /// Bits of the record of a packet.
     #[inline]
-    pub(super) fn record_bits(&self) -> usize {
+    fn record_bits(&self) -> usize {
         RECORD_HEAD_BITS + RECORD_SLOTS * self.index_width()
     }
 
@@ -228,7 +228,7 @@ impl PackedHead {
     /// Reads the integers of the vertex in a place of the pool. Bytes beyond the block read as zero.
     #[inline(always)]
     fn vertex(&self, block: &[u8], place: u32) -> [i32; 3] {
-        let mut at = self.pool_at as usize * 8 + place as usize * self.stride();
+        let mut at = self.vertex_at(place);
         [0, 1, 2].map(|axis| {
             let width = u32::from(self.bits[axis].min(32));
             let offset = read_bits(block, at, width);
@@ -237,10 +237,10 @@ impl PackedHead {
         })
     }
 
-    /// The bit of the block at which the pool starts.
+    /// The bit of the block at which the vertex in a place of the pool starts.
     #[inline(always)]
-    pub fn pool_bit(&self) -> usize {
-        self.pool_at as usize * 8
+    fn vertex_at(&self, place: u32) -> usize {
+        self.pool_at as usize * 8 + place as usize * self.stride()
     }
 
     /// Reads the integers of a packet's vertices, by axis. Bytes beyond the block read as zero.
@@ -255,24 +255,18 @@ impl PackedHead {
         integers
     }
 
-    /// Returns true if a load of eight bytes holds the fields of x and y, wherever in its first byte they start.
-    #[inline(always)]
-    pub fn has_short_fields(&self) -> bool {
-        let [x, y, z] = self.bits.map(u32::from);
-        x + y <= 57 && x.max(y).max(z) <= 32
-    }
-
     /// Reads them with two loads per vertex. Returns false where fields are too wide for that, or too near the end of the
     /// block.
     #[inline(always)]
     fn with_two_loads(&self, block: &[u8], places: &[u32], integers: &mut [[i32; 16]; 3]) -> bool {
-        if !self.has_short_fields() {
+        let [x, y, z] = self.bits.map(u32::from);
+        // A load of eight bytes holds 57 bits, wherever in its first byte they start.
+        if x + y > 57 || x.max(y).max(z) > 32 {
             return false;
         }
-        let [x, y, z] = self.bits.map(u32::from);
         let masks = [x, y, z].map(|bits| (1u64 << bits) - 1);
         for (to, &place) in places.iter().enumerate() {
-            let at = self.pool_bit() + place as usize * self.stride();
+            let at = self.vertex_at(place);
             let (Some(both), Some(third)) = (field_at(block, at), field_at(block, at + (x + y) as usize))
             else {
                 return false;
@@ -312,9 +306,9 @@ pub struct Record {
     /// Bits of a slot.
     width: u8,
     /// Slots 0 to 2 and 3 to 5 as they stand in the record, and whatever follows them.
-    pub first_words: [u64; 2],
+    first_words: [u64; 2],
     /// Slots 5 to 8 and 9 to 11 as they stand among the further slots, if the pattern has more than six.
-    pub further_words: [u64; 2],
+    further_words: [u64; 2],
 }
 
 impl Record {
@@ -325,14 +319,8 @@ impl Record {
 
     /// The number of slots: at most twelve.
     #[inline(always)]
-    pub fn count(&self) -> usize {
+    fn count(&self) -> usize {
         usize::from(SLOTS[usize::from(self.pattern) & (PATTERNS - 1)])
-    }
-
-    /// Bits of a slot.
-    #[inline(always)]
-    pub fn width(&self) -> u8 {
-        self.width
     }
 
     #[inline(always)]
@@ -348,7 +336,7 @@ impl Record {
 
     /// The places in the pool of the packet's vertices, as many as `count` tells.
     #[inline(always)]
-    pub fn slots(&self) -> [u32; MAX_SLOTS] {
+    fn slots(&self) -> [u32; MAX_SLOTS] {
         let mut slots = [0; MAX_SLOTS];
         for slot in 0..RECORD_SLOTS {
             slots[slot] = self.field(self.first_words[slot / 3], slot % 3);
