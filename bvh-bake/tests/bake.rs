@@ -8,7 +8,6 @@ use bvh_format::ids::decode_id;
 use bvh_format::leaf::{TriangleEncoding, decode_packet};
 use bvh_format::page::{PAGE, Page};
 use bvh_format::profile::{Encoding, Profile};
-use bvh_format::treelet::Links;
 use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_format::validate::{packets, validate};
 use bvh_format::{Layout, Rule};
@@ -445,7 +444,7 @@ fn every_page_holds_leaves_of_at_most_four_and_children_of_at_most_its_width() {
         for number in 0..pages {
             let page = Page::new(layout.page_bytes(&bytes, number).unwrap(), profile);
             let slots = 0..page.header().treelets;
-            children += slots.map(|slot| Links::read(page.treelet(slot)).children()).sum::<usize>();
+            children += slots.map(|slot| page.links(slot).children()).sum::<usize>();
         }
         let treelets = layout.objects[0].record().treelets.get();
         assert_eq!(report.mean_children, children as f64 / treelets as f64);

@@ -7,7 +7,7 @@
 use bvh_format::Layout;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_crossing, check_page};
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::Child;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -53,7 +53,7 @@ fn count_triangles(layout: &Layout, bytes: &[u8], object: &Object) -> Result<u64
     let mut stack = vec![(object.pages().start, 0)];
     while let Some((number, slot)) = stack.pop() {
         let page = page_of(number)?;
-        let links = Links::read(page.treelet(slot));
+        let links = page.links(slot);
         for child in 0..links.children() {
             match links.child(child) {
                 Child::Treelet(slot) => stack.push((number, slot)),

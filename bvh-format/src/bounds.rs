@@ -14,7 +14,7 @@ use crate::object::Object;
 use crate::page::{Page, RootRef};
 use crate::rule::Rule;
 use crate::slabs::NodeSlabs;
-use crate::treelet::{Child, Links};
+use crate::treelet::Child;
 use crate::turning::{MAX_TRIANGLES, TurningSlab, decode_turning};
 use crate::validate::packets as packets_of;
 
@@ -78,7 +78,7 @@ impl Patches {
             Child::Empty => (0, 0),
         };
         let children = |slot: u8| {
-            let links = Links::read(page.treelet(slot));
+            let links = page.links(slot);
             (0..links.children()).map(move |child| links.child(child))
         };
         for slot in (0..treelets).rev() {
@@ -149,7 +149,7 @@ pub fn visit_bounds<'b>(
     let width = profile.width();
     let mut children = vec![Kdop::EMPTY; treelets * width];
     for slot in (0..treelets).rev() {
-        let links = Links::read(page.treelet(slot as u8));
+        let links = page.links(slot as u8);
         for child in 0..links.children() {
             let kdop = match links.child(child) {
                 Child::Treelet(slot) => tight[usize::from(slot)],
@@ -171,7 +171,7 @@ pub fn visit_bounds<'b>(
     }
     for slot in 0..treelets {
         let treelet = page.treelet(slot as u8);
-        let links = Links::read(treelet);
+        let links = page.links(slot as u8);
         for child in 0..links.children() {
             let node = decode_child(profile, object.f16_scale, treelet, child, &decoded[slot]);
             let turning = decode_turning(profile, treelet, child, &node);

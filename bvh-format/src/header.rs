@@ -11,7 +11,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 /// The first eight bytes of a file. Transfers in text mode damage the high bit or the line ends, and so show.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
 /// The major version. Readers refuse any other.
-pub const MAJOR: u16 = 3;
+pub const MAJOR: u16 = 4;
 /// The minor version. Readers accept any minor version of their major version.
 pub const MINOR: u16 = 0;
 /// The most entries that the section table can have.

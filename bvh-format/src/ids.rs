@@ -27,13 +27,13 @@ const LANE_BITS: usize = 2;
 /// Makes the id block of a page from the ids of its packets, one to four per packet.
 pub fn encode_ids(packets: &[impl AsRef<[u32]>]) -> Vec<u8> {
     let (mut table, mut writer) = (Vec::new(), BitWriter::default());
-    let first = ID_ENTRY_BYTES * packets.len().div_ceil(ID_GROUP) * 8;
+    let first = ID_ENTRY_BYTES * packets.len().div_ceil(ID_GROUP);
     for group in packets.chunks(ID_GROUP) {
         let packets = group.iter().map(|ids| PacketIds::new(ids.as_ref())).collect::<Vec<_>>();
         let base = packets.iter().map(|packet| packet.least).min().unwrap_or(0);
         let largest = packets.iter().map(|packet| packet.least - base).max().unwrap_or(0);
         table.extend_from_slice(&base.to_le_bytes());
-        table.extend_from_slice(&((first + writer.bits()) as u16).to_le_bytes());
+        table.extend_from_slice(&((first + writer.bits() / 8) as u16).to_le_bytes());
         let least_width = bit_width(largest);
         writer.push(least_width, LEAST_WIDTH_BITS as u32);
         for place in 0..ID_GROUP {
@@ -44,6 +44,7 @@ pub fn encode_ids(packets: &[impl AsRef<[u32]>]) -> Vec<u8> {
             writer.push(packet.lane, LANE_BITS as u32);
             packet.others.iter().for_each(|&offset| writer.push(offset, packet.width));
         }
+        writer.push(0, writer.bits().wrapping_neg() as u32 % 8);
     }
     let mut block = table;
     block.extend_from_slice(&writer.finish());
@@ -89,7 +90,7 @@ impl Group {
     #[inline]
     fn read(block: &[u8], group: usize) -> Self {
         let entry = load_bits(block, group * ID_ENTRY_BYTES * 8);
-        let start = usize::from((entry >> 32) as u16);
+        let start = usize::from((entry >> 32) as u16) * 8;
         let head = load_bits(block, start);
         let least_width = head as u32 & ((1 << LEAST_WIDTH_BITS) - 1);
         Self { base: entry as u32, start, least_width, widths: head >> LEAST_WIDTH_BITS }
@@ -119,16 +120,16 @@ impl Group {
 /// each other or have widths that do not exist.
 pub(crate) fn id_block_bytes(block: &[u8], packets: usize) -> Option<usize> {
     let groups = packets.div_ceil(ID_GROUP);
-    let mut end = groups * ID_ENTRY_BYTES * 8;
+    let mut end = groups * ID_ENTRY_BYTES;
     for number in 0..groups {
         let group = Group::read(block, number);
         let is_valid = group.least_width <= 32 && (0..ID_GROUP).all(|place| group.width(place) <= 32);
-        if group.start != end || !is_valid {
+        if group.start != end * 8 || !is_valid {
             return None;
         }
-        end = group.packet((packets - number * ID_GROUP).min(ID_GROUP));
+        end = group.packet((packets - number * ID_GROUP).min(ID_GROUP)).div_ceil(8);
     }
-    Some((end.div_ceil(8) + 8).next_multiple_of(WORD))
+    Some((end + 8).next_multiple_of(WORD))
 }
 
 /// Returns the id of the triangle in a lane of a packet. Bytes beyond the block read as zero.

@@ -7,8 +7,8 @@
 //!
 //! Treelet slots are numbered breadth-first. The slots of the roots come first, in the order of the anchors; then follow
 //! the child treelets of slot 0, of slot 1, and so on. Leaf packets and remote links are numbered in the same order, so
-//! a treelet stores only the number of its first child of each kind. [`check_page`] demands this order, and
-//! with it no slot, packet or link can be reached twice.
+//! a treelet stores only the number of its first child of each kind. Short treelets have the last slots, in the same
+//! order. [`check_page`] demands this order, and with it no slot, packet or link can be reached twice.
 
 mod check;
 mod patcher;
@@ -25,6 +25,7 @@ use crate::ids::WORD;
 use crate::leaf::LINE;
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
+use crate::treelet::SHORT_TREELET_BYTES;
 use std::ops::Range;
 use zerocopy::byteorder::little_endian::{U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
@@ -42,8 +43,6 @@ pub const NO_PARENT: u32 = u32::MAX;
 const PARENT_BYTES: usize = 8;
 /// Bytes of a remote link.
 const LINK_BYTES: usize = 4;
-/// Remote links in one line.
-const LINKS_PER_LINE: usize = LINE / LINK_BYTES;
 /// The most subtree roots of a page: a root reference holds 6 bits of root number, and one value stays unused.
 const MAX_ROOTS_PER_PAGE: usize = 63;
 /// The most remote links of a page: the header counts them in a `u8`.
@@ -75,7 +74,7 @@ pub struct PageHeader {
     pub packets: U16,
     /// Subtree roots.
     pub roots: u8,
-    /// Treelets.
+    /// Treelets, short ones included.
     pub treelets: u8,
     /// Remote links.
     pub remotes: u8,
@@ -83,13 +82,20 @@ pub struct PageHeader {
     pub treelet_line: u8,
     /// Number of the object's `Profile`.
     pub profile: u8,
-    /// Zero.
-    pub reserved: u8,
+    /// How many of the treelets are short: those in the last slots.
+    pub short: u8,
 }
 
 const _: () = assert!(size_of::<PageHeader>() == PAGE_HEADER_BYTES);
 
 impl PageHeader {
+    /// How many roots, remote links and treelets the header states.
+    pub fn shape(&self) -> PageShape {
+        let [roots, remotes, treelets, short] =
+            [self.roots, self.remotes, self.treelets, self.short].map(usize::from);
+        PageShape { roots, remotes, treelets, short }
+    }
+
     /// The bytes of the leaf section that the header states as the page's leaf block.
     pub fn leaf_bytes(&self) -> Range<usize> {
         bytes_of_units(self.leaf_line.get(), self.leaf_lines.get(), LINE)
@@ -149,19 +155,22 @@ pub struct PageShape {
     pub roots: usize,
     /// Remote links.
     pub remotes: usize,
-    /// Treelets.
+    /// Treelets, short ones included.
     pub treelets: usize,
+    /// How many of the treelets are short.
+    pub short: usize,
 }
 
 impl PageShape {
     /// The line of the page at which the treelets start.
     pub fn treelet_line(self, profile: Profile) -> usize {
-        anchor_at(profile, self.roots) / LINE + self.remotes.div_ceil(LINKS_PER_LINE)
+        (anchor_at(profile, self.roots) + self.remotes * LINK_BYTES).div_ceil(LINE)
     }
 
     /// The lines of the page that are in use.
     pub fn lines(self, profile: Profile) -> usize {
-        self.treelet_line(profile) + self.treelets * (profile.treelet_bytes() / LINE)
+        let treelets = self.treelets.saturating_sub(self.short) * profile.treelet_bytes();
+        self.treelet_line(profile) + (treelets + self.short * SHORT_TREELET_BYTES).div_ceil(LINE)
     }
 
     /// Returns true if a page has room for all parts and its header can count them.

@@ -120,7 +120,13 @@ impl Profile {
         WIDTHS[self as usize] as usize
     }
 
-    /// Bytes of a treelet: 64, 128 or 256.
+    /// Whether treelets of nothing but leaf packets may be short: see [`treelet`](crate::treelet).
+    #[inline]
+    pub const fn has_short_treelets(self) -> bool {
+        matches!(self, Self::Dop14U8 | Self::Dop6U8)
+    }
+
+    /// Bytes of a treelet that is not short: 64, 128 or 256.
     #[inline]
     pub const fn treelet_bytes(self) -> usize {
         // A table is faster than a match, and each node of a traversal asks.
@@ -128,11 +134,12 @@ impl Profile {
         BYTES[self as usize] as usize
     }
 
-    /// Bytes of the anchor of a subtree root: 64, or 128 for 26-DOPs.
+    /// Bytes of the anchor of a subtree root.
     pub const fn anchor_bytes(self) -> usize {
         match self.directions() {
+            DirectionSet::Dop6 => 32,
+            DirectionSet::Dop14 => 64,
             DirectionSet::Dop26 => 128,
-            _ => 64,
         }
     }
 

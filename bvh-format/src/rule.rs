@@ -47,7 +47,7 @@ rules! {
     TreeletLinks = 22, "treelets are numbered breadth-first: roots first, then the children in order";
     RemoteLinks = 23, "remote links are numbered in treelet order and lead to later pages of the object";
     LeafLinks = 24, "leaf packets are numbered in treelet order";
-    Reserved = 25, "the reserved byte of a page header is zero";
+    ShortTreelets = 25, "short treelets are in profiles that have them, and none is a root";
     LeafPlace = 26, "a leaf block lies within the leaf section and has the size its packets need";
     LeafChecksum = 27, "a leaf block has the checksum that its page states";
     PackedHeader = 28, "a packed leaf block's bit widths are within the limits and its parts within the block";

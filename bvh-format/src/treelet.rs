@@ -8,6 +8,10 @@
 //! and where the first child of each kind is. Children of one kind are numbered consecutively from the first, in the
 //! order of the children.
 //!
+//! A *short* treelet has no children but leaf packets, and takes half a line. One byte holds both codes of a slab, each
+//! of four bits that stand for one of [`SHORT_CODES`]. Packets are where a loose slab costs least, because no slab
+//! below is predicted from theirs, and two treelets of three have nothing else.
+//!
 //! Section 7 of `spec/format.md` says where each byte stands and what the kinds are.
 
 use crate::kdop::Kdop;
@@ -15,6 +19,12 @@ use crate::leaf::PACKET;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{encode_four_outward, encode_max_outward, encode_min_outward, residual_unit};
 use crate::slabs::{Group, NodeSlabs, row};
+
+/// Bytes of a short treelet.
+pub const SHORT_TREELET_BYTES: usize = 32;
+/// The 8-bit codes for which the 4-bit codes of short treelets stand. They are closer together where the codes of
+/// packets are frequent.
+pub const SHORT_CODES: [u8; 16] = [0, 10, 21, 32, 44, 55, 67, 78, 90, 103, 116, 129, 142, 157, 176, 208];
 
 /// One child of a treelet. The list of variants is part of the major version of the format, and each reader must handle
 /// all of them.
@@ -38,8 +48,10 @@ pub enum Child {
 /// The kind of a child, from which its nibble follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ChildKind {
-    /// A treelet of the same page.
+    /// A treelet of the same page, which is not short.
     Treelet,
+    /// A short treelet of the same page.
+    ShortTreelet,
     /// A subtree root of another page.
     Remote,
     /// A leaf packet of 1 to 4 triangles.
@@ -47,62 +59,91 @@ pub(crate) enum ChildKind {
 }
 
 /// The links of a treelet, as stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Links {
     /// The kinds of the children: one nibble per child, that of child 0 lowest.
     pub kinds: u32,
-    /// The slot of the first child treelet.
+    /// The slot of the first child treelet that is not short.
     pub first_treelet: u8,
+    /// The slot of the first short child treelet.
+    pub first_short: u8,
     /// The number of the first remote link.
     pub first_remote: u8,
-    /// The number of the first leaf packet.
+    /// The number of the first leaf packet, below 1024.
     pub first_leaf: u16,
 }
+
+/// The lowest bits of the fields of the word that holds the first of each kind.
+const FIRST_SHORT_BIT: u32 = 7;
+const FIRST_REMOTE_BIT: u32 = 14;
+const FIRST_LEAF_BIT: u32 = 22;
 
 /// A mask of the lowest bit of each nibble.
 const LOWEST_BITS: u32 = 0x1111_1111;
 
-/// The nibble of a child that is a treelet of the same page.
+/// The nibble of a child that is a treelet of the same page, which is not short.
 const KIND_TREELET: u32 = 1;
 /// The nibble of a child that is a subtree root of another page.
 const KIND_REMOTE: u32 = 2;
+/// The nibble of a child that is a short treelet of the same page.
+const KIND_SHORT_TREELET: u32 = 3;
 /// The nibble of a child that is a leaf packet of one triangle; up to three more triangles add to it.
 const KIND_LEAF: u32 = 4;
 /// The nibble of a child that is a leaf packet of four triangles.
 const KIND_LEAF_LAST: u32 = KIND_LEAF + PACKET as u32 - 1;
 
 impl Links {
-    /// Reads the links of a treelet of 64, 128 or 256 bytes.
+    /// The links of no children.
+    pub const NONE: Self =
+        Self { kinds: 0, first_treelet: 0, first_short: 0, first_remote: 0, first_leaf: 0 };
+
+    /// Reads the links of a treelet of 32, 64, 128 or 256 bytes.
     #[inline]
-    pub fn read(treelet: &[u8]) -> Self {
-        let half = treelet.len() / 2;
+    pub fn read(profile: Profile, treelet: &[u8]) -> Self {
         let word = |end: usize| {
             let mut bytes = [0; 4];
             bytes.copy_from_slice(&treelet[end - 4..end]);
             u32::from_le_bytes(bytes)
         };
-        let second = word(treelet.len());
+        let (half, firsts) = (word(treelet.len() / 2), word(treelet.len()));
+        // In a short treelet of four children, codes take the place of the first word.
+        let kinds = if is_short(treelet) && profile.width() == 4 { firsts & 0xffff } else { half };
+        let field = |bit: u32, bits: u32| firsts >> bit & ((1 << bits) - 1);
+        let first_leaf = field(FIRST_LEAF_BIT, 10) as u16;
+        if is_short(treelet) {
+            return Self { kinds, first_leaf, ..Self::NONE };
+        }
         Self {
-            kinds: word(half),
-            first_treelet: second as u8,
-            first_remote: (second >> 8) as u8,
-            first_leaf: (second >> 16) as u16,
+            kinds,
+            first_treelet: field(0, 7) as u8,
+            first_short: field(FIRST_SHORT_BIT, 7) as u8,
+            first_remote: field(FIRST_REMOTE_BIT, 8) as u8,
+            first_leaf,
         }
     }
 
     /// Writes the links into a treelet.
-    pub fn write(&self, treelet: &mut [u8]) {
+    pub fn write(&self, profile: Profile, treelet: &mut [u8]) {
         let (half, end) = (treelet.len() / 2, treelet.len());
-        treelet[half - 4..half].copy_from_slice(&self.kinds.to_le_bytes());
-        treelet[end - 4] = self.first_treelet;
-        treelet[end - 3] = self.first_remote;
-        treelet[end - 2..end].copy_from_slice(&self.first_leaf.to_le_bytes());
+        let mut firsts = u32::from(self.first_leaf) << FIRST_LEAF_BIT;
+        if is_short(treelet) && profile.width() == 4 {
+            firsts |= self.kinds;
+        } else {
+            treelet[half - 4..half].copy_from_slice(&self.kinds.to_le_bytes());
+        }
+        if !is_short(treelet) {
+            firsts |= u32::from(self.first_treelet)
+                | u32::from(self.first_short) << FIRST_SHORT_BIT
+                | u32::from(self.first_remote) << FIRST_REMOTE_BIT;
+        }
+        treelet[end - 4..end].copy_from_slice(&firsts.to_le_bytes());
     }
 
     /// States the kind of the child in place `index`, 0 to 7, which was empty.
     pub(crate) fn set_kind(&mut self, index: usize, kind: ChildKind) {
         let nibble = match kind {
             ChildKind::Treelet => KIND_TREELET,
+            ChildKind::ShortTreelet => KIND_SHORT_TREELET,
             ChildKind::Remote => KIND_REMOTE,
             ChildKind::Leaf { triangles } => KIND_LEAF + triangles as u32 - 1,
         };
@@ -115,23 +156,31 @@ impl Links {
         (self.kinds >> 2) & LOWEST_BITS
     }
 
-    /// Returns the treelets of this page among the children, as the lowest bits of their nibbles.
+    /// Returns the treelets of this page among the children that are not short, as the lowest bits of their nibbles.
     #[inline]
     pub fn treelets(&self) -> u32 {
-        self.kinds & LOWEST_BITS & !self.leaves()
+        self.kinds & LOWEST_BITS & !(self.kinds >> 1) & !self.leaves()
+    }
+
+    /// Returns the short treelets of this page among the children, as the lowest bits of their nibbles.
+    #[inline]
+    pub fn short_treelets(&self) -> u32 {
+        self.kinds & LOWEST_BITS & (self.kinds >> 1) & !self.leaves()
     }
 
     /// Returns the children in other pages, as the lowest bits of their nibbles.
     #[inline]
     pub fn remotes(&self) -> u32 {
-        (self.kinds >> 1) & LOWEST_BITS & !self.leaves()
+        (self.kinds >> 1) & LOWEST_BITS & !self.kinds & !self.leaves()
     }
 
-    /// Returns true if the kinds of the first `children` children are known ones.
-    pub(crate) fn kinds_are_known(&self, children: usize) -> bool {
-        let kind = |child: usize| self.kinds >> (4 * child) & 15;
-        (0..children)
-            .all(|child| matches!(kind(child), KIND_TREELET | KIND_REMOTE | KIND_LEAF..=KIND_LEAF_LAST))
+    /// Returns true if the kinds of the first `children` children are known ones and, in a short treelet, those of packets.
+    pub(crate) fn kinds_are_known(&self, children: usize, short: bool) -> bool {
+        (0..children).all(|child| match self.kinds >> (4 * child) & 15 {
+            KIND_LEAF..=KIND_LEAF_LAST => true,
+            KIND_TREELET | KIND_REMOTE | KIND_SHORT_TREELET => !short,
+            _ => false,
+        })
     }
 
     /// Returns the number of children, if there are no gaps between them.
@@ -149,6 +198,9 @@ impl Links {
         let kind = (self.kinds >> shift) & 15;
         match kind {
             KIND_TREELET => Child::Treelet(self.first_treelet.wrapping_add(rank(self.treelets()) as u8)),
+            KIND_SHORT_TREELET => {
+                Child::Treelet(self.first_short.wrapping_add(rank(self.short_treelets()) as u8))
+            }
             KIND_REMOTE => Child::Remote(self.first_remote.wrapping_add(rank(self.remotes()) as u8)),
             KIND_LEAF..=KIND_LEAF_LAST => Child::Leaf {
                 packet: self.first_leaf.wrapping_add(rank(self.leaves()) as u16),
@@ -159,13 +211,26 @@ impl Links {
     }
 }
 
+/// Returns true if these are the bytes of a short treelet.
+#[inline]
+pub(crate) fn is_short(treelet: &[u8]) -> bool {
+    treelet.len() == SHORT_TREELET_BYTES
+}
+
+/// Returns where both codes of a child stand in a short treelet.
+fn short_place(profile: Profile, child: usize, slab: usize) -> usize {
+    debug_assert!(profile.has_short_treelets() && slab < 7);
+    let half = if profile.width() == 8 { SHORT_TREELET_BYTES / 2 } else { 0 };
+    (child / 4) * half + row(slab) * 4 + child % 4
+}
+
 /// Where the two codes of a child's slab stand in a treelet, in bytes.
 struct CodePlace {
     lo: usize,
     hi: usize,
 }
 
-/// Returns where the codes of a child stand. U4 keeps both in one byte, that of the lower end in the low nibble.
+/// Returns where the codes of a child stand in a treelet that is not short. U4 keeps both in one byte, that of the lower end in the low nibble.
 fn place(profile: Profile, child: usize, slab: usize) -> CodePlace {
     let half = profile.treelet_bytes() / 2;
     let row = row(slab);
@@ -193,6 +258,10 @@ fn place(profile: Profile, child: usize, slab: usize) -> CodePlace {
 
 /// Reads the two codes of a child's slab. For F32, which has no codes, it returns 0: see `read_ends`.
 pub(crate) fn read_codes(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (u16, u16) {
+    if is_short(treelet) {
+        let both = usize::from(treelet[short_place(profile, child, slab)]);
+        return (SHORT_CODES[both & 15].into(), SHORT_CODES[both >> 4].into());
+    }
     let CodePlace { lo, hi } = place(profile, child, slab);
     match profile.encoding() {
         Encoding::U4 => (u16::from(treelet[lo] & 15), u16::from(treelet[lo] >> 4)),
@@ -246,6 +315,10 @@ impl SlabEncoder {
         let encoding = profile.encoding();
         let slabs = profile.directions().slabs();
         let mut put = |slab: usize, code_lo: u16, code_hi: u16| {
+            if is_short(treelet) {
+                treelet[short_place(profile, index, slab)] = short_code(code_lo) | short_code(code_hi) << 4;
+                return;
+            }
             let CodePlace { lo, hi } = place(profile, index, slab);
             match encoding {
                 Encoding::U4 => treelet[lo] = (code_lo | code_hi << 4) as u8,
@@ -291,6 +364,11 @@ impl SlabEncoder {
     }
 }
 
+/// Returns the last code of four bits that stands for a code of at most this one. Smaller codes are farther outward.
+fn short_code(code: u16) -> u8 {
+    SHORT_CODES.iter().filter(|&&of| u16::from(of) <= code).count() as u8 - 1
+}
+
 /// Returns the slabs of one child of a decoded group, which predict those of its own children.
 #[inline]
 pub fn child_slabs(group: &Group, child: usize) -> NodeSlabs {
@@ -334,25 +412,59 @@ mod tests {
 
     #[test]
     fn links_round_trip_and_number_children_by_kind() {
-        let links = Links { kinds: 0x7214_1251, first_treelet: 9, first_remote: 3, first_leaf: 700 };
+        let links = Links {
+            kinds: 0x7234_1251,
+            first_treelet: 9,
+            first_short: 100,
+            first_remote: 253,
+            first_leaf: 700,
+        };
         let mut treelet = [0xaa; 64];
-        links.write(&mut treelet);
-        assert_eq!(Links::read(&treelet), links);
+        links.write(Profile::Dop6U8, &mut treelet);
+        assert_eq!(Links::read(Profile::Dop6U8, &treelet), links);
         let children: Vec<Child> = (0..8).map(|i| links.child(i)).collect();
         assert_eq!(
             children,
             [
                 Child::Treelet(9),
                 Child::Leaf { packet: 700, triangles: 2 },
-                Child::Remote(3),
+                Child::Remote(253),
                 Child::Treelet(10),
                 Child::Leaf { packet: 701, triangles: 1 },
-                Child::Treelet(11),
-                Child::Remote(4),
+                Child::Treelet(100),
+                Child::Remote(254),
                 Child::Leaf { packet: 702, triangles: 4 },
             ]
         );
         assert_eq!(links.children(), 8);
         assert_eq!(Links { kinds: 0x0000_0051, ..links }.children(), 2);
+    }
+
+    #[test]
+    fn short_treelets_link_to_packets_alone() {
+        for (profile, kinds) in [(Profile::Dop14U8, 0x7546), (Profile::Dop6U8, 0x4567_7654)] {
+            let links = Links { kinds, first_leaf: 1023, ..Links::NONE };
+            let mut treelet = [0; SHORT_TREELET_BYTES];
+            links.write(profile, &mut treelet);
+            assert_eq!(Links::read(profile, &treelet), links, "{}", profile.name());
+            // Codes leave the links as they are, and the other way round.
+            for child in 0..profile.width() {
+                for slab in 0..profile.directions().slabs() {
+                    treelet[short_place(profile, child, slab)] = 0x93;
+                }
+            }
+            assert_eq!(Links::read(profile, &treelet), links, "{}", profile.name());
+            let codes = read_codes(profile, &treelet, profile.width() - 1, profile.directions().slabs() - 1);
+            assert_eq!(codes, (32, 103));
+        }
+    }
+
+    #[test]
+    fn short_codes_are_the_next_ones_outward() {
+        for code in 0..=255u16 {
+            let place = usize::from(short_code(code));
+            assert!(u16::from(SHORT_CODES[place]) <= code);
+            assert!(SHORT_CODES.get(place + 1).is_none_or(|&next| u16::from(next) > code));
+        }
     }
 }

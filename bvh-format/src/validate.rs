@@ -19,7 +19,7 @@ use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source, chunks};
 use crate::topology::{ObjectTopology, boundary, check_in_pages};
-use crate::treelet::{Child, Links};
+use crate::treelet::Child;
 use counts::CountsFromStart;
 use std::ops::Range;
 
@@ -308,7 +308,7 @@ fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), Form
 /// Returns the leaf packets of a checked page in the order of slots: the number of each packet, and of its triangles.
 pub fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u16, usize)> + 'a {
     (0..page.header().treelets).flat_map(|slot| {
-        let links = Links::read(page.treelet(slot));
+        let links = page.links(slot);
         (0..8).filter_map(move |child| match links.child(child) {
             Child::Leaf { packet, triangles } => Some((packet, usize::from(triangles))),
             _ => None,

@@ -138,7 +138,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     vec![
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
-        (2, "major-4", header(|f| f.header(8, &[4]))),
+        (2, "major-5", header(|f| f.header(8, &[5]))),
         (3, "short", change(&[], |f| f.bytes.truncate(100))),
         (4, "flipped-bit", change(&[], |f| f.bytes[4000] ^= 1)),
         (5, "truncated", change(&[1], |f| f.bytes.truncate(4096 + 100))),
@@ -209,7 +209,7 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
         (18, "another-profile", page(|f| f.page(62, &[1]))),
         (19, "nan", page(|f| f.page(64, &f32::NAN.to_le_bytes()))),
         (20, "root-with-parent", page(|f| f.page(120, &[0; 4]))),
-        (21, "unknown-kind", page(|f| f.treelet(28, &[3, 0, 0, 0]))),
+        (21, "unknown-kind", page(|f| f.treelet(28, &[8, 0, 0, 0]))),
         (21, "no-children", page(|f| f.treelet(28, &[0; 4]))),
         (
             22,
@@ -227,8 +227,8 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
                 f.treelet(61, &[0]);
             }),
         ),
-        (24, "packet-numbers", page(|f| f.treelet(62, &[1, 0]))),
-        (25, "reserved", page(|f| f.page(63, &[1]))),
+        (24, "packet-numbers", page(|f| f.treelet(62, &[1 << 6, 0]))),
+        (25, "short-root", page(|f| f.page(63, &[1]))),
         (38, "f16-negative", cube_of_profile(2, 1, &[0x80])),
         (38, "f16-infinite", cube_of_profile(2, 1, &[0x7c])),
         (38, "f32-nan", cube_of_profile(6, 0, &f32::NAN.to_le_bytes())),

@@ -20,7 +20,7 @@ use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::topology::{Net, TopologyRecord, write_topology_head};
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::{Child, Links, SHORT_CODES, SHORT_TREELET_BYTES};
 use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, decode_turning};
 use std::any::type_name_of_val;
 use std::mem::offset_of;
@@ -107,7 +107,7 @@ fn structures() {
     compare!(Net: place, net);
     compare!(PageHeader: checksum, leaf_checksum, id_checksum, leaf_line, id_word, first_packet,
         page_number, leaf_lines, id_words, packets, roots, treelets, remotes, treelet_line, profile,
-        reserved);
+        short);
 }
 
 #[test]
@@ -151,26 +151,40 @@ fn heads_of_blocks() {
     // One group of two packets, whose widths are 6 for least ids and 9 for the offsets of the second packet.
     let rows = byte_table("id-entry", ID_ENTRY_BYTES);
     let mut block = vec![0; ID_ENTRY_BYTES];
-    (block[offset(&rows, "base")], block[offset(&rows, "start")]) = (100, 8 * ID_ENTRY_BYTES as u8);
+    (block[offset(&rows, "base")], block[offset(&rows, "start")]) = (100, ID_ENTRY_BYTES as u8);
     let second = ID_GROUP_HEAD_BITS + 6 + 2;
     let group = 6 | 9 << (6 + 6) | 40 << second | 2 << (second + 6) | 511u128 << (second + 8 + 9);
     block.extend(group.to_le_bytes());
     let ids = |packet: usize| [0, 1, 2, 3].map(|lane| decode_id(&block, packet, lane));
     assert_eq!((ids(0), ids(1)), ([100; 4], [140, 651, 140, 140]));
 
-    let rows = byte_table("links", 4);
+    let links = Links { kinds: 0, first_treelet: 101, first_short: 102, first_remote: 203, first_leaf: 904 };
     let mut treelet = [0; 64];
-    Links { kinds: 0, first_treelet: 1, first_remote: 2, first_leaf: 3 }.write(&mut treelet);
-    for (first, field) in (1..).zip(["first_treelet", "first_remote", "first_leaf"]) {
-        assert_eq!(treelet[60 + offset(&rows, field)], first, "{field}");
+    links.write(Profile::Dop14U8, &mut treelet);
+    let (word, mut next) = (u32::from_le_bytes(*treelet.last_chunk().unwrap()), 0);
+    for row in table("format.md", "links") {
+        let (start, end) = row[0].split_once("..").unwrap();
+        let (start, end) = (number(start), number(end));
+        assert_eq!(start, next, "{}", row[1]);
+        next = end;
+        let held = match row[1].as_str() {
+            "first_treelet" => links.first_treelet.into(),
+            "first_short" => links.first_short.into(),
+            "first_remote" => links.first_remote.into(),
+            "first_leaf" => links.first_leaf,
+            other => panic!("no field {other} in the links"),
+        };
+        assert_eq!(u64::from(word) >> start & ((1 << (end - start)) - 1), held.into(), "{}", row[1]);
     }
+    assert_eq!(next, 32);
 }
 
 #[test]
 fn anchors() {
     let slabs = Kdop { lo: [1; 13].map(f32::from_bits), hi: [2; 13].map(f32::from_bits) };
     for (column, profile) in [(2, Profile::Dop6U8), (3, Profile::Dop14U8), (4, Profile::Dop26U8Wide)] {
-        let mut writer = PageWriter::new(profile, 1.0, PageShape { roots: 1, remotes: 0, treelets: 1 });
+        let mut writer =
+            PageWriter::new(profile, 1.0, PageShape { roots: 1, treelets: 1, ..PageShape::default() });
         writer.root(&slabs, Some((3, 4)));
         writer.begin_treelet();
         writer.leaf(&TightBound::of_kdop(slabs), std::iter::once(([[0.0; 3]; 3], 0)));
@@ -212,10 +226,12 @@ fn lists() {
     let profiles = Profile::ALL.map(|p| {
         let (slabs, encoding) = (p.directions().slabs(), format!("{:?}", p.encoding()).to_lowercase());
         let head = format!("{}|{}|{}|{slabs}|{encoding}", p.number(), p.name(), 2 * slabs);
-        let turning = yes(p.has_turning_slabs());
-        format!("{head}|{}|{}|{}|{turning}", p.width(), p.treelet_bytes(), p.anchor_bytes())
+        let tail = [p.has_turning_slabs(), p.has_short_treelets()].map(yes).join("|");
+        format!("{head}|{}|{}|{}|{tail}", p.width(), p.treelet_bytes(), p.anchor_bytes())
     });
-    assert_eq!(rows("profiles", 9), profiles);
+    assert_eq!(rows("profiles", 10), profiles);
+    let codes = (0..).zip(SHORT_CODES).map(|(nibble, code)| format!("{nibble}|{code}"));
+    assert_eq!(rows("short-codes", 2), codes.collect::<Vec<_>>());
 
     let numbered = (0..).zip(DIRECTIONS);
     let directions =
@@ -251,6 +267,7 @@ fn constants() {
         MINOR,
         MAX_SECTIONS,
         PAGE_HEADER_BYTES,
+        SHORT_TREELET_BYTES,
         NO_PARENT,
         PACKET,
         F32_PACKET_BYTES,
@@ -351,7 +368,41 @@ fn places_of_codes() {
         }
         let mut treelet = zero.clone();
         (treelet[kinds], treelet[links]) = (1, 9);
-        assert_eq!(Links::read(&treelet).child(0), Child::Treelet(9), "{}", profile.name());
+        assert_eq!(Links::read(profile, &treelet).child(0), Child::Treelet(9), "{}", profile.name());
+    }
+}
+
+/// Writes each code of a short treelet at the place that the table states, and expects that end and no other to move.
+#[test]
+fn places_in_short_treelets() {
+    let rows = table("format.md", "short-places");
+    let with = Profile::ALL.into_iter().filter(|profile| profile.has_short_treelets());
+    assert!(rows.iter().map(|row| row[0].as_str()).eq(with.map(Profile::name)));
+    for row in rows {
+        let profile = Profile::from_name(&row[0]).unwrap();
+        let [block, kinds, kinds_bits, links] = [1, 2, 3, 4].map(|column| number(&row[column]) as usize);
+        let (slabs, width) = (profile.directions().slabs(), profile.width());
+        let parent = NodeSlabs { lo: [0.0; 16], hi: [255.0; 16] };
+        for (child, slab, end) in
+            (0..width).flat_map(|c| (0..slabs).flat_map(move |s| [(c, s, 0), (c, s, 1)]))
+        {
+            let mut treelet = [0; SHORT_TREELET_BYTES];
+            treelet[block * (child / 4) + 4 * slab + child % 4] = 3 << (4 * end);
+            for other in 0..width {
+                let kdop = decode_child(profile, 1.0, &treelet, other, &parent).to_kdop(slabs);
+                for at in 0..slabs {
+                    // The step is a little more than 1.
+                    let moved = [kdop.lo[at], 255.0 - kdop.hi[at]].map(f32::floor);
+                    let code = |of: usize| if (other, at, of) == (child, slab, end) { 32.0 } else { 0.0 };
+                    assert_eq!(moved, [code(0), code(1)], "{}: child {child}, slab {slab}", profile.name());
+                }
+            }
+        }
+        let mut treelet = [0; SHORT_TREELET_BYTES];
+        treelet[kinds + kinds_bits / 8 - 1] = 5 << 4;
+        treelet[links + 3] = 200;
+        let found = Links::read(profile, &treelet).child(width - 1);
+        assert_eq!(found, Child::Leaf { packet: 800, triangles: 2 }, "{}", profile.name());
     }
 }
 
@@ -398,7 +449,7 @@ fn example() {
         treelet.extend(row[1].split(' ').map(|byte| u8::from_str_radix(byte, 16).unwrap()));
     }
     assert_eq!(treelet.len(), Profile::Dop14U8.treelet_bytes());
-    let links = Links::read(&treelet);
+    let links = Links::read(Profile::Dop14U8, &treelet);
     let children = [0, 1, 2, 3].map(|child| links.child(child));
     let leaf = Child::Leaf { packet: 300, triangles: 3 };
     assert_eq!(children, [Child::Treelet(5), leaf, Child::Remote(2), Child::Empty]);

@@ -14,7 +14,6 @@ use bvh_format::ids::encode_ids;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::page::Page;
 use bvh_format::profile::Profile;
-use bvh_format::treelet::Links;
 use bvh_format::validate::validate;
 use bvh_query::{Backend, Bvh, Querier, QueryError};
 use cbvh_testkit::seal::{put, put_together, seal, take_apart};
@@ -87,13 +86,15 @@ fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
             }
         }
         for slot in 0..header.treelets {
-            let mut treelet = vec![0; size];
-            let links = Links::read(Page::new(&page, profile).treelet(slot));
+            let view = Page::new(&page, profile);
+            let mut treelet = vec![0; view.treelet(slot).len()];
+            let links = view.links(slot);
+            let (part, last) = if treelet.len() < size { (16, 0x0f) } else { (32, 255) };
             for child in (0..links.children()).filter(|child| links.leaves() >> (4 * child) & 1 == 1) {
-                treelet[(child / 4) * 32 + profile.width().min(4) + child % 4] = 255;
+                treelet[(child / 4) * part + profile.width().min(4) + child % 4] = last;
             }
-            links.write(&mut treelet);
-            put(&mut bytes, at + 64 * usize::from(header.treelet_line) + usize::from(slot) * size, &treelet);
+            links.write(profile, &mut treelet);
+            put(&mut bytes, at + view.treelet_at(slot), &treelet);
         }
     }
     // The object's box and sphere are enlarged, too.

@@ -13,8 +13,9 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR = 3
+MAJOR = 4
 MAX_SECTIONS = 64
+SHORT_TREELET_BYTES = 32
 NO_PARENT = 0xFFFFFFFF
 PACKET = 4
 F32_PACKET_BYTES = 144
@@ -105,7 +106,7 @@ PAGE_HEADER = np.dtype(
         ("remotes", "u1"),
         ("treelet_line", "u1"),
         ("profile", "u1"),
-        ("reserved", "u1"),
+        ("short", "u1"),
     ]
 )
 PACKED_HEAD = np.dtype(
@@ -122,7 +123,9 @@ PACKED_HEAD = np.dtype(
     ]
 )
 ID_ENTRY = np.dtype([("base", "<u4"), ("start", "<u2")])
-LINKS = np.dtype([("first_treelet", "u1"), ("first_remote", "u1"), ("first_leaf", "<u2")])
+
+# 7.2: the bits of each field of a treelet's links, the first one and the one behind the last
+LINKS = {"first_treelet": (0, 7), "first_short": (7, 14), "first_remote": (14, 22), "first_leaf": (22, 32)}
 
 # 2.1
 OBJECTS, NODES, LEAVES, IDS, DUPLICATES, PROVENANCE, INSTANCES, TOPOLOGY = KINDS = range(1, 9)
@@ -151,16 +154,19 @@ DIRECTIONS = np.array(
     ]
 )
 
-# 5, 7.1 and 7.4: `turning` has the offsets of lower, upper, A and B of child 0; child c has its own c bytes further
+# 5, 7.1, 7.4 and 7.5: `turning` has the offsets of lower, upper, A and B of child 0; child c has its own c bytes
+# further. `short` has the places in short treelets, if the profile has them.
 Profile = namedtuple(
     "Profile",
-    "name slabs encoding width treelet_bytes anchor_bytes code_bytes block row child hi kinds_at links_at turning",
-    defaults=[()],
+    "name slabs encoding width treelet_bytes anchor_bytes "
+    "code_bytes block row child hi kinds_at links_at turning short",
+    defaults=[(), None],
 )
+Short = namedtuple("Short", "block kinds_at kinds_bits links_at")
 PROFILES = [
-    Profile("dop14-u8", 7, "u8", 4, 64, 64, 1, 0, 4, 1, 32, 28, 60),
-    Profile("dop6-u8", 3, "u8", 8, 64, 64, 1, 32, 4, 1, 16, 28, 60),
-    Profile("dop6-f16", 3, "f16", 4, 64, 64, 2, 0, 8, 2, 32, 28, 60),
+    Profile("dop14-u8", 7, "u8", 4, 64, 64, 1, 0, 4, 1, 32, 28, 60, short=Short(0, 28, 16, 28)),
+    Profile("dop6-u8", 3, "u8", 8, 64, 32, 1, 32, 4, 1, 16, 28, 60, short=Short(16, 12, 32, 28)),
+    Profile("dop6-f16", 3, "f16", 4, 64, 32, 2, 0, 8, 2, 32, 28, 60),
     Profile("dop14-u4", 7, "u4", 8, 64, 64, 1, 32, 4, 1, 0, 28, 60),
     Profile("dop26-u4", 13, "u4", 4, 64, 128, 1, 0, 4, 1, 0, 28, 60),
     Profile("dop26-u8-wide", 13, "u8", 4, 128, 128, 1, 0, 4, 1, 64, 60, 124, (28, 92, 56, 120)),
@@ -169,7 +175,11 @@ PROFILES = [
 ENCODINGS = ["f32", "packed", "quantized"]
 
 # 7.2: kinds of children; 4 to 7 are packets of 1 to 4 triangles
-TREELET, REMOTE, LEAF = 1, 2, 4
+TREELET, REMOTE, SHORT, LEAF = 1, 2, 3, 4
+SORTS = {TREELET: "first_treelet", SHORT: "first_short", REMOTE: "first_remote", LEAF: "first_leaf"}
+
+# 7.5: the code of u8 for which a nibble of a short treelet stands
+SHORT_CODES = np.array([0, 10, 21, 32, 44, 55, 67, 78, 90, 103, 116, 129, 142, 157, 176, 208], np.uint8)
 
 # 11.2: kinds of axes, and the slots that patterns state [pattern, lane, corner]
 ORDERED, BINARY, DECIMAL = range(3)
@@ -218,11 +228,35 @@ def row_of(slab):
     return slab if slab < 7 else slab + 1
 
 
+def sort_of(kind):
+    """The sort of a kind of children: those of a sort are numbered together (7.2)."""
+    return min(kind, LEAF)
+
+
+def bits_of(number, first, end):
+    return number >> first & (1 << end - first) - 1
+
+
+def places_with_strides(profile, block, row, child):
+    """The offsets [child, slab] that strides lead to (7.1)."""
+    number = np.arange(profile.width)[:, None]
+    rows = np.array([row_of(slab) for slab in range(profile.slabs)])
+    return block * (number // 4) + row * rows + child * (number % 4)
+
+
 def places_of_codes(profile):
     """Offsets in a treelet of the codes of lower ends [child, slab]; those of upper ends are `hi` bytes further."""
-    child = np.arange(profile.width)[:, None]
-    row = np.array([row_of(slab) for slab in range(profile.slabs)])
-    return profile.block * (child // 4) + profile.row * row + profile.child * (child % 4)
+    return places_with_strides(profile, profile.block, profile.row, profile.child)
+
+
+def places_of_short_codes(profile):
+    """Offsets in a short treelet of the bytes with both codes [child, slab] (7.5)."""
+    return places_with_strides(profile, profile.short.block, 4, 1)
+
+
+def decode_short_codes(stored):
+    """The codes of u8 of lower and upper ends for which bytes of short treelets stand."""
+    return SHORT_CODES[stored & 15], SHORT_CODES[stored >> 4]
 
 
 def bit_values(data, at, first_bit, stride, width, count):
@@ -434,35 +468,64 @@ class Page(Record):
 
     # Treelets (7)
 
+    @property
+    def first_short(self):
+        """The slot of the first short treelet, which is also the number of those that are not short."""
+        return self.treelets - self.short
+
+    def is_short(self, slot):
+        return slot >= self.first_short
+
     def treelet_at(self, slot):
-        return self.at + LINE * self.treelet_line + slot * self.layout.treelet_bytes
+        full = min(slot, self.first_short)
+        at = self.at + LINE * self.treelet_line
+        return at + full * self.layout.treelet_bytes + (slot - full) * SHORT_TREELET_BYTES
 
     def treelet_bytes(self):
+        """The bytes of the treelets that are not short [slot, byte]."""
         size = self.layout.treelet_bytes
-        return np.frombuffer(self.data, "u1", self.treelets * size, self.treelet_at(0)).reshape(-1, size)
+        return np.frombuffer(self.data, "u1", self.first_short * size, self.treelet_at(0)).reshape(-1, size)
+
+    def short_bytes(self):
+        """The bytes of the short treelets [slot less the first short one, byte]."""
+        size = SHORT_TREELET_BYTES
+        at = self.treelet_at(self.first_short)
+        return np.frombuffer(self.data, "u1", self.short * size, at).reshape(-1, size)
+
+    def layout_of(self, slot):
+        """What has the places of kinds and links in a treelet."""
+        return self.layout.short if self.is_short(slot) else self.layout
+
+    def kinds_at(self, slot):
+        return self.treelet_at(slot) + self.layout_of(slot).kinds_at
+
+    def links_at(self, slot):
+        return self.treelet_at(slot) + self.layout_of(slot).links_at
 
     def kinds(self, slot):
-        """All eight nibbles, whatever the treelet's width."""
-        at = self.treelet_at(slot) + self.layout.kinds_at
+        """All nibbles, whatever the treelet's width: eight, or as many as a short treelet has."""
+        at, bits = self.kinds_at(slot), self.layout.short.kinds_bits if self.is_short(slot) else 32
         word = int.from_bytes(self.data[at : at + 4], "little")
-        return [word >> 4 * child & 15 for child in range(8)]
+        return [word >> first & 15 for first in range(0, bits, 4)]
 
     def children(self, slot):
         """The number of children: one more than the index of the highest nibble that is not 0."""
         return max((child + 1 for child, kind in enumerate(self.kinds(slot)) if kind), default=0)
 
     def links(self, slot):
-        return Record(LINKS, self.data, self.treelet_at(slot) + self.layout.links_at)
+        """The number of the first child of each sort. Short treelets have only that of leaf packets (7.5)."""
+        at = self.links_at(slot)
+        word = int.from_bytes(self.data[at : at + 4], "little")
+        sorts = (LEAF,) if self.is_short(slot) else SORTS
+        return {sort: bits_of(word, *LINKS[SORTS[sort]]) for sort in sorts}
 
     def targets(self, slot):
         """For each child, its kind and the number of the slot, remote link or packet to which it leads."""
-        links = self.links(slot)
-        following = {TREELET: links.first_treelet, REMOTE: links.first_remote, LEAF: links.first_leaf}
+        following = self.links(slot)
         found = []
         for kind in self.kinds(slot)[: self.children(slot)]:
-            sort = min(kind, LEAF)
-            found.append((kind, following[sort]))
-            following[sort] += 1
+            found.append((kind, following[sort_of(kind)]))
+            following[sort_of(kind)] += 1
         return found
 
     def lanes_used(self):
@@ -475,12 +538,19 @@ class Page(Record):
         return PACKET * self.first_packet + np.arange(PACKET * self.packets).reshape(-1, PACKET)
 
     def codes(self):
-        """The codes of lower and upper ends as they are stored, each [slot, child, slab]."""
+        """The codes of lower and upper ends, each [slot, child, slab]. Those of short treelets are the codes of u8 for
+        which nibbles stand.
+        """
         profile = self.layout
         places, size = places_of_codes(profile), profile.code_bytes
         stored = np.ascontiguousarray(self.treelet_bytes()).view({1: "u1", 2: "<u2", 4: "<f4"}[size])
         lo, hi = stored[:, places // size], stored[:, (places + profile.hi) // size]
-        return (lo & 15, hi >> 4) if profile.encoding == "u4" else (lo, hi)
+        if profile.encoding == "u4":
+            return lo & 15, hi >> 4
+        if not self.short:
+            return lo, hi
+        short_lo, short_hi = decode_short_codes(self.short_bytes()[:, places_of_short_codes(profile)])
+        return np.concatenate([lo, short_lo]), np.concatenate([hi, short_hi])
 
     def decode(self):
         """Lower and upper ends of the slabs of treelets [slot, slab] and of their children [slot, child, slab] (8)."""
@@ -496,7 +566,7 @@ class Page(Record):
                 profile, self.owner.f16_exponent, own_lo[slot], own_hi[slot], code_lo[slot], code_hi[slot]
             )
             for child, (kind, target) in enumerate(self.targets(slot)):
-                if kind == TREELET:
+                if kind in (TREELET, SHORT):
                     own_lo[target], own_hi[target] = lo[slot, child], hi[slot, child]
         return own_lo, own_hi, lo, hi
 
@@ -621,13 +691,13 @@ class Page(Record):
         return ID_ENTRY_BYTES * ceil_div(self.packets, ID_GROUP)
 
     def id_groups(self):
-        """The entry of each group, the widths in its head [group, 9] with v as the first, and the bits at which its
-        packets start and the last of them ends [group, packet + 1]. The block holds the table, but groups may start
-        anywhere (R31): bits beyond the block are 0. Packets that a group does not have take no bits.
+        """The entry of each group, the widths in its head [group, 9] with v as the first, and the bits of the block at
+        which its packets start and the last of them ends [group, packet + 1]. The block holds the table, but groups may
+        start anywhere (R31): bits beyond the block are 0. Packets that a group does not have take no bits.
         """
         block = self.id_block()
         table = np.frombuffer(block[: self.id_table_bytes()], ID_ENTRY)
-        start = table["start"].astype(np.intp)[:, None]
+        start = 8 * table["start"].astype(np.intp)[:, None]
         widths = bits_at(block, 0, start + np.arange(0, ID_GROUP_HEAD_BITS, 6), 6).astype(np.intp)
         present = np.arange(ID_GROUP * len(table)).reshape(-1, ID_GROUP) < self.packets
         sizes = np.where(present, widths[:, :1] + 2 + 3 * widths[:, 1:], 0)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 import cbvh
-from cbvh import LEAF, LINE, PAGE, WORD
+from cbvh import LEAF, LINE, PAGE, REMOTE, SHORT, SORTS, TREELET, WORD, sort_of
 from query import minus, outer
 
 
@@ -190,30 +190,44 @@ def of_page(page):
         used[at : at + 8 * layout.slabs] = True
         used[page.parent_at(root) - page.at :][:5] = True
     used[page.remote_at(0) - page.at :][: 4 * page.remotes] = True
-    places = cbvh.places_of_codes(layout)
     for slot in range(page.treelets):
         at = page.treelet_at(slot) - page.at
-        present = places[: page.children(slot)].ravel()
-        for byte in range(layout.code_bytes):
-            used[at + present + byte] = True
-            used[at + present + layout.hi + byte] = True
+        used[at + places_of_code_bytes(page, slot)] = True
         for first in layout.turning:
             used[at + first :][: page.children(slot)] = True
-        used[at + layout.kinds_at :][:4] = True
-        used[at + layout.links_at :][:4] = True
+        used[page.kinds_at(slot) - page.at :][:4] = True
+        used[page.links_at(slot) - page.at :][:4] = True
     if np.frombuffer(page.data, "u1", PAGE, page.at)[~used].any():
         yield f"(1.2) {where}: bytes without meaning are not zero"
-    counters = {cbvh.TREELET: page.roots, cbvh.REMOTE: 0, LEAF: 0}
+    counters = {TREELET: page.roots, SHORT: page.first_short, REMOTE: 0, LEAF: 0}
     for slot in range(page.treelets):
         links = page.links(slot)
-        if (links.first_treelet, links.first_remote, links.first_leaf) != tuple(counters.values()):
+        if any(first != counters[sort] for sort, first in links.items()):
             yield f"(7.2) {where}, slot {slot}: a link without children is not the counter"
         for kind, _ in page.targets(slot):
-            counters[min(kind, LEAF)] += 1
+            counters[sort_of(kind)] += 1
+        if page.is_short(slot) and bits_beside_first_leaf(page, slot):
+            yield f"(7.5) {where}, slot {slot}: bits that belong neither to the kinds nor to first_leaf are not zero"
     if page.id_words == 0 and (page.id_word or page.id_checksum):
         yield f"(6) {where}: id fields without ids"
     if page.packets == 0 and page.leaf_lines:
         yield f"(10) {where}: leaf lines without packets"
+
+
+def places_of_code_bytes(page, slot):
+    """The offsets in a treelet of all bytes that hold codes of children."""
+    layout, present = page.layout, page.children(slot)
+    if page.is_short(slot):
+        return cbvh.places_of_short_codes(layout)[:present].ravel()
+    lo = cbvh.places_of_codes(layout)[:present].ravel()
+    return np.concatenate([end + byte for end in (lo, lo + layout.hi) for byte in range(layout.code_bytes)])
+
+
+def bits_beside_first_leaf(page, slot):
+    """The bits of the number at *links at* of a short treelet that belong neither to the kinds nor to `first_leaf`."""
+    at, short = page.links_at(slot), page.layout.short
+    first = short.kinds_bits if short.kinds_at == short.links_at else 0
+    return cbvh.bits_of(int.from_bytes(page.data[at : at + 4], "little"), first, cbvh.LINKS[SORTS[LEAF]][0])
 
 
 def of_slabs(page):
@@ -275,9 +289,13 @@ def of_id_block(page, words):
     where = f"(12) page {page.number}"
     if page.id_word != words:
         yield f"{where}: id block at word {page.id_word}, expected {words}"
-    _, widths, bits = page.id_groups()
-    if int.from_bytes(page.id_block(), "little") >> int(bits[-1, -1]):
-        yield f"{where}: nonzero bits after the last group"
+    table, widths, bits = page.id_groups()
+    block = page.id_block()
+    for group, end in enumerate(bits[:, -1].tolist()):
+        start = end // 8
+        behind = block[start : [*table["start"].tolist(), len(block)][group + 1]]
+        if int.from_bytes(behind, "little") >> end % 8:
+            yield f"{where}: nonzero bits after group {group}"
     if widths[:, 1:].ravel()[page.packets :].any():
         yield f"{where}: nonzero widths of packets that the last group does not have"
     (least, lane, _), ids, used = page.id_packets(), page.ids(), page.lanes_used()

@@ -23,6 +23,7 @@ import rules
 from xxh3 import xxh3_64
 
 LEAF_SUMS, ID_SUMS, PAGE_SUMS, ALL = 1, 2, 4, 7  # what `seal` corrects besides sections and header
+FIELDS = [first for first, _ in cbvh.LINKS.values()]  # bits at which the fields of links start
 EXTREMES = (0, 1, 0x7F800000, 0x7FC00000, 0x80000000, (1 << 64) - 1)
 
 
@@ -41,15 +42,20 @@ def places(data, only=""):
     for one in file.objects:
         for page in one.pages_read:
             sorts["page header"] += range(page.at, page.at + cbvh.LINE)
+            sorts["short counts"] += (page.place("treelets"), page.place("short"))
             sorts["anchors"] += range(page.anchor_at(0), page.anchor_at(page.roots))
             sorts["remotes"] += range(page.remote_at(0), page.remote_at(page.remotes))
             for root in range(page.roots):
                 sorts["parents"] += range(page.parent_at(root), page.parent_at(root) + 5)
             for slot in range(page.treelets):
                 at = page.treelet_at(slot)
-                sorts["treelets"] += range(at, page.treelet_at(slot + 1))
-                for offset in (one.layout.kinds_at, one.layout.links_at):
-                    sorts["links"] += range(at + offset, at + offset + 4)
+                name = "short " if page.is_short(slot) else ""
+                sorts[name + "treelets"] += range(at, page.treelet_at(slot + 1))
+                for at in (page.kinds_at(slot), page.links_at(slot)):
+                    sorts[name + "links"] += range(at, at + 4)
+                if cbvh.SHORT in page.kinds(slot):
+                    sorts["short parents"] += range(page.kinds_at(slot), page.kinds_at(slot) + 4)
+                    sorts["short parents"] += range(page.links_at(slot), page.links_at(slot) + 4)
             if page.packets:
                 at = page.leaf_block_at()
                 sorts["leaf heads"] += range(at, at + 40)
@@ -58,8 +64,10 @@ def places(data, only=""):
             if page.id_words:
                 at, length = page.id_block_at(), cbvh.WORD * page.id_words
                 sorts["id tables"] += range(at, at + page.id_table_bytes())
-                for start in page.id_groups()[0]["start"].tolist():
-                    sorts["id groups"] += range(at + start // 8, at + start // 8 + 7)
+                for group, start in enumerate(page.id_groups()[0]["start"].tolist()):
+                    sorts["id groups"] += range(at + start, at + start + 7)
+                    entry = at + cbvh.ID_ENTRY_BYTES * group
+                    sorts["id starts"] += range(entry + 4, entry + 6)
                 sorts["ids"] += range(at + page.id_table_bytes(), at + length)
     return [sort for name, sort in sorts.items() if sort and str(name).startswith(only)]
 
@@ -72,11 +80,14 @@ def mutant(chance, data, sorts):
         size = chance.choice((1, 2, 4, 8))
         at -= at % size
         old = int.from_bytes(data[at : at + size], "little")
+        nibble = 4 * chance.randrange(2 * size)
         new = chance.choice(
             (
                 old ^ 1 << chance.randrange(8 * size),
                 old ^ 1 << chance.randrange(8 * size),
                 old + chance.choice((-64, -1, 1, 2, 64, 4096)),
+                old + chance.choice((-1, 1)) * (1 << chance.choice(FIELDS)),
+                old & ~(15 << nibble) | chance.randrange(8) << nibble,  # another kind of child
                 chance.choice(EXTREMES),
                 chance.getrandbits(8 * size),
             )

@@ -9,7 +9,8 @@ from collections import namedtuple
 import numpy as np
 
 import cbvh
-from cbvh import DUPLICATES, IDS, INSTANCES, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, TOPOLOGY, TREELET
+from cbvh import DUPLICATES, IDS, INSTANCES, LEAF, LEAVES, NEEDED, NODES, OBJECTS, PACKET, PAGE, REMOTE, SHORT, SORTS
+from cbvh import TOPOLOGY, TREELET, sort_of
 from xxh3 import xxh3_64
 
 MAX_COORDINATE = 2.0**120  # R12, R30
@@ -180,13 +181,14 @@ def touch(one, number):
     need_checksum(15, at, page.checksum, page.data[at + 8 : at + PAGE])
     need(page.page_number == number, 16, page.place("page_number"), number, page.page_number)
     need(page.profile == one.profile, 18, page.place("profile"), one.profile, page.profile)
+    most = max(0, page.treelets - page.roots) if page.layout.short else 0
+    need(page.short <= most, 25, page.place("short"), f"at most {most}", page.short)
     need(1 <= page.roots <= page.treelets, 17, page.place("roots"), f"1 to {page.treelets}", page.roots)
     need(page.roots <= 63, 17, page.place("roots"), "at most 63", page.roots)
-    line = 1 + page.roots * page.layout.anchor_bytes // cbvh.LINE + cbvh.ceil_div(page.remotes, 16)
+    line = cbvh.ceil_div(page.remote_at(page.remotes) - at, cbvh.LINE)
     need(page.treelet_line == line, 17, page.place("treelet_line"), line, page.treelet_line)
-    end = line + page.treelets * page.layout.treelet_bytes // cbvh.LINE
-    need(end <= PAGE // cbvh.LINE, 17, page.place("treelets"), "an end within 64 lines", end)
-    need(page.reserved == 0, 25, page.place("reserved"), 0, page.reserved)
+    end = page.treelet_at(page.treelets) - at
+    need(end <= PAGE, 17, page.place("treelets"), f"an end within {PAGE} bytes", end)
     for root in range(page.roots):
         check_anchor(page, root)
     check_codes(page)
@@ -228,26 +230,30 @@ def check_codes(page):
 
 
 def check_numbering(page):
-    counters = {TREELET: page.roots, REMOTE: 0, LEAF: 0}
-    rules = {TREELET: (22, "first_treelet"), REMOTE: (23, "first_remote"), LEAF: (24, "first_leaf")}
+    counters = {TREELET: page.roots, SHORT: page.first_short, REMOTE: 0, LEAF: 0}
+    rules = {TREELET: 22, SHORT: 22, REMOTE: 23, LEAF: 24}
     for slot in range(page.treelets):
-        kinds = page.kinds(slot)
-        count = page.children(slot)
-        at = page.treelet_at(slot) + page.layout.kinds_at
+        count, at = page.children(slot), page.kinds_at(slot)
         need(1 <= count <= page.layout.width, 21, at, f"1 to {page.layout.width} children", count)
-        for kind in kinds[:count]:
-            need(kind in (1, 2, 4, 5, 6, 7), 21, at, "a kind of child", kind)
-        links = page.links(slot)
-        for sort, (rule, field) in rules.items():
-            of_sort = sum(min(kind, LEAF) == sort for kind in kinds[:count])
-            if of_sort:
-                first = getattr(links, field)
-                need(first == counters[sort], rule, links.place(field), counters[sort], first)
-                need(sort != TREELET or first > slot, rule, links.place(field), f"more than {slot}", first)
-            counters[sort] += of_sort
-    for sort, field in ((TREELET, "treelets"), (REMOTE, "remotes"), (LEAF, "packets")):
-        stated = getattr(page, field)
-        need(stated == counters[sort], rules[sort][0], page.place(field), counters[sort], stated)
+        kinds, least = page.kinds(slot)[:count], LEAF if page.is_short(slot) else TREELET
+        for kind in kinds:
+            need(least <= kind <= 7, 21, at, f"a kind from {least} to 7", kind)
+        links, at = page.links(slot), page.links_at(slot)
+        sorts = [sort_of(kind) for kind in kinds]
+        for sort, field in SORTS.items():
+            if sort in sorts:
+                first, counter = links[sort], counters[sort]
+                need(first == counter, rules[sort], at, f"{field} {counter}", first)
+                need(sort != TREELET or first > slot, rules[sort], at, f"{field} above {slot}", first)
+            counters[sort] += sorts.count(sort)
+    for sort, field, stated in (
+        (TREELET, "short", page.first_short),
+        (SHORT, "treelets", page.treelets),
+        (REMOTE, "remotes", page.remotes),
+        (LEAF, "packets", page.packets),
+    ):
+        found = counters[sort]
+        need(stated == found, rules[sort], page.place(field), f"an end of {SORTS[sort]} at {found}", stated)
 
 
 # Cross
@@ -305,11 +311,11 @@ def check_id_block(page):
     block, table, at = page.id_block(), page.id_table_bytes(), page.id_block_at()
     need(len(block) >= table, 31, page.place("id_words"), f"a table of {table} bytes", f"{len(block)} bytes")
     entries, widths, bits = page.id_groups()
-    end = 8 * table
+    end = table
     for group, start in enumerate(entries["start"].tolist()):
-        need(start == end, 31, at + cbvh.ID_ENTRY_BYTES * group + 4, f"a start at bit {end}", start)
-        need(bool((widths[group] <= 32).all()), 31, at + start // 8, "widths of at most 32", widths[group])
-        end = int(bits[group, -1])
+        need(start == end, 31, at + cbvh.ID_ENTRY_BYTES * group + 4, f"a start at byte {end}", start)
+        need(bool((widths[group] <= 32).all()), 31, at + start, "widths of at most 32", widths[group])
+        end = cbvh.ceil_div(int(bits[group, -1]), 8)
     words = cbvh.ceil_div(page.id_bytes_needed(), cbvh.WORD)
     need(page.id_words == words, 31, page.place("id_words"), words, page.id_words)
     need_checksum(32, page.place("id_checksum"), page.id_checksum, block)
@@ -560,7 +566,7 @@ def subtrees_of(page, below):
     for slot in reversed(range(page.treelets)):
         children[slot] = []
         for kind, target in page.targets(slot):
-            if kind == TREELET:
+            if kind in (TREELET, SHORT):
                 subtree = own[target]
             elif kind == REMOTE:
                 subtree = below.pop(page.remote(target))

@@ -24,7 +24,7 @@ import musts
 import mutate
 import query
 import rules
-from test_reader import instances, with_section
+from test_reader import Tree, instances, with_section
 
 COMMAND = os.environ.get("CBVH")
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
@@ -58,6 +58,54 @@ def write_obj(path, parts):
             for first in range(count + 1, count + 3 * len(triangles), 3):
                 print("f", first, first + 1, first + 2, file=stream)
             count += 3 * len(triangles)
+
+
+def with_pages(data, pages, profile):
+    """Returns a file of one object with these pages, of a profile, in place of those that it has."""
+    file = rules.open_file(data)
+    table, parts, end = [], [], cbvh.PAGE
+    for entry in file.entries:
+        part = bytearray(file.bytes_of(entry.kind))
+        if entry.kind == cbvh.NODES:
+            part = b"".join(pages)
+        elif entry.kind == cbvh.OBJECTS:
+            one = file.objects[0]
+            at = one.place("pages") - entry.offset
+            part[at : at + 4] = len(pages).to_bytes(4, "little")
+            part[one.place("profile") - entry.offset] = profile
+        table.append((entry.kind, entry.required, end, len(part), 0))
+        parts.append(part + bytes(-len(part) % cbvh.PAGE))
+        end += len(parts[-1])
+    head = bytearray(data[: cbvh.PAGE])
+    head[16:24] = end.to_bytes(8, "little")
+    table = np.array(table, cbvh.SECTION_ENTRY).tobytes()
+    head[cbvh.LINE : cbvh.LINE + len(table)] = table
+    data = bytearray(head + b"".join(parts))
+    mutate.seal(data)
+    return data
+
+
+def random_kinds(chance, layout, roots):
+    """The kinds of the treelets of a page, and how many of them are short. They need not fit in a page."""
+    full, counts = [[] for _ in range(roots)], {cbvh.TREELET: 0, cbvh.SHORT: 0, cbvh.REMOTE: 0}
+    most = {
+        cbvh.TREELET: chance.randint(0, 4000 // layout.treelet_bytes),
+        cbvh.SHORT: chance.choice((0, 3, 30, 100)) if layout.short else 0,
+        cbvh.REMOTE: chance.choice((0, 3, 30)),
+    }
+    for row in full:  # which grows
+        for _ in range(chance.randint(1, layout.width)):
+            kind = chance.choice((1, 1, 2, 3, 3, 3, 4, 5, 6, 7))
+            if kind in most:
+                kind = kind if counts[kind] < most[kind] else 7
+            if kind in most:
+                counts[kind] += 1
+            if kind == cbvh.TREELET:
+                full.append([])
+            row.append(kind)
+    short = counts[cbvh.SHORT]
+    leaves = [[chance.randint(4, 7) for _ in range(chance.randint(1, layout.width))] for _ in range(short)]
+    return full + leaves, short
 
 
 def run(*arguments):
@@ -112,6 +160,7 @@ class AgainstCbvh(unittest.TestCase):
         self.check_triangles(file, read_obj(mesh))
         self.check_facts(file, path)
         self.check_decoding(file, path)
+        self.check_short_treelets(file)
 
     def check_triangles(self, file, expected):
         """Checks triangles by id: corners keep their order, and moved no further than the record states."""
@@ -191,9 +240,11 @@ class AgainstCbvh(unittest.TestCase):
         self.assertEqual(dumped["instances"], instances)
 
     def check_decoding(self, file, path):
-        """Compares the bits of decoded slabs, and links, of a few treelets drawn at random."""
+        """Compares the bits of decoded slabs, and links, of a few treelets drawn at random, short ones and others."""
         places = [(page, slot) for one in file.objects for page in one.pages_read for slot in range(page.treelets)]
-        for number in self.chance.sample(range(len(places)), min(4, len(places))):
+        short = [number for number, (page, slot) in enumerate(places) if page.is_short(slot)]
+        full = [number for number, (page, slot) in enumerate(places) if not page.is_short(slot)]
+        for number in (self.chance.choice(sort) for sort in (full, full, short, short) if sort):
             page, slot = places[number]
             dumped = json.loads(run("dump", path, "--treelet", number, "--json"))
             self.assertEqual(
@@ -204,14 +255,25 @@ class AgainstCbvh(unittest.TestCase):
             for child, found in enumerate(dumped["children"]):
                 slabs.append((lo[slot, child], hi[slot, child], found["slabs"]))
                 kind, target = page.targets(slot)[child]
-                if kind == cbvh.TREELET:
+                if kind in (cbvh.TREELET, cbvh.SHORT):
                     self.assertEqual((found["kind"], found["slot"]), ("treelet", target))
-                elif kind >= cbvh.LEAF:
+                elif kind == cbvh.REMOTE:
+                    self.assertEqual((found["kind"], found["page"], found["root"]), ("remote", *page.remote(target)))
+                else:
                     self.assertEqual((found["packet"], found["triangles"]), (target, kind - 3))
             self.assertEqual(len(dumped["children"]), page.children(slot))
             for low, high, found in slabs:
                 ends = list(zip(*found))
                 self.assertTrue(same_f32(ends[0], low) and same_f32(ends[1], high), (path, number))
+
+    def check_short_treelets(self, file):
+        """Checks what 7.5 states about bvh-bake: which treelets are short."""
+        for one in file.objects:
+            for page in one.pages_read:
+                for slot in range(page.treelets):
+                    only_leaves = all(kind >= cbvh.LEAF for kind, _ in page.targets(slot))
+                    may_be_short = one.layout.short and page.is_packed() and slot >= page.roots
+                    self.assertEqual(page.is_short(slot), bool(may_be_short and only_leaves), (page.number, slot))
 
     def answers(self, mode, path_a, path_b, poses):
         """Returns the answers of `cbvh query` as text."""
@@ -365,6 +427,33 @@ class AgainstCbvh(unittest.TestCase):
             broken.add(ours)
         self.assertEqual(broken, {0, 35, 39})
 
+    def test_codes_of_short_treelets(self):
+        """Changes codes of one short treelet each: `cbvh verify` and this reader find the same rule broken."""
+        for profile in ("dop14-u8", "dop6-u8"):
+            path = self.bake(ROOM, profile, "packed")
+            file = load(path)
+            pages = [page for page in file.objects[0].pages_read if page.short]
+            self.assertGreater(len(pages), 0)
+            broken = set()
+            for _ in range(40):
+                data, page = bytearray(file.data), self.chance.choice(pages)
+                slot = self.chance.randrange(page.first_short, page.treelets)
+                places = cbvh.places_of_short_codes(page.layout)[: page.children(slot)]
+                at = page.treelet_at(slot) + int(self.chance.choice(places.ravel()))
+                lo, hi = data[at] & 15, data[at] >> 4
+                change = self.chance.choice((-1, 1))
+                if self.chance.random() < 0.5:
+                    lo = min(max(lo + change, 0), 15)
+                else:
+                    hi = min(max(hi + change, 0), 15)
+                data[at] = lo | hi << 4
+                mutate.seal(data)
+                ours = mutate.verdict(data, bounds=True)
+                forged = self.written("forged.cbvh", data)
+                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), (page.number, slot))
+                broken.add(ours)
+            self.assertEqual(broken, {0, 35})
+
     def test_limit_of_turning_slabs(self):
         """R39 depends on the greatest number of triangles that occurs, and comes after R35 in a later page."""
         file = load(self.bake(ROOM, "dop26-u8-wide", "f32"))
@@ -471,6 +560,8 @@ class AgainstCbvh(unittest.TestCase):
             ("dop14-f32", "quantized"),
             ("dop26-u4", "f32"),
             ("dop26-u8-wide", "packed"),
+            ("dop14-u8", "packed"),
+            ("dop6-u8", "quantized"),
         ):
             meshes += [self.bake(mesh, profile, triangles) for mesh in (ROBOT, ROOM)]
         count = int(os.environ.get("CBVH_MUTANTS", "1000"))
@@ -485,6 +576,57 @@ class AgainstCbvh(unittest.TestCase):
         self.assertEqual(different, [])
         if count >= 100:
             self.assertLessEqual({0, 31, 32, 33}, set(broken))
+
+    def test_random_pages(self):
+        """Trees of all profiles drawn at random. A number in the page's header or in a treelet is changed in most."""
+        base, broken = load(self.bake(ROBOT, "auto", "packed", "--no-topology")).data, set()
+        count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 4
+        for number in range(count):
+            profile = self.chance.choice((0, 1, self.chance.randrange(len(cbvh.PROFILES))))
+            roots = self.chance.choice((1, 1, 2, 3, 8))
+            kinds, short = random_kinds(self.chance, cbvh.PROFILES[profile], roots)
+            tree = Tree(profile, kinds, short, roots, number=1)
+            if tree.verdict() == 0 and number % 4:
+                page = tree.touch()
+                slot = self.chance.randrange(page.treelets)
+                places = page.place("roots"), page.kinds_at(slot), page.links_at(slot)
+                at = self.chance.choice(places) - page.at
+                size = 6 if at + page.at == places[0] else 4
+                word = int.from_bytes(tree.data[at : at + size], "little")
+                word += self.chance.choice((-1, 1, 2)) << self.chance.choice((*range(0, 8 * size, 4), *mutate.FIELDS))
+                tree.data[at : at + size] = (word % (1 << 8 * size)).to_bytes(size, "little")
+            # The page above has a link to the first root.
+            data = with_pages(base, [Tree(profile, [[2]]).data, tree.data, bytes(cbvh.PAGE)], profile)
+            ours = mutate.verdict(data)
+            path = self.written("tree.cbvh", data)
+            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, path), (profile, kinds, short, roots, number))
+            broken.add(ours)
+        if count >= 250:
+            self.assertLessEqual({17, 21, 22, 23, 24, 25, 28}, broken)
+
+    def test_damaged_short_treelets(self):
+        """Damages short treelets, the links to them and the counts in headers."""
+        meshes = [
+            self.bake(mesh, profile, "packed", *options)
+            for mesh, profile in itertools.product((ROBOT, ROOM), ("dop14-u8", "dop6-u8"))
+            for options in ((), ("--no-ids",))
+        ]
+        count = int(os.environ.get("CBVH_MUTANTS", "1000"))
+        broken, different = mutate.compare(COMMAND, count, 9, meshes, self.folder, only="short")
+        self.assertEqual(different, [])
+        if count >= 500:
+            self.assertLessEqual({0, 17, 21, 22, 24, 25}, set(broken))
+
+    def test_damaged_files_without_short_treelets(self):
+        """Damages counts and links of files in which no treelet is short, or can be."""
+        layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop14-u4", "f32")
+        meshes = [self.bake(ROOM, *layout) for layout in layouts]
+        for only, expected in (("short counts", {17, 18, 25}), ("links", {0, 21, 22, 24})):
+            count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 4
+            broken, different = mutate.compare(COMMAND, count, 10, meshes, self.folder, only=only)
+            self.assertEqual(different, [])
+            if count >= 200:
+                self.assertLessEqual(expected, set(broken))
 
 
 def random_rotation(chance):

@@ -155,7 +155,6 @@ class Tables(unittest.TestCase):
             "PageHeader": cbvh.PAGE_HEADER,
             "PackedHead": cbvh.PACKED_HEAD,
             "id-entry": cbvh.ID_ENTRY,
-            "links": cbvh.LINKS,
         }
         for name, dtype in structures.items():
             fields = [(dtype.fields[field][1], dtype.fields[field][0], field) for field in dtype.names]
@@ -166,9 +165,17 @@ class Tables(unittest.TestCase):
         self.assertEqual([[int(c) for c in row[2:]] for row in table("directions")], cbvh.DIRECTIONS.tolist())
         self.assertEqual([int(row[1]) for row in table("directions")], [cbvh.row_of(slab) for slab in range(13)])
         for row, places, profile in zip(table("profiles"), table("places"), cbvh.PROFILES, strict=True):
-            ours = [profile.name, 2 * profile.slabs, *profile[1:6], "yes" if profile.turning else "no"]
+            ours = [profile.name, 2 * profile.slabs, *profile[1:6]]
+            ours += ["yes" if part else "no" for part in (profile.turning, profile.short)]
             self.assertEqual(row[1:], [str(value) for value in ours])
-            self.assertEqual(places, [str(value) for value in (profile.name, *profile[6:-1])])
+            self.assertEqual(places, [str(value) for value in (profile.name, *profile[6:-2])])
+        short = [[profile.name, *map(str, profile.short)] for profile in cbvh.PROFILES if profile.short]
+        self.assertEqual(table("short-places"), short)
+        codes = [[str(nibble), str(code)] for nibble, code in enumerate(cbvh.SHORT_CODES)]
+        self.assertEqual(table("short-codes"), codes)
+        ours = [[f"{first}..{end}", field] for field, (first, end) in cbvh.LINKS.items()]
+        self.assertEqual([row[:2] for row in table("links")], ours)
+        self.assertEqual(list(cbvh.LINKS), list(cbvh.SORTS.values()))
         turning = [[profile.name, *profile.turning] for profile in cbvh.PROFILES if profile.turning]
         self.assertEqual(table("turning"), [[row[0], *(f"{first} + c" for first in row[1:])] for row in turning])
         self.assertEqual([row[1] for row in table("triangle-encodings")], cbvh.ENCODINGS)
@@ -203,6 +210,10 @@ class Tables(unittest.TestCase):
         places = cbvh.places_of_codes(profile)[1]
         codes = treelet[places], treelet[places + profile.hi]
         self.assertEqual([[int(row[3]), int(row[4])] for row in rows], np.transpose(codes).tolist())
+        kinds, links = (int.from_bytes(treelet[at : at + 4].tobytes(), "little") for at in (28, 60))
+        self.assertEqual((kinds, links), (0x261, 0x4B008A05))
+        found = {field: cbvh.bits_of(links, *bits) for field, bits in cbvh.LINKS.items()}
+        self.assertEqual(found, {"first_treelet": 5, "first_short": 20, "first_remote": 2, "first_leaf": 300})
 
         def bits(column):
             return np.array([int(row[column].split()[0], 0) for row in rows], np.uint32).view(np.float32)
@@ -351,6 +362,256 @@ def bit_array(fields):
         whole |= value << at
         at += width
     return whole.to_bytes(cbvh.ceil_div(at, 8), "little")
+
+
+def set_bits(data, at, word):
+    """Sets the bits of a number in the u32 at a place."""
+    data[at : at + 4] = (int.from_bytes(data[at : at + 4], "little") | word).to_bytes(4, "little")
+
+
+class Tree:
+    """One page of an object, whose treelets are lists of kinds. The last `last` of them are short, and the first
+    `roots` are roots. The page is number `number`, and there is one more.
+
+    Numbers, links and the header are as sections 6 and 7 require. `links` replaces links, given by slot and field, and
+    `fields` replaces fields of the header. Short treelets have the bytes `codes`, but for kinds and links. What does
+    not fit in a page is left out.
+    """
+
+    def __init__(self, profile, kinds, last=0, roots=1, number=0, links=None, codes=bytes(32), **fields):
+        layout, full = cbvh.PROFILES[profile], len(kinds) - last
+        remotes, packets = (sum(cbvh.sort_of(kind) == sort for row in kinds for kind in row) for sort in (2, 4))
+        data = bytearray(64)
+        for root in range(roots):
+            ends = np.array([-1, 2], "<f4").repeat(layout.slabs).tobytes()
+            parent = number - 1 if number else cbvh.NO_PARENT
+            data += ends.ljust(layout.anchor_bytes - 8, b"\0") + parent.to_bytes(4, "little") + bytes([root, 0, 0, 0])
+        for link in range(remotes):
+            data += (64 * (number + 1) + link).to_bytes(4, "little")
+        data += bytes(-len(data) % 64)
+        header = np.zeros((), cbvh.PAGE_HEADER)
+        fields = {
+            **{"page_number": number, "packets": packets, "roots": roots, "treelets": len(kinds), "remotes": remotes},
+            **{"treelet_line": len(data) // 64, "profile": profile, "short": last},
+            **fields,
+        }
+        for field, value in fields.items():
+            header[field] = value
+        counters = {1: roots, 3: full, 2: 0, 4: 0}
+        for slot, row in enumerate(kinds):
+            is_short, at = slot >= full, len(data)
+            data += codes if is_short else bytes(layout.treelet_bytes)
+            places = layout.short if is_short else layout
+            for place in (places.kinds_at, places.links_at):
+                data[at + place : at + place + 4] = bytes(4)
+            set_bits(data, at + places.kinds_at, sum(kind << 4 * child for child, kind in enumerate(row)))
+            for sort, (field, (first, end)) in zip(counters, cbvh.LINKS.items()):
+                value = (links or {}).get((slot, field), counters[sort]) & (1 << end - first) - 1
+                if sort == cbvh.LEAF or not is_short:
+                    set_bits(data, at + places.links_at, value << first)
+                counters[sort] += sum(cbvh.sort_of(kind) == sort for kind in row)
+        data[:64] = header.tobytes()
+        self.data, self.number, self.profile = data[:4096].ljust(4096, b"\0"), number, profile
+
+    def touch(self):
+        page = self.data[8:]
+        data = bytes(4096 * self.number) + xxh3_64(bytes(page)).to_bytes(8, "little") + page
+        file = types.SimpleNamespace(data=bytes(data), sections={cbvh.NODES: types.SimpleNamespace(offset=0)})
+        owner = types.SimpleNamespace(file=file, layout=cbvh.PROFILES[self.profile], profile=self.profile)
+        owner.first_page, owner.pages, owner.f16_exponent = 0, self.number + 2, 0
+        return rules.touch(owner, self.number)
+
+    def verdict(self):
+        try:
+            self.touch()
+        except rules.Broken as broken:
+            return broken.rule
+        return 0
+
+
+class Treelets(unittest.TestCase):
+    # The last three treelets are short. Slot 2 could be short, too.
+    NARROW = [1, 3, 4], [2, 3, 1, 3], [7, 5], [7, 6, 5, 4], [4], [7, 7, 7]
+    WIDE = [1, 3, 4, 2, 3, 2, 3, 7], [7] * 8, [4, 5, 6, 7, 7, 6, 5, 4], [4], [7, 7, 7, 7, 5]
+
+    def test_places_and_targets(self):
+        page = Tree(0, self.NARROW, 3).touch()
+        starts = [192, 256, 320, 384, 416, 448, 480]  # after a header, an anchor and a link
+        self.assertEqual([page.treelet_at(slot) for slot in range(7)], starts)
+        self.assertEqual([page.kinds_at(slot) for slot in (2, 3)], [320 + 28, 384 + 28])
+        expected = [
+            [(1, 1), (3, 3), (4, 0)],
+            [(2, 0), (3, 4), (1, 2), (3, 5)],
+            [(7, 1), (5, 2)],
+            [(7, 3), (6, 4), (5, 5), (4, 6)],
+            [(4, 7)],
+            [(7, 8), (7, 9), (7, 10)],
+        ]
+        self.assertEqual([page.targets(slot) for slot in range(6)], expected)
+        self.assertEqual(page.lanes_used().sum(axis=1).tolist(), [1, 4, 2, 4, 3, 2, 1, 1, 4, 4, 4])
+        page = Tree(1, self.WIDE, 3).touch()
+        starts = [128, 192, 256, 288, 320, 352]  # header, anchor and links take 104 bytes
+        self.assertEqual([page.treelet_at(slot) for slot in range(6)], starts)
+        self.assertEqual([page.kinds_at(slot) for slot in (1, 2)], [192 + 28, 256 + 12])
+        self.assertEqual(page.targets(2), [(kind, 10 + child) for child, kind in enumerate(self.WIDE[2])])
+
+    def test_decoding_one_number_at_a_time(self):
+        chance, codes = random.Random(8), {int(nibble): int(code) for nibble, code in table("short-codes")}
+        for profile, kinds in ((0, self.NARROW), (1, self.WIDE)) * 10:
+            stored = chance.randbytes(32)
+            page = Tree(profile, kinds, 3, codes=stored).touch()
+            own_lo, own_hi, lo, hi = page.decode()
+            self.assertEqual((lo.dtype, hi.dtype), (np.float32, np.float32))
+            of_slot = {
+                target: (slot, child)
+                for slot in range(page.treelets)
+                for child, (kind, target) in enumerate(page.targets(slot))
+                if kind == 3
+            }
+            self.assertEqual(sorted(of_slot), list(range(page.treelets - 3, page.treelets)))
+            for slot, place in of_slot.items():
+                self.assertEqual(own_lo[slot].tobytes(), lo[place].tobytes())
+                self.assertEqual(own_hi[slot].tobytes(), hi[place].tobytes())
+                for child, slab in np.ndindex(len(kinds[slot]), page.layout.slabs):
+                    byte = stored[(16 if profile == 1 else 0) * (child // 4) + 4 * slab + child % 4]
+                    p, q = (Fraction(float(ends[slot, slab])) for ends in (own_lo, own_hi))
+                    unit = up(nearest_f32(nearest_f32(q - p) * Fraction(float(cbvh.STEP_U8))))
+                    expected = nearest_f32(p + codes[byte % 16] * unit), nearest_f32(q - codes[byte // 16] * unit)
+                    found = lo[slot, child, slab], hi[slot, child, slab]
+                    self.assertEqual(tuple(Fraction(float(end)) for end in found), expected)
+
+    def test_kinds(self):
+        def verdict(number, *row):
+            kinds = list(self.NARROW)
+            kinds[number] = row
+            return Tree(0, kinds, 3).verdict()
+
+        for kind in range(16):
+            self.assertEqual(verdict(3, kind), 0 if 4 <= kind <= 7 else 21, kind)
+            self.assertEqual(verdict(3, 4, kind, 7), 0 if 4 <= kind <= 7 else 21, kind)
+            self.assertEqual(verdict(2, 4, kind, 7), {1: 22, 2: 0, 3: 22}.get(kind, 0 if 4 <= kind <= 7 else 21), kind)
+        self.assertEqual(verdict(3), 21)
+        self.assertEqual(verdict(2, 7, 7, 7, 7, 7), 21)
+        self.assertEqual(Tree(0, ([3, 3], [7]), 1).verdict(), 22)
+        self.assertEqual(Tree(0, ([3, 7], [7], [7]), 2).verdict(), 22)
+        self.assertEqual(Tree(0, ([3, 1], [7], [7]), 1).verdict(), 0)
+        for profile in range(7):  # a page without short treelets
+            self.assertEqual(Tree(profile, ([3, 7],)).verdict(), 22, profile)
+
+    def test_numbering(self):
+        for rule, slot, field, value in (
+            (22, 0, "treelet", 2),
+            (22, 1, "treelet", 1),
+            (22, 0, "short", 4),
+            (22, 1, "short", 3),
+            (22, 1, "short", 127),
+            (23, 1, "remote", 1),
+            (24, 0, "leaf", 1),
+            (24, 3, "leaf", 2),
+            (24, 5, "leaf", 1023),
+            (0, 0, "remote", 9),  # it has no children of that sort
+            (0, 2, "treelet", 0),
+            (0, 2, "short", 127),
+        ):
+            tree = Tree(0, self.NARROW, 3, links={(slot, "first_" + field): value})
+            self.assertEqual(tree.verdict(), rule, (slot, field, value))
+        for rule, fields in (
+            (24, {"packets": 12}),
+            (23, {"remotes": 2}),
+            (22, {"short": 2}),
+            (22, {"short": 4}),
+            (22, {"treelets": 5, "short": 2}),
+            (21, {"treelets": 7, "short": 4}),  # the last one has no children
+        ):
+            self.assertEqual(Tree(0, self.NARROW, 3, **fields).verdict(), rule, fields)
+
+    def test_order_of_links(self):
+        """The links of a treelet come one sort after the other, and before the kinds of the next treelet."""
+        for rule, kinds, links in (
+            (22, self.NARROW, {(1, "first_remote"): 5, (1, "first_short"): 9}),
+            (23, self.NARROW, {(1, "first_remote"): 5, (2, "first_leaf"): 9}),
+            (24, self.NARROW, {(0, "first_leaf"): 5, (1, "first_treelet"): 9}),
+            (24, ([3, 4], [1]), {(0, "first_leaf"): 1}),
+            (21, ([3, 4], [1]), {}),
+        ):
+            self.assertEqual(Tree(0, kinds, 3 if kinds is self.NARROW else 1, links=links).verdict(), rule)
+
+    def test_counts_of_short_treelets(self):
+        for rule, fields in (
+            (25, {"short": 6}),
+            (25, {"short": 255}),
+            (25, {"treelets": 3}),
+            (25, {"roots": 4}),
+            (25, {"roots": 0, "short": 7}),
+            (25, {"short": 6, "treelet_line": 0}),
+            (17, {"roots": 0}),
+            (17, {"roots": 0, "short": 6}),
+            (17, {"short": 0, "roots": 7}),
+            (16, {"short": 6, "page_number": 1}),
+        ):
+            self.assertEqual(Tree(0, self.NARROW, 3, **fields).verdict(), rule, fields)
+        for profile, layout in enumerate(cbvh.PROFILES):
+            kinds = [1, 1], [7], [7]
+            self.assertEqual(Tree(profile, kinds).verdict(), 0)
+            tree = Tree(profile, kinds, short=3)
+            self.assertEqual(tree.verdict(), 25)
+            tree.data[62] ^= 1  # another profile
+            self.assertEqual(tree.verdict(), 18)
+            if not layout.short:
+                self.assertEqual(Tree(profile, kinds, short=1).verdict(), 25)
+                self.assertEqual(Tree(profile, kinds, short=1, roots=0, treelets=0).verdict(), 25)
+
+    def test_what_fits_in_a_page(self):
+        """The most treelets of a page, and the most roots, are as in section 17."""
+
+        def widest(full, short, roots=1):
+            """Treelets with as many children as possible: treelets that are not short, short ones, and packets."""
+            children = [1] * (full - roots) + [3] * short
+            children += [7] * (8 * full - len(children))
+            kinds = [children[first : first + 8] for first in range(0, 8 * full, 8)] + [[7] * 8] * short
+            return Tree(1, kinds, short, roots, number=1)
+
+        for roots, packets in ((1, 771), (2, 772)):
+            tree = widest(14, 96, roots)
+            self.assertEqual(tree.verdict(), 0)
+            self.assertEqual((tree.touch().treelets, tree.touch().packets), (110, packets))
+        self.assertEqual(widest(14, 97).verdict(), 17)
+        self.assertEqual(widest(15, 95).verdict(), 17)
+        self.assertEqual(widest(14, 96, 3).verdict(), 17)
+        self.assertEqual(Tree(1, [[7]] * 42, roots=42, number=1).verdict(), 0)
+        self.assertEqual(Tree(1, [[7]] * 43, roots=43, number=1).verdict(), 17)
+
+    def test_lines_before_treelets(self):
+        """In dop6, two anchors share a line, and anchors and links do, too."""
+        for profile, roots, remotes, line in (
+            *((profile, *row) for profile in (1, 2) for row in ((1, 0, 2), (1, 8, 2), (1, 9, 3), (2, 0, 2), (2, 1, 3))),
+            *((profile, *row) for profile in (0, 3, 6) for row in ((1, 0, 2), (1, 1, 3), (2, 16, 4), (2, 17, 5))),
+            *((profile, *row) for profile in (4, 5) for row in ((1, 0, 3), (1, 16, 4), (2, 17, 7))),
+        ):
+            for stated in range(line - 2, line + 3):
+                fields = {"remotes": remotes, "treelet_line": stated}
+                verdict = Tree(profile, [[7]] * roots, roots=roots, number=1, **fields).verdict()
+                self.assertEqual(verdict == 17, stated != line, (profile, roots, remotes, stated))
+
+    def test_what_binds_writers(self):
+        def count(tree):
+            return len(list(musts.of_page(tree.touch())))
+
+        for profile, kinds in ((0, self.NARROW), (1, self.WIDE)):
+            page = Tree(profile, kinds, 3).touch()
+            at, end = (page.treelet_at(slot) - page.at for slot in (page.treelets - 2, page.treelets))
+            self.assertEqual(count(Tree(profile, kinds, 3)), 0)
+            # The short treelet in this slot has one child, with codes in every fourth byte.
+            codes = [at + 4 * row for row in range(page.layout.slabs)]
+            spare = range(16 if profile == 0 else 0, 22)  # bits beside those of kinds and of the link
+            bits = [(at + 28 + bit // 8, bit % 8) for bit in spare]
+            bits += [(byte, 4) for byte in {*range(at, at + 28), end} - {*range(at + 12, at + 16)}]
+            for byte, bit in bits:
+                tree = Tree(profile, kinds, 3)
+                tree.data[byte] |= 1 << bit
+                self.assertEqual(count(tree), byte not in codes, (byte - at, bit))
+        for slot, field, value in ((0, "remote", 1), (2, "treelet", 0), (2, "short", 0)):
+            self.assertEqual(count(Tree(0, self.NARROW, 3, links={(slot, "first_" + field): value})), 1)
 
 
 class Block(cbvh.Page):
@@ -520,27 +781,27 @@ class IdBlock(cbvh.Page):
     """A page of which there is only an id block (12), between bytes 0xff.
 
     Groups are (base, v, packets), and packets (triangles, w, m, lane, three offsets). `absent` is the w of packets that
-    the last group does not have. `moved` are numbers to add to the starts of groups, `more` are bytes
-    to add at the end, or -8, and `filled` is a bit to set, counted from the end of the last group.
+    the last group does not have. `moved` are numbers to add to the starts of groups, `more` are bytes to add at the
+    end, or -8, and `filled` is a group and a bit to set, counted from the end of that group.
     """
 
     def __init__(self, groups, absent=0, moved=(), more=0, filled=None):
         self.packets = sum(len(packets) for _, _, packets in groups)
         self.triangles_of = [packet[0] for _, _, packets in groups for packet in packets]
-        fields, table, start = [], b"", 48 * len(groups)
+        data, table, start, self.ends = b"", b"", 6 * len(groups), []
         for number, (base, v, packets) in enumerate(groups):
             here = [(v, 6), *((w, 6) for _, w, *_ in packets), *[(absent, 6)] * (8 - len(packets))]
             for _, w, m, lane, offsets in packets:
                 here += [(m, v), (lane, 2), *((value, w) for value in offsets)]
             stated = start + dict(enumerate(moved)).get(number, 0)
             table += base.to_bytes(4, "little") + stated.to_bytes(2, "little")
-            fields += here
-            start += sum(size for _, size in here)
-        self.end = start
-        block = int.from_bytes(table + bit_array(fields), "little")
+            self.ends.append(8 * start + sum(size for _, size in here))
+            data += bit_array(here)
+            start += len(bit_array(here))
+        block = int.from_bytes(table + data, "little")
         if filled is not None:
-            block |= 1 << start + filled
-        size = cbvh.WORD * cbvh.ceil_div(cbvh.ceil_div(start, 8) + 8, cbvh.WORD)
+            block |= 1 << self.ends[filled[0]] + filled[1]
+        size = cbvh.WORD * cbvh.ceil_div(start + 8, cbvh.WORD)
         block = (block.to_bytes(size, "little") + b"\xff" * 8)[: size + more]
         data = b"\xff" * 80 + block + b"\xff" * 8
         section = types.SimpleNamespace(offset=72, length=len(data) - 72)
@@ -601,13 +862,15 @@ class IdBlocks(unittest.TestCase):
             (31, two, {"absent": 33}),
             (31, two, {"moved": (1,)}),
             (31, two, {"moved": (0, -1)}),
-            (31, two, {"moved": (-96, 0)}),
+            (31, two, {"moved": (-12, 0)}),
             (31, two, {"moved": (0, 60000)}),
             (31, two, {"moved": (0, 8)}),
+            (31, two, {"moved": (7 * 12, 7 * 36)}),  # in bits
             (31, two, {"more": 8}),
             (31, two, {"more": -8}),
             (31, two, {"more": -1000}),  # no bytes
-            (0, two, {"filled": 0}),
+            (0, two, {"filled": (0, 0)}),
+            (0, two, {"filled": (1, 0)}),
         ):
             page = IdBlock(groups, **fields)
             self.assertEqual(page.verdict(), rule, (groups, fields))
@@ -628,9 +891,10 @@ class IdBlocks(unittest.TestCase):
         good = (2, 5, 7, 1, (31, 0, 0))
         self.assertEqual(count([good]), 0)
         self.assertEqual(count([good], absent=1), 1)
-        end = IdBlock([self.FULL, (90, 3, [good])]).end
-        for filled in (0, -end % 8, -end % 8 + 63):
-            self.assertEqual(count([good], filled=filled), 1)
+        first, last = IdBlock([self.FULL, (90, 3, [good])]).ends
+        self.assertEqual((-first % 8, -last % 8), (2, 6))
+        for filled in ((0, 0), (0, 1), (1, 0), (1, 5), (1, 6), (1, 85)):
+            self.assertEqual(count([good], filled=filled), 1, filled)
         self.assertEqual(count([good, (2, 5, 7, 0, (1, 1, 0))]), 1)  # an offset of lane 2
         self.assertEqual(count([good, (2, 5, 7, 0, (1, 0, 1))]), 1)
         self.assertEqual(count([(2, 5, 7, 2, (0, 3, 0))]), 1)  # lane 2 has no triangle

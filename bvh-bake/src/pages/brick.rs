@@ -91,7 +91,7 @@ pub(crate) fn encode_object(
     for (range, placed) in ranges.iter().zip(&placed) {
         placed.iter().for_each(|(treelet, _)| taken[range.start + *treelet as usize] = true);
     }
-    let pages = plan::plan_rest(&top, style.profile, taken);
+    let pages = plan::plan_rest(&top, style, taken);
     let mut places = plan::places(&pages, top.len());
     let mut base = pages.len() as u32;
     for ((range, placed), part) in ranges.iter().zip(placed).zip(&parts) {
@@ -140,7 +140,7 @@ fn encode_brick(
     }
     drop(tree);
     let kdop = arena.kdop(0, slabs);
-    let plan = plan::plan_brick(&arena, style.profile);
+    let plan = plan::plan_brick(&arena, style);
     let places = plan::places(&plan.pages, arena.len());
     let encoder = Encoder { arena: &arena, pages: &plan.pages, places: &places, triangles, style };
     let encoded = encoder.encode();

@@ -22,6 +22,14 @@ pub(crate) struct Style {
     pub(crate) turning_slabs: bool,
 }
 
+impl Style {
+    /// Whether treelets of nothing but packets are short: where the size of triangles counts more than time, that of
+    /// treelets does as well.
+    pub(crate) fn has_short_treelets(&self) -> bool {
+        self.profile.has_short_treelets() && self.encoding != TriangleEncoding::F32
+    }
+}
+
 /// Pages that are encoded together.
 pub(crate) struct Encoder<'a> {
     pub(crate) arena: &'a Arena,
@@ -104,7 +112,9 @@ impl Encoder<'_> {
     fn page(&self, plan: &PagePlan, number: usize, parents: &[Option<(u32, u8)>]) -> WrittenPage {
         let Style { profile, f16_scale, encoding, ids, .. } = self.style;
         let slabs = profile.directions().slabs();
-        let shape = PageShape { roots: plan.roots, remotes: plan.remotes.len(), treelets: plan.slots.len() };
+        let PagePlan { roots, short, .. } = *plan;
+        let (remotes, treelets) = (plan.remotes.len(), plan.slots.len());
+        let shape = PageShape { roots, remotes, treelets, short };
         let mut writer = PageWriter::new(profile, f16_scale, shape);
         for (&root, parent) in plan.slots.iter().zip(parents) {
             writer.root(&self.arena.kdop(root, slabs), *parent);
@@ -124,10 +134,11 @@ impl Encoder<'_> {
                     // first page, which the check of the file refuses.
                     ChildKind::Brick(_) => Place::default(),
                 };
-                if matches!(child.kind, ChildKind::Treelet(_)) && place.page as usize == number {
-                    writer.treelet(&child.bound);
-                } else {
-                    writer.remote(&child.bound, RootRef::new(place.page, place.slot));
+                let is_here = matches!(child.kind, ChildKind::Treelet(_)) && place.page as usize == number;
+                match is_here {
+                    true if usize::from(place.slot) < treelets - short => writer.treelet(&child.bound),
+                    true => writer.short_treelet(&child.bound),
+                    false => writer.remote(&child.bound, RootRef::new(place.page, place.slot)),
                 }
             }
         }

@@ -6,9 +6,12 @@
 //! The pages of the last level, which has the root, come first in the file, so that children are always in later pages
 //! than their parents.
 //!
+//! Treelets of nothing but packets are written as short ones if the style of the pages says so, except for roots.
+//!
 //! Each brick is planned by itself, except for a rest of at most half a page. The rests and the tree above the bricks
 //! are planned last and come first in the file; the bricks follow one after the other.
 
+use crate::pages::encode::Style;
 use crate::tree::arena::{Arena, TreeletIndex};
 use bvh_format::page::{PAGE, PageShape};
 use bvh_format::profile::Profile;
@@ -20,8 +23,10 @@ const MAX_OPEN_PAGES: usize = 24;
 /// A page: its subtree roots, and all its treelets by slot.
 pub(crate) struct PagePlan {
     pub(crate) roots: usize,
-    /// Treelets in slot order, breadth-first from the roots.
+    /// Treelets in slot order: breadth-first from the roots, and short ones after the others.
     pub(crate) slots: Vec<TreeletIndex>,
+    /// How many of the treelets are short.
+    pub(crate) short: usize,
     /// The treelet to which each remote link leads, in the order of slots and children.
     pub(crate) remotes: Vec<TreeletIndex>,
 }
@@ -46,6 +51,7 @@ struct Load {
     roots: u32,
     remotes: u32,
     treelets: u32,
+    short: u32,
 }
 
 impl Load {
@@ -54,12 +60,14 @@ impl Load {
             roots: self.roots + other.roots,
             remotes: self.remotes + other.remotes,
             treelets: self.treelets + other.treelets,
+            short: self.short + other.short,
         }
     }
 
     fn shape(self) -> PageShape {
-        let Self { roots, remotes, treelets } = self;
-        PageShape { roots: roots as usize, remotes: remotes as usize, treelets: treelets as usize }
+        let [roots, remotes, treelets, short] =
+            [self.roots, self.remotes, self.treelets, self.short].map(|count| count as usize);
+        PageShape { roots, remotes, treelets, short }
     }
 
     fn fits(self, profile: Profile) -> bool {
@@ -72,15 +80,15 @@ impl Load {
 }
 
 /// Plans the pages of a brick, except for a rest of at most half a page.
-pub(crate) fn plan_brick(arena: &Arena, profile: Profile) -> Plan {
-    let mut region = Region::new(arena, profile, vec![false; arena.len()]);
+pub(crate) fn plan_brick(arena: &Arena, style: Style) -> Plan {
+    let mut region = Region::new(arena, style, vec![false; arena.len()]);
     let pages = region.plan(Until::HalfAPage);
     Plan { pages, taken: region.taken }
 }
 
 /// Plans the pages of all treelets that are not taken.
-pub(crate) fn plan_rest(arena: &Arena, profile: Profile, taken: Vec<bool>) -> Vec<PagePlan> {
-    Region::new(arena, profile, taken).plan(Until::Nothing)
+pub(crate) fn plan_rest(arena: &Arena, style: Style, taken: Vec<bool>) -> Vec<PagePlan> {
+    Region::new(arena, style, taken).plan(Until::Nothing)
 }
 
 /// Returns the place of each of `count` treelets.
@@ -108,6 +116,8 @@ enum Until {
 struct Region<'a> {
     arena: &'a Arena,
     profile: Profile,
+    /// Whether treelets of nothing but packets are short.
+    short_treelets: bool,
     /// Per treelet, whether it is in a page.
     taken: Vec<bool>,
     /// For each of the others, the room that it and the unplanned treelets below it take.
@@ -115,17 +125,24 @@ struct Region<'a> {
 }
 
 impl<'a> Region<'a> {
-    fn new(arena: &'a Arena, profile: Profile, taken: Vec<bool>) -> Self {
+    fn new(arena: &'a Arena, style: Style, taken: Vec<bool>) -> Self {
         let loads = vec![Load::default(); taken.len()];
-        Self { arena, profile, taken, loads }
+        Self { arena, profile: style.profile, short_treelets: style.has_short_treelets(), taken, loads }
+    }
+
+    /// Returns true if a treelet is short wherever it is no root.
+    fn may_be_short(&self, index: TreeletIndex) -> bool {
+        self.short_treelets && self.arena.has_only_packets(index)
     }
 
     fn is_taken(&self, index: TreeletIndex) -> bool {
         self.taken[index as usize]
     }
 
+    /// The room of a subtree. Its root is not short.
     fn load(&self, index: TreeletIndex) -> Load {
-        Load { roots: 1, ..self.loads[index as usize] }
+        let load = self.loads[index as usize];
+        Load { roots: 1, short: if load.treelets == 1 { 0 } else { load.short }, ..load }
     }
 
     /// Returns the children of a treelet that are treelets in no page yet.
@@ -193,7 +210,8 @@ impl<'a> Region<'a> {
             if self.taken[index] {
                 continue;
             }
-            let mut load = Load { treelets: 1, ..Load::default() };
+            let short = self.may_be_short(index as u32).into();
+            let mut load = Load { treelets: 1, short, ..Load::default() };
             for child in self.arena.treelets_below(index as u32) {
                 if self.is_taken(child) {
                     load.remotes += 1;
@@ -207,14 +225,21 @@ impl<'a> Region<'a> {
 
     /// Numbers the treelets of a page breadth-first, and collects its remote links in the same order.
     fn plan_page(&self, roots: Vec<TreeletIndex>) -> PagePlan {
-        let mut plan = PagePlan { roots: roots.len(), slots: roots, remotes: Vec::new() };
-        let mut next = 0;
+        let mut plan = PagePlan { roots: roots.len(), slots: roots, short: 0, remotes: Vec::new() };
+        let (mut next, mut short) = (0, Vec::new());
         while next < plan.slots.len() {
             for child in self.arena.treelets_below(plan.slots[next]) {
-                if self.is_taken(child) { plan.remotes.push(child) } else { plan.slots.push(child) }
+                let list = match child {
+                    _ if self.is_taken(child) => &mut plan.remotes,
+                    _ if self.may_be_short(child) => &mut short,
+                    _ => &mut plan.slots,
+                };
+                list.push(child);
             }
             next += 1;
         }
+        plan.short = short.len();
+        plan.slots.append(&mut short);
         plan
     }
 

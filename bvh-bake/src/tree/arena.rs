@@ -93,6 +93,11 @@ impl Arena {
         })
     }
 
+    /// Returns true if all children of a treelet are leaf packets.
+    pub(crate) fn has_only_packets(&self, treelet: TreeletIndex) -> bool {
+        self.children(treelet).iter().all(|child| matches!(child.kind, ChildKind::Leaf(_)))
+    }
+
     /// Returns the first `slabs` slabs of the k-DOP of all children of a treelet.
     pub(crate) fn kdop(&self, treelet: TreeletIndex, slabs: usize) -> Kdop {
         let mut kdop = Kdop::EMPTY;

@@ -6,7 +6,6 @@ use bvh_format::decode::decode_child;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::{Page, check_crossing, check_page};
-use bvh_format::treelet::Links;
 use bvh_format::turning::decode_turning;
 use bvh_format::validate::{packets, validate};
 
@@ -35,7 +34,7 @@ pub fn decode(bytes: &[u8]) {
             for slot in 0..header.treelets {
                 let treelet = page.treelet(slot);
                 let node = page.anchor(slot % header.roots.max(1)).slabs;
-                for child in 0..Links::read(treelet).children().min(object.profile().width()) {
+                for child in 0..page.links(slot).children().min(object.profile().width()) {
                     let slabs = decode_child(object.profile(), object.f16_scale(), treelet, child, &node);
                     let _ = decode_turning(object.profile(), treelet, child, &slabs);
                 }

@@ -8,7 +8,7 @@ use crate::profile::Encoding;
 use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;
 use crate::slabs::row;
-use crate::treelet::{Links, read_codes, read_ends};
+use crate::treelet::{read_codes, read_ends};
 
 /// Checks all that a page shows by itself: its checksum, shape, anchors, codes and links. `number` is the page's number
 /// in the node section, and `at` its byte offset in the file.
@@ -23,18 +23,20 @@ pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> 
     require(Rule::PageChecksum, at, hex(header.checksum.get()), hex(page_checksum(bytes)))?;
     require(Rule::PageNumber, at + 44, number, header.page_number.get())?;
     require(Rule::PageProfile, at + 62, object.profile.number(), header.profile)?;
-    let (roots, remotes) = (usize::from(header.roots), usize::from(header.remotes));
-    let treelets = usize::from(header.treelets);
-    let shape = PageShape { roots, remotes, treelets };
+    let shape = header.shape();
+    let PageShape { roots, remotes, treelets, short } = shape;
+    let room = if object.profile.has_short_treelets() { treelets.saturating_sub(roots) } else { 0 };
+    ensure(short <= room, Rule::ShortTreelets, at + 63, || {
+        (format!("at most {room} short treelets"), short.to_string())
+    })?;
     let first_line = shape.treelet_line(object.profile);
     let holds = (1..=treelets).contains(&roots)
         && shape.fits(object.profile)
         && usize::from(header.treelet_line) == first_line;
     ensure(holds, Rule::PageShape, at + 56, || {
-        let found = format!("{roots} roots, {remotes} links, {treelets} treelets");
+        let found = format!("{roots} roots, {remotes} links, {treelets} treelets, {short} of them short");
         (format!("treelets at line {first_line} and all within {PAGE} bytes"), found)
     })?;
-    ensure(header.reserved == 0, Rule::Reserved, at + 63, || ("0".into(), header.reserved.to_string()))?;
     check_anchors(&page, number, object, at)?;
     check_codes(&page, at)?;
     check_links(&page, at)?;
@@ -79,7 +81,7 @@ fn check_codes(page: &Page, at: u64) -> Result<(), FormatError> {
     for slot in 0..page.header().treelets {
         let treelet = page.treelet(slot);
         let at = at + page.treelet_at(slot) as u64;
-        for child in 0..Links::read(treelet).children().min(profile.width()) {
+        for child in 0..page.links(slot).children().min(profile.width()) {
             for slab in 0..profile.directions().slabs() {
                 let (code_lo, code_hi) = read_codes(profile, treelet, child, slab);
                 let (lo, hi) = read_ends(profile, treelet, child, slab);
@@ -105,13 +107,16 @@ fn check_links(page: &Page, at: u64) -> Result<(), FormatError> {
     let header = page.header();
     let width = page.profile().width();
     let (mut treelets, mut remotes, mut packets) = (u32::from(header.roots), 0u32, 0u32);
+    let full = u32::from(header.treelets - header.short);
+    let mut short = full;
     for slot in 0..header.treelets {
         let at = at + page.treelet_at(slot) as u64;
-        let links = Links::read(page.treelet(slot));
+        let (links, is_short) = (page.links(slot), page.is_short(slot));
         let children = links.children();
-        let kinds = (1..=width).contains(&children) && links.kinds_are_known(children);
+        let kinds = (1..=width).contains(&children) && links.kinds_are_known(children, is_short);
         ensure(kinds, Rule::ChildKinds, at, || {
-            (format!("1 to {width} children, no gaps"), format!("kinds {:08x}", links.kinds))
+            let sort = if is_short { "leaf packets" } else { "children" };
+            (format!("1 to {width} {sort}, no gaps"), format!("kinds {:08x}", links.kinds))
         })?;
         let numbered = |rule, bits: u32, first: u32, expected: &mut u32| {
             let count = bits.count_ones();
@@ -126,10 +131,12 @@ fn check_links(page: &Page, at: u64) -> Result<(), FormatError> {
             (format!("children in slots after {slot}"), first.to_string())
         })?;
         numbered(Rule::TreeletLinks, links.treelets(), first, &mut treelets)?;
+        numbered(Rule::TreeletLinks, links.short_treelets(), links.first_short.into(), &mut short)?;
         numbered(Rule::RemoteLinks, links.remotes(), links.first_remote.into(), &mut remotes)?;
         numbered(Rule::LeafLinks, links.leaves(), links.first_leaf.into(), &mut packets)?;
     }
-    require(Rule::TreeletLinks, at + 59, u32::from(header.treelets), treelets)?;
+    require(Rule::TreeletLinks, at + 59, full, treelets)?;
+    require(Rule::TreeletLinks, at + 59, u32::from(header.treelets), short)?;
     require(Rule::RemoteLinks, at + 60, u32::from(header.remotes), remotes)?;
     require(Rule::LeafLinks, at + 56, u32::from(header.packets.get()), packets)
 }

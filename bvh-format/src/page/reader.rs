@@ -6,7 +6,7 @@ use super::{
 use crate::leaf::LINE;
 use crate::profile::Profile;
 use crate::slabs::{NodeSlabs, row};
-use crate::treelet::Links;
+use crate::treelet::{Links, SHORT_TREELET_BYTES};
 
 /// A view of a page that has passed [`check_page`](super::check_page), or is being checked.
 ///
@@ -45,23 +45,50 @@ impl<'a> Page<'a> {
     /// The treelet in a slot. A slot that lies beyond the page reads the page's first bytes.
     #[inline]
     pub fn treelet(&self, slot: u8) -> &'a [u8] {
-        let size = self.profile.treelet_bytes();
+        let size = if self.is_short(slot) { SHORT_TREELET_BYTES } else { self.profile.treelet_bytes() };
         let start = self.treelet_at(slot);
         self.bytes.get(start..start + size).unwrap_or(&self.bytes[..size])
     }
 
-    /// The byte of the page at which the treelet in a slot starts.
+    /// The links of the treelet in a slot.
     #[inline]
-    pub(super) fn treelet_at(&self, slot: u8) -> usize {
-        usize::from(self.header().treelet_line) * LINE + usize::from(slot) * self.profile.treelet_bytes()
+    pub fn links(&self, slot: u8) -> Links {
+        Links::read(self.profile, self.treelet(slot))
     }
 
-    /// The bytes of a treelet's child treelets in this page, which are contiguous.
+    /// The first slot of a short treelet.
     #[inline]
-    pub fn treelets_ahead(&self, links: &Links) -> &'a [u8] {
-        let start = self.treelet_at(links.first_treelet);
-        let end = start + links.treelets().count_ones() as usize * self.profile.treelet_bytes();
-        self.bytes.get(start..end).unwrap_or(&[])
+    fn first_short(&self) -> u8 {
+        let header = self.header();
+        header.treelets.saturating_sub(header.short)
+    }
+
+    /// Returns true if the treelet in a slot is short.
+    #[inline]
+    pub(super) fn is_short(&self, slot: u8) -> bool {
+        slot >= self.first_short() && self.profile.has_short_treelets()
+    }
+
+    /// The byte of the page at which the treelet in a slot starts.
+    #[inline]
+    pub fn treelet_at(&self, slot: u8) -> usize {
+        let short =
+            if self.profile.has_short_treelets() { slot.saturating_sub(self.first_short()) } else { 0 };
+        let others = usize::from(slot - short) * self.profile.treelet_bytes();
+        usize::from(self.header().treelet_line) * LINE + others + usize::from(short) * SHORT_TREELET_BYTES
+    }
+
+    /// The bytes of a treelet's child treelets in this page: those of the short ones, and those of the others.
+    #[inline]
+    pub fn treelets_ahead(&self, links: &Links) -> [&'a [u8]; 2] {
+        let of = |first: u8, children: u32, size: usize| {
+            let start = self.treelet_at(first);
+            self.bytes.get(start..start + children.count_ones() as usize * size).unwrap_or(&[])
+        };
+        [
+            of(links.first_short, links.short_treelets(), SHORT_TREELET_BYTES),
+            of(links.first_treelet, links.treelets(), self.profile.treelet_bytes()),
+        ]
     }
 
     /// The anchor of a root.

@@ -15,7 +15,7 @@ use crate::kdop::Kdop;
 use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, encode_block};
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
-use crate::treelet::{ChildKind, Links, SlabEncoder};
+use crate::treelet::{ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
 use crate::turning::{TurningSlab, encode_turning};
 use zerocopy::IntoBytes;
 
@@ -33,9 +33,10 @@ pub struct WrittenPage {
 /// Writes one page.
 ///
 /// Call [`root`](Self::root) for each root; then, for each slot in turn, [`begin_treelet`](Self::begin_treelet) and one
-/// of [`treelet`](Self::treelet), [`remote`](Self::remote) and [`leaf`](Self::leaf) for each child; at last
-/// [`finish`](Self::finish). Children that are treelets of this page take the next free slots, and remote links and
-/// leaf packets the next free numbers, in the order of the calls.
+/// of [`treelet`](Self::treelet), [`short_treelet`](Self::short_treelet), [`remote`](Self::remote) and
+/// [`leaf`](Self::leaf) for each child; at last [`finish`](Self::finish). Children that are treelets of this page take
+/// the next free slots, short ones the next after all others, and remote links and leaf packets the next free numbers,
+/// in the order of the calls. A short treelet must have no children but packets.
 ///
 /// # Panics
 /// The methods panic if more is written than the shape has room for, or than the profile allows for a treelet.
@@ -46,6 +47,8 @@ pub struct PageWriter {
     shape: PageShape,
     /// The decoded slabs of the slots that have been given to a root or a child so far.
     decoded: Vec<NodeSlabs>,
+    /// The same of the slots of short treelets.
+    decoded_short: Vec<NodeSlabs>,
     /// Treelets begun so far.
     begun: usize,
     /// Remote links written so far.
@@ -78,6 +81,7 @@ impl TightBound {
 struct OpenTreelet {
     /// The byte of the page at which it starts.
     at: usize,
+    bytes: usize,
     children: usize,
     links: Links,
     slabs: SlabEncoder,
@@ -106,14 +110,16 @@ impl PageWriter {
             f16_scale,
             shape,
             decoded: Vec::with_capacity(shape.treelets),
+            decoded_short: Vec::with_capacity(shape.short),
             begun: 0,
             remotes: 0,
             packets: Vec::new(),
             ids: Vec::new(),
             open: OpenTreelet {
                 at: 0,
+                bytes: 0,
                 children: 0,
-                links: Links::default(),
+                links: Links::NONE,
                 slabs: SlabEncoder::new(profile, f16_scale, &none),
             },
         }
@@ -134,24 +140,37 @@ impl PageWriter {
 
     /// Starts the treelet in the next slot.
     pub fn begin_treelet(&mut self) {
-        let slot = self.begun;
+        let (slot, others) = (self.begun, self.shape.treelets - self.shape.short);
         self.begun += 1;
+        let short = slot.saturating_sub(others);
+        let (bytes, own) = match slot < others {
+            true => (self.profile.treelet_bytes(), &self.decoded[slot]),
+            false => (SHORT_TREELET_BYTES, &self.decoded_short[short]),
+        };
+        let within = (slot - short) * self.profile.treelet_bytes() + short * SHORT_TREELET_BYTES;
         self.open = OpenTreelet {
-            at: self.shape.treelet_line(self.profile) * LINE + slot * self.profile.treelet_bytes(),
+            at: self.shape.treelet_line(self.profile) * LINE + within,
+            bytes,
             children: 0,
             links: Links {
                 kinds: 0,
                 first_treelet: self.decoded.len() as u8,
+                first_short: (others + self.decoded_short.len()) as u8,
                 first_remote: self.remotes as u8,
                 first_leaf: self.packets.len() as u16,
             },
-            slabs: SlabEncoder::new(self.profile, self.f16_scale, &self.decoded[slot]),
+            slabs: SlabEncoder::new(self.profile, self.f16_scale, own),
         };
     }
 
     /// Adds a child that is a treelet of this page: the one in the next free slot.
     pub fn treelet(&mut self, bound: &TightBound) {
         self.child(bound, ChildKind::Treelet);
+    }
+
+    /// Adds a child that is a short treelet of this page: the one in the next free slot of those.
+    pub fn short_treelet(&mut self, bound: &TightBound) {
+        self.child(bound, ChildKind::ShortTreelet);
     }
 
     /// Adds a child that is a subtree root of another page.
@@ -179,28 +198,32 @@ impl PageWriter {
         let child = open.children;
         open.children += 1;
         open.links.set_kind(child, kind);
-        let treelet = &mut self.bytes[open.at..][..self.profile.treelet_bytes()];
+        let treelet = &mut self.bytes[open.at..][..open.bytes];
         open.slabs.encode(child, &bound.kdop, treelet);
-        open.links.write(treelet);
+        open.links.write(self.profile, treelet);
         let turning = bound.turning.as_ref().filter(|_| self.profile.has_turning_slabs());
-        if kind != ChildKind::Treelet && turning.is_none() {
+        let is_treelet = matches!(kind, ChildKind::Treelet | ChildKind::ShortTreelet);
+        if !is_treelet && turning.is_none() {
             return;
         }
         // Of a child that is not a treelet, only the box is needed.
-        let slabs = if kind == ChildKind::Treelet { self.profile.directions().slabs() } else { 3 };
+        let slabs = if is_treelet { self.profile.directions().slabs() } else { 3 };
         let decoded = decode_slabs(self.profile, self.f16_scale, treelet, child, &open.slabs.parent, slabs);
         if let Some(turning) = turning {
             encode_turning(self.profile, treelet, child, &decoded, turning);
         }
-        if kind == ChildKind::Treelet {
-            self.decoded.push(decoded);
+        match kind {
+            ChildKind::Treelet => self.decoded.push(decoded),
+            ChildKind::ShortTreelet => self.decoded_short.push(decoded),
+            _ => {}
         }
     }
 
     /// Encodes the blocks and writes the header.
     pub fn finish(mut self, encoding: TriangleEncoding, with_ids: bool) -> WrittenPage {
-        let written =
-            PageShape { roots: self.shape.roots, remotes: self.remotes, treelets: self.decoded.len() };
+        let short = self.decoded_short.len();
+        let treelets = self.decoded.len() + short;
+        let written = PageShape { roots: self.shape.roots, remotes: self.remotes, treelets, short };
         debug_assert!(written == self.shape && self.begun == self.shape.treelets);
         let none = self.packets.is_empty();
         let leaf_block = if none { Vec::new() } else { encode_block(encoding, &self.packets) };
@@ -221,7 +244,7 @@ impl PageWriter {
             remotes: self.shape.remotes as u8,
             treelet_line: self.shape.treelet_line(self.profile) as u8,
             profile: self.profile.number(),
-            reserved: 0,
+            short: self.shape.short as u8,
         };
         write_header(&mut self.bytes, &header);
         WrittenPage { bytes: self.bytes, leaf_block, id_block }
@@ -254,6 +277,7 @@ mod tests {
     use crate::ids::decode_id;
     use crate::leaf::decode_packet;
     use crate::object::{Object, ObjectRecord};
+    use crate::rule::Rule;
     use crate::treelet::Child;
     use crate::turning::{TurningDirection, decode_turning};
     use std::ops::Range;
@@ -282,15 +306,20 @@ mod tests {
         TightBound { kdop: kdop(numbers), turning: Some(TurningSlab::around(direction, &packets)) }
     }
 
-    /// A page of two roots. The first has a packet of four triangles, a treelet and a remote link. That treelet has a packet of one triangle, and so has the second root.
+    /// A page of two roots. The first has a packet of four triangles, a treelet and a remote link. That treelet has a packet of one triangle, and so has the second root. The treelet is short in profiles that have such.
     fn write(profile: Profile, with_ids: bool) -> WrittenPage {
-        let mut writer =
-            PageWriter::new(profile, 2f32.powi(-12), PageShape { roots: 2, remotes: 1, treelets: 3 });
+        let short = profile.has_short_treelets();
+        let shape = PageShape { roots: 2, remotes: 1, treelets: 3, short: short.into() };
+        let mut writer = PageWriter::new(profile, 2f32.powi(-12), shape);
         writer.root(&kdop(0..8), None);
         writer.root(&kdop(8..9), Some(PARENT));
         writer.begin_treelet();
         writer.leaf(&bound(0..4), (0..4).map(triangle));
-        writer.treelet(&bound(4..5));
+        if short {
+            writer.short_treelet(&bound(4..5))
+        } else {
+            writer.treelet(&bound(4..5))
+        }
         writer.remote(&bound(5..8), REMOTE);
         writer.begin_treelet();
         writer.leaf(&bound(8..9), (8..9).map(triangle));
@@ -334,12 +363,12 @@ mod tests {
             assert_eq!(header.leaf_bytes(), 64_000..64_000 + written.leaf_block.len());
             assert_eq!(header.id_bytes(), 16_000..16_000 + written.id_block.len());
             assert_eq!(PLACE.behind(header).first_packet, 3003);
-            let first = Links::read(page.treelet(0));
+            let first = page.links(0);
             let leaf = |packet, triangles| Child::Leaf { packet, triangles };
             assert_eq!([first.child(0), first.child(1)], [leaf(0, 4), Child::Treelet(2)]);
             assert_eq!((first.child(2), page.remote(0)), (Child::Remote(0), REMOTE));
-            assert_eq!(Links::read(page.treelet(1)).child(0), leaf(1, 1));
-            assert_eq!(Links::read(page.treelet(2)).child(0), leaf(2, 1));
+            assert_eq!(page.links(1).child(0), leaf(1, 1));
+            assert_eq!(page.links(2).child(0), leaf(2, 1));
 
             let decode = |slot, child, parent: &NodeSlabs| {
                 decode_child(profile, 2f32.powi(-12), page.treelet(slot), child, parent)
@@ -365,6 +394,35 @@ mod tests {
             for (packet, lane, number) in [(0, 0, 0), (0, 3, 3), (1, 0, 8), (2, 0, 4)] {
                 let corners = decode_packet(ENCODING, &written.leaf_block, packet).triangle(lane);
                 assert_eq!((corners, decode_id(&written.id_block, packet, lane)), triangle(number));
+            }
+        }
+    }
+
+    #[test]
+    fn short_treelets_are_numbered_after_all_others_and_have_packets_alone() {
+        for profile in Profile::ALL.into_iter().filter(|profile| profile.has_short_treelets()) {
+            let kinds = if profile.width() == 4 { 28 } else { 12 };
+            // The only child of the treelet in slot 2 becomes a treelet, a root of another page and a short treelet.
+            let kinds_at =
+                PagePatcher::new(&mut write(profile, true).bytes, profile).page().treelet_at(2) + kinds;
+            // Then the page states no short treelet, and two of three where two are roots.
+            let changes = [
+                (kinds_at, 4, None),
+                (kinds_at, 1, Some(Rule::ChildKinds)),
+                (kinds_at, 2, Some(Rule::ChildKinds)),
+                (kinds_at, 3, Some(Rule::ChildKinds)),
+                (63, 0, Some(Rule::TreeletLinks)),
+                (63, 2, Some(Rule::ShortTreelets)),
+            ];
+            for (at, value, rule) in changes {
+                let mut written = write(profile, true);
+                let mut patcher = PagePatcher::new(&mut written.bytes, profile);
+                patcher.set_place(&PLACE);
+                patcher.set_parent(0, 4, 1);
+                written.bytes[at] = value;
+                PagePatcher::new(&mut written.bytes, profile).seal();
+                let found = check_page(&written.bytes, 7, &object(profile), 0).err().map(|error| error.rule);
+                assert_eq!(found, rule, "{}: {value} at byte {at}", profile.name());
             }
         }
     }
@@ -396,7 +454,7 @@ mod tests {
 
     #[test]
     fn a_page_without_packets_has_no_blocks() {
-        let shape = PageShape { roots: 1, remotes: 1, treelets: 1 };
+        let shape = PageShape { roots: 1, remotes: 1, treelets: 1, short: 0 };
         let mut writer = PageWriter::new(Profile::Dop14U8, 1.0, shape);
         writer.root(&kdop(0..3), None);
         writer.begin_treelet();

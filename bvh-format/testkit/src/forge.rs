@@ -12,7 +12,7 @@ use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PageHeader, PageShape};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::topology::{TopologyRecord, write_topology_head};
-use bvh_format::treelet::Links;
+use bvh_format::treelet::{Links, SHORT_TREELET_BYTES};
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Reads a description. After its end, it returns zeros.
@@ -46,7 +46,9 @@ impl Input<'_> {
 #[derive(Default)]
 struct Draft {
     parents: Vec<(u32, u8)>,
+    /// Treelets that are not short, and short ones.
     treelets: Vec<Links>,
+    short: Vec<Links>,
     remotes: Vec<u32>,
     packets: Vec<Packet>,
     triangles: u64,
@@ -54,12 +56,13 @@ struct Draft {
 
 impl Draft {
     fn shape(&self) -> PageShape {
-        let (roots, remotes) = (self.parents.len(), self.remotes.len());
-        PageShape { roots, remotes, treelets: self.treelets.len() }
+        let (roots, remotes, short) = (self.parents.len(), self.remotes.len(), self.short.len());
+        PageShape { roots, remotes, treelets: self.treelets.len() + short, short }
     }
 }
 
 const MAX_TREELETS_PER_PAGE: usize = 12;
+const MAX_SHORT_TREELETS_PER_PAGE: u8 = 12;
 const MAX_ROOTS_PER_PAGE: usize = 4;
 const MAX_REMOTES_PER_PAGE: usize = 16;
 
@@ -84,7 +87,8 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
         header.id_words = (id_block.len() as u32 / 8).into();
         header.packets = (page.packets.len() as u16).into();
         header.roots = page.parents.len() as u8;
-        header.treelets = page.treelets.len() as u8;
+        header.treelets = page.shape().treelets as u8;
+        header.short = page.shape().short as u8;
         header.remotes = page.remotes.len() as u8;
         header.treelet_line = page.shape().treelet_line(profile) as u8;
         header.profile = profile.number();
@@ -92,7 +96,7 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
         leaves.extend(block);
         ids.extend(id_block);
         record.packets += page.packets.len() as u64;
-        record.treelets += page.treelets.len() as u64;
+        record.treelets += page.shape().treelets as u64;
         record.triangles += page.triangles;
     }
     record.pages = (pages.len() as u32).into();
@@ -182,20 +186,25 @@ fn drafts(input: &mut Input, profile: Profile) -> Vec<Draft> {
             pages[number].parents.push((0, 0));
         }
         let roots = pages[number].parents.len();
-        let (mut slots, mut slot) = (roots, 0);
+        let (mut slots, mut slot, mut short) = (roots, 0, 0);
         while slot < slots {
             let (remotes, packets) = (pages[number].remotes.len(), pages[number].packets.len());
             let mut links = Links {
                 kinds: 0,
                 first_treelet: slots as u8,
+                first_short: short,
                 first_remote: remotes as u8,
                 first_leaf: packets as u16,
             };
             for child in 0..1 + input.below(profile.width()) {
                 let kind = match input.below(8) {
-                    0 | 1 if slots < MAX_TREELETS_PER_PAGE => {
+                    0 if slots < MAX_TREELETS_PER_PAGE => {
                         slots += 1;
                         1
+                    }
+                    1 if profile.has_short_treelets() && short < MAX_SHORT_TREELETS_PER_PAGE => {
+                        short += 1;
+                        3
                     }
                     2 | 3 if number + 1 < count && pages[number].remotes.len() < MAX_REMOTES_PER_PAGE => {
                         let to = number + 1 + input.below(count - number - 1);
@@ -216,6 +225,15 @@ fn drafts(input: &mut Input, profile: Profile) -> Vec<Draft> {
             pages[number].treelets.push(links);
             slot += 1;
         }
+        for _ in 0..short {
+            let mut links = Links { first_leaf: pages[number].packets.len() as u16, ..Links::NONE };
+            for child in 0..1 + input.below(profile.width()) {
+                links.kinds |= leaf(input, &mut pages[number]) << (4 * child);
+            }
+            pages[number].short.push(links);
+        }
+        // Slots of short treelets follow those of all others.
+        pages[number].treelets.iter_mut().for_each(|links| links.first_short += slots as u8);
         let page = &pages[number];
         assert!(page.shape().fits(profile));
     }
@@ -249,10 +267,11 @@ fn page_bytes(input: &mut Input, profile: Profile, header: &PageHeader, page: &D
     for (link, remote) in page.remotes.iter().enumerate() {
         put(&mut bytes, 64 + page.parents.len() * anchor + 4 * link, &remote.to_le_bytes());
     }
-    let size = profile.treelet_bytes();
-    for (slot, links) in page.treelets.iter().enumerate() {
-        let start = usize::from(header.treelet_line) * 64 + slot * size;
+    let mut start = usize::from(header.treelet_line) * 64;
+    let full = page.treelets.iter().map(|links| (links, profile.treelet_bytes()));
+    for (links, size) in full.chain(page.short.iter().map(|links| (links, SHORT_TREELET_BYTES))) {
         let treelet = &mut bytes[start..start + size];
+        start += size;
         match profile.encoding() {
             Encoding::F32 => treelet.as_chunks_mut::<4>().0.iter_mut().for_each(|end| {
                 *end = f32::from(input.byte() as i8).to_le_bytes();
@@ -263,7 +282,7 @@ fn page_bytes(input: &mut Input, profile: Profile, header: &PageHeader, page: &D
             }),
             Encoding::U4 | Encoding::U8 => treelet.iter_mut().for_each(|code| *code = input.byte()),
         }
-        links.write(treelet);
+        links.write(profile, treelet);
     }
     bytes
 }

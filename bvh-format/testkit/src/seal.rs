@@ -48,7 +48,7 @@ pub fn take_apart(bytes: &[u8]) -> Vec<Section> {
 /// Returns a file of these sections with correct checksums.
 pub fn put_together(sections: &[Section]) -> Vec<u8> {
     let mut bytes = vec![0; PAGE];
-    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 3, 0, 0, 0]);
+    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 4, 0, 0, 0]);
     put(&mut bytes, 12, &(sections.len() as u32).to_le_bytes());
     for (index, (kind, required, data)) in sections.iter().enumerate() {
         let at = 64 + 32 * index;

@@ -5,7 +5,7 @@ use bvh_format::kdop::{DirectionSet, Kdop};
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
 use bvh_format::slabs::NodeSlabs;
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::Child;
 use bvh_query::Bvh;
 
 /// A tree of bounds. Children have higher numbers than their parents; node 0 is the root.
@@ -63,7 +63,7 @@ impl Tree {
             tree.nodes[node].first = tree.corners.len() as u32;
             let page_here = page(number)?;
             let treelet = page_here.treelet(slot);
-            let links = Links::read(treelet);
+            let links = page_here.links(slot);
             for child in 0..links.children() {
                 let slabs_of = decode_child(profile, object.f16_scale(), treelet, child, &decoded);
                 let place = tree.nodes.len();

@@ -99,7 +99,7 @@ impl Bvh {
         let packet = packet.and_then(|packet| u16::try_from(packet).ok());
         let triangles = packet.and_then(|packet| {
             let mut slots = 0..page.header().treelets;
-            slots.find_map(|slot| triangles_of(&Links::read(page.treelet(slot)), packet))
+            slots.find_map(|slot| triangles_of(&page.links(slot), packet))
         });
         match packet.filter(|_| triangles.is_some_and(|triangles| lane < triangles)) {
             Some(packet) => Ok(TrianglePlace { page: low, packet, lane }),

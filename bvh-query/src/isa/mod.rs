@@ -106,6 +106,10 @@ pub(crate) trait Isa: Copy {
     fn codes_low(self, from: &[u8; 16]) -> Self::V;
     /// Reads the high nibbles of 16 bytes.
     fn codes_high(self, from: &[u8; 16]) -> Self::V;
+    /// Reads the codes for which the low nibbles of 16 bytes of a short treelet stand.
+    fn short_codes_low(self, from: &[u8; 16]) -> Self::V;
+    /// Reads the codes for which the high nibbles of 16 bytes of a short treelet stand.
+    fn short_codes_high(self, from: &[u8; 16]) -> Self::V;
     /// Reads 16 little-endian `f16`.
     fn codes_f16(self, from: &[u8; 32]) -> Self::V;
     /// Reads 16 little-endian `f32`.

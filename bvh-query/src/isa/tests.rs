@@ -9,7 +9,7 @@ use bvh_format::leaf::{Packet, TriangleEncoding, decode_packet, encode_block};
 use bvh_format::profile::Profile;
 use bvh_format::slabs::row;
 use bvh_format::slabs::{Group, NodeSlabs};
-use bvh_format::treelet::child_slabs;
+use bvh_format::treelet::{SHORT_TREELET_BYTES, child_slabs};
 
 struct Decode<'a> {
     profile: Profile,
@@ -51,7 +51,10 @@ fn every_backend_decodes_to_the_bits_of_the_reference() {
         }
         for profile in Profile::ALL {
             for round in 0..300 {
-                let mut treelet: Vec<u8> = (0..profile.treelet_bytes()).map(|_| random() as u8).collect();
+                // Every third treelet is short.
+                let is_short = profile.has_short_treelets() && round % 3 == 0;
+                let bytes = if is_short { SHORT_TREELET_BYTES } else { profile.treelet_bytes() };
+                let mut treelet: Vec<u8> = (0..bytes).map(|_| random() as u8).collect();
                 if profile.encoding() == bvh_format::profile::Encoding::F16 {
                     // Codes are non-negative and finite.
                     treelet.as_chunks_mut::<2>().0.iter_mut().for_each(|code| code[1] &= 0x7b);

@@ -4,6 +4,7 @@ use crate::isa::{Isa, Lanes};
 use bvh_format::profile::Profile;
 use bvh_format::quantize::{STEP_U4, STEP_U8};
 use bvh_format::slabs::Group;
+use bvh_format::treelet::SHORT_TREELET_BYTES;
 
 /// The predictor-corrector over `$quads` registers of lower and of upper ends. `$unit` is the unit of
 /// the codes, given the parent's ends; `$codes` the codes of register `$q`. A macro, because a
@@ -53,7 +54,20 @@ pub(crate) fn decode_group<I: Isa>(
 ) {
     let scale = Unit::Fixed(isa.splat(object_scale));
     let (u8_step, u4_step) = (Unit::Step(isa.splat(STEP_U8)), Unit::Step(isa.splat(STEP_U4)));
+    let is_short = treelet.len() == SHORT_TREELET_BYTES;
     match profile {
+        Profile::Dop14U8 if is_short => {
+            let t: &[u8; 32] = fixed(treelet, 0);
+            quads!(isa, parent, column, out, 2, u8_step, |q| {
+                (isa.short_codes_low(fixed(t, 16 * q)), isa.short_codes_high(fixed(t, 16 * q)))
+            });
+        }
+        Profile::Dop6U8 if is_short => {
+            let t: &[u8; 16] = fixed(treelet, 16 * part);
+            quads!(isa, parent, column, out, 1, u8_step, |q| {
+                (isa.short_codes_low(fixed(t, 16 * q)), isa.short_codes_high(fixed(t, 16 * q)))
+            });
+        }
         Profile::Dop14U8 => {
             let t: &[u8; 64] = fixed(treelet, 0);
             quads!(isa, parent, column, out, 2, u8_step, |q| {

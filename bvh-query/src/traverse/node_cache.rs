@@ -76,7 +76,7 @@ impl CachedNode {
         turning: TurningCodes::NONE,
         extents: [0.0; 8],
         opened: [CLOSED; 8],
-        links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
+        links: Links::NONE,
         page: 0,
         count: 0,
     };
@@ -150,8 +150,9 @@ pub(crate) struct NodeCache {
     reach: Reach,
 }
 
-/// The most treelets of a page by rule 17: its header and one anchor take two of its 64 lines.
-const MAX_TREELETS_PER_PAGE: usize = 62;
+/// More treelets than a page has by rule 17: its header and one anchor take two of its 64 lines, and a short treelet
+/// takes half a line.
+const MAX_TREELETS_PER_PAGE: usize = 124;
 /// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
 /// With more nodes than this, the next walk starts anew. They take 300 KiB, less than the second-level cache of a core.
@@ -174,7 +175,7 @@ impl NodeCache {
             root.groups[0] = spread(isa, &slabs);
             root.turning = TurningCodes::NONE;
             self.generation += 1;
-            root.links = Links { kinds: 1, ..Links::default() };
+            root.links = Links { kinds: 1, ..Links::NONE };
             root.page = page;
             root.extents[0] = f32::INFINITY;
             root.opened = [CLOSED; 8];
@@ -279,7 +280,9 @@ fn decode_node<I: Isa>(
     to.links = opened.links;
     isa.prefetch(bvh.packets_to_prefetch(object, &opened.page, &to.links));
     if bvh.is_worth_prefetching() {
-        isa.prefetch(opened.page.treelets_ahead(&to.links));
+        for treelets in opened.page.treelets_ahead(&to.links) {
+            isa.prefetch(treelets);
+        }
     }
     to.page = opened.page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
@@ -321,7 +324,7 @@ pub(super) fn open_child<'a, I: Isa>(
     };
     let profile = object.profile();
     let treelet = at.treelet(slot);
-    let links = Links::read(treelet);
+    let links = Links::read(profile, treelet);
     for part in 0..profile.groups() {
         let coding = (profile, object.f16_scale());
         decode_group(isa, coding, (treelet, part), (slabs, column), &mut to[part]);
@@ -384,7 +387,7 @@ mod tests {
         let bvh = Bvh::from_static(bytes).unwrap();
         let mut nodes = NodeCache::default();
         Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
-        assert_eq!(nodes.max_nodes, 1 + 62);
+        assert_eq!(nodes.max_nodes, 1 + 124);
         nodes.max_nodes = 1;
         let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
         assert!(matches!(refused, QueryError::Damaged(error) if error.rule == Rule::Counts));

@@ -63,12 +63,7 @@ static HIDDEN: [[f32; 4]; 16] = {
 };
 
 impl ProbeFrame {
-    const EMPTY: Self = Self {
-        groups: [Group::ZERO; 2],
-        bounds: [GONE; 8],
-        links: Links { kinds: 0, first_treelet: 0, first_remote: 0, first_leaf: 0 },
-        page: 0,
-    };
+    const EMPTY: Self = Self { groups: [Group::ZERO; 2], bounds: [GONE; 8], links: Links::NONE, page: 0 };
 
     /// Removes the nearest child that is left, if its bound is at most `limit`.
     #[inline(always)]
@@ -117,7 +112,7 @@ impl ProbeStack {
             }
             let root = &mut self.frames[0];
             root.groups[0] = spread(isa, &slabs);
-            (root.links, root.page) = (Links { kinds: 1, ..Links::default() }, page);
+            (root.links, root.page) = (Links { kinds: 1, ..Links::NONE }, page);
             self.of = Some((bvh.identity(), page));
         }
         self.frames[0].bounds[0] = 0.0;
@@ -167,7 +162,9 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
                 continue;
             };
             if bvh.is_worth_prefetching() {
-                prefetch_ahead(isa, page.treelets_ahead(&links));
+                for treelets in page.treelets_ahead(&links) {
+                    prefetch_ahead(isa, treelets);
+                }
             }
             let page = page.header().page_number.get();
             (next.links, next.page) = (links, page);

@@ -338,7 +338,8 @@ mod tests {
             triangles: Vec<Vec<[[f32; 3]; 3]>>,
             mut direction: impl FnMut(&[[[f32; 3]; 3]]) -> Option<TurningDirection>,
         ) -> Self {
-            let mut writer = PageWriter::new(PROFILE, 1.0, PageShape { roots: 1, remotes: 0, treelets: 1 });
+            let mut writer =
+                PageWriter::new(PROFILE, 1.0, PageShape { roots: 1, treelets: 1, ..PageShape::default() });
             writer.root(&Kdop::of_points(triangles.iter().flatten().flatten().copied()), None);
             writer.begin_treelet();
             for patch in &triangles {

@@ -8,7 +8,7 @@ use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page};
 use bvh_format::slabs::NodeSlabs;
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::Child;
 use bvh_format::turning::decode_turning;
 use bvh_format::{FormatError, Layout, Rule};
 use serde::Serialize;
@@ -29,6 +29,7 @@ pub(super) struct PageDump {
     id_words: u32,
     first_packet: u32,
     packets: u16,
+    short_treelets: u8,
     treelet_line: u8,
     /// The 64-byte lines in use, of 64.
     lines: usize,
@@ -128,7 +129,7 @@ impl ChildDump {
 }
 
 fn children(page: &Page, slot: u8) -> Vec<ChildDump> {
-    let links = Links::read(page.treelet(slot));
+    let links = page.links(slot);
     (0..links.children()).filter_map(|child| ChildDump::new(page, links.child(child))).collect()
 }
 
@@ -165,7 +166,6 @@ impl PageDump {
             let to = page.remote(link);
             RootDump { link, page: to.page(), root: to.root() }
         };
-        let treelet_lines = usize::from(header.treelets) * object.profile().treelet_bytes() / 64;
         Ok(Self {
             page: number,
             offset: at,
@@ -181,7 +181,8 @@ impl PageDump {
             first_packet: header.first_packet.get(),
             packets: header.packets.get(),
             treelet_line: header.treelet_line,
-            lines: usize::from(header.treelet_line) + treelet_lines,
+            lines: header.shape().lines(object.profile()),
+            short_treelets: header.short,
             anchors: (0..header.roots).map(anchor).collect(),
             remotes: (0..header.remotes).map(remote).collect(),
             treelets: (0..header.treelets)
@@ -196,11 +197,12 @@ impl PageDump {
             self.page, self.offset, self.object, self.profile, self.checksum
         );
         text += &format!(
-            "  {} of 64 lines in use: {} anchors, {} remote links, {} treelets from line {}\n",
+            "  {} of 64 lines in use: {} anchors, {} remote links, {} treelets, {} of them short, from line {}\n",
             self.lines,
             self.anchors.len(),
             self.remotes.len(),
             self.treelets.len(),
+            self.short_treelets,
             self.treelet_line
         );
         text += &format!(
@@ -259,7 +261,6 @@ impl TreeletDump {
     }
 
     fn new(layout: &Layout, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
-        let header = page.header();
         let slabs = object.profile().directions().slabs();
         let own = decoded_slots(object, page)[usize::from(slot)];
         let mut children = children(page, slot);
@@ -270,16 +271,14 @@ impl TreeletDump {
             dump.turning = turning
                 .map(|slab| TurningDump { direction: slab.direction.vector(), slab: [slab.lo, slab.hi] });
         }
-        let page_number = header.page_number.get();
-        let within =
-            usize::from(header.treelet_line) * 64 + usize::from(slot) * object.profile().treelet_bytes();
+        let page_number = page.header().page_number.get();
         Self {
             treelet: number,
             object: index,
             profile: object.profile().name(),
             page: page_number,
             slot,
-            offset: layout.page_offset(page_number) + within as u64,
+            offset: layout.page_offset(page_number) + page.treelet_at(slot) as u64,
             slabs: slabs_of(&own.to_kdop(slabs), slabs),
             children,
         }
@@ -316,7 +315,7 @@ fn decoded_slots(object: &Object, page: &Page) -> Vec<NodeSlabs> {
     }
     for slot in 0..header.treelets {
         let treelet = page.treelet(slot);
-        let links = Links::read(treelet);
+        let links = page.links(slot);
         for child in 0..links.children() {
             if let Child::Treelet(inner) = links.child(child) {
                 let parent = decoded[usize::from(slot)];

@@ -73,13 +73,12 @@ impl Statistics {
             let page = bytes.page(object);
             let header = page.header();
             layout.check_leaf_block_of(&layout.read_leaf_block(file, header)?, &page, object)?;
-            let treelet_lines = usize::from(header.treelets) * object.profile().treelet_bytes() / 64;
-            statistics.lines += u64::from(header.treelet_line) + treelet_lines as u64;
+            statistics.lines += header.shape().lines(object.profile()) as u64;
             statistics.roots += u64::from(header.roots);
             let levels = slot_levels(&page, &root_levels.advance(number, header.roots));
             for slot in 0..header.treelets {
                 let level = levels[usize::from(slot)];
-                let links = Links::read(page.treelet(slot));
+                let links = page.links(slot);
                 statistics.count(level, &links);
                 for child in 0..links.children() {
                     if let Child::Remote(link) = links.child(child) {
@@ -145,7 +144,7 @@ fn slot_levels(page: &Page, roots: &[usize]) -> Vec<usize> {
         levels[root] = roots.get(root).copied().unwrap_or(0);
     }
     for slot in 0..header.treelets {
-        let links = Links::read(page.treelet(slot));
+        let links = page.links(slot);
         for child in 0..links.children() {
             if let Child::Treelet(inner) = links.child(child) {
                 levels[usize::from(inner)] = levels[usize::from(slot)] + 1;

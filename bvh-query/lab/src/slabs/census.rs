@@ -7,7 +7,7 @@ use bvh_format::leaf::{LINE, PACKED_HEAD_BYTES, PackedHead, TriangleEncoding, de
 use bvh_format::page::{PAGE, PAGE_HEADER_BYTES, Page};
 use bvh_format::profile::Encoding;
 use bvh_format::slabs::row;
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::{Child, SHORT_CODES, SHORT_TREELET_BYTES};
 use bvh_query::Bvh;
 use cbvh_measure::table::{Cell, Cells};
 use std::collections::HashSet;
@@ -92,7 +92,7 @@ impl Census {
         self.bytes[1] += PAGE_HEADER_BYTES as u64;
         self.bytes[2] += anchors;
         self.bytes[3] += u64::from(header.remotes) * REMOTE_LINK;
-        let used = before + treelets * profile.treelet_bytes() as u64;
+        let used = (0..header.treelets).fold(before, |used, slot| used + page.treelet(slot).len() as u64);
         // What fills up the lines of remote links is empty, too.
         let links = u64::from(header.remotes) * REMOTE_LINK;
         self.bytes[8] += PAGE as u64 - used + before - PAGE_HEADER_BYTES as u64 - anchors - links;
@@ -102,16 +102,19 @@ impl Census {
             Encoding::F16 => [2, 2],
             Encoding::F32 => [4, 2],
         };
-        let child_bytes = code * ends * profile.directions().slabs() as u64;
         for slot in 0..header.treelets {
-            let children = Links::read(page.treelet(slot)).children() as u64;
+            let treelet = page.treelet(slot);
+            let is_short = treelet.len() == SHORT_TREELET_BYTES;
+            let codes = if is_short { 1 } else { code * ends };
+            let child_bytes = codes * profile.directions().slabs() as u64;
+            let link_bytes = if is_short && profile.width() == 4 { 4 } else { TREELET_LINKS };
+            let children = page.links(slot).children() as u64;
             let absent = profile.width() as u64 - children;
             self.children += children;
             self.bytes[4] += children * child_bytes;
             self.bytes[5] += absent * child_bytes;
-            self.bytes[6] += TREELET_LINKS;
-            self.bytes[7] +=
-                profile.treelet_bytes() as u64 - TREELET_LINKS - (children + absent) * child_bytes;
+            self.bytes[6] += link_bytes;
+            self.bytes[7] += treelet.len() as u64 - link_bytes - (children + absent) * child_bytes;
         }
     }
 
@@ -155,7 +158,7 @@ impl Census {
         while let Some((number, slot, parent)) = stack.pop() {
             let here = page(number).ok_or(missing)?;
             let treelet = here.treelet(slot);
-            let links = Links::read(treelet);
+            let links = here.links(slot);
             for child in 0..links.children() {
                 let decoded = decode_child(profile, object.f16_scale(), treelet, child, &parent);
                 for slab in 0..profile.directions().slabs() {
@@ -199,12 +202,14 @@ impl Census {
 /// Returns both codes of a child's slab in a treelet of codes of 4 or 8 bits, as section 7 of `spec/format.md` places them.
 fn codes(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> [u8; 2] {
     let half = treelet.len() / 2;
+    let is_short = treelet.len() == SHORT_TREELET_BYTES;
     let at = if profile.width() == 8 {
         child / 4 * half + row(slab) * 4 + child % 4
     } else {
         row(slab) * profile.width() + child
     };
     match (profile.encoding(), profile.width()) {
+        _ if is_short => [treelet[at] & 15, treelet[at] >> 4].map(|nibble| SHORT_CODES[usize::from(nibble)]),
         (Encoding::U4, _) => [treelet[at] & 15, treelet[at] >> 4],
         (_, 8) => [treelet[at], treelet[at + half / 2]],
         _ => [treelet[at], treelet[at + half]],

@@ -5,6 +5,7 @@
 
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
+use bvh_format::treelet::SHORT_CODES;
 use std::arch::x86_64::*;
 
 /// The token of the AVX2 backend.
@@ -271,6 +272,17 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
+    fn short_codes_low(self, from: &[u8; 16]) -> Y {
+        with_features!(bytes_to_lanes(short_codes(_mm_loadu_si128(from.as_ptr().cast()))))
+    }
+    #[inline(always)]
+    fn short_codes_high(self, from: &[u8; 16]) -> Y {
+        with_features!({
+            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+            bytes_to_lanes(short_codes(bytes))
+        })
+    }
+    #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Y {
         with_features!(Y(
             _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())),
@@ -346,6 +358,17 @@ impl Isa for Avx2 {
 fn round_up_half_register(step: __m256) -> __m256 {
     let bits = _mm256_add_epi32(_mm256_castps_si256(step), _mm256_set1_epi32(0xff));
     _mm256_castsi256_ps(_mm256_and_si256(bits, _mm256_set1_epi32(!0xff)))
+}
+
+/// The codes for which the low nibbles of sixteen bytes of a short treelet stand.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn short_codes(bytes: __m128i) -> __m128i {
+    let table = _mm_set_epi64x(
+        i64::from_le_bytes(*SHORT_CODES.last_chunk().expect("16 codes")),
+        i64::from_le_bytes(*SHORT_CODES.first_chunk().expect("16 codes")),
+    );
+    _mm_shuffle_epi8(table, _mm_and_si128(bytes, _mm_set1_epi8(15)))
 }
 
 /// Converts sixteen bytes to lanes.

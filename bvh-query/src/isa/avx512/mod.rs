@@ -3,6 +3,7 @@
 //! All `unsafe` here rests on one fact: only `detect` creates an `Avx512`, after it has found the features below on
 //! the CPU, and a `Z` or `X` can be made only with an `Avx512`.
 
+use super::avx2::short_codes;
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
@@ -275,6 +276,20 @@ impl Isa for Avx512 {
         Z(with_features!({
             let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
             _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_and_si128(bytes, _mm_set1_epi8(15))))
+        }))
+    }
+    #[inline(always)]
+    fn short_codes_low(self, from: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let codes = short_codes(_mm_loadu_si128(from.as_ptr().cast()));
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(codes))
+        }))
+    }
+    #[inline(always)]
+    fn short_codes_high(self, from: &[u8; 16]) -> Z {
+        Z(with_features!({
+            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(short_codes(bytes)))
         }))
     }
     #[inline(always)]

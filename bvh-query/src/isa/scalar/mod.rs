@@ -4,6 +4,7 @@ use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
 use bvh_format::slabs::Group;
+use bvh_format::treelet::SHORT_CODES;
 use half::f16;
 
 /// The token of the portable backend.
@@ -149,6 +150,14 @@ impl Isa for Scalar {
     #[inline(always)]
     fn codes_high(self, from: &[u8; 16]) -> Array<16> {
         Array(from.map(|byte| f32::from(byte >> 4)))
+    }
+    #[inline(always)]
+    fn short_codes_low(self, from: &[u8; 16]) -> Array<16> {
+        Array(from.map(|byte| f32::from(SHORT_CODES[usize::from(byte & 15)])))
+    }
+    #[inline(always)]
+    fn short_codes_high(self, from: &[u8; 16]) -> Array<16> {
+        Array(from.map(|byte| f32::from(SHORT_CODES[usize::from(byte >> 4)])))
     }
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Array<16> {
