@@ -366,7 +366,18 @@ impl SlabEncoder {
 
 /// Returns the last code of four bits that stands for a code of at most this one. Smaller codes are farther outward.
 fn short_code(code: u16) -> u8 {
-    SHORT_CODES.iter().filter(|&&of| u16::from(of) <= code).count() as u8 - 1
+    const PLACES: [u8; 256] = {
+        let (mut places, mut code, mut place) = ([0; 256], 0, 0);
+        while code < 256 {
+            if place + 1 < SHORT_CODES.len() && code >= SHORT_CODES[place + 1] as usize {
+                place += 1;
+            }
+            places[code] = place as u8;
+            code += 1;
+        }
+        places
+    };
+    PLACES[usize::from(code) & 255]
 }
 
 /// Returns the slabs of one child of a decoded group, which predict those of its own children.

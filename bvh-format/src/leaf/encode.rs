@@ -154,9 +154,11 @@ impl Axis {
     }
 }
 
-/// The number of units that is nearest to a value.
+/// The number of units that is nearest to a value, if it is below 2^31.
 fn nearest(value: f32, size: f64) -> i32 {
-    (f64::from(value) / size).round_ties_even() as i32
+    /// The sum with this has no room for fractions: it is rounded to a whole number, which stands in its low bits.
+    const ROUNDER: f64 = (3u64 << 51) as f64;
+    (f64::from(value) / size + ROUNDER).to_bits() as i32
 }
 
 /// The exponent of the lowest set bit of a float that is not zero.

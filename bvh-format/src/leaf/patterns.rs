@@ -297,17 +297,21 @@ fn permutations(lanes: usize) -> impl Iterator<Item = [u8; PACKET]> {
 
 /// Gives equal numbers to corners of which all bits are equal: the place of the first such corner, `3 * lane + corner`.
 pub(crate) fn labels_of(triangles: &[[[u32; 3]; 3]; PACKET]) -> Places {
+    // One array per axis: compilers turn the comparison of one corner with all into vector code.
+    let mut axes = [[0; 16]; 3];
+    for place in 0..MAX_SLOTS {
+        for axis in 0..3 {
+            axes[axis][place] = triangles[place / 3][place % 3][axis];
+        }
+    }
     let mut labels = [[0; 3]; PACKET];
     for place in 0..MAX_SLOTS {
-        let vertex = triangles[place / 3][place % 3];
-        // From the last place to the first, without a branch: the first equal one stays.
-        let mut first = place;
-        for other in (0..place).rev() {
-            let held = triangles[other / 3][other % 3];
-            let differs = (held[0] ^ vertex[0]) | (held[1] ^ vertex[1]) | (held[2] ^ vertex[2]);
-            first = if differs == 0 { other } else { first };
+        let mut equal = 0u32;
+        for other in 0..MAX_SLOTS {
+            let differs = (0..3).fold(0, |bits, axis| bits | axes[axis][other] ^ axes[axis][place]);
+            equal |= u32::from(differs == 0) << other;
         }
-        labels[place / 3][place % 3] = first as u8;
+        labels[place / 3][place % 3] = equal.trailing_zeros() as u8;
     }
     labels
 }
