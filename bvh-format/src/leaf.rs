@@ -110,10 +110,14 @@ impl Packet {
 }
 
 /// Makes the leaf block of a page, in whole lines.
-pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet]) -> Vec<u8> {
+///
+/// `order` has the number of each packet once, such that neighbours in space are near each other. Vertices are stored in
+/// the order in which these packets have them, so that a reader finds those of a packet in few lines.
+pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet], order: &[u16]) -> Vec<u8> {
+    debug_assert_eq!(packets.len(), order.len());
     let mut block = match encoding {
         TriangleEncoding::F32 => encode_f32(packets),
-        TriangleEncoding::Packed | TriangleEncoding::Quantized => encode::packed(packets),
+        TriangleEncoding::Packed | TriangleEncoding::Quantized => encode::packed(packets, order),
     };
     block.resize(block.len().next_multiple_of(LINE), 0);
     block
@@ -182,6 +186,10 @@ mod tests {
             .collect()
     }
 
+    fn in_order(packets: &[Packet]) -> Vec<u16> {
+        (0..packets.len() as u16).collect()
+    }
+
     #[test]
     fn both_encodings_return_every_bit() {
         let kinds: [fn(u64) -> f32; 6] = [
@@ -196,7 +204,7 @@ mod tests {
             for count in [1, 2, 7, 150] {
                 let packets = packets(kind as u64 + 1, count, make);
                 for encoding in TriangleEncoding::ALL {
-                    let block = encode_block(encoding, &packets);
+                    let block = encode_block(encoding, &packets, &in_order(&packets));
                     assert_eq!(block.len() % LINE, 0);
                     for (index, packet) in packets.iter().enumerate() {
                         let decoded = decode_packet(encoding, &block, index);
@@ -246,7 +254,8 @@ mod tests {
     fn a_grid_takes_the_bits_of_its_extent() {
         // 16 steps of 2^-10 far from zero take 4 bits per axis, whatever the magnitude.
         let packets = packets(3, 40, |r| 100.0 + (r % 16) as f32 / 1024.0);
-        let head = PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets)).unwrap();
+        let head =
+            PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets, &in_order(&packets))).unwrap();
         assert_eq!((head.bits, head.kinds, head.exponent), ([4, 4, 4], 0b01_01_01, [-10; 3]));
     }
 
@@ -254,7 +263,8 @@ mod tests {
     fn printed_decimals_take_the_bits_of_their_last_digit() {
         // A thousand steps of 10^-5: as bits of `f32` they take more than twice as many.
         let packets = packets(3, 40, |r| ((r % 1000) as f64 / 1e5 - 0.003) as f32);
-        let head = PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets)).unwrap();
+        let head =
+            PackedHead::read(&encode_block(TriangleEncoding::Packed, &packets, &in_order(&packets))).unwrap();
         assert_eq!((head.bits, head.kinds, head.exponent), ([10; 3], 0b10_10_10, [5; 3]));
     }
 
@@ -265,7 +275,7 @@ mod tests {
         let triangle = |n: u32| [n, n + 1 + n % 2, n + 2 - n % 2].map(corner);
         let packets: Vec<Packet> =
             (0..25).map(|p| Packet::new(&[0, 1, 2, 3].map(|lane| triangle(4 * p + lane)))).collect();
-        let block = encode_block(TriangleEncoding::Packed, &packets);
+        let block = encode_block(TriangleEncoding::Packed, &packets, &in_order(&packets));
         let head = PackedHead::read(&block).unwrap();
         assert_eq!((head.vertices, head.further, head.index_bits), (102, 0, 7));
         assert_eq!(

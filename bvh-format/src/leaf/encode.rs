@@ -7,9 +7,12 @@ use crate::bits::{BitWriter, bit_width};
 use crate::ordered::to_ordered;
 
 /// Makes a packed block, without the zeros that fill its last line.
-pub(super) fn packed(packets: &[Packet]) -> Vec<u8> {
+pub(super) fn packed(packets: &[Packet], order: &[u16]) -> Vec<u8> {
     let mut pool = Pool::new(packets.len() * MAX_SLOTS);
-    let records: Vec<Record> = packets.iter().map(|packet| Record::new(packet, &mut pool)).collect();
+    let mut records = vec![Record::NONE; packets.len()];
+    for number in order.iter().copied().map(usize::from) {
+        records[number] = Record::new(&packets[number], &mut pool);
+    }
     let further = records.iter().map(|record| record.further().len()).sum::<usize>();
     let pool = pool.vertices;
     let axes = [0, 1, 2].map(|axis| Axis::fit(pool.iter().map(move |vertex| vertex[axis])));
@@ -52,6 +55,7 @@ pub(super) fn packed(packets: &[Packet]) -> Vec<u8> {
 }
 
 /// A packet as the block states it.
+#[derive(Clone, Copy)]
 struct Record {
     fit: Fit,
     /// Places in the pool, as many as the pattern has slots.
@@ -59,6 +63,9 @@ struct Record {
 }
 
 impl Record {
+    /// Room for another one.
+    const NONE: Self = Self { fit: Fit { pattern: 0, rotations: [0; PACKET] }, slots: [0; MAX_SLOTS] };
+
     /// Fits a packet to a pattern, and its vertices into the pool.
     fn new(packet: &Packet, pool: &mut Pool) -> Self {
         let mut corners = [[[0; 3]; 3]; PACKET];

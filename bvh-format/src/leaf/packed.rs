@@ -79,12 +79,6 @@ impl Unit {
             Self::Decimal { digits } => Some(DECIMALS[usize::from(digits) % DECIMALS.len()]),
         }
     }
-
-    /// The coordinate for which an integer stands.
-    #[inline(always)]
-    pub(crate) fn coordinate(self, integer: i32) -> f32 {
-        self.factor().map_or_else(|| from_ordered(integer), |unit| in_units(integer, unit))
-    }
 }
 
 /// The coordinate that is so many units: a product of two `f64`, rounded to `f32`.
@@ -349,6 +343,25 @@ impl Record {
         slots
     }
 
+    /// The place in the pool of one of the packet's vertices.
+    #[inline(always)]
+    fn slot(&self, slot: usize) -> u32 {
+        match slot.checked_sub(RECORD_SLOTS - 1) {
+            Some(further) if self.count() > RECORD_SLOTS => {
+                self.field(self.further_words[(further / 4) & 1], further % 4)
+            }
+            _ => self.field(self.first_words[(slot / 3) & 1], slot % 3),
+        }
+    }
+
+    /// For each corner of a lane, the number of its vertex among the slots.
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> [u8; 3] {
+        let pattern = &CORNERS[usize::from(self.pattern) & (PATTERNS - 1)];
+        let corners = pattern[lane & 3][self.rotation(lane)] >> (8 * lane);
+        [0, 1, 2].map(|corner| (corners >> (8 * PACKET * corner)) as u8)
+    }
+
     /// For each corner of each lane, the number of its vertex among the slots: that of corner c is element `4 * c + lane`.
     /// The last four elements have no meaning.
     #[inline(always)]
@@ -400,11 +413,24 @@ pub(super) fn decode(block: &[u8], index: usize) -> Packet {
 pub(super) fn decode_lane(block: &[u8], index: usize, lane: usize) -> [[f32; 3]; 3] {
     let Some(head) = PackedHead::read(block) else { return [[0.0; 3]; 3] };
     let record = head.record(block, index);
-    let (corners, slots) = (record.corners(), record.slots());
-    [0, 1, 2].map(|corner| {
-        let vertex = head.vertex(block, slots[usize::from(corners[PACKET * corner + lane])]);
-        [0, 1, 2].map(|axis| head.unit(axis).unwrap_or(Unit::Ordered).coordinate(vertex[axis]))
-    })
+    let slots = record.lane(lane);
+    let mut integers = [[0; 16]; 3];
+    let places = slots.map(|slot| record.slot(slot.into()));
+    if !head.with_two_loads(block, &places, &mut integers) {
+        head.one_by_one(block, &places, &mut integers);
+    }
+    let mut triangle = [[0.0; 3]; 3];
+    for axis in 0..3 {
+        let unit = head.unit_of(axis);
+        for corner in 0..3 {
+            let integer = integers[axis][corner];
+            triangle[corner][axis] = match unit {
+                None => from_ordered(integer),
+                Some(unit) => in_units(integer, unit),
+            };
+        }
+    }
+    triangle
 }
 
 /// Reads at least 121 bits from bit `at` on. Bytes beyond the block read as zero.

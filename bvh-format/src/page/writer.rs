@@ -5,8 +5,8 @@
 //! slot, and visits the treelets in that order.
 
 use super::{
-    LINK_BYTES, NO_PARENT, PAGE, PAGE_HEADER_BYTES, PARENT_BYTES, PageHeader, PageShape, RootRef, anchor_at,
-    link_at,
+    LINK_BYTES, NO_PARENT, PAGE, PAGE_HEADER_BYTES, PARENT_BYTES, Page, PageHeader, PageShape, RootRef,
+    anchor_at, link_at,
 };
 use crate::checksum::checksum;
 use crate::decode::decode_slabs;
@@ -15,9 +15,9 @@ use crate::kdop::Kdop;
 use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, encode_block};
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
-use crate::treelet::{ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
+use crate::treelet::{Child, ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
 use crate::turning::{TurningSlab, encode_turning};
-use zerocopy::IntoBytes;
+use zerocopy::{FromZeros, IntoBytes};
 
 /// A page and its blocks. Its numbers count from itself until a [`PagePatcher`](super::PagePatcher) changes them: it is
 /// page 0, its blocks start their sections, and its checksum is missing.
@@ -226,18 +226,7 @@ impl PageWriter {
         let written = PageShape { roots: self.shape.roots, remotes: self.remotes, treelets, short };
         debug_assert!(written == self.shape && self.begun == self.shape.treelets);
         let none = self.packets.is_empty();
-        let leaf_block = if none { Vec::new() } else { encode_block(encoding, &self.packets) };
-        let id_block = if none || !with_ids { Vec::new() } else { encode_ids(&self.ids) };
-        let header = PageHeader {
-            checksum: 0.into(),
-            leaf_checksum: checksum(&leaf_block).into(),
-            id_checksum: if id_block.is_empty() { 0 } else { checksum(&id_block) }.into(),
-            leaf_line: 0.into(),
-            id_word: 0.into(),
-            first_packet: 0.into(),
-            page_number: 0.into(),
-            leaf_lines: ((leaf_block.len() / LINE) as u32).into(),
-            id_words: ((id_block.len() / WORD) as u32).into(),
+        let mut header = PageHeader {
             packets: (self.packets.len() as u16).into(),
             roots: self.shape.roots as u8,
             treelets: self.shape.treelets as u8,
@@ -245,10 +234,36 @@ impl PageWriter {
             treelet_line: self.shape.treelet_line(self.profile) as u8,
             profile: self.profile.number(),
             short: self.shape.short as u8,
+            ..PageHeader::new_zeroed()
         };
+        write_header(&mut self.bytes, &header);
+        let order = packets_depth_first(&Page::new(&self.bytes, self.profile));
+        let leaf_block = if none { Vec::new() } else { encode_block(encoding, &self.packets, &order) };
+        let id_block = if none || !with_ids { Vec::new() } else { encode_ids(&self.ids) };
+        header.leaf_checksum = checksum(&leaf_block).into();
+        header.id_checksum = if id_block.is_empty() { 0 } else { checksum(&id_block) }.into();
+        header.leaf_lines = ((leaf_block.len() / LINE) as u32).into();
+        header.id_words = ((id_block.len() / WORD) as u32).into();
         write_header(&mut self.bytes, &header);
         WrittenPage { bytes: self.bytes, leaf_block, id_block }
     }
+}
+
+/// The numbers of a page's packets in the order of the tree, depth-first.
+fn packets_depth_first(page: &Page) -> Vec<u16> {
+    let mut order = Vec::with_capacity(page.header().packets.get().into());
+    let mut stack: Vec<Child> = (0..page.header().roots).rev().map(Child::Treelet).collect();
+    while let Some(child) = stack.pop() {
+        match child {
+            Child::Treelet(slot) => {
+                let links = page.links(slot);
+                stack.extend((0..links.children()).rev().map(|child| links.child(child)));
+            }
+            Child::Leaf { packet, .. } => order.push(packet),
+            Child::Remote(_) | Child::Empty => {}
+        }
+    }
+    order
 }
 
 /// Writes the header of a page.
@@ -271,7 +286,7 @@ pub(super) fn write_remote(bytes: &mut [u8; PAGE], profile: Profile, roots: u8, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Page, PagePatcher, PagePlace, check_page};
+    use super::super::{PagePatcher, PagePlace, check_page};
     use super::*;
     use crate::decode::decode_child;
     use crate::ids::decode_id;
@@ -281,7 +296,6 @@ mod tests {
     use crate::treelet::Child;
     use crate::turning::{TurningDirection, decode_turning};
     use std::ops::Range;
-    use zerocopy::FromZeros;
 
     const ENCODING: TriangleEncoding = TriangleEncoding::Packed;
     /// Root 1 of page 7 is that of page 5, link 3.

@@ -75,7 +75,12 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
     let mut record = ObjectRecord::new_zeroed();
     let (mut nodes, mut leaves, mut ids) = (Vec::new(), Vec::new(), Vec::new());
     for (number, page) in pages.iter().enumerate() {
-        let block = if page.packets.is_empty() { Vec::new() } else { encode_block(encoding, &page.packets) };
+        let in_order: Vec<u16> = (0..page.packets.len() as u16).collect();
+        let block = if page.packets.is_empty() {
+            Vec::new()
+        } else {
+            encode_block(encoding, &page.packets, &in_order)
+        };
         let numbers: Vec<Vec<u32>> = page.packets.iter().map(|_| vec![u32::from(input.byte()); 4]).collect();
         let id_block = if has_ids && !numbers.is_empty() { encode_ids(&numbers) } else { Vec::new() };
         let mut header = PageHeader::new_zeroed();

@@ -126,7 +126,9 @@ fn every_backend_unpacks_to_the_bits_of_the_reference() {
                     Packet::new(&triangles)
                 })
                 .collect();
-            let block = encode_block(TriangleEncoding::Packed, &packets);
+            // The last packet comes first.
+            let order: Vec<u16> = (0..packets.len() as u16).rev().collect();
+            let block = encode_block(TriangleEncoding::Packed, &packets, &order);
             let mut changed = block.clone();
             for _ in 0..1 + random() % 4 {
                 let at = random() % changed.len();
