@@ -1,0 +1,107 @@
+//! Answers as tuples of arrays, one element or row per question.
+//!
+//! Answers that may be missing have an array of bool in front; the other arrays hold NaN and 0 where there is none.
+
+use crate::arrays::{array, table};
+use bvh_query::{ClosestPoint, Contact, Distance, RayHit};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+type Points<'py> = Bound<'py, PyArray2<f64>>;
+type Ids<'py> = Bound<'py, PyArray1<u32>>;
+
+/// Distance, lower and upper bound, points of A and B, object and triangle of A, and of B.
+pub(crate) type Distances<'py> = (
+    Numbers<'py>,
+    Numbers<'py>,
+    Numbers<'py>,
+    Points<'py>,
+    Points<'py>,
+    Ids<'py>,
+    Ids<'py>,
+    Ids<'py>,
+    Ids<'py>,
+);
+
+pub(crate) fn distances<'py>(py: Python<'py>, of: &[Distance]) -> PyResult<Distances<'py>> {
+    Ok((
+        array(py, of.iter().map(|answer| answer.distance)),
+        array(py, of.iter().map(|answer| answer.lower)),
+        array(py, of.iter().map(|answer| answer.upper)),
+        table(py, of.iter().map(|answer| answer.point_a))?,
+        table(py, of.iter().map(|answer| answer.point_b))?,
+        array(py, of.iter().map(|answer| answer.object_a)),
+        array(py, of.iter().map(|answer| answer.triangle_a)),
+        array(py, of.iter().map(|answer| answer.object_b)),
+        array(py, of.iter().map(|answer| answer.triangle_b)),
+    ))
+}
+
+/// Where the rows of each question start, and the rows of all.
+pub(crate) type Lists<'py, T> = (Bound<'py, PyArray1<i64>>, T);
+
+pub(crate) fn starts<'py>(
+    py: Python<'py>,
+    lengths: impl Iterator<Item = usize>,
+) -> Bound<'py, PyArray1<i64>> {
+    let mut end = 0;
+    array(
+        py,
+        std::iter::once(0).chain(lengths.map(|length| {
+            end += length as i64;
+            end
+        })),
+    )
+}
+
+/// Rows of object and triangle of A, and of B.
+pub(crate) fn contacts<'py>(
+    py: Python<'py>,
+    of: &[Vec<Contact>],
+) -> PyResult<Lists<'py, Bound<'py, PyArray2<u32>>>> {
+    let row =
+        |contact: &Contact| [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b];
+    Ok((starts(py, of.iter().map(Vec::len)), table(py, of.iter().flatten().map(row))?))
+}
+
+/// Distance, lower and upper bound, point, object and triangle.
+pub(crate) type Closest<'py> =
+    (Bound<'py, PyArray1<bool>>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Points<'py>, Ids<'py>, Ids<'py>);
+
+pub(crate) fn closest<'py>(
+    py: Python<'py>,
+    of: impl Iterator<Item = Option<ClosestPoint>> + Clone,
+) -> PyResult<Closest<'py>> {
+    let number = |field: fn(&ClosestPoint) -> f64| {
+        array(py, of.clone().map(move |answer| answer.map_or(f64::NAN, |answer| field(&answer))))
+    };
+    Ok((
+        array(py, of.clone().map(|answer| answer.is_some())),
+        number(|answer| answer.distance),
+        number(|answer| answer.lower),
+        number(|answer| answer.upper),
+        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], |answer| answer.point)))?,
+        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.object))),
+        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.triangle))),
+    ))
+}
+
+/// Parameter, lower and upper bound, point, object and triangle.
+pub(crate) fn hits<'py>(
+    py: Python<'py>,
+    of: impl Iterator<Item = Option<RayHit>> + Clone,
+) -> PyResult<Closest<'py>> {
+    let number = |field: fn(&RayHit) -> f64| {
+        array(py, of.clone().map(move |answer| answer.map_or(f64::NAN, |answer| field(&answer))))
+    };
+    Ok((
+        array(py, of.clone().map(|answer| answer.is_some())),
+        number(|answer| answer.t),
+        number(|answer| answer.lower),
+        number(|answer| answer.upper),
+        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], |answer| answer.point)))?,
+        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.object))),
+        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.triangle))),
+    ))
+}

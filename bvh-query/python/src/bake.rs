@@ -1,0 +1,80 @@
+//! Bakes meshes: arrays into memory, and files into files of any size.
+
+use crate::arrays::rows;
+use crate::errors::{BakeError, bake_error};
+use crate::mesh::Mesh;
+use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
+use bvh_query::Bvh;
+use numpy::PyReadonlyArray2;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// The options of the command line that have the same names there.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct BakeOptions {
+    profile: Option<String>,
+    triangles: Option<String>,
+    max_error: Option<f64>,
+    effort: Option<String>,
+    ids: bool,
+    topology: bool,
+}
+
+impl BakeOptions {
+    fn read(&self) -> PyResult<Options> {
+        let unknown = |name: &str, found: &str, known: &[&str]| {
+            let known = known.join(", ");
+            PyValueError::new_err(format!("{name}: expected one of {known}, found {found:?}"))
+        };
+        let mut options = Options::default().max_error(self.max_error).ids(self.ids).topology(self.topology);
+        if let Some(name) = &self.profile {
+            let profile = Profile::from_name(name);
+            let known = Profile::ALL.map(Profile::name);
+            options = options.profile(profile.ok_or_else(|| unknown("profile", name, &known))?);
+        }
+        if let Some(name) = &self.triangles {
+            let encoding = TriangleEncoding::ALL.into_iter().find(|encoding| encoding.name() == name);
+            let known = TriangleEncoding::ALL.map(TriangleEncoding::name);
+            options = options.triangles(encoding.ok_or_else(|| unknown("triangles", name, &known))?);
+        }
+        if let Some(name) = &self.effort {
+            let effort = Effort::from_name(name);
+            options =
+                options.effort(effort.ok_or_else(|| unknown("effort", name, &["fast", "default", "high"]))?);
+        }
+        Ok(options)
+    }
+}
+
+/// Bakes arrays of shape (V, 3) and (F, 3) in memory.
+#[pyfunction]
+pub(crate) fn bake(
+    py: Python<'_>,
+    vertices: PyReadonlyArray2<'_, f64>,
+    faces: PyReadonlyArray2<'_, u32>,
+    options: BakeOptions,
+) -> PyResult<Mesh> {
+    let options = options.read()?;
+    let mesh = bvh_bake::mesh::Mesh::from_triangles(rows(&vertices, "vertices")?, rows(&faces, "faces")?);
+    let (bytes, _) = py.detach(|| to_bytes(&mesh, &options)).map_err(bake_error)?;
+    let opened = Bvh::from_bytes(bytes);
+    opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
+}
+
+/// Bakes mesh files into a file. Returns whether it was up to date already.
+#[pyfunction]
+pub(crate) fn bake_files(
+    py: Python<'_>,
+    inputs: Vec<PathBuf>,
+    output: PathBuf,
+    options: BakeOptions,
+    max_memory: Option<u64>,
+    force: bool,
+) -> PyResult<bool> {
+    let options = options.read()?;
+    let bake = || FileBake::new(inputs, output).options(options).max_memory(max_memory).force(force).run();
+    let outcome = py.detach(bake).map_err(bake_error)?;
+    Ok(matches!(outcome, Outcome::UpToDate(_)))
+}

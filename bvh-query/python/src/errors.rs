@@ -1,0 +1,45 @@
+//! Errors of the libraries as exceptions with the same messages.
+
+use bvh_query::{OpenError, PoseError, QueryError};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+create_exception!(cbvh, FormatError, PyValueError, "A file is not a valid .cbvh file, or is damaged.");
+create_exception!(cbvh, BakeError, PyValueError, "A mesh cannot be baked.");
+
+/// The exception of a file that cannot be opened. An error of the system keeps its class, such as `FileNotFoundError`.
+pub(crate) fn open_error(error: OpenError) -> PyErr {
+    let message = error.to_string();
+    match error {
+        OpenError::Io { path, source } => match source.raw_os_error() {
+            // With its number, `OSError` picks the class.
+            Some(number) => {
+                let text = source.to_string();
+                let text = text.split(" (os error").next().unwrap_or_default().to_owned();
+                PyOSError::new_err((number, text, path))
+            }
+            None => PyOSError::new_err(message),
+        },
+        _ => FormatError::new_err(message),
+    }
+}
+
+/// The exception of a question that has no answer.
+pub(crate) fn query_error(error: QueryError) -> PyErr {
+    match error {
+        QueryError::Damaged(_) => FormatError::new_err(error.to_string()),
+        QueryError::File { .. } => PyOSError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// The exception of a matrix that is not a pose.
+pub(crate) fn pose_error(place: &str, error: PoseError) -> PyErr {
+    PyValueError::new_err(format!("{place}: {error}"))
+}
+
+/// The exception of a mesh that cannot be baked.
+pub(crate) fn bake_error(error: bvh_bake::BakeError) -> PyErr {
+    BakeError::new_err(error.to_string())
+}

@@ -1,0 +1,42 @@
+//! The compiled part of the Python module `cbvh`: meshes, and questions about them, with arrays in and arrays out.
+//!
+//! What users see is in `python/cbvh/__init__.py`: it checks shapes, names results and documents them. This module takes
+//! arrays of exactly the shapes stated here, and lets other threads of Python run while it works.
+
+mod answers;
+mod arrays;
+mod bake;
+mod errors;
+mod mesh;
+mod pairs;
+mod probes;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<mesh::Mesh>()?;
+    macro_rules! functions {
+        ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
+    }
+    functions![bake::bake, bake::bake_files];
+    functions![
+        pairs::collide,
+        pairs::within,
+        pairs::relation,
+        pairs::distance,
+        pairs::distance_with,
+        pairs::contacts
+    ];
+    functions![
+        probes::closest_points,
+        probes::sides,
+        probes::first_hits,
+        probes::any_hits,
+        probes::all_hits,
+        probes::meet_segments
+    ];
+    module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
+    module.add("BakeError", module.py().get_type::<errors::BakeError>())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}

@@ -1,0 +1,76 @@
+//! A mesh in a `.cbvh` file, mapped or in memory: what Python code holds.
+
+use crate::errors::{FormatError, open_error};
+use bvh_query::{Bvh, OwnedShape};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// All objects of a file, or one of them.
+#[pyclass(frozen, module = "cbvh._cbvh")]
+pub(crate) struct Mesh {
+    shape: OwnedShape,
+}
+
+impl Mesh {
+    pub(crate) fn new(bvh: Bvh) -> Self {
+        Self { shape: bvh.into() }
+    }
+
+    pub(crate) fn shape(&self) -> &OwnedShape {
+        &self.shape
+    }
+}
+
+#[pymethods]
+impl Mesh {
+    /// Maps a file.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        py.detach(|| Bvh::open(path)).map(Self::new).map_err(open_error)
+    }
+
+    /// Opens the bytes of a file, which are copied.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let opened = Bvh::from_bytes(bytes.to_vec());
+        opened.map(Self::new).map_err(|error| FormatError::new_err(error.to_string()))
+    }
+
+    /// One object of the file.
+    fn object(&self, number: usize) -> PyResult<Self> {
+        let bvh = Arc::clone(self.shape.bvh());
+        let objects = bvh.objects().len();
+        let shape = OwnedShape::object(bvh, number).ok_or_else(|| {
+            PyIndexError::new_err(format!("object: expected a number below {objects}, found {number}"))
+        })?;
+        Ok(Self { shape })
+    }
+
+    /// The names of all objects of the file.
+    fn names(&self) -> Vec<String> {
+        self.shape.bvh().objects().iter().map(|object| object.name().to_owned()).collect()
+    }
+
+    /// The triangles stored.
+    fn triangles(&self) -> u64 {
+        self.shape.shape().triangles()
+    }
+
+    /// The bytes of the file.
+    fn bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.shape.bvh().bytes())
+    }
+
+    /// The number of bytes of the file.
+    fn size(&self) -> usize {
+        self.shape.bvh().bytes().len()
+    }
+
+    /// Checks the whole file.
+    fn check(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.shape.bvh().check_all()).map_err(crate::errors::query_error)
+    }
+}
