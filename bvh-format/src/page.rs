@@ -39,6 +39,9 @@ pub const MAX_PAGES: u64 = 1 << 26;
 /// The parent page that the anchor of an object's root states.
 pub const NO_PARENT: u32 = u32::MAX;
 
+/// More leaf packets than a page has: links have ten bits for the number of the first of up to eight.
+pub const MAX_PACKETS_PER_PAGE: usize = (1 << 10) + 8;
+
 /// Bytes at the end of an anchor that say which remote link leads to the root.
 const PARENT_BYTES: usize = 8;
 /// Bytes of a remote link.

@@ -7,7 +7,7 @@ use crate::checksum::{Hasher, checksum};
 use crate::error::FormatError;
 use crate::leaf::{F32_PACKET_BYTES, LINE};
 use crate::object::Object;
-use crate::page::{PAGE, Page};
+use crate::page::{MAX_PACKETS_PER_PAGE, PAGE, Page};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -17,9 +17,6 @@ const CHUNK_BYTES: usize = 1 << 16;
 /// The most bytes of a block that keeps the rules.
 const MAX_BLOCK_BYTES: usize = 1 << 20;
 
-/// The most leaf packets of a page: by rule 17 it has at most 62 treelets, which have at most 8 children, of which 61 are
-/// treelets.
-const MAX_PACKETS_PER_PAGE: usize = 62 * 8 - 61;
 /// The most bytes of a packed block: a head, 110 bits per packet, 65535 further slots of 16 bits, 65535 vertices of 96 bits,
 /// spare bytes and the rest of a line.
 const MAX_PACKED_BLOCK_BYTES: usize = 32 + MAX_PACKETS_PER_PAGE * 14 + 65535 * 2 + 65535 * 12 + 8 + LINE;
@@ -154,8 +151,8 @@ mod tests {
         }
         // Of each packet, the least id, the lane that has it, and three offsets, all as wide as can be.
         let groups = MAX_PACKETS_PER_PAGE.div_ceil(ID_GROUP);
-        let bits =
-            groups * (8 * ID_ENTRY_BYTES + ID_GROUP_HEAD_BITS) + MAX_PACKETS_PER_PAGE * (32 + 2 + 3 * 32);
-        assert!(bits <= usize::from(u16::MAX) && bits / 8 + 16 <= MAX_BLOCK_BYTES);
+        let group_bits = ID_GROUP_HEAD_BITS + ID_GROUP * (32 + 2 + 3 * 32);
+        let bytes = groups * (ID_ENTRY_BYTES + group_bits.div_ceil(8));
+        assert!(bytes <= usize::from(u16::MAX) && bytes + 16 <= MAX_BLOCK_BYTES);
     }
 }

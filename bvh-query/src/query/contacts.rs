@@ -16,6 +16,7 @@ use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
+use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::{FormatError, Rule};
 use std::ops::ControlFlow;
 
@@ -113,8 +114,8 @@ fn max_triangles(side: Shape<'_>) -> u64 {
     pages * MAX_TRIANGLES_PER_PAGE + layout.duplicate_ids(bytes).len() as u64
 }
 
-/// The most triangles of a page: it has at most 62 treelets of 8 children, each of which may be a packet.
-const MAX_TRIANGLES_PER_PAGE: u64 = 62 * 8 * PACKET as u64;
+/// More triangles than a page has.
+const MAX_TRIANGLES_PER_PAGE: u64 = (MAX_PACKETS_PER_PAGE * PACKET) as u64;
 
 /// Returns the rule that is broken where there are more contacts than pairs of triangles.
 #[cold]
@@ -158,5 +159,25 @@ impl TrianglePair {
     /// Returns where the triangle of B is stored.
     pub(super) fn place_b(&self) -> TrianglePlace {
         TrianglePlace { page: self.b.page, packet: self.b.packet, lane: self.lane_b }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_bake::mesh::Mesh;
+    use bvh_bake::{Options, Profile, TriangleEncoding, to_bytes};
+
+    /// Short treelets let a page have more packets than 62 treelets of whole lines have room for.
+    #[test]
+    fn no_page_has_more_triangles_than_contacts_count_on() {
+        let positions: Vec<[f64; 3]> =
+            (0..2202u32).map(|n| [f64::from(n % 47), f64::from(n / 47), f64::from(n * n % 7)]).collect();
+        let mesh = Mesh::from_triangles(positions, (0..2200).map(|n| [n, n + 1, n + 2]).collect());
+        let options = Options::default().profile(Profile::Dop6U8).triangles(TriangleEncoding::Packed);
+        let bvh = Bvh::from_bytes(to_bytes(&mesh, &options).unwrap().0).unwrap();
+        assert_eq!(bvh.objects()[0].record().pages.get(), 1);
+        assert!(bvh.objects()[0].record().packets.get() > 62 * 8);
+        assert!(max_triangles(bvh.all()) >= 2200);
     }
 }

@@ -24,7 +24,7 @@ use crate::traverse::walk_memory::WalkMemory;
 ///   one packet test each. Ordinary meshes need a few hundred visits. Where files come from strangers, bound the
 ///   time further by [`Querier::set_budget`].
 /// - Memory: at most 8 KiB for each treelet that the query opens, of either file, and 4 MiB; no recursion.
-///   A page has at most 62 treelets. The answer of [`Querier::contacts`] takes 16 bytes per contact on top.
+///   A page has at most 110 treelets. The answer of [`Querier::contacts`] takes 16 bytes per contact on top.
 /// - Contacts: at most as many as the pages of both files have room for pairs of triangles, listed duplicates
 ///   included. More are an error.
 ///
