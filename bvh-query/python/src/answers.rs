@@ -65,43 +65,35 @@ pub(crate) fn contacts<'py>(
     Ok((starts(py, of.iter().map(Vec::len)), table(py, of.iter().flatten().map(row))?))
 }
 
-/// Distance, lower and upper bound, point, object and triangle.
-pub(crate) type Closest<'py> =
+/// Whether there is an answer; distance or parameter, its lower and upper bound, point, object and triangle.
+pub(crate) type Found<'py> =
     (Bound<'py, PyArray1<bool>>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Points<'py>, Ids<'py>, Ids<'py>);
+
+/// Distance or parameter with its bounds, point, object and triangle of one answer.
+type Row = ([f64; 3], [f64; 3], u32, u32);
 
 pub(crate) fn closest<'py>(
     py: Python<'py>,
-    of: impl Iterator<Item = Option<ClosestPoint>> + Clone,
-) -> PyResult<Closest<'py>> {
-    let number = |field: fn(&ClosestPoint) -> f64| {
-        array(py, of.clone().map(move |answer| answer.map_or(f64::NAN, |answer| field(&answer))))
-    };
-    Ok((
-        array(py, of.clone().map(|answer| answer.is_some())),
-        number(|answer| answer.distance),
-        number(|answer| answer.lower),
-        number(|answer| answer.upper),
-        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], |answer| answer.point)))?,
-        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.object))),
-        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.triangle))),
-    ))
+    of: impl Iterator<Item = Option<ClosestPoint>>,
+) -> PyResult<Found<'py>> {
+    let row = |c: ClosestPoint| ([c.distance, c.lower, c.upper], c.point, c.object, c.triangle);
+    found(py, of.map(|answer| answer.map(row)).collect())
 }
 
-/// Parameter, lower and upper bound, point, object and triangle.
-pub(crate) fn hits<'py>(
-    py: Python<'py>,
-    of: impl Iterator<Item = Option<RayHit>> + Clone,
-) -> PyResult<Closest<'py>> {
-    let number = |field: fn(&RayHit) -> f64| {
-        array(py, of.clone().map(move |answer| answer.map_or(f64::NAN, |answer| field(&answer))))
-    };
+pub(crate) fn hits<'py>(py: Python<'py>, of: impl Iterator<Item = Option<RayHit>>) -> PyResult<Found<'py>> {
+    let row = |hit: RayHit| ([hit.t, hit.lower, hit.upper], hit.point, hit.object, hit.triangle);
+    found(py, of.map(|answer| answer.map(row)).collect())
+}
+
+fn found(py: Python<'_>, of: Vec<Option<Row>>) -> PyResult<Found<'_>> {
+    let rows = || of.iter().map(|row| row.unwrap_or(([f64::NAN; 3], [f64::NAN; 3], 0, 0)));
     Ok((
-        array(py, of.clone().map(|answer| answer.is_some())),
-        number(|answer| answer.t),
-        number(|answer| answer.lower),
-        number(|answer| answer.upper),
-        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], |answer| answer.point)))?,
-        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.object))),
-        array(py, of.clone().map(|answer| answer.map_or(0, |answer| answer.triangle))),
+        array(py, of.iter().map(Option::is_some)),
+        array(py, rows().map(|row| row.0[0])),
+        array(py, rows().map(|row| row.0[1])),
+        array(py, rows().map(|row| row.0[2])),
+        table(py, rows().map(|row| row.1))?,
+        array(py, rows().map(|row| row.2)),
+        array(py, rows().map(|row| row.3)),
     ))
 }

@@ -4,16 +4,16 @@
 
 use crate::errors::pose_error;
 use bvh_query::Pose;
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Reads poses from an array of shape (N, 4, 4).
 pub(crate) fn poses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Pose>> {
-    let (matrices, rest) = array.as_slice()?.as_chunks::<16>();
-    if !rest.is_empty() {
-        return Err(PyValueError::new_err("poses: expected shape (N, 4, 4)"));
-    }
+    expect("poses", &array.shape()[1..], &[4, 4])?;
+    let matrices = array.as_slice()?.as_chunks::<16>().0;
     let numbered = matrices.iter().enumerate();
     numbered
         .map(|(number, matrix)| pose(matrix).map_err(|error| pose_error(&format!("poses[{number}]"), error)))
@@ -22,8 +22,8 @@ pub(crate) fn poses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Pose>> {
 
 /// Reads one pose from an array of shape (4, 4).
 pub(crate) fn one_pose(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
-    let matrix =
-        array.as_slice()?.try_into().map_err(|_| PyValueError::new_err("pose: expected shape (4, 4)"))?;
+    expect("pose", array.shape(), &[4, 4])?;
+    let matrix = array.as_slice()?.first_chunk().ok_or_else(|| PyValueError::new_err("pose: no matrix"))?;
     pose(matrix).map_err(|error| pose_error("pose", error))
 }
 
@@ -34,11 +34,16 @@ fn pose(matrix: &[f64; 16]) -> Result<Pose, bvh_query::PoseError> {
 
 /// Reads rows of three numbers from an array of shape (N, 3).
 pub(crate) fn rows<T: Element + Copy>(array: &PyReadonlyArray2<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
-    let (rows, rest) = array.as_slice()?.as_chunks::<3>();
-    if !rest.is_empty() {
-        return Err(PyValueError::new_err(format!("{name}: expected shape (N, 3)")));
+    expect(name, &array.shape()[1..], &[3])?;
+    Ok(array.as_slice()?.as_chunks::<3>().0.to_vec())
+}
+
+/// Compares the shape of one row of an array.
+fn expect(name: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
+    if found == expected {
+        return Ok(());
     }
-    Ok(rows.to_vec())
+    Err(PyValueError::new_err(format!("{name}: expected rows of shape {expected:?}, found {found:?}")))
 }
 
 /// Makes an array of shape (N,).

@@ -1,6 +1,6 @@
 //! Questions about one mesh and many points, rays or segments.
 
-use crate::answers::{self, Closest, Lists, starts};
+use crate::answers::{self, Found, Lists, starts};
 use crate::arrays::{array, one_pose, rows};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
@@ -59,7 +59,7 @@ pub(crate) fn closest_points<'py>(
     within: f64,
     pose: PyReadonlyArray2<'py, f64>,
     parallel: bool,
-) -> PyResult<Closest<'py>> {
+) -> PyResult<Found<'py>> {
     let points = rows(&points, "points")?;
     let found = Place::new(&pose, parallel)?.ask(
         py,
@@ -117,7 +117,7 @@ pub(crate) fn first_hits<'py>(
     until: PyReadonlyArray1<'py, f64>,
     pose: PyReadonlyArray2<'py, f64>,
     parallel: bool,
-) -> PyResult<Closest<'py>> {
+) -> PyResult<Found<'py>> {
     let rays = rays(&origins, &directions, &until)?;
     let found = Place::new(&pose, parallel)?.ask(
         py,
@@ -157,7 +157,7 @@ pub(crate) fn all_hits<'py>(
     until: PyReadonlyArray1<'py, f64>,
     pose: PyReadonlyArray2<'py, f64>,
     parallel: bool,
-) -> PyResult<Lists<'py, Closest<'py>>> {
+) -> PyResult<Lists<'py, Found<'py>>> {
     let rays = rays(&origins, &directions, &until)?;
     let found = Place::new(&pose, parallel)?.ask(
         py,

@@ -198,6 +198,15 @@ class BadArguments(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "parallel"):
             mesh.distance(mesh, one, rel_err=0.1, parallel=True)
 
+    def test_the_compiled_module_checks_shapes_itself(self):
+        for call, array in (
+            (lambda rows: _cbvh.sides(self.cube._mesh, rows, np.eye(4), False), np.zeros((3, 2))),
+            (lambda pose: _cbvh.sides(self.cube._mesh, np.zeros((1, 3)), pose, False), np.zeros((2, 8))),
+            (lambda poses: _cbvh.collide(self.cube._mesh, self.cube._mesh, poses, False), np.zeros((1, 2, 8))),
+        ):
+            with self.assertRaisesRegex(ValueError, "expected rows of shape"):
+                call(array)
+
     def test_damage_is_an_exception(self):
         whole = self.cube.tobytes()
         random_numbers = random.Random(3)
