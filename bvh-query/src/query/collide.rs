@@ -11,6 +11,7 @@ use crate::narrow::triangles_intersect;
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
 use crate::query::bounding_volumes::surely_apart;
+use crate::query::exact::RecentTriangles;
 use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::node_test::Measure;
@@ -74,6 +75,7 @@ impl Querier {
                 queue: &mut self.queue,
                 drain_at: FIRST_DRAIN,
                 stats: QueryStats::default(),
+                recent: Default::default(),
                 visit: |candidate| Ok(ControlFlow::Break(candidate)),
                 found: None,
             },
@@ -101,6 +103,8 @@ pub(super) struct Candidates<'a, F> {
     /// The number of candidates that are decided together next; after that, a full queue.
     pub(super) drain_at: usize,
     pub(super) stats: QueryStats,
+    /// Of A and of B.
+    pub(super) recent: [RecentTriangles; 2],
     pub(super) visit: F,
     /// What `visit` broke with.
     pub(super) found: Option<TrianglePair>,
@@ -135,9 +139,11 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Ca
     #[inline(never)]
     fn intersect(&mut self, candidate: TrianglePair) -> Result<bool, QueryError> {
         self.stats.exact_tests += 1;
-        let a = self.placed.triangle_a(candidate.a, candidate.lane_a)?;
-        let b = self.placed.triangle_b(candidate.b, candidate.lane_b)?;
-        Ok(triangles_intersect(&a, &b))
+        let TrianglePair { a, b, lane_a, lane_b } = candidate;
+        let [recent_a, recent_b] = &mut self.recent;
+        let triangle_a = recent_a.get_or_place(a, lane_a, || self.placed.triangle_a(a, lane_a))?;
+        let triangle_b = recent_b.get_or_place(b, lane_b, || self.placed.triangle_b(b, lane_b))?;
+        Ok(triangles_intersect(triangle_a, triangle_b))
     }
 }
 

@@ -93,6 +93,7 @@ impl Querier {
                 queue: &mut self.queue,
                 drain_at: TriangleQueue::FULL,
                 stats: QueryStats::default(),
+                recent: Default::default(),
                 visit: |candidate| report(placed, candidate, visit),
                 found: None,
             },

@@ -7,6 +7,7 @@ use crate::isa::{Isa, Task};
 use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
 use crate::query::placed_pair::PlacedPair;
+use bvh_format::leaf::PACKET;
 use bvh_format::object::Object;
 
 impl PlacedPair<'_> {
@@ -18,6 +19,34 @@ impl PlacedPair<'_> {
     /// Returns a triangle of B, placed in A's frame.
     pub(crate) fn triangle_b(&self, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
         Ok(placed(&stored(self.pair.bvh_b, self.pair.object_b, leaf, lane)?, self.pose))
+    }
+}
+
+/// The triangles of a side that were placed last, one for each lane. Candidates of two packets name a triangle up to four
+/// times, and unpacking it takes a third of an exact test.
+pub(super) struct RecentTriangles([(Option<(u32, u16)>, Triangle); PACKET]);
+
+impl Default for RecentTriangles {
+    fn default() -> Self {
+        Self([(None, [[0.0; 3]; 3]); PACKET])
+    }
+}
+
+impl RecentTriangles {
+    /// Returns the triangle in a lane of a packet, or what `place` returns, which is then kept.
+    #[inline(always)]
+    pub(super) fn get_or_place(
+        &mut self,
+        leaf: LeafPacket,
+        lane: u8,
+        place: impl FnOnce() -> Result<Triangle, QueryError>,
+    ) -> Result<&Triangle, QueryError> {
+        let (known, triangle) = &mut self.0[usize::from(lane) % PACKET];
+        if *known != Some((leaf.page, leaf.packet)) {
+            *triangle = place()?;
+            *known = Some((leaf.page, leaf.packet));
+        }
+        Ok(triangle)
     }
 }
 
