@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| default.to_owned());
     let bytes = std::fs::read(path)?;
 
-    // Reads and checks the header page and the object table, and nothing else.
+    // Reads and checks the head of the file and the object table, and nothing else.
     let layout = Layout::read(&bytes)?;
     println!("version {}.{}, {} bytes", layout.version.0, layout.version.1, bytes.len());
     for section in &layout.sections {

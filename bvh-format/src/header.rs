@@ -1,7 +1,8 @@
-//! The header page: magic bytes, version, length, checksums and the section table.
+//! The head of a file: magic bytes, version, length, checksums and the section table.
 
-use crate::checksum::{checksum, hex};
+use crate::checksum::{Hasher, checksum, hex};
 use crate::error::{FormatError, ensure, require};
+use crate::leaf::LINE;
 use crate::page::PAGE;
 use crate::rule::Rule;
 use std::ops::Range;
@@ -11,11 +12,18 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 /// The first eight bytes of a file. Transfers in text mode damage the high bit or the line ends, and so show.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
 /// The major version. Readers refuse any other.
-pub const MAJOR: u16 = 4;
+pub const MAJOR: u16 = 5;
 /// The minor version. Readers accept any minor version of their major version.
 pub const MINOR: u16 = 0;
 /// The most entries that the section table can have.
 pub const MAX_SECTIONS: usize = 64;
+/// The most bytes that the header and the section table can take together.
+pub(crate) const MAX_HEAD_BYTES: usize = head_bytes(MAX_SECTIONS);
+
+/// The number of bytes of the header and a section table together.
+pub const fn head_bytes(sections: usize) -> usize {
+    size_of::<Header>() + sections * size_of::<SectionEntry>()
+}
 
 /// The first 64 bytes of a file.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
@@ -33,7 +41,7 @@ pub struct Header {
     pub file_length: U64,
     /// XXH3 of the sections that make up the content: see [`ContentHasher`](crate::layout::ContentHasher).
     pub content_checksum: U64,
-    /// XXH3 of the header page, in which this field counts as zero.
+    /// XXH3 of the header, in which this field counts as zero, and the section table.
     pub header_checksum: U64,
     /// Zero.
     pub reserved: [u8; 24],
@@ -47,9 +55,9 @@ pub struct SectionEntry {
     pub kind: U32,
     /// 0 if a reader that does not know the kind skips the section; 1 if it refuses the file.
     pub required: U32,
-    /// Byte offset in the file, a multiple of the page size.
+    /// Byte offset in the file, a multiple of [`SectionKind::alignment`].
     pub offset: U64,
-    /// Length in bytes. Zeros fill the rest of the last page.
+    /// Length in bytes.
     pub length: U64,
     /// XXH3 of the section's bytes.
     pub checksum: U64,
@@ -57,7 +65,7 @@ pub struct SectionEntry {
 
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
 
-/// The sections of version 3. Later minor versions of the format may add kinds.
+/// The sections of version 5. Later minor versions of the format may add kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[repr(u32)]
@@ -108,6 +116,12 @@ impl SectionKind {
         self != Self::Provenance
     }
 
+    /// The sections of this kind start at multiples of so many bytes: pages are mapped as they are, and the vectors of the
+    /// other sections lie in lines.
+    pub fn alignment(self) -> usize {
+        if self == Self::Nodes { PAGE } else { LINE }
+    }
+
     /// The name in listings.
     pub fn name(self) -> &'static str {
         match self {
@@ -134,7 +148,7 @@ pub struct Section {
     pub checksum: u64,
 }
 
-/// Writes a header page. `sections` must be in the order of the file.
+/// Writes the header and the section table. `sections` must be in the order of the file.
 pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section]) -> Vec<u8> {
     let header = Header {
         magic: MAGIC,
@@ -146,7 +160,7 @@ pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section
         header_checksum: 0.into(),
         reserved: [0; 24],
     };
-    let mut page = header.as_bytes().to_vec();
+    let mut head = header.as_bytes().to_vec();
     for section in sections {
         let entry = SectionEntry {
             kind: (section.kind as u32).into(),
@@ -155,15 +169,15 @@ pub fn write_header(file_length: u64, content_checksum: u64, sections: &[Section
             length: (section.range.len() as u64).into(),
             checksum: section.checksum.into(),
         };
-        page.extend_from_slice(entry.as_bytes());
+        head.extend_from_slice(entry.as_bytes());
     }
-    page.resize(PAGE, 0);
-    let sum = checksum(&page);
-    page[32..40].copy_from_slice(&sum.to_le_bytes());
-    page
+    let sum = checksum(&head);
+    head[32..40].copy_from_slice(&sum.to_le_bytes());
+    head
 }
 
-/// Reads and checks the header page and the section table of a file of `length` bytes that starts with `bytes`.
+/// Reads and checks the header and the section table of a file of `length` bytes that starts with `bytes`: all of it or
+/// [`MAX_HEAD_BYTES`].
 ///
 /// # Errors
 /// The first of rules 1 to 9 that does not hold.
@@ -174,35 +188,35 @@ pub(crate) fn read_header(bytes: &[u8], length: u64) -> Result<(Header, Vec<Sect
         let found = if start.is_empty() { "an empty file".into() } else { text };
         ("the magic bytes of a .cbvh file".into(), found)
     })?;
-    let found = bytes.len();
-    let page = bytes
-        .get(..PAGE)
-        .ok_or_else(|| FormatError::new(Rule::HeaderSize, 0, "4096 bytes or more", found))?;
-    // A page always has room for a header; the error keeps the code free of panics.
-    let (header, rest) = Header::read_from_prefix(page)
-        .map_err(|_| FormatError::new(Rule::HeaderSize, 0, "a header", "none"))?;
+    let (header, rest) = Header::read_from_prefix(bytes).map_err(|_| {
+        FormatError::new(Rule::HeaderSize, 0, format!("{} bytes or more", size_of::<Header>()), bytes.len())
+    })?;
     require(Rule::Version, 8, MAJOR, header.major.get())?;
-    let mut zeroed = page.to_vec();
-    zeroed[32..40].fill(0);
-    require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(checksum(&zeroed)))?;
-    require(Rule::FileLength, 16, header.file_length.get(), length)?;
     let count = header.sections.get() as usize;
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
     let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)
-        .map_err(|_| FormatError::new(Rule::SectionCount, 12, "a table within the page", count))?;
+        .map_err(|_| FormatError::new(Rule::SectionCount, 12, "a table within the file", count))?;
+    let unsummed = Header { header_checksum: 0.into(), ..header };
+    let mut hasher = Hasher::default();
+    hasher.update(unsummed.as_bytes());
+    hasher.update(entries.as_bytes());
+    require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(hasher.finish()))?;
+    require(Rule::FileLength, 16, header.file_length.get(), length)?;
     let sections = read_entries(entries, usize::try_from(length).unwrap_or(usize::MAX))?;
     Ok((header, sections))
 }
 
 fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Section>, FormatError> {
     let mut sections: Vec<Section> = Vec::new();
-    let mut free_from = PAGE;
+    let mut free_from = head_bytes(entries.len());
     for (index, entry) in entries.iter().enumerate() {
         let at = (size_of::<Header>() + index * size_of::<SectionEntry>()) as u64;
         let (offset, length) = (entry.offset.get(), entry.length.get());
-        let place = || (format!("a multiple of {PAGE} from {free_from}"), format!("{offset}"));
+        let kind = SectionKind::from_number(entry.kind.get());
+        let alignment = kind.map_or(LINE, SectionKind::alignment);
+        let place = || (format!("a multiple of {alignment} from {free_from}"), format!("{offset}"));
         let start = usize::try_from(offset).unwrap_or(usize::MAX);
-        let fits = start % PAGE == 0 && start >= free_from;
+        let fits = start % alignment == 0 && start >= free_from;
         ensure(fits, Rule::SectionPlace, at + 8, place)?;
         let end = usize::try_from(length).ok().and_then(|length| start.checked_add(length));
         let end = end.filter(|&end| end <= file_length).ok_or_else(|| {
@@ -210,7 +224,7 @@ fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Sect
             FormatError::new(Rule::SectionPlace, at + 16, expected, length)
         })?;
         free_from = end;
-        match SectionKind::from_number(entry.kind.get()) {
+        match kind {
             Some(kind) => {
                 let once = sections.iter().all(|section| section.kind != kind);
                 ensure(once, Rule::SectionOnce, at, || {

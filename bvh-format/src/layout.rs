@@ -3,7 +3,7 @@
 use crate::checksum::hex;
 use crate::checksum::{Hasher, checksum};
 use crate::error::{FormatError, ensure, require};
-use crate::header::{Header, Section, SectionKind, read_header};
+use crate::header::{Header, MAX_HEAD_BYTES, Section, SectionKind, read_header};
 use crate::ids::{WORD, id_block_bytes};
 use crate::instances::{Instance, read_instances};
 use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
@@ -16,7 +16,7 @@ use std::ops::Range;
 use zerocopy::FromBytes;
 use zerocopy::little_endian::U32;
 
-/// Where everything is in a file. Reading it takes the header page and the object table, and nothing else.
+/// Where everything is in a file. Reading it takes the head of the file and the object table, and nothing else.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Major and minor version.
@@ -36,7 +36,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Reads and checks the header page, the section table and the object table of a file in memory. The cost grows
+    /// Reads and checks the header, the section table and the object table of a file in memory. The cost grows
     /// with the number of objects, and not with the length of the file.
     ///
     /// # Errors
@@ -45,13 +45,13 @@ impl Layout {
         Self::read_from(bytes)
     }
 
-    /// Does the same for a file whose bytes are read piece by piece: first the header page, then the object section.
+    /// Does the same for a file whose bytes are read piece by piece: first its head, then the object section.
     ///
     /// # Errors
     /// The errors of [`Layout::read`], and those of the source.
     pub fn read_from<S: Source + ?Sized>(source: &S) -> Result<Self, S::Error> {
         let length = source.length();
-        let head = source.read(0..length.min(PAGE as u64) as usize)?;
+        let head = source.read(0..length.min(MAX_HEAD_BYTES as u64) as usize)?;
         let (header, sections) = read_header(&head, length)?;
         let objects = sections.iter().find(|section| section.kind == SectionKind::Objects);
         let table = source.read(objects.map_or(0..0, |section| section.range.clone()))?;

@@ -15,7 +15,7 @@
 //!                                             └ id block
 //! ```
 //!
-//! 1. [`Layout::read`] checks the header page and the object table, and reads nothing else, however long the file is.
+//! 1. [`Layout::read`] checks the head of the file and the object table, and reads nothing else, however long the file is.
 //! 2. A [page] of 4 KiB is found by its number. [`page::check_page`] checks it when it is first needed, and then
 //!    [`page::Page`] reads it without any further check.
 //! 3. A [treelet] in a page holds the bounds of up to eight children, and [`treelet::Links`] says where each

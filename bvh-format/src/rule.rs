@@ -25,11 +25,11 @@ macro_rules! rules {
 rules! {
     Magic = 1, "the file starts with the magic bytes";
     Version = 2, "the major version is one that this reader knows";
-    HeaderSize = 3, "the file holds a whole header page";
-    HeaderChecksum = 4, "the checksum in the header page is that of the page";
+    HeaderSize = 3, "the file holds a whole header";
+    HeaderChecksum = 4, "the checksum in the header is that of the header and the section table";
     FileLength = 5, "the file is as long as the header states";
-    SectionCount = 6, "the section table has at most 64 entries";
-    SectionPlace = 7, "sections are page-aligned, in order, and within the file";
+    SectionCount = 6, "the section table is in the file and has at most 64 entries";
+    SectionPlace = 7, "sections are aligned, in order, and within the file";
     SectionKnown = 8, "a required section is of a kind that this reader knows";
     SectionOnce = 9, "the needed sections are there, each once";
     SectionChecksum = 10, "a section has the checksum that the table states";

@@ -130,6 +130,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     let header = |edit: fn(&mut Change)| sealed(&[], edit);
     let entry = |at: usize, kind: u32, required: u32, offset: u64, length: u64| {
         sealed(&[], |f| {
+            f.bytes.resize(128, 0);
             f.header(12, &1u32.to_le_bytes());
             f.header(at, &[kind.to_le_bytes(), required.to_le_bytes()].concat());
             f.header(at + 8, &[offset.to_le_bytes(), length.to_le_bytes()].concat());
@@ -138,15 +139,18 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
     vec![
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
-        (2, "major-5", header(|f| f.header(8, &[5]))),
-        (3, "short", change(&[], |f| f.bytes.truncate(100))),
-        (4, "flipped-bit", change(&[], |f| f.bytes[4000] ^= 1)),
-        (5, "truncated", change(&[1], |f| f.bytes.truncate(4096 + 100))),
+        (2, "major-6", header(|f| f.header(8, &[6]))),
+        (3, "short", change(&[], |f| f.bytes.truncate(60))),
+        (4, "flipped-bit", change(&[], |f| f.bytes[60] ^= 1)),
+        (5, "truncated", change(&[1], |f| f.bytes.truncate(100))),
         (6, "65-sections", header(|f| f.header(12, &[65]))),
-        (7, "unaligned", entry(64, 1, 1, 4097, 0)),
-        (7, "beyond-the-end", entry(64, 1, 1, 4096, 1)),
-        (7, "wraps-around", entry(64, 99, 0, 4096, u64::MAX)),
-        (8, "unknown-required", entry(64, 99, 1, 4096, 0)),
+        (6, "table-beyond", change(&[1], |f| f.bytes.truncate(80))),
+        (7, "unaligned", entry(64, 1, 1, 129, 0)),
+        (7, "unaligned-nodes", entry(64, 2, 1, 128, 0)),
+        (7, "in-the-table", entry(64, 1, 1, 64, 0)),
+        (7, "beyond-the-end", entry(64, 1, 1, 128, 1)),
+        (7, "wraps-around", entry(64, 99, 0, 128, u64::MAX)),
+        (8, "unknown-required", entry(64, 99, 1, 128, 0)),
         (9, "no-sections", header(|_| ())),
         (9, "twice", {
             let objects = (1, 1, Vec::new());
@@ -261,6 +265,7 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
                 // The section table states a length that is longer by one line.
                 let length = section(&f.bytes, 3).len() as u64 + 64;
                 f.header(64 + 2 * 32 + 16, &length.to_le_bytes());
+                f.bytes.extend([0; 64]);
             }),
         ),
         (
@@ -431,11 +436,12 @@ fn bad_files_break_the_rule_in_their_name() {
 fn every_flipped_bit_that_means_something_is_found() {
     let topology = std::fs::read(testdata().join("ok-topology.cbvh")).unwrap();
     for bytes in [scene(), topology] {
+        let head = 64 + 32 * bytes[12] as usize;
         let sections: Vec<_> = (1..=8).map(|kind| section(&bytes, kind)).collect();
         for at in (0..bytes.len()).step_by(7) {
             let mut changed = bytes.clone();
             changed[at] ^= 1 << (at % 8);
-            let covered = at < 4096 || sections.iter().any(|section| section.contains(&at));
+            let covered = at < head || sections.iter().any(|section| section.contains(&at));
             assert_eq!(validate(&changed).is_err(), covered, "byte {at}");
         }
     }

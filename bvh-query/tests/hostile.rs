@@ -13,7 +13,7 @@ use bvh_format::{Layout, Rule};
 use bvh_query::{Bvh, DistanceOptions, Pose, Querier, QueryError};
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::{put, seal, seal_header, section};
-use common::asked::{Answers, ask, victims};
+use common::asked::{Answers, ask, place_in_file, victims};
 use common::shapes::{soup, sphere};
 use common::{Random, mesh, options, queriers, random_pose, translation};
 use std::path::Path;
@@ -22,9 +22,7 @@ use std::time::{Duration, Instant};
 /// Changes some bytes: flips a bit, sets a byte, writes a number that is often a limit, or copies a stretch.
 fn mutate(bytes: &mut [u8], random: &mut Random) {
     for _ in 0..1 + random.below(3) {
-        // Most of a file is zeros between structures. The bytes in use are at the start of pages.
-        let page = 4096 * random.below(bytes.len() / 4096);
-        let at = page + if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
+        let at = place_in_file(bytes, random);
         match random.below(6) {
             0 | 1 => bytes[at] ^= 1 << random.below(8),
             2 => bytes[at] = random.bits() as u8,

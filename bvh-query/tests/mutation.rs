@@ -13,7 +13,7 @@ use bvh_query::{Bvh, Pose, QueryError};
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::forge::{Input, forge};
 use cbvh_testkit::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
-use common::asked::{Answers, ask, victims};
+use common::asked::{Answers, ask, place_in_file, victims};
 use common::shapes::sphere;
 use common::{Random, mesh, queriers, random_pose, translation};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ const SEALS: [Seal; 5] = [Seal::None, Seal::Header, Seal::Pages, Seal::Sections,
 
 impl Seal {
     fn apply(self, bytes: &mut [u8]) {
-        if bytes.len() < 4096 {
+        if bytes.len() < 64 {
             return;
         }
         if self >= Self::Pages {
@@ -52,20 +52,13 @@ impl Seal {
     }
 }
 
-/// Returns a place in the file, more often one that is in use, at the start of a page.
-fn place(bytes: &[u8], random: &mut Random) -> usize {
-    let page = 4096 * random.below(bytes.len().div_ceil(4096));
-    let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
-    (page + within).min(bytes.len() - 1)
-}
-
 /// Damages a file in one of these ways. `other` is a second valid file.
 fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static str {
-    let at = place(bytes, random);
+    let at = place_in_file(bytes, random);
     match random.below(6) {
         0 => {
             for _ in 0..1 + random.below(3) {
-                let at = place(bytes, random);
+                let at = place_in_file(bytes, random);
                 bytes[at] ^= 1 << random.below(8);
             }
             "flipped"
@@ -81,7 +74,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
             // A stretch of another file replaces bytes, at the same place or at any place.
             let most = 2 << random.below(13);
             let length = (1 + random.below(most)).min(bytes.len() - at);
-            let from = if random.below(2) == 0 { at } else { place(other, random) };
+            let from = if random.below(2) == 0 { at } else { place_in_file(other, random) };
             let stretch = &other[from.min(other.len())..(from + length).min(other.len())];
             put(bytes, at, stretch);
             "spliced"
@@ -97,7 +90,7 @@ fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static st
         4 => {
             // A page, line or word replaces another one.
             let unit = [4096, 64, 8][random.below(3)];
-            let (to, from) = (at / unit * unit, place(bytes, random) / unit * unit);
+            let (to, from) = (at / unit * unit, place_in_file(bytes, random) / unit * unit);
             let length = unit.min(bytes.len() - to).min(bytes.len() - from);
             bytes.copy_within(from..from + length, to);
             "doubled"

@@ -7,7 +7,7 @@ use bvh_bake::mesh::Mesh;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier, Shape, Tracker};
-use common::asked::victims;
+use common::asked::{place_in_file, victims};
 use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
 use common::{Random, Triangle, bake, mesh, options, queriers, rotation, translation};
 
@@ -216,8 +216,8 @@ fn damaged_files_are_refused_or_answer_as_before() {
         let sound = Bvh::from_bytes(file.clone()).unwrap();
         for _ in 0..100 {
             let mut bytes = file.clone();
-            let page = 4096 * random.below(bytes.len() / 4096);
-            bytes[page + random.below(4096)] ^= 1 << random.below(8);
+            let at = place_in_file(&bytes, &mut random);
+            bytes[at] ^= 1 << random.below(8);
             let Ok(damaged) = Bvh::from_bytes(bytes) else { continue };
             for pose in walk(&mut random, 8) {
                 let distance = tracker.distance(&mut querier, &damaged, &good, &pose);

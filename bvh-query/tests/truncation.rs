@@ -29,7 +29,7 @@ fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn truncate(path: &Path) {
-    // Everything that opening has read, which is the header page, stays there.
+    // Everything that opening has read, which is the first page, stays there.
     OpenOptions::new().write(true).open(path).unwrap().set_len(4096).unwrap();
 }
 

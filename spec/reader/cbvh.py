@@ -13,7 +13,7 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR = 4
+MAJOR = 5
 MAX_SECTIONS = 64
 SHORT_TREELET_BYTES = 32
 NO_PARENT = 0xFFFFFFFF
@@ -209,6 +209,21 @@ def ceil_div(a, b):
     return -(-a // b)
 
 
+def head_bytes(sections):
+    """The length of the head of a file with this number of sections (2)."""
+    return HEADER.itemsize + SECTION_ENTRY.itemsize * sections
+
+
+def alignment_of(kind):
+    """What divides the offsets of sections of a kind, known or not (2)."""
+    return PAGE if kind == NODES else LINE
+
+
+def aligned(at, unit):
+    """The first multiple of `unit` from `at` on."""
+    return unit * ceil_div(at, unit)
+
+
 def records_of(head):
     """The number of records that the head of a section with named records states, in its first field."""
     return getattr(head, head.dtype.names[0])
@@ -301,14 +316,16 @@ class File:
 
     def read_header(self):
         self.header = Record(HEADER, self.data, 0)
-        page = bytearray(self.data[:PAGE])
-        page[32:40] = bytes(8)
-        self.header_checksum = xxh3_64(page)
+
+    def head_bytes(self):
+        return head_bytes(self.header.sections)
 
     def read_entries(self):
-        self.entries = [
-            Record(SECTION_ENTRY, self.data, LINE + SECTION_ENTRY.itemsize * i) for i in range(self.header.sections)
-        ]
+        """Reads the section table, and computes the checksum of the whole head."""
+        head = bytearray(self.data[: self.head_bytes()])
+        head[32:40] = bytes(8)
+        self.header_checksum = xxh3_64(head)
+        self.entries = [Record(SECTION_ENTRY, self.data, head_bytes(i)) for i in range(self.header.sections)]
 
     def bytes_of(self, kind):
         entry = self.sections.get(kind)

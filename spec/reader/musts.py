@@ -14,7 +14,7 @@ from query import minus, outer
 
 
 def violations(file):
-    yield from of_header_page(file)
+    yield from of_header(file)
     yield from of_sections(file)
     yield from of_object_table(file)
     yield from of_instances(file)
@@ -37,23 +37,22 @@ def violations(file):
     yield from of_provenance(file)
 
 
-def of_header_page(file):
-    table_end = LINE + cbvh.SECTION_ENTRY.itemsize * len(file.entries)
-    if file.header.reserved.any() or any(file.data[table_end:PAGE]):
-        yield "(1.2) nonzero reserved bytes in the header page"
+def of_header(file):
+    if file.header.reserved.any():
+        yield "(1.2) nonzero reserved bytes in the header"
 
 
 def of_sections(file):
-    end, kinds = PAGE, [entry.kind for entry in file.entries]
+    end, kinds = file.head_bytes(), [entry.kind for entry in file.entries]
     for entry in file.entries:
-        start = PAGE * cbvh.ceil_div(end, PAGE)
+        start = cbvh.aligned(end, cbvh.alignment_of(entry.kind))
         if entry.offset != start or any(file.data[end:start]):
             yield f"(2) section {entry.kind}: expected at byte {start} after zeros, found at {entry.offset}"
         if entry.required != (entry.kind in cbvh.NEEDED):
             yield f"(2.1) section {entry.kind}: required is {entry.required}"
         end = entry.offset + entry.length
-    if len(file.data) != PAGE * cbvh.ceil_div(end, PAGE) or any(file.data[end:]):
-        yield "(2) the last section is not followed by zeros up to the next page and then the end of the file"
+    if len(file.data) != cbvh.aligned(end, LINE) or any(file.data[end:]):
+        yield "(2) the last section is not followed by zeros up to the next line and then the end of the file"
     if kinds != sorted(kinds):
         yield f"(2.1) order of kinds {kinds}"
     if cbvh.DUPLICATES in kinds and (cbvh.IDS not in kinds or not file.sections[cbvh.DUPLICATES].length):

@@ -33,7 +33,12 @@ def places(data, only=""):
     """
     file = rules.validate(data)
     sorts = collections.defaultdict(list)
-    sorts["table"] += range(cbvh.LINE + 32 * len(file.entries) + 32)
+    head = file.head_bytes()
+    sorts["table"] += range(head + cbvh.SECTION_ENTRY.itemsize)
+    sorts["head"] += [*range(8, 24), *range(cbvh.HEADER.itemsize, head)]  # without magic and checksums
+    for entry in file.entries:
+        sorts["offsets"] += range(entry.place("offset"), entry.place("checksum"))
+        sorts["offsets"] += range(entry.place("kind"), entry.place("required"))
     sorts["bytes in use"] += np.flatnonzero(np.frombuffer(data, "u1")).tolist()
     sorts["anywhere"] += range(len(data))
     for kind, entry in file.sections.items():
@@ -93,17 +98,18 @@ def mutant(chance, data, sorts):
             )
         )
         data[at : at + size] = (new % (1 << 8 * size)).to_bytes(8, "little")[: len(data[at : at + size])]
+    length = len(data)
     if chance.random() < 0.02:
-        del data[chance.randrange(len(data)) :]
+        del data[chance.choice((chance.randrange(length), chance.randrange(cbvh.head_bytes(8)))) :]
     if chance.random() < 0.02:
-        data += bytes(chance.choice((1, 4096)))
+        data += bytes(chance.choice((1, 64, 4096)))
+    if len(data) not in (length, *range(24)) and chance.random() < 0.5:
+        data[16:24] = len(data).to_bytes(8, "little")
     return data
 
 
 def seal(data, sums=ALL):
     """Corrects checksums, as far as the damaged numbers still lead to bytes of the file."""
-    if len(data) < cbvh.PAGE:
-        return
 
     def number(at, size=8):
         return int.from_bytes(data[at : at + size], "little")
@@ -115,9 +121,14 @@ def seal(data, sums=ALL):
         start, length = section
         return data[start + unit * first :][: unit * count] if unit * (first + count) <= length else b""
 
+    if len(data) < cbvh.HEADER.itemsize:
+        return
+    count = number(12, 4)
+    head = cbvh.head_bytes(count)
+    if count > cbvh.MAX_SECTIONS or len(data) < head:
+        return
     entries = []
-    for i in range(min(number(12, 4), cbvh.MAX_SECTIONS)):
-        at = cbvh.LINE + 32 * i
+    for at in map(cbvh.head_bytes, range(count)):
         if number(at + 8) + number(at + 16) <= len(data):
             entries.append((at, number(at, 4), (number(at + 8), number(at + 16))))
     found = {kind: section for _, kind, section in reversed(entries)}
@@ -136,7 +147,7 @@ def seal(data, sums=ALL):
             content += kind.to_bytes(4, "little") + length.to_bytes(8, "little") + data[start : start + length]
     store(24, xxh3_64(content))
     store(32, 0)
-    store(32, xxh3_64(data[: cbvh.PAGE]))
+    store(32, xxh3_64(data[:head]))
 
 
 def verdict(data, bounds=False):

@@ -48,11 +48,16 @@ def is_within(values, limit):
 
 def open_file(data):
     need(data[:8] == cbvh.MAGIC, 1, 0, cbvh.MAGIC.hex(" "), data[:8].hex(" "))
-    need(len(data) >= PAGE, 3, len(data), f"at least {PAGE} bytes", len(data))
+    whole = cbvh.HEADER.itemsize
+    need(len(data) >= whole, 3, len(data), f"at least {whole} bytes", len(data))
     file = cbvh.File(data)
     file.read_header()
     header = file.header
     need(header.major == cbvh.MAJOR, 2, header.place("major"), cbvh.MAJOR, header.major)
+    most, whole = cbvh.MAX_SECTIONS, file.head_bytes()
+    need(header.sections <= most, 6, header.place("sections"), f"at most {most}", header.sections)
+    need(len(data) >= whole, 6, len(data), f"at least {whole} bytes", len(data))
+    file.read_entries()
     need(
         header.header_checksum == file.header_checksum,
         4,
@@ -61,14 +66,6 @@ def open_file(data):
         f"{file.header_checksum:016x}",
     )
     need(header.file_length == len(data), 5, header.place("file_length"), f"{header.file_length} bytes", len(data))
-    need(
-        header.sections <= cbvh.MAX_SECTIONS,
-        6,
-        header.place("sections"),
-        f"at most {cbvh.MAX_SECTIONS}",
-        header.sections,
-    )
-    file.read_entries()
     check_entries(file)
     check_section_checksum(file, file.sections[OBJECTS])
     nodes = file.sections[NODES]
@@ -79,13 +76,14 @@ def open_file(data):
 
 
 def check_entries(file):
-    end = PAGE
+    end = file.head_bytes()
     for entry in file.entries:
+        unit = cbvh.alignment_of(entry.kind)
         need(
-            entry.offset % PAGE == 0 and entry.offset >= end,
+            entry.offset % unit == 0 and entry.offset >= end,
             7,
             entry.place("offset"),
-            f"a multiple of {PAGE}, at least {end}",
+            f"a multiple of {unit}, at least {end}",
             entry.offset,
         )
         end = entry.offset + entry.length

@@ -24,7 +24,7 @@ import musts
 import mutate
 import query
 import rules
-from test_reader import Tree, instances, with_section
+from test_reader import Tree, file_of, instances, sections_of, with_section
 
 COMMAND = os.environ.get("CBVH")
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
@@ -63,26 +63,14 @@ def write_obj(path, parts):
 def with_pages(data, pages, profile):
     """Returns a file of one object with these pages, of a profile, in place of those that it has."""
     file = rules.open_file(data)
-    table, parts, end = [], [], cbvh.PAGE
-    for entry in file.entries:
-        part = bytearray(file.bytes_of(entry.kind))
-        if entry.kind == cbvh.NODES:
-            part = b"".join(pages)
-        elif entry.kind == cbvh.OBJECTS:
-            one = file.objects[0]
-            at = one.place("pages") - entry.offset
-            part[at : at + 4] = len(pages).to_bytes(4, "little")
-            part[one.place("profile") - entry.offset] = profile
-        table.append((entry.kind, entry.required, end, len(part), 0))
-        parts.append(part + bytes(-len(part) % cbvh.PAGE))
-        end += len(parts[-1])
-    head = bytearray(data[: cbvh.PAGE])
-    head[16:24] = end.to_bytes(8, "little")
-    table = np.array(table, cbvh.SECTION_ENTRY).tobytes()
-    head[cbvh.LINE : cbvh.LINE + len(table)] = table
-    data = bytearray(head + b"".join(parts))
-    mutate.seal(data)
-    return data
+    one, file.data = file.objects[0], bytearray(data)
+    at = one.place("pages")
+    file.data[at : at + 4] = len(pages).to_bytes(4, "little")
+    file.data[one.place("profile")] = profile
+    nodes = b"".join(pages)
+    return file_of(
+        (kind, required, nodes if kind == cbvh.NODES else content) for kind, required, content in sections_of(file)
+    )
 
 
 def random_kinds(chance, layout, roots):
@@ -568,6 +556,26 @@ class AgainstCbvh(unittest.TestCase):
         broken, different = mutate.compare(COMMAND, count, 3, meshes, self.folder)
         self.assertEqual(different, [])
         self.assertGreater(len(broken), min(count // 20, 20))
+
+    def test_damaged_heads(self):
+        """Damages the header and the section table, and cuts files off in them."""
+        names = "ok-plain", "ok-everything", "ok-scene", "ok-topology"
+        meshes = [os.path.join(TESTDATA, f"{name}.cbvh") for name in names]
+        for seed, only in ((11, "head"), (12, "offsets")):
+            count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 2
+            broken, different = mutate.compare(COMMAND, count, seed, meshes, self.folder, only=only)
+            self.assertEqual(different, [])
+            if count >= 500:
+                self.assertLessEqual({4, 5, 7, 8, 9} if only == "offsets" else {2, 4, 5, 6, 7, 8, 9}, set(broken))
+
+    def test_short_files(self):
+        for name in ("ok-plain", "ok-everything", "bad-R02-version-4"):
+            with open(os.path.join(TESTDATA, f"{name}.cbvh"), "rb") as stream:
+                data = stream.read()
+            for length in (*range(0, 64 + 32 * 8, 7), 63, 64, 159, 160, 255, 256):
+                path = self.written("short.cbvh", data[:length])
+                ours = mutate.verdict(data[:length])
+                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, path), (name, length))
 
     def test_damaged_ids(self):
         meshes = [os.path.join(TESTDATA, "ok-everything.cbvh"), self.bake(ROBOT, "dop14-u8", "packed")]

@@ -117,22 +117,39 @@ def instances(*changes, count=None, names=None, **head):
     return first.tobytes() + records.tobytes() + texts
 
 
-def with_section(data, section, required=0, before=0, kind=cbvh.INSTANCES):
-    """Returns a file with a section of these bytes, behind all sections but the last `before` ones."""
-    file, last = rules.open_file(data), len(data)
-    entries = [tuple(getattr(entry, field) for field in cbvh.SECTION_ENTRY.names) for entry in file.entries]
-    later, entries = entries[len(entries) - before :], entries[: len(entries) - before]
-    start = later[0][2] if later else last
-    room = cbvh.PAGE * cbvh.ceil_div(len(section), cbvh.PAGE)
-    entries.append((kind, required, start, len(section), 0))
-    entries += [(kind, need, at + room, length, 0) for kind, need, at, length, _ in later]
-    data = bytearray(data[:start] + section.ljust(room, b"\0") + data[start:])
-    data[12:16] = len(entries).to_bytes(4, "little")
-    data[16:24] = len(data).to_bytes(8, "little")
-    table = np.array(entries, cbvh.SECTION_ENTRY).tobytes()
-    data[cbvh.LINE : cbvh.LINE + len(table)] = table
+def sections_of(file):
+    """The kind, `required` and bytes of each section."""
+    return [
+        (entry.kind, entry.required, bytes(file.data[entry.offset : entry.offset + entry.length]))
+        for entry in file.entries
+    ]
+
+
+def file_of(sections):
+    """Returns a file of these sections, given as by `sections_of`, placed as writers place them (2)."""
+    sections = list(sections)
+    end, table, body = cbvh.head_bytes(len(sections)), [], b""
+    first = end
+    for kind, required, content in sections:
+        start = cbvh.aligned(end, cbvh.alignment_of(kind))
+        table.append((kind, required, start, len(content), 0))
+        body = body.ljust(start - first, b"\0") + content
+        end = start + len(content)
+    length = cbvh.aligned(end, cbvh.LINE)
+    header = np.zeros((), cbvh.HEADER)
+    header["magic"], header["major"] = np.frombuffer(cbvh.MAGIC, "u1"), cbvh.MAJOR
+    header["sections"], header["file_length"] = len(sections), length
+    head = header.tobytes() + np.array(table, cbvh.SECTION_ENTRY).tobytes()
+    data = bytearray((head + body).ljust(length, b"\0"))
     mutate.seal(data)
     return bytes(data)
+
+
+def with_section(data, section, required=0, before=0, kind=cbvh.INSTANCES):
+    """Returns a file with a section of these bytes, behind all sections but the last `before` ones."""
+    sections = sections_of(rules.open_file(data))
+    sections.insert(len(sections) - before, (kind, required, section))
+    return file_of(sections)
 
 
 def after(number, towards=np.inf):
@@ -904,6 +921,146 @@ class IdBlocks(unittest.TestCase):
         self.assertEqual(len(list(musts.of_id_block(page, 0))), 1)
 
 
+class Head(unittest.TestCase):
+    """Where the head and the sections may be (R03 to R07)."""
+
+    UNKNOWN = 99
+
+    def setUp(self):
+        ((_, self.plain),) = golden("ok-plain.cbvh")
+        self.file = rules.open_file(self.plain)
+        self.sections = sections_of(self.file)
+
+    def placed(self, *sections, length=None):
+        """A file of sections that are given by kind, `required`, offset and length, and hold zeros."""
+        header = np.zeros((), cbvh.HEADER)
+        head = cbvh.head_bytes(len(sections))
+        header["magic"], header["major"] = np.frombuffer(cbvh.MAGIC, "u1"), cbvh.MAJOR
+        header["sections"], header["file_length"] = len(sections), head if length is None else length
+        table = np.array([(*section, 0) for section in sections], cbvh.SECTION_ENTRY).tobytes()
+        data = bytearray((header.tobytes() + table).ljust(int(header["file_length"]), b"\0"))
+        mutate.seal(data)
+        return data
+
+    def test_files_are_made_as_writers_make_them(self):
+        for _, data in golden("ok-*.cbvh"):
+            self.assertEqual(file_of(sections_of(rules.open_file(data))), data)
+
+    def test_short_files(self):
+        """The magic comes first, then the length of the header, and the version before that of the table."""
+        for length in range(8):
+            self.assertEqual(mutate.verdict(self.plain[:length]), 1)
+        for length in (8, 10, 63):
+            self.assertEqual(mutate.verdict(self.plain[:length]), 3)
+        head = self.file.head_bytes()
+        for length in (64, 65, head - 1):
+            self.assertEqual(mutate.verdict(self.plain[:length]), 6)
+        for length in (head, head + 1, len(self.plain) - 1):
+            self.assertEqual(mutate.verdict(self.plain[:length]), 5)
+        self.assertEqual(mutate.verdict(self.plain + b"\0"), 5)
+        older = bytearray(self.plain)
+        older[8] = 4
+        for length, rule in ((63, 3), (64, 2), (head, 2), (len(older), 2)):
+            self.assertEqual(mutate.verdict(older[:length]), rule)
+
+    def test_numbers_of_sections(self):
+        """Before the checksum, since it depends on the number."""
+        data = bytearray(self.plain)
+        for count, rule in ((2, 4), (4, 4), (64, 4), (65, 6), (1 << 31, 6), ((1 << 32) - 1, 6)):
+            data[12:16] = count.to_bytes(4, "little")
+            self.assertEqual(mutate.verdict(data), rule, count)
+        empty = [(self.UNKNOWN, 0, b"")] * 62
+        self.assertEqual(mutate.verdict(file_of(self.sections + empty[:61])), 0)
+        self.assertEqual(mutate.verdict(file_of(self.sections + empty)), 6)
+        self.assertEqual(mutate.verdict(file_of([])), 9)
+
+    def test_what_the_checksum_covers(self):
+        head = self.file.head_bytes()
+        for at in range(head):
+            data = bytearray(self.plain)
+            data[at] ^= 1
+            early = dict.fromkeys(range(8), 1) | dict.fromkeys((8, 9), 2) | dict.fromkeys((13, 14, 15), 6)
+            self.assertEqual(mutate.verdict(data), early.get(at, 4), at)
+        data[head - 1] ^= 1
+        for at in range(head, self.file.entries[0].offset):
+            data[at] ^= 1
+            self.assertEqual(mutate.verdict(data), 0)
+            self.assertEqual(len(list(musts.violations(rules.validate(bytes(data))))), 1)
+
+    def test_alignment(self):
+        for kind, unit in ((cbvh.NODES, 4096), *((kind, 64) for kind in (cbvh.OBJECTS, cbvh.LEAVES, self.UNKNOWN))):
+            for offset in (96, 100, 127, 128, 160, 192, 4032, 4096, 4128, 4160, 6144, 8192):
+                rule = 7 if offset % unit else 9  # needed sections are missing
+                data = self.placed((kind, 0, offset, 0), length=8192)
+                self.assertEqual(mutate.verdict(data), rule, (kind, offset))
+
+    def test_sections_and_the_head(self):
+        """A section may start where the head ends, and no earlier, even if it is empty."""
+        self.assertEqual(mutate.verdict(self.placed((1, 1, 64, 0), length=256)), 7)
+        self.assertEqual(mutate.verdict(self.placed((1, 1, 0, 0), length=256)), 7)
+        self.assertEqual(mutate.verdict(self.placed((2, 1, 0, 0), length=256)), 7)
+        two = [(1, 1, 128, 0), (3, 1, 128, 0)]
+        self.assertEqual(mutate.verdict(self.placed(*two)), 9)
+        self.assertEqual(mutate.verdict(self.placed((1, 1, 128, 0), (3, 1, 64, 0))), 7)
+        self.assertEqual(mutate.verdict(self.placed(*two, (4, 0, 192, 0), length=192)), 7)  # of 160 bytes
+        two = [(1, 1, 128, 65), (3, 1, 192, 0)]
+        self.assertEqual(mutate.verdict(self.placed(*two, length=256)), 7)  # overlap
+        two[0] = (1, 1, 128, 64)
+        self.assertEqual(mutate.verdict(self.placed(*two, length=256)), 9)
+        self.assertEqual(mutate.verdict(self.placed(*two, length=192)), 9)
+        two[1] = (3, 1, 192, 1)
+        self.assertEqual(mutate.verdict(self.placed(*two, length=193)), 9)
+        self.assertEqual(mutate.verdict(self.placed(*two, length=192)), 7)
+        for length in (1 << 63, (1 << 64) - 128, (1 << 64) - 1):  # ends beyond 64 bits
+            self.assertEqual(mutate.verdict(self.placed((1, 1, 128, length), length=192)), 7)
+            self.assertEqual(mutate.verdict(self.placed((1, 1, length & -64, 192), length=192)), 7)
+
+    def test_ends(self):
+        """A file may end anywhere behind the last section. Writers end it at the next line, and leave no gaps."""
+
+        def violations(data):
+            return len(list(musts.violations(rules.validate(bytes(data)))))
+
+        def with_length(data, length):
+            data = bytearray(data[:length].ljust(length, b"\0"))
+            data[16:24] = length.to_bytes(8, "little")
+            mutate.seal(data)
+            return data
+
+        data = file_of([*self.sections, (cbvh.PROVENANCE, 0, b"a=b\n")])
+        used = len(data) - 60
+        self.assertEqual(violations(data), 0)
+        for length in (used, used + 1, len(data) + 1, len(data) + 64, len(data) + 4096):
+            self.assertEqual(violations(with_length(data, length)), 1, length)
+        self.assertEqual(mutate.verdict(with_length(data, used - 1)), 7)
+        changed = bytearray(data)
+        changed[-1] = 1
+        self.assertEqual(violations(changed), 1)
+        moved = bytearray(with_length(data, len(data) + 64))
+        entry = rules.open_file(data).entries[-1]
+        moved[entry.offset : entry.offset + 128] = bytes(64) + data[entry.offset :]
+        moved[entry.place("offset") : entry.place("length")] = (entry.offset + 64).to_bytes(8, "little")
+        mutate.seal(moved)
+        self.assertEqual(violations(moved), 1)
+
+    def test_order_of_rules(self):
+        two = [(self.UNKNOWN, 1, 128, 0), (1, 1, 100, 0)]
+        self.assertEqual(mutate.verdict(self.placed(*two)), 8)
+        self.assertEqual(mutate.verdict(self.placed(*reversed(two))), 7)
+        data = self.placed(*two)
+        data += b"\0"
+        self.assertEqual(mutate.verdict(data), 5)
+        data[33] ^= 1
+        self.assertEqual(mutate.verdict(data), 4)
+        data[12] = 4
+        self.assertEqual(mutate.verdict(data), 6)
+        data[8] = 4
+        self.assertEqual(mutate.verdict(data), 2)
+        self.assertEqual(mutate.verdict(data[:63]), 3)
+        data[0] = 0
+        self.assertEqual(mutate.verdict(data[:63]), 1)
+
+
 class Instances(unittest.TestCase):
     def setUp(self):
         ((_, self.everything),) = golden("ok-everything.cbvh")
@@ -1200,7 +1357,7 @@ class Topology(unittest.TestCase):
         file = rules.validate(self.everything)
         for kind, offset, rule in ((cbvh.DUPLICATES, 3, 36), (cbvh.NODES, 44, 16)):
             data = bytearray(self.with_topology(components=[1]))
-            data[file.sections[kind].offset + offset] = 0xFF
+            data[rules.open_file(data).sections[kind].offset + offset] = 0xFF
             mutate.seal(data)
             self.assertEqual(mutate.verdict(data), rule)
 

@@ -230,8 +230,7 @@ impl Disks {
     /// Mounts a disk with the old output on it and `pages` free pages, and bakes on it while the script runs
     /// `meanwhile`. Checks the files that are on the disk afterwards, and returns how the bake ended.
     fn bake(&self, pages: u64, arguments: &str, meanwhile: &str) -> Output {
-        let old = self.folder.old.len() as u64;
-        assert_eq!(old % PAGE, 0);
+        let old = (self.folder.old.len() as u64).div_ceil(PAGE);
         let script = format!(
             "mkdir -p disk\n\
              mount -t tmpfs -o size={} tmpfs disk\n\
@@ -243,7 +242,7 @@ impl Disks {
              cp disk/out.cbvh found.cbvh\n\
              umount disk && rmdir disk\n\
              exit $code\n",
-            old + pages * PAGE,
+            (old + pages) * PAGE,
             env!("CARGO_BIN_EXE_cbvh"),
         );
         fs::write(&self.script, script).unwrap();
@@ -270,7 +269,7 @@ impl Disks {
 #[test]
 fn a_full_disk_for_the_output_changes_nothing() {
     let Some(disks) = Disks::new() else { return };
-    let needed = disks.folder.new.len() as u64 / PAGE;
+    let needed = (disks.folder.new.len() as u64).div_ceil(PAGE);
     for moment in moments(4) {
         let pages = (moment * needed as f64) as u64;
         let ended = disks.bake(pages, "large.stl -o disk/out.cbvh", "");

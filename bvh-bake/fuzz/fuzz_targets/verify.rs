@@ -16,7 +16,7 @@ static CUBE: LazyLock<Mesh> = LazyLock::new(|| {
 });
 
 fuzz_target!(|bytes: &[u8]| {
-    if bytes.len() < 4096 {
+    if bytes.len() < 64 {
         return;
     }
     let mut bytes = bytes.to_vec();

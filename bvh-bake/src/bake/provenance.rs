@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// The revision of the baker. It is raised whenever a bake of the same mesh with the same options gives other bytes, so
 /// that files of an earlier revision do not count as up to date.
-const REVISION: u32 = 7;
+const REVISION: u32 = 8;
 
 /// The lines `key=value` of the provenance section.
 pub(super) struct Provenance {

@@ -8,9 +8,10 @@ use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
 use crate::topology::TopologyLists;
 use bvh_format::checksum::Hasher;
-use bvh_format::header::{Section, SectionKind, write_header};
+use bvh_format::header::{Section, SectionKind, head_bytes, write_header};
 use bvh_format::instances::{Instance, write_instances};
 use bvh_format::layout::ContentHasher;
+use bvh_format::leaf::LINE;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PagePlace};
 use bvh_format::topology::write_topology_head;
@@ -62,10 +63,14 @@ pub(crate) fn assemble(
     let instances = if instances.is_empty() { Vec::new() } else { write_instances(&instances) };
     let topology_bytes = if topology.records.is_empty() { 0 } else { topology.bytes() };
     let rest =
-        duplicates.count() as usize * 8 + provenance.len() + instances.len() + topology_bytes + 9 * PAGE;
+        duplicates.count() as usize * 8 + provenance.len() + instances.len() + topology_bytes + 2 * PAGE;
     let expected = (lengths.iter().sum::<usize>() + rest) as u64;
     output.expect(expected);
-    output.append(Arc::new(vec![0; PAGE]))?;
+    let has_duplicates = with_ids && duplicates.count() > 0;
+    let optional =
+        [with_ids, has_duplicates, !provenance.is_empty(), !instances.is_empty(), topology_bytes > 0];
+    let sections = 3 + optional.into_iter().filter(|&is_there| is_there).count();
+    output.append(Arc::new(vec![0; head_bytes(sections)]))?;
     let triangles = records.iter().map(|(_, record)| record.triangles.get()).sum();
     let tally = progress.tally(Step::Bake(Stage::Encode), WHOLE, triangles, expected);
     let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default(), tally };
@@ -96,7 +101,7 @@ pub(crate) fn assemble(
     if with_ids {
         file.section(SectionKind::Ids, lengths[3], |section| blocks(section, ids))?;
     }
-    if with_ids && duplicates.count() > 0 {
+    if has_duplicates {
         file.section(SectionKind::Duplicates, duplicates.count() as usize * 8, |section| {
             let mut bytes = Vec::new();
             duplicates.visit(|pair| {
@@ -128,6 +133,7 @@ pub(crate) fn assemble(
             nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
         })?;
     }
+    file.align(LINE)?;
     let Sections { table, content, .. } = file;
     let header = write_header(output.length(), content.finish(), &table);
     output.replace_first(header)
@@ -167,13 +173,20 @@ struct Sections<'a> {
 }
 
 impl Sections<'_> {
-    /// Adds a section of `length` bytes, which `write` writes, and pads its last page.
+    /// Fills the file with zeros up to a multiple of so many bytes.
+    fn align(&mut self, bytes: usize) -> Result<(), BakeError> {
+        let end = self.output.length() as usize;
+        self.output.append(Arc::new(vec![0; end.next_multiple_of(bytes) - end]))
+    }
+
+    /// Adds a section of `length` bytes, which `write` writes.
     fn section(
         &mut self,
         kind: SectionKind,
         length: usize,
         write: impl FnOnce(&mut OpenSection) -> Result<(), BakeError>,
     ) -> Result<(), BakeError> {
+        self.align(kind.alignment())?;
         let start = self.output.length() as usize;
         if kind.is_content() {
             self.content.begin(kind, length as u64);
@@ -184,8 +197,7 @@ impl Sections<'_> {
         write(&mut section)?;
         let checksum = section.checksum.finish();
         self.table.push(Section { kind, range: start..start + length, checksum });
-        let end = self.output.length() as usize;
-        self.output.append(Arc::new(vec![0; end.next_multiple_of(PAGE) - end]))
+        Ok(())
     }
 }
 

@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     decode::decode(bytes);
-    if bytes.len() >= 4096 {
+    if bytes.len() >= 64 {
         let mut bytes = bytes.to_vec();
         seal(&mut bytes);
         decode::decode(&bytes);

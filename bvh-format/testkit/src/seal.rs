@@ -1,10 +1,11 @@
 //! Takes files apart, puts them together, and corrects the checksums of changed files, so that a reader reaches the
-//! change. All functions accept any bytes.
+//! change. All functions accept any bytes; those that write checksums need a header.
 
 use bvh_format::checksum::checksum;
 use std::ops::Range;
 
 const PAGE: usize = 4096;
+const LINE: usize = 64;
 
 /// A section: its kind, a 1 if readers must know it, and its bytes.
 pub type Section = (u32, u32, Vec<u8>);
@@ -22,10 +23,10 @@ pub fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
     bytes[at..at + value.len()].copy_from_slice(value);
 }
 
-/// Returns the entries of the section table: the offset of each entry, the kind, and the range of the section if the
+/// Returns the entries of the section table that the file has: the offset of each entry, the kind, and the range of the section if the
 /// file contains it.
 fn entries(bytes: &[u8]) -> Vec<(usize, u32, Option<Range<usize>>)> {
-    let places = (0..u32_at(bytes, 12).min(64) as usize).map(|i| 64 + 32 * i);
+    let places = (0..u32_at(bytes, 12).min(64) as usize).map(head).filter(|at| at + 32 <= bytes.len());
     let entry = |at: usize| {
         let start = u64_at(bytes, at + 8);
         let end = start.saturating_add(u64_at(bytes, at + 16));
@@ -45,21 +46,28 @@ pub fn take_apart(bytes: &[u8]) -> Vec<Section> {
     all.map(|(at, kind, range)| (kind, u32_at(bytes, at + 4), bytes[range.unwrap()].to_vec())).collect()
 }
 
+/// The bytes of the header and of a section table of so many entries.
+fn head(sections: usize) -> usize {
+    64 + 32 * sections
+}
+
 /// Returns a file of these sections with correct checksums.
 pub fn put_together(sections: &[Section]) -> Vec<u8> {
-    let mut bytes = vec![0; PAGE];
-    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 4, 0, 0, 0]);
+    let mut bytes = vec![0; head(sections.len())];
+    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 5, 0, 0, 0]);
     put(&mut bytes, 12, &(sections.len() as u32).to_le_bytes());
     for (index, (kind, required, data)) in sections.iter().enumerate() {
-        let at = 64 + 32 * index;
+        let at = head(index);
+        // Nodes, kind 2, start at pages, the others at lines.
+        bytes.resize(bytes.len().next_multiple_of(if *kind == 2 { PAGE } else { LINE }), 0);
         let (offset, length) = (bytes.len() as u64, data.len() as u64);
         put(&mut bytes, at, &kind.to_le_bytes());
         put(&mut bytes, at + 4, &required.to_le_bytes());
         put(&mut bytes, at + 8, &offset.to_le_bytes());
         put(&mut bytes, at + 16, &length.to_le_bytes());
         bytes.extend_from_slice(data);
-        bytes.resize(bytes.len().next_multiple_of(PAGE), 0);
     }
+    bytes.resize(bytes.len().next_multiple_of(LINE), 0);
     seal(&mut bytes);
     bytes
 }
@@ -116,11 +124,12 @@ pub fn seal_sections(bytes: &mut [u8]) {
     put(bytes, 24, &checksum(&content).to_le_bytes());
 }
 
-/// Corrects the length and the checksum of the header page.
+/// Corrects the length and the checksum of the header and the section table.
 pub fn seal_header(bytes: &mut [u8]) {
     let length = bytes.len() as u64;
     put(bytes, 16, &length.to_le_bytes());
     put(bytes, 32, &[0; 8]);
-    let sum = checksum(&bytes[..PAGE]);
+    let end = head(u32_at(bytes, 12).min(64) as usize).min(bytes.len());
+    let sum = checksum(&bytes[..end]);
     put(bytes, 32, &sum.to_le_bytes());
 }

@@ -21,7 +21,7 @@ use std::sync::{Arc, OnceLock};
 
 /// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`: share it between threads.
 ///
-/// Opening a file reads its header page and its object table, whatever the size of the file. A page is checked when a
+/// Opening a file reads its head and its object table, whatever the size of the file. A page is checked when a
 /// query first touches it. The memory needed is one byte per page, twice the bytes of the object table, and some KiB,
 /// whatever numbers the file holds.
 pub struct Bvh {

@@ -1,13 +1,14 @@
 //! Asks a file of any bytes every query, and provides the valid files that tests damage.
 
 use super::shapes::{dirty, soup};
-use super::{mesh, options};
+use super::{Random, mesh, options};
 use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
     Bvh, ClosestPoint, Contact, Distance, Pose, Querier, QueryError, Ray, RayHit, Relation, Side,
 };
+use cbvh_testkit::seal::section;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -89,4 +90,14 @@ pub(crate) fn victims() -> Vec<Vec<u8>> {
         files.push(to_bytes(&mesh, &options(profile, TriangleEncoding::Packed)).unwrap().0);
     }
     files
+}
+
+/// Returns a place in a file of any bytes, more often one that is in use: near the start of a page or of a section.
+pub(crate) fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
+    let start = match random.below(3) {
+        0 => section(bytes, 1 + random.below(8) as u32).start,
+        _ => 4096 * random.below(bytes.len().div_ceil(4096)),
+    };
+    let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
+    (start + within).min(bytes.len() - 1)
 }
