@@ -363,6 +363,25 @@ impl Scene {
         Ok(&self.instance(id)?.world)
     }
 
+    /// Returns the groups of an instance.
+    ///
+    /// # Errors
+    /// [`SceneError::NoInstance`].
+    pub fn groups(&self, id: InstanceId) -> Result<Groups, SceneError> {
+        Ok(self.instance(id)?.groups)
+    }
+
+    /// Returns the pairs that [`Scene::allow`] lets touch, in ascending order.
+    pub fn allowed(&self) -> impl Iterator<Item = ScenePair> {
+        self.instances().flat_map(move |a| {
+            let allowed = self.instances[a.place as usize].iter().flat_map(|instance| &instance.allowed);
+            allowed.filter(move |&&place| place > a.place).filter_map(move |&place| {
+                let generation = self.instances[place as usize].as_ref()?.generation;
+                Some(ScenePair { a, b: InstanceId { place, generation } })
+            })
+        })
+    }
+
     /// Returns all instances in ascending order.
     pub fn instances(&self) -> impl Iterator<Item = InstanceId> {
         let id = |(place, instance): (u32, &Option<Instance>)| {

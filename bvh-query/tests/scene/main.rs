@@ -219,6 +219,12 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
             for (number, scene) in scenes.iter_mut().enumerate() {
                 scene.set_poses(moves.iter().copied()).unwrap();
                 assert_eq!(scene.len(), placed.len());
+                assert!(placed.iter().all(|of| scene.groups(of.id) == Ok(of.groups)));
+                let mut allowed: Vec<_> =
+                    placed.iter().flat_map(|a| a.allowed.iter().map(|&b| (a.id, b))).collect();
+                allowed.retain(|(a, b)| a < b);
+                allowed.sort_unstable();
+                assert_eq!(scene.allowed().map(|pair| (pair.a, pair.b)).collect::<Vec<_>>(), allowed);
                 assert_eq!(pool.install(|| ask(scene)), expected, "scene {number}, frame {frame}");
                 // Asked again, with what the scene remembers.
                 assert_eq!(pool.install(|| ask(scene)), expected, "scene {number}, frame {frame}");
