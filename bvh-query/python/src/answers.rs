@@ -3,7 +3,7 @@
 //! Answers that may be missing have an array of bool in front; the other arrays hold NaN and 0 where there is none.
 
 use crate::arrays::{array, table};
-use bvh_query::{ClosestPoint, Contact, Distance, RayHit};
+use bvh_query::{ClosestPoint, Contact, Distance, MotionAnswer, RayHit};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -24,17 +24,53 @@ pub(crate) type Distances<'py> = (
     Ids<'py>,
 );
 
-pub(crate) fn distances<'py>(py: Python<'py>, of: &[Distance]) -> PyResult<Distances<'py>> {
+pub(crate) fn distances<'py>(
+    py: Python<'py>,
+    of: impl Iterator<Item = Option<Distance>> + Clone,
+) -> PyResult<Distances<'py>> {
+    let numbers =
+        |of_one: fn(Distance) -> f64| array(py, of.clone().map(|answer| answer.map_or(f64::NAN, of_one)));
+    let points = |of_one: fn(Distance) -> [f64; 3]| {
+        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], of_one)))
+    };
+    let ids = |of_one: fn(Distance) -> u32| array(py, of.clone().map(|answer| answer.map_or(0, of_one)));
     Ok((
-        array(py, of.iter().map(|answer| answer.distance)),
-        array(py, of.iter().map(|answer| answer.lower)),
-        array(py, of.iter().map(|answer| answer.upper)),
-        table(py, of.iter().map(|answer| answer.point_a))?,
-        table(py, of.iter().map(|answer| answer.point_b))?,
-        array(py, of.iter().map(|answer| answer.object_a)),
-        array(py, of.iter().map(|answer| answer.triangle_a)),
-        array(py, of.iter().map(|answer| answer.object_b)),
-        array(py, of.iter().map(|answer| answer.triangle_b)),
+        numbers(|answer| answer.distance),
+        numbers(|answer| answer.lower),
+        numbers(|answer| answer.upper),
+        points(|answer| answer.point_a)?,
+        points(|answer| answer.point_b)?,
+        ids(|answer| answer.object_a),
+        ids(|answer| answer.triangle_a),
+        ids(|answer| answer.object_b),
+        ids(|answer| answer.triangle_b),
+    ))
+}
+
+/// The numbers of the kinds of answers about motions.
+pub(crate) const FREE: u8 = 0;
+pub(crate) const HIT: u8 = 1;
+pub(crate) const NEAR: u8 = 2;
+
+/// Kind, time until which the way is free, time of the contact or of the first undecided pose, and the distance there.
+pub(crate) type Motions<'py> = (Bound<'py, PyArray1<u8>>, Numbers<'py>, Numbers<'py>, Distances<'py>);
+
+pub(crate) fn motions<'py>(py: Python<'py>, of: &[MotionAnswer]) -> PyResult<Motions<'py>> {
+    let rows: Vec<_> = of
+        .iter()
+        .map(|answer| match *answer {
+            MotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
+            MotionAnswer::Hit { free_until, touching_at, contact } => {
+                (HIT, free_until, touching_at, Some(contact))
+            }
+            MotionAnswer::Near { free_until, at, distance } => (NEAR, free_until, at, Some(distance)),
+        })
+        .collect();
+    Ok((
+        array(py, rows.iter().map(|row| row.0)),
+        array(py, rows.iter().map(|row| row.1)),
+        array(py, rows.iter().map(|row| row.2)),
+        distances(py, rows.iter().map(|row| row.3))?,
     ))
 }
 

@@ -5,26 +5,29 @@
 use crate::errors::pose_error;
 use bvh_query::Pose;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Reads poses from an array of shape (N, 4, 4).
-pub(crate) fn poses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Pose>> {
-    expect("poses", &array.shape()[1..], &[4, 4])?;
+/// Reads poses from an array of shape (N, 4, 4), which messages call `name`.
+pub(crate) fn poses(array: &PyReadonlyArray3<'_, f64>, name: &str) -> PyResult<Vec<Pose>> {
+    expect(name, &array.shape()[1..], &[4, 4])?;
     let matrices = array.as_slice()?.as_chunks::<16>().0;
     let numbered = matrices.iter().enumerate();
     numbered
-        .map(|(number, matrix)| pose(matrix).map_err(|error| pose_error(&format!("poses[{number}]"), error)))
+        .map(|(number, matrix)| pose(matrix).map_err(|error| pose_error(&format!("{name}[{number}]"), error)))
         .collect()
 }
 
-/// Reads one pose from an array of shape (4, 4).
-pub(crate) fn one_pose(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
-    expect("pose", array.shape(), &[4, 4])?;
-    let matrix = array.as_slice()?.first_chunk().ok_or_else(|| PyValueError::new_err("pose: no matrix"))?;
-    pose(matrix).map_err(|error| pose_error("pose", error))
+/// Reads one pose from an array of shape (4, 4), which messages call `name`.
+pub(crate) fn one_pose(array: &PyReadonlyArray2<'_, f64>, name: &str) -> PyResult<Pose> {
+    expect(name, array.shape(), &[4, 4])?;
+    let matrix = array.as_slice()?.first_chunk();
+    let matrix =
+        matrix.ok_or_else(|| PyValueError::new_err(format!("{name}: expected a matrix, found none")))?;
+    pose(matrix).map_err(|error| pose_error(name, error))
 }
 
 fn pose(matrix: &[f64; 16]) -> Result<Pose, bvh_query::PoseError> {
@@ -44,6 +47,21 @@ fn expect(name: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
         return Ok(());
     }
     Err(PyValueError::new_err(format!("{name}: expected rows of shape {expected:?}, found {found:?}")))
+}
+
+/// Makes an array of shape (N, 4, 4).
+pub(crate) fn pose_rows<'py>(
+    py: Python<'py>,
+    of: impl Iterator<Item = Pose>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let matrix = |pose: Pose| {
+        let (r, t) = (*pose.rotation(), pose.translation());
+        let row = |k: usize| [r[k][0], r[k][1], r[k][2], t[k]];
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+    };
+    let flat: Vec<f64> = of.flat_map(matrix).flatten().collect();
+    let rows = flat.len() / 16;
+    PyArray1::from_vec(py, flat).reshape([rows, 4, 4])
 }
 
 /// Makes an array of shape (N,).

@@ -1,6 +1,6 @@
 //! Errors of the libraries as exceptions with the same messages.
 
-use bvh_query::{OpenError, PoseError, QueryError};
+use bvh_query::{MotionError, OpenError, PoseError, QueryError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -42,4 +42,9 @@ pub(crate) fn pose_error(place: &str, error: PoseError) -> PyErr {
 /// The exception of a mesh that cannot be baked.
 pub(crate) fn bake_error(error: bvh_bake::BakeError) -> PyErr {
     BakeError::new_err(error.to_string())
+}
+
+/// The exception of poses or numbers that make no motion.
+pub(crate) fn path_error(place: &str, error: &MotionError) -> PyErr {
+    PyValueError::new_err(format!("{place}: {error}"))
 }

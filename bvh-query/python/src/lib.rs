@@ -8,7 +8,9 @@ mod arrays;
 mod bake;
 mod errors;
 mod mesh;
+mod motions;
 mod pairs;
+mod paths;
 mod probes;
 
 use pyo3::prelude::*;
@@ -16,6 +18,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<mesh::Mesh>()?;
+    module.add_class::<paths::Paths>()?;
     macro_rules! functions {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
     }
@@ -28,6 +31,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         pairs::distance_with,
         pairs::contacts
     ];
+    functions![motions::motion, motions::is_free];
     functions![
         probes::closest_points,
         probes::sides,

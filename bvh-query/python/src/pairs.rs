@@ -13,13 +13,16 @@ use std::sync::Mutex;
 static QUERIERS: Mutex<Vec<Querier>> = Mutex::new(Vec::new());
 
 /// Calls `ask` with a querier that no other thread has.
-pub(crate) fn with_querier<T>(
-    ask: impl FnOnce(&mut Querier) -> Result<T, QueryError>,
-) -> Result<T, QueryError> {
+pub(crate) fn with_querier<T, E: From<QueryError>>(
+    ask: impl FnOnce(&mut Querier) -> Result<T, E>,
+) -> Result<T, E> {
     let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
     let mut querier = kept.map_or_else(Querier::new, Ok)?;
     let answer = ask(&mut querier);
-    if let Ok(mut queriers) = QUERIERS.lock() {
+    // After an error, which is rare, a querier may be in the middle of a question.
+    if answer.is_ok()
+        && let Ok(mut queriers) = QUERIERS.lock()
+    {
         queriers.push(querier);
     }
     answer
@@ -35,7 +38,7 @@ struct Question<'a> {
 
 impl<'a> Question<'a> {
     fn new(a: &'a Mesh, b: &'a Mesh, array: &PyReadonlyArray3<'_, f64>, parallel: bool) -> PyResult<Self> {
-        Ok(Self { a: a.shape().shape(), b: b.shape().shape(), poses: poses(array)?, parallel })
+        Ok(Self { a: a.shape().shape(), b: b.shape().shape(), poses: poses(array, "poses")?, parallel })
     }
 
     /// Asks about all poses, on all cores or one after the other, without Python's lock.
@@ -119,7 +122,8 @@ pub(crate) fn distance<'py>(
 ) -> PyResult<Distances<'py>> {
     let question = Question::new(a, b, &poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.distance(a, b, pose);
-    answers::distances(py, &question.ask(py, |batch, poses| batch.distance(poses), one)?)
+    let found = question.ask(py, |batch, poses| batch.distance(poses), one)?;
+    answers::distances(py, found.iter().copied().map(Some))
 }
 
 #[pyfunction]
@@ -137,7 +141,8 @@ pub(crate) fn distance_with<'py>(
         querier.distance_with(a, b, pose, &options)
     };
     // Only a querier takes allowed errors.
-    answers::distances(py, &question.ask(py, |_, _| Ok(Vec::new()), one)?)
+    let found = question.ask(py, |_, _| Ok(Vec::new()), one)?;
+    answers::distances(py, found.iter().copied().map(Some))
 }
 
 #[pyfunction]

@@ -18,7 +18,7 @@ struct Place {
 
 impl Place {
     fn new(pose: &PyReadonlyArray2<'_, f64>, parallel: bool) -> PyResult<Self> {
-        Ok(Self { pose: one_pose(pose)?, parallel })
+        Ok(Self { pose: one_pose(pose, "pose")?, parallel })
     }
 
     /// Asks about all probes, on all cores or one after the other, without Python's lock.

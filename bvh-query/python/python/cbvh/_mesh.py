@@ -1,0 +1,320 @@
+"""Meshes, and all questions about one mesh or a pair."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _cbvh
+from ._answers import (
+    ClosestPoint,
+    Distance,
+    MotionAnswer,
+    RayHit,
+    Relation,
+    Side,
+    as_answer,
+    as_motion,
+    signed,
+    split_hits,
+    split_rows,
+)
+from ._arrays import read_pose, read_poses, read_rays, read_rows
+from ._motion import Path, read_paths
+
+
+def _other(mesh: Mesh) -> _cbvh.Mesh:
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"other: expected a cbvh.Mesh, found {type(mesh).__name__}")
+    return mesh._mesh
+
+
+class Mesh:
+    """A mesh in a ``.cbvh`` file: all objects of the file, or one. Made by `open` and `bake`.
+
+    It is never changed, so threads may share it. Pickling one that was opened from a file stores the path alone, so that
+    other processes map the same file; pickling one in memory stores its bytes.
+    """
+
+    __slots__ = ("_mesh", "_path", "_object")
+
+    def __init__(self, mesh: _cbvh.Mesh, path: str | None = None, object: int | None = None) -> None:
+        self._mesh, self._path, self._object = mesh, path, object
+
+    @staticmethod
+    def from_bytes(data: bytes) -> Mesh:
+        """Opens the bytes of a ``.cbvh`` file."""
+        return Mesh(_cbvh.Mesh.from_bytes(data))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._path is not None:
+            return (open, (self._path, self._object))
+        return (_unpickle, (self._mesh.bytes(), self._object))
+
+    def __repr__(self) -> str:
+        place = "in memory" if self._path is None else repr(self._path)
+        object = "" if self._object is None else f", object {self._object}"
+        return f"<cbvh.Mesh {place}{object}: {self.triangles} triangles>"
+
+    @property
+    def triangles(self) -> int:
+        """The number of triangles, without exact duplicates."""
+        return self._mesh.triangles()
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all objects of the file."""
+        return self._mesh.names()
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of the file, which are all the memory that the mesh takes."""
+        return self._mesh.size()
+
+    def object(self, object: int | str) -> Mesh:
+        """One object of the file, by number or name."""
+        if isinstance(object, str):
+            names = self.names
+            if names.count(object) != 1:
+                raise ValueError(f"object: expected one name of {names}, found {object!r}")
+            object = names.index(object)
+        return Mesh(self._mesh.object(object), self._path, object)
+
+    def check(self) -> None:
+        """Checks all checksums and rules of the whole file, which questions check only where they go.
+
+        Raises FormatError for the first rule that is broken.
+        """
+        self._mesh.check()
+
+    def tobytes(self) -> bytes:
+        """The bytes of the file."""
+        return self._mesh.bytes()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the file. A file of that name is replaced when all is written."""
+        temporary = f"{os.fspath(path)}.{os.getpid()}.tmp"
+        try:
+            with _open_file(temporary, "xb") as file:
+                file.write(self.tobytes())
+            os.replace(temporary, path)
+        except BaseException:
+            if os.path.exists(temporary):
+                os.remove(temporary)
+            raise
+
+    def collide(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
+        """Do the surfaces touch? Exact: bool, or an array of bool of shape (N,).
+
+        ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
+        """
+        rows, one = read_poses(poses)
+        found = _cbvh.collide(self._mesh, _other(other), rows, parallel)
+        return bool(found[0]) if one else found
+
+    def within(self, other: Mesh, poses: ArrayLike, d: float, *, parallel: bool = False) -> Any:
+        """Are they at most ``d`` mesh units apart? Exact: bool, or an array of bool of shape (N,).
+
+        ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
+        """
+        rows, one = read_poses(poses)
+        found = _cbvh.within(self._mesh, _other(other), rows, d, parallel)
+        return bool(found[0]) if one else found
+
+    def distance(
+        self,
+        other: Mesh,
+        poses: ArrayLike,
+        *,
+        rel_err: float = 0.0,
+        abs_err: float = 0.0,
+        parallel: bool = False,
+    ) -> Distance:
+        """How far apart are they? The least distance, a pair of closest points, and their triangles.
+
+        ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4). ``rel_err`` and
+        ``abs_err`` let the answer exceed the least distance by a fraction of it or by a length, which saves time;
+        ``lower`` is what is certain. They cannot be combined with ``parallel``.
+        """
+        rows, one = read_poses(poses)
+        if rel_err == 0 and abs_err == 0:
+            return as_answer(Distance, _cbvh.distance(self._mesh, _other(other), rows, parallel), one)
+        if parallel:
+            raise ValueError("parallel: expected False with rel_err or abs_err, found True")
+        return as_answer(Distance, _cbvh.distance_with(self._mesh, _other(other), rows, rel_err, abs_err), one)
+
+    def relation(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
+        """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers, shape (N,).
+
+        ``poses``: of ``other``, mesh B, in the frame of this mesh, A (body to world), shape (4, 4) or (N, 4, 4).
+        """
+        rows, one = read_poses(poses)
+        found = _cbvh.relation(self._mesh, _other(other), rows, parallel)
+        return Relation(int(found[0])) if one else found
+
+    def contacts(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
+        """All pairs of triangles that touch, exactly, in ascending order.
+
+        An array of uint32 of shape (K, 4) for one pose, or a list of N of them. The columns are object and triangle of
+        this mesh, and object and triangle of ``other``. Triangles are numbered as in the input.
+
+        ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
+        """
+        rows, one = read_poses(poses)
+        starts, pairs = _cbvh.contacts(self._mesh, _other(other), rows, parallel)
+        return pairs if one else split_rows(starts, pairs)
+
+    def motion(
+        self,
+        other: Mesh,
+        motion: Path | Sequence[Path],
+        *,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        parallel: bool = False,
+    ) -> MotionAnswer:
+        """Is the way of ``other`` free, with it moving in the frame of this mesh, and where does it end if it is not?
+
+        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or a list of N paths, the
+        answer has arrays of N elements. The answer is certain at every moment, not at samples. ``clearance``: meshes that come
+        as near as this, in mesh units, hit. ``tolerance``: how near they may come to a hit, beyond the clearance, without an
+        answer that says free or hit, in mesh units; None: a millionth of the diagonal of the larger object's box. ``parallel``
+        does nothing where a path is your own.
+        """
+        paths, one = read_paths(motion)
+        found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)
+        return as_motion(*found, one)
+
+    def is_free(
+        self,
+        other: Mesh,
+        motion: Path | Sequence[Path],
+        *,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """Whether `motion` answers FREE, which takes less time to find out: bool, or an array of bool of shape (N,).
+
+        This is what planners ask. Arguments are those of `motion`.
+        """
+        paths, one = read_paths(motion)
+        found = _cbvh.is_free(self._mesh, _other(other), paths, clearance, tolerance, parallel)
+        return bool(found[0]) if one else found
+
+    def closest_points(
+        self,
+        points: ArrayLike,
+        *,
+        within: float = np.inf,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
+    ) -> ClosestPoint:
+        """The points of the surface that are closest to ``points``, of shape (3,) or (N, 3).
+
+        ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
+        shape (4, 4); None: they are in the frame of the mesh.
+        """
+        rows, one = read_rows(points, "points", 3)
+        return as_answer(ClosestPoint, _cbvh.closest_points(self._mesh, rows, within, read_pose(pose), parallel), one)
+
+    def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
+        """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers, shape (N,).
+
+        ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
+        """
+        rows, one = read_rows(points, "points", 3)
+        found = _cbvh.sides(self._mesh, rows, read_pose(pose), parallel)
+        return Side(int(found[0])) if one else found
+
+    def signed_distances(
+        self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
+    ) -> Any:
+        """Distances of points from the surface, negative inside: a float, or an array of shape (N,).
+
+        NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of this
+        mesh in the frame of the points (body to world).
+        """
+        rows, one = read_rows(points, "points", 3)
+        placed = read_pose(pose)
+        distances = _cbvh.closest_points(self._mesh, rows, np.inf, placed, parallel)[1]
+        sides = _cbvh.sides(self._mesh, rows, placed, parallel)
+        found = signed(distances, sides)
+        return found[0].item() if one else found
+
+    def first_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        until: ArrayLike = np.inf,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
+    ) -> RayHit:
+        """Where rays first hit the surface: which triangle, and at which parameter.
+
+        ``origins`` and ``directions`` have shape (3,) or (N, 3); directions of any length are the unit of ``t``. ``until``:
+        the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to world).
+        """
+        rays, one = read_rays(origins, directions, until)
+        return as_answer(RayHit, _cbvh.first_hits(self._mesh, *rays, read_pose(pose), parallel), one)
+
+    def any_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        until: ArrayLike = np.inf,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of `first_hits`."""
+        rays, one = read_rays(origins, directions, until)
+        found = _cbvh.any_hits(self._mesh, *rays, read_pose(pose), parallel)
+        return bool(found[0]) if one else found
+
+    def all_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        until: ArrayLike = np.inf,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """All triangles that rays hit, in the exact order along each: a `RayHit` of arrays of K elements, or a list of N.
+
+        Arguments are those of `first_hits`.
+        """
+        rays, one = read_rays(origins, directions, until)
+        starts, hits = _cbvh.all_hits(self._mesh, *rays, read_pose(pose), parallel)
+        return RayHit(*hits) if one else split_hits(starts, hits)
+
+    def meet_segments(
+        self, starts: ArrayLike, ends: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
+    ) -> Any:
+        """Whether closed segments meet the surface, exactly: bool, or an array of shape (N,).
+
+        ``starts`` and ``ends`` have shape (3,) or (N, 3). ``pose``: of this mesh in their frame (body to world).
+        """
+        first, one = read_rows(starts, "starts", 3)
+        last, _ = read_rows(ends, "ends", 3)
+        found = _cbvh.meet_segments(self._mesh, first, last, read_pose(pose), parallel)
+        return bool(found[0]) if one else found
+
+
+_open_file = open
+
+
+def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
+    """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size."""
+    mesh = Mesh(_cbvh.Mesh.open(os.fspath(path)), os.path.abspath(path))
+    return mesh if object is None else mesh.object(object)
+
+
+def _unpickle(data: bytes, object: int | None) -> Mesh:
+    mesh = Mesh.from_bytes(data)
+    return mesh if object is None else mesh.object(object)
