@@ -96,9 +96,12 @@ pub(crate) fn contacts<'py>(
     py: Python<'py>,
     of: &[Vec<Contact>],
 ) -> PyResult<Lists<'py, Bound<'py, PyArray2<u32>>>> {
-    let row =
-        |contact: &Contact| [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b];
-    Ok((starts(py, of.iter().map(Vec::len)), table(py, of.iter().flatten().map(row))?))
+    Ok((starts(py, of.iter().map(Vec::len)), table(py, of.iter().flatten().map(triangles))?))
+}
+
+/// Object and triangle of A, and of B.
+pub(crate) fn triangles(contact: &Contact) -> [u32; 4] {
+    [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b]
 }
 
 /// Whether there is an answer; distance or parameter, its lower and upper bound, point, object and triangle.

@@ -12,6 +12,9 @@ mod motions;
 mod pairs;
 mod paths;
 mod probes;
+mod scene;
+mod scene_pairs;
+mod scene_probes;
 
 use pyo3::prelude::*;
 
@@ -19,6 +22,7 @@ use pyo3::prelude::*;
 fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<mesh::Mesh>()?;
     module.add_class::<paths::Paths>()?;
+    module.add_class::<scene::Scene>()?;
     macro_rules! functions {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
     }
@@ -39,6 +43,26 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         probes::any_hits,
         probes::all_hits,
         probes::meet_segments
+    ];
+    functions![
+        scene_pairs::scene_collide,
+        scene_pairs::scene_within,
+        scene_pairs::scene_pairs_in_contact,
+        scene_pairs::scene_pairs_within,
+        scene_pairs::scene_relations,
+        scene_pairs::scene_contacts,
+        scene_pairs::scene_distance,
+        scene_pairs::scene_motion,
+        scene_pairs::scene_is_free
+    ];
+    functions![
+        scene_probes::scene_closest_points,
+        scene_probes::scene_sides,
+        scene_probes::scene_signed_distances,
+        scene_probes::scene_first_hits,
+        scene_probes::scene_any_hits,
+        scene_probes::scene_all_hits,
+        scene_probes::scene_meet_segments
     ];
     module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
     module.add("BakeError", module.py().get_type::<errors::BakeError>())?;

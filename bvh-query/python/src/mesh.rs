@@ -19,6 +19,10 @@ impl Mesh {
         Self { shape: bvh.into() }
     }
 
+    pub(crate) fn of(shape: OwnedShape) -> Self {
+        Self { shape }
+    }
+
     pub(crate) fn shape(&self) -> &OwnedShape {
         &self.shape
     }

@@ -60,7 +60,7 @@ impl<'a> Question<'a> {
 }
 
 /// The number of a relation, as `cbvh query` prints it.
-fn number(relation: Relation) -> u8 {
+pub(crate) fn number(relation: Relation) -> u8 {
     match relation {
         Relation::Touching => 0,
         Relation::Apart => 1,

@@ -207,7 +207,7 @@ impl AnyPath {
         }
     }
 
-    fn path(&self) -> &(dyn Path + Sync) {
+    pub(crate) fn path(&self) -> &(dyn Path + Sync) {
         match self {
             Self::Own(own) => own.path(),
             Self::Called(called) => called,

@@ -42,7 +42,7 @@ impl Place {
 }
 
 /// The number of a side.
-fn number(side: Side) -> u8 {
+pub(crate) fn number(side: Side) -> u8 {
     match side {
         Side::Outside => 0,
         Side::Inside => 1,
@@ -89,7 +89,7 @@ pub(crate) fn sides<'py>(
 }
 
 /// Reads rays: origins and directions of shape (N, 3), and the greatest parameter of each of shape (N,).
-fn rays(
+pub(crate) fn rays(
     origins: &PyReadonlyArray2<'_, f64>,
     directions: &PyReadonlyArray2<'_, f64>,
     until: &PyReadonlyArray1<'_, f64>,
@@ -169,6 +169,19 @@ pub(crate) fn all_hits<'py>(
     Ok((starts(py, found.iter().map(Vec::len)), hits))
 }
 
+/// Reads segments: starts and ends of shape (N, 3).
+pub(crate) fn segments(
+    starts: &PyReadonlyArray2<'_, f64>,
+    ends: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<[[f64; 3]; 2]>> {
+    let (starts, ends) = (rows(starts, "starts")?, rows(ends, "ends")?);
+    if starts.len() != ends.len() {
+        let found = format!("expected as many ends as starts, found {} and {}", ends.len(), starts.len());
+        return Err(PyValueError::new_err(found));
+    }
+    Ok(starts.into_iter().zip(ends).map(|(start, end)| [start, end]).collect())
+}
+
 #[pyfunction]
 pub(crate) fn meet_segments<'py>(
     py: Python<'py>,
@@ -178,13 +191,7 @@ pub(crate) fn meet_segments<'py>(
     pose: PyReadonlyArray2<'py, f64>,
     parallel: bool,
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let (starts, ends) = (rows(&starts, "starts")?, rows(&ends, "ends")?);
-    if starts.len() != ends.len() {
-        let found = format!("expected as many ends as starts, found {} and {}", ends.len(), starts.len());
-        return Err(PyValueError::new_err(found));
-    }
-    let segments: Vec<[[f64; 3]; 2]> =
-        starts.into_iter().zip(ends).map(|(start, end)| [start, end]).collect();
+    let segments = segments(&starts, &ends)?;
     let found = Place::new(&pose, parallel)?.ask(
         py,
         (mesh, &segments),

@@ -25,11 +25,26 @@ Errors are exceptions: ``ValueError`` for arguments that mean nothing, ``OSError
 ``FormatError`` for files that are damaged or no .cbvh files, ``BakeError`` for meshes that cannot be baked.
 """
 
-from ._answers import ClosestPoint, Distance, MotionAnswer, MotionKind, RayHit, Relation, Side
+from ._answers import (
+    ClosestPoint,
+    Distance,
+    MotionAnswer,
+    MotionKind,
+    RayHit,
+    Relation,
+    SceneClosestPoint,
+    SceneContacts,
+    SceneDistance,
+    SceneMotion,
+    SceneRayHit,
+    SceneRelations,
+    Side,
+)
 from ._baking import bake, bake_files
 from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
+from ._scene import Scene, _scene_of
 
 __all__ = [
     "BakeError",
@@ -44,6 +59,13 @@ __all__ = [
     "Polyline",
     "RayHit",
     "Relation",
+    "Scene",
+    "SceneClosestPoint",
+    "SceneContacts",
+    "SceneDistance",
+    "SceneMotion",
+    "SceneRayHit",
+    "SceneRelations",
     "Side",
     "bake",
     "bake_files",
@@ -52,6 +74,6 @@ __all__ = [
 ]
 
 # What is public belongs to this module, in pickles and in messages, whatever file it is in.
-for _thing in (*(globals()[name] for name in __all__ if name != "__version__"), _unpickle):
+for _thing in (*(globals()[name] for name in __all__ if name != "__version__"), _unpickle, _scene_of):
     _thing.__module__ = __name__
 del _thing

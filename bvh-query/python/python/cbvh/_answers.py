@@ -121,6 +121,66 @@ class RayHit(NamedTuple):
     """The number of the triangle in the input, or of its place in a file without ids."""
 
 
+class SceneRelations(NamedTuple):
+    """Pairs of instances, and how they lie."""
+
+    pairs: NDArray[np.int64]
+    """Numbers of instances, A and B, shape (K, 2)."""
+    relations: NDArray[np.uint8]
+    """Numbers of `Relation`, shape (K,)."""
+
+
+class SceneContacts(NamedTuple):
+    """Pairs of triangles in contact, in ascending order of the pairs of instances."""
+
+    pairs: NDArray[np.int64]
+    """Numbers of instances, A and B, shape (K, 2)."""
+    triangles: NDArray[np.uint32]
+    """Object and triangle of A, object and triangle of B, shape (K, 4)."""
+
+
+class SceneDistance(NamedTuple):
+    """A pair of instances, and how far apart they are."""
+
+    a: int
+    """The number of the instance whose frame the points are in."""
+    b: int
+    """The number of the other instance."""
+    distance: Distance
+    """The answer of `Mesh.distance`."""
+
+
+class SceneMotion(NamedTuple):
+    """Whether the ways of instances are free."""
+
+    kind: MotionKind
+    free_until: float
+    """Before this time, from 0 to 1, certainly no pair is within the clearance. 1 where the ways are free."""
+    at: float
+    """Of a hit, a time at which a pair is, the earliest one found; of NEAR, that of the first undecided pose; else NaN."""
+    nearest: SceneDistance | None
+    """The pair, and its distance at that time; A is the one that stands still or, if both move, the first one. None where the
+    ways are free."""
+
+
+class SceneClosestPoint(NamedTuple):
+    """The point of all instances that is closest to a point. After N questions, each field has N elements or rows."""
+
+    instance: Any
+    """The number of the instance; -1 where nothing is found. Shape () or (N,)."""
+    closest: ClosestPoint
+    """The answer of `Mesh.closest_points`, in the world."""
+
+
+class SceneRayHit(NamedTuple):
+    """Where a ray hits an instance. After N questions, each field has N elements or rows."""
+
+    instance: Any
+    """The number of the instance; -1 where nothing is hit. Shape () or (N,)."""
+    hit: RayHit
+    """The answer of `Mesh.first_hits`, in the world."""
+
+
 def as_answer(kind: Any, fields: Sequence[NDArray[Any]], one: bool) -> Any:
     """A named tuple of arrays or, for one question, of its elements."""
     return kind(*(field[0] if field.ndim > 1 else field[0].item() for field in fields)) if one else kind(*fields)

@@ -1,0 +1,369 @@
+"""Scenes: many placed meshes, and questions over all pairs of them that matter."""
+
+from __future__ import annotations
+
+import operator
+import os
+from typing import Any, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _cbvh
+from ._answers import (
+    ClosestPoint,
+    Distance,
+    MotionKind,
+    RayHit,
+    SceneClosestPoint,
+    SceneContacts,
+    SceneDistance,
+    SceneMotion,
+    SceneRayHit,
+    SceneRelations,
+    Side,
+    as_answer,
+    split_hits,
+    split_rows,
+)
+from ._arrays import Floats, read_pose, read_poses, read_rays, read_rows
+from ._mesh import Mesh
+from ._motion import Path, read_path
+
+ALL_GROUPS = 0xFFFF_FFFF
+
+
+def _number(value: Any, name: str) -> int:
+    """The number of an instance."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected the number of an instance, found {type(value).__name__}") from None
+    # A number that is too large for the compiled module names no instance either.
+    return number if 0 <= number < 2**63 else -1
+
+
+def _groups(value: Any, name: str) -> int:
+    """A set of groups as bits."""
+    try:
+        bits = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected 32 bits of groups, found {type(value).__name__}") from None
+    if not 0 <= bits <= ALL_GROUPS:
+        raise ValueError(f"{name}: expected 32 bits of groups, from 0 to {ALL_GROUPS:#x}, found {bits:#x}")
+    return bits
+
+
+class Scene:
+    """Many placed meshes, and questions over all pairs that are asked about.
+
+    An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given again: of
+    an instance that was removed, it is a KeyError. Iterating over a scene gives the numbers of its instances, in their order,
+    and of a pair the one that comes first is A. A question is over each pair of instances whose groups meet and whose contact
+    is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the pose of B in A's frame, to the
+    bit.
+
+    **Threads** may share a scene: a question waits until the one before is answered, and other threads of Python run
+    meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers. Pickling
+    keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone, each once.
+
+    >>> import cbvh, numpy as np
+    >>> tetrahedron = cbvh.bake([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> pose = np.eye(4)
+    >>> pose[:3, 3] = [0, 0, 3]
+    >>> scene = cbvh.Scene()
+    >>> floor, part = scene.add(tetrahedron, name="floor"), scene.add(tetrahedron, pose, name="part")
+    >>> scene.distance().distance.distance
+    2.0
+    >>> scene.set_pose(part, np.eye(4))
+    >>> scene.pairs_in_contact().tolist()
+    [[0, 1]]
+    """
+
+    __slots__ = ("_scene",)
+
+    def __init__(self) -> None:
+        """An empty scene."""
+        self._scene = _cbvh.Scene()
+
+    @staticmethod
+    def open(path: str | os.PathLike[str]) -> Scene:
+        """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the size."""
+        whole = os.path.abspath(path)
+        scene = Scene.__new__(Scene)
+        scene._scene = _cbvh.Scene.open(os.fspath(path), lambda mesh, object: Mesh(mesh, whole, object))
+        return scene
+
+    def copy(self) -> Scene:
+        """A scene of the same instances, under the same numbers. Meshes are shared."""
+        other = Scene.__new__(Scene)
+        other._scene = self._scene.copy()
+        return other
+
+    def __copy__(self) -> Scene:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        # Meshes never change.
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Nobody changes a copy while it is read.
+        scene = self.copy()
+        poses = scene.poses()
+        rows = [
+            (number, scene.mesh(number), scene.name(number), scene.groups(number), poses[place])
+            for place, number in enumerate(scene)
+        ]
+        return (_scene_of, (rows, scene.allowed(), scene._scene.next(), scene._scene.switches()))
+
+    def __repr__(self) -> str:
+        return f"<cbvh.Scene: {len(self)} instances>"
+
+    def add(
+        self,
+        mesh: Mesh,
+        pose: ArrayLike | None = None,
+        *,
+        name: str | None = None,
+        member: int = ALL_GROUPS,
+        meets: int = ALL_GROUPS,
+    ) -> int:
+        """Adds an instance, and returns its number.
+
+        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: one that no
+        other instance has. ``member`` are the groups that the instance is in, ``meets`` those it is asked about with, a bit for
+        each of 32: two instances are asked about if each is in a group that the other meets.
+        """
+        if not isinstance(mesh, Mesh):
+            raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
+        if name is not None and not isinstance(name, str):
+            raise TypeError(f"name: expected a str or None, found {type(name).__name__}")
+        groups = [_groups(member, "member"), _groups(meets, "meets")]
+        return self._scene.add(mesh._mesh, mesh, read_pose(pose), name, groups, None)
+
+    def remove(self, id: int) -> None:
+        """Removes an instance, and its permissions to touch others."""
+        self._scene.remove(_number(id, "id"))
+
+    def set_pose(self, id: int, pose: ArrayLike) -> None:
+        """Moves an instance. ``pose`` (body to world) has shape (4, 4)."""
+        self._scene.set_poses(np.array([_number(id, "id")]), read_pose(pose)[None])
+
+    def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
+        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). If an argument is wrong,
+        none has moved."""
+        rows, one = read_poses(poses)
+        if one:
+            raise ValueError("poses: expected shape (N, 4, 4), found (4, 4)")
+        self._scene.set_poses(self._ids(ids), rows)
+
+    def set_groups(self, id: int, *, member: int = ALL_GROUPS, meets: int = ALL_GROUPS) -> None:
+        """Puts an instance into groups: see `add`."""
+        self._scene.set_groups(_number(id, "id"), [_groups(member, "member"), _groups(meets, "meets")])
+
+    def groups(self, id: int) -> tuple[int, int]:
+        """The groups that an instance is in, and those that it meets."""
+        return self._scene.groups(_number(id, "id"))
+
+    def allow(self, a: int, b: int, may_touch: bool = True) -> None:
+        """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a robot."""
+        self._scene.allow(_number(a, "a"), _number(b, "b"), bool(may_touch))
+
+    def allowed(self) -> NDArray[np.int64]:
+        """The pairs that may touch, shape (K, 2)."""
+        return self._scene.allowed()
+
+    def find(self, name: str) -> int | None:
+        """The number of the instance with a name, or None."""
+        return self._scene.find(name)
+
+    def name(self, id: int) -> str | None:
+        """The name of an instance, or None."""
+        return self._scene.name(_number(id, "id"))
+
+    def mesh(self, id: int) -> Mesh:
+        """The mesh of an instance."""
+        return self._scene.mesh(_number(id, "id"))
+
+    def pose(self, id: int) -> Floats:
+        """The pose of an instance (body to world), shape (4, 4)."""
+        return self._scene.poses(np.array([_number(id, "id")]))[0]
+
+    def poses(self, ids: ArrayLike | None = None) -> Floats:
+        """The poses (body to world) of instances, shape (N, 4, 4); of all, in their order, if ``ids`` is None."""
+        return self._scene.poses(self._scene.ids() if ids is None else self._ids(ids))
+
+    def _ids(self, ids: ArrayLike) -> NDArray[np.int64]:
+        array = np.asarray(ids)
+        if array.ndim != 1 or array.size > 0 and array.dtype.kind not in "iu":
+            raise ValueError(f"ids: expected integers of shape (N,), found dtype {array.dtype} of shape {array.shape}")
+        return np.asarray(array, dtype=np.int64, order="C")
+
+    def __len__(self) -> int:
+        return self._scene.count()
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._scene.ids().tolist())
+
+    def __contains__(self, id: object) -> bool:
+        return isinstance(id, (int, np.integer)) and self._scene.has(_number(id, "id"))
+
+    def __bool__(self) -> bool:
+        return True
+
+    @property
+    def parallel(self) -> bool:
+        """Whether a question uses all cores. Answers are the same bits. False at first."""
+        return self._scene.switches()[0]
+
+    @parallel.setter
+    def parallel(self, parallel: bool) -> None:
+        self._scene.set_switches(bool(parallel), self._scene.switches()[1])
+
+    @property
+    def tracking(self) -> bool:
+        """Whether the scene remembers of each pair what it last found, which changes no answer, and saves time where instances
+        move little from question to question. False at first."""
+        return self._scene.switches()[1]
+
+    @tracking.setter
+    def tracking(self, tracking: bool) -> None:
+        self._scene.set_switches(self._scene.switches()[0], bool(tracking))
+
+    def collide(self) -> bool:
+        """Whether any pair touches, exactly."""
+        return _cbvh.scene_collide(self._scene)
+
+    def within(self, d: float) -> bool:
+        """Whether any pair is at most ``d`` mesh units apart, exactly."""
+        return _cbvh.scene_within(self._scene, d)
+
+    def pairs_in_contact(self) -> NDArray[np.int64]:
+        """All pairs that touch, exactly: numbers of instances, shape (K, 2)."""
+        return _cbvh.scene_pairs_in_contact(self._scene)
+
+    def pairs_within(self, d: float) -> NDArray[np.int64]:
+        """All pairs that are at most ``d`` mesh units apart, exactly: numbers of instances, shape (K, 2)."""
+        return _cbvh.scene_pairs_within(self._scene, d)
+
+    def relations(self) -> SceneRelations:
+        """All pairs that touch, or of which one is inside the other, wholly or in part, and how they lie."""
+        return SceneRelations(*_cbvh.scene_relations(self._scene))
+
+    def contacts(self) -> SceneContacts:
+        """All pairs of triangles that touch, exactly."""
+        return SceneContacts(*_cbvh.scene_contacts(self._scene))
+
+    def distance(self) -> SceneDistance | None:
+        """The nearest pair and its distance, or None if there are no pairs. Points are in A's frame."""
+        pairs, fields = _cbvh.scene_distance(self._scene)
+        if len(pairs) == 0:
+            return None
+        return SceneDistance(*pairs[0].tolist(), as_answer(Distance, fields, True))
+
+    def closest_points(self, points: ArrayLike, *, within: float = np.inf) -> SceneClosestPoint:
+        """The points of all instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
+
+        ``within``: look no farther, in mesh units.
+        """
+        rows, one = read_rows(points, "points", 3)
+        instances, fields = _cbvh.scene_closest_points(self._scene, rows, within)
+        return SceneClosestPoint(_one(instances, one), as_answer(ClosestPoint, fields, one))
+
+    def sides(self, points: ArrayLike) -> Any:
+        """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers, shape (N,).
+
+        INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no inside.
+        """
+        rows, one = read_rows(points, "points", 3)
+        found = _cbvh.scene_sides(self._scene, rows)
+        return Side(int(found[0])) if one else found
+
+    def signed_distances(self, points: ArrayLike) -> Any:
+        """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape (N,).
+
+        NaN where the side is UNDEFINED, and without instances.
+        """
+        rows, one = read_rows(points, "points", 3)
+        return _one(_cbvh.scene_signed_distances(self._scene, rows), one)
+
+    def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
+        """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""
+        rays, one = read_rays(origins, directions, until)
+        instances, fields = _cbvh.scene_first_hits(self._scene, *rays)
+        return SceneRayHit(_one(instances, one), as_answer(RayHit, fields, one))
+
+    def any_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
+        """Whether rays in the world hit any instance, exactly: bool, or an array of shape (N,)."""
+        rays, one = read_rays(origins, directions, until)
+        return _one(_cbvh.scene_any_hits(self._scene, *rays), one)
+
+    def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
+        """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
+
+        Each parameter occurs once, however many instances are hit at exactly that.
+        """
+        rays, one = read_rays(origins, directions, until)
+        starts, (instances, fields) = _cbvh.scene_all_hits(self._scene, *rays)
+        if one:
+            return SceneRayHit(instances, RayHit(*fields))
+        return [SceneRayHit(*both) for both in zip(split_rows(starts, instances), split_hits(starts, fields))]
+
+    def meet_segments(self, starts: ArrayLike, ends: ArrayLike) -> Any:
+        """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
+        first, one = read_rows(starts, "starts", 3)
+        last, _ = read_rows(ends, "ends", 3)
+        return _one(_cbvh.scene_meet_segments(self._scene, first, last), one)
+
+    def motion(
+        self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
+    ) -> SceneMotion:
+        """Are the ways of some instances free, while they move in the world at the same time and the rest stands still?
+
+        ``paths`` has a `Motion`, a `Polyline` or a path of your own (body to world) for the number of each that moves. Asked
+        about are all pairs of which one moves. ``clearance`` and ``tolerance`` are those of `Mesh.motion`. Where a moving
+        instance stands now does not matter, and it stays there.
+        """
+        numbers, ways = _ways(paths)
+        kind, until, at, (pairs, fields) = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
+        if len(pairs) == 0:
+            return SceneMotion(MotionKind(kind), until, at, None)
+        placed = SceneDistance(*pairs[0].tolist(), as_answer(Distance, fields, True))
+        return SceneMotion(MotionKind(kind), until, at, placed)
+
+    def is_free(
+        self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
+    ) -> bool:
+        """Whether `motion` answers FREE, which takes less time to find out. Arguments are those of `motion`."""
+        numbers, ways = _ways(paths)
+        return _cbvh.scene_is_free(self._scene, numbers, ways, clearance, tolerance)
+
+
+def _one(found: NDArray[Any], one: bool) -> Any:
+    return found[0].item() if one else found
+
+
+def _ways(paths: Mapping[int, Path]) -> tuple[list[int], list[Any]]:
+    """The numbers of instances, and their paths as the compiled module takes them."""
+    if not isinstance(paths, Mapping):
+        raise TypeError(f"paths: expected a mapping of numbers of instances to paths, found {type(paths).__name__}")
+    numbers = [_number(number, "paths") for number in paths]
+    return numbers, [read_path(path, f"paths[{number!r}]") for number, path in paths.items()]
+
+
+def _scene_of(
+    rows: list[tuple[int, Mesh, str | None, tuple[int, int], Floats]],
+    allowed: NDArray[np.int64],
+    next: int,
+    switches: tuple[bool, bool],
+) -> Scene:
+    """A scene as it was pickled."""
+    scene = Scene()
+    for number, mesh, name, groups, pose in rows:
+        scene._scene.add(mesh._mesh, mesh, pose, name, list(groups), number)
+    for a, b in allowed.tolist():
+        scene.allow(a, b)
+    scene._scene.skip_to(next)
+    scene._scene.set_switches(*switches)
+    return scene

@@ -1,0 +1,367 @@
+//! Scenes: placed meshes under numbers of their own, and questions about all of them.
+//!
+//! A number is given once and never again. The scene is locked while a question runs, without Python's lock, so that threads
+//! wait for each other there and nowhere else. Paths of Python code are asked about with a copy of the scene: they may then
+//! ask the scene themselves.
+
+use crate::arrays::{array, one_pose, pose_rows, poses, table};
+use crate::errors::{FormatError, open_error, query_error};
+use crate::mesh::Mesh;
+use crate::paths::locked;
+use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, SceneError, ScenePair, SceneShape};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use std::collections::{BTreeSet, HashMap};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+/// An instance, as far as the scene of the library does not tell.
+#[derive(Clone)]
+struct Entry {
+    id: InstanceId,
+    groups: Groups,
+    /// What the caller added.
+    mesh: Arc<Py<PyAny>>,
+}
+
+/// A scene, and its numbers of instances.
+#[derive(Clone)]
+pub(crate) struct State {
+    pub(crate) scene: bvh_query::Scene,
+    entries: HashMap<i64, Entry>,
+    numbers: HashMap<InstanceId, i64>,
+    /// Pairs that may touch, the lower number first.
+    allowed: BTreeSet<(i64, i64)>,
+    next: i64,
+    parallel: bool,
+    tracking: bool,
+}
+
+/// Why a scene refuses something: what callers have to be told is made of it while the scene is locked.
+pub(crate) type Refused = (SceneError, String);
+
+impl State {
+    fn new(scene: bvh_query::Scene) -> Self {
+        Self {
+            scene,
+            entries: HashMap::new(),
+            numbers: HashMap::new(),
+            allowed: BTreeSet::new(),
+            next: 0,
+            parallel: false,
+            tracking: false,
+        }
+    }
+
+    fn enter(&mut self, number: Option<i64>, id: InstanceId, groups: Groups, mesh: Py<PyAny>) -> i64 {
+        let number = number.filter(|number| !self.entries.contains_key(number)).unwrap_or(self.next);
+        self.entries.insert(number, Entry { id, groups, mesh: Arc::new(mesh) });
+        self.numbers.insert(id, number);
+        self.next = self.next.max(number.saturating_add(1));
+        number
+    }
+
+    fn entry(&self, number: i64, name: &str) -> PyResult<&Entry> {
+        self.entries.get(&number).ok_or_else(|| no_instance(name, number))
+    }
+
+    pub(crate) fn id(&self, number: i64, name: &str) -> PyResult<InstanceId> {
+        Ok(self.entry(number, name)?.id)
+    }
+
+    /// Returns the number of an instance of the scene.
+    pub(crate) fn number(&self, id: InstanceId) -> i64 {
+        self.numbers.get(&id).copied().unwrap_or(-1)
+    }
+
+    pub(crate) fn pair(&self, pair: ScenePair) -> [i64; 2] {
+        [self.number(pair.a), self.number(pair.b)]
+    }
+
+    /// Names an instance that an error of the scene names: by its name or, without one, by its number.
+    fn called(&self, instance: &str) -> String {
+        let unnamed = |id: &InstanceId| id.to_string() == instance && self.scene.name(*id) == Ok(None);
+        match self.scene.instances().find(unnamed) {
+            Some(id) => self.number(id).to_string(),
+            None => format!("{instance:?}"),
+        }
+    }
+
+    /// Returns an error with a message that names instances as callers know them.
+    pub(crate) fn refused(&self, error: SceneError) -> Refused {
+        let message = match &error {
+            SceneError::Pair { a, b, source } => {
+                format!("instances {} and {}: {source}", self.called(a), self.called(b))
+            }
+            SceneError::Instance { instance, source } => {
+                format!("instance {}: {source}", self.called(instance))
+            }
+            SceneError::Pose { instance, what, found } => {
+                format!("instance {}: expected {what}, found {found:e}", self.called(instance))
+            }
+            error => error.to_string(),
+        };
+        (error, message)
+    }
+}
+
+/// The exception of a number that names no instance, or no longer.
+fn no_instance(name: &str, found: i64) -> PyErr {
+    PyKeyError::new_err(format!("{name}: expected an instance of the scene, found {found}; was it removed?"))
+}
+
+/// The exception of what a scene refuses.
+pub(crate) fn scene_error((error, message): Refused) -> PyErr {
+    match error {
+        SceneError::Pair { source, .. } | SceneError::Instance { source, .. } => {
+            let kind = query_error(source);
+            Python::attach(|py| PyErr::from_type(kind.get_type(py), message))
+        }
+        SceneError::Query(source) => query_error(source),
+        _ => PyValueError::new_err(message),
+    }
+}
+
+/// Many placed meshes.
+#[pyclass(frozen, module = "cbvh._cbvh")]
+pub(crate) struct Scene(Mutex<State>);
+
+impl Scene {
+    /// Waits for the scene without Python's lock, and calls `work` with it, without Python's lock.
+    pub(crate) fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> T {
+        py.detach(|| work(&mut locked(&self.0)))
+    }
+
+    /// Asks a question, and reads the answer while the scene is still as it was.
+    pub(crate) fn ask<A, T: Send>(
+        &self,
+        py: Python<'_>,
+        ask: impl FnOnce(&mut bvh_query::Scene) -> Result<A, SceneError> + Send,
+        read: impl FnOnce(&State, A) -> T + Send,
+    ) -> PyResult<T> {
+        let asked = self.with(py, |state| match ask(&mut state.scene) {
+            Ok(answer) => Ok(read(state, answer)),
+            Err(error) => Err(state.refused(error)),
+        });
+        asked.map_err(scene_error)
+    }
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    fn new() -> PyResult<Self> {
+        let scene = bvh_query::Scene::new().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self(Mutex::new(State::new(scene))))
+    }
+
+    /// Opens a scene file. `mesh` makes what callers know of an object of the file.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf, mesh: Bound<'_, PyAny>) -> PyResult<Self> {
+        let damaged = |error: String| FormatError::new_err(format!("{}: {error}", path.display()));
+        let (bvh, scene) = py.detach(|| {
+            let bvh = Arc::new(Bvh::open(&path).map_err(open_error)?);
+            let scene = bvh_query::Scene::of_file(bvh.clone());
+            Ok::<_, PyErr>((bvh, scene.map_err(|error| damaged(error.to_string()))?))
+        })?;
+        let instances = bvh.layout().read_instances(bvh.bytes());
+        let instances = instances.map_err(|error| damaged(error.to_string()))?;
+        let ids: Vec<InstanceId> = scene.instances().collect();
+        let mut meshes = HashMap::new();
+        let mut state = State::new(scene);
+        for (id, instance) in ids.into_iter().zip(instances) {
+            let known = meshes.get(&instance.object).map(|mesh: &Py<PyAny>| mesh.clone_ref(py));
+            let mesh = match known {
+                Some(mesh) => mesh,
+                None => {
+                    let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
+                    let own = shape.map_or_else(|| OwnedShape::from(bvh.clone()), |shape| shape);
+                    let made = mesh.call1((Mesh::of(own), instance.object))?.unbind();
+                    meshes.insert(instance.object, made.clone_ref(py));
+                    made
+                }
+            };
+            state.enter(None, id, Groups { member: instance.member, meets: instance.meets }, mesh);
+        }
+        Ok(Self(Mutex::new(state)))
+    }
+
+    /// A scene of the same instances, under the same numbers.
+    fn copy(&self, py: Python<'_>) -> Self {
+        Self(Mutex::new(self.with(py, |state| state.clone())))
+    }
+
+    /// Adds `mesh`, which callers know as `known`. A number that is given is that of a scene that this one is made after.
+    #[expect(clippy::too_many_arguments, reason = "these are what an instance has")]
+    fn add(
+        &self,
+        py: Python<'_>,
+        mesh: &Mesh,
+        known: Py<PyAny>,
+        pose: PyReadonlyArray2<'_, f64>,
+        name: Option<String>,
+        groups: [u32; 2],
+        number: Option<i64>,
+    ) -> PyResult<i64> {
+        let pose = one_pose(&pose, "pose")?;
+        let shape = SceneShape::from(mesh.shape().clone());
+        let groups = Groups { member: groups[0], meets: groups[1] };
+        let added = self.with(py, |state| {
+            let added = match name {
+                Some(name) => state.scene.add_named(name, shape, pose),
+                None => state.scene.add(shape, pose),
+            };
+            let id = added.map_err(|error| match error {
+                SceneError::Pose { what, found, .. } => format!("pose: expected {what}, found {found:e}"),
+                SceneError::NameTaken(name) => {
+                    format!("name: expected one that no instance has, found {name:?}")
+                }
+                error => state.refused(error).1,
+            })?;
+            // The instance is there.
+            state.scene.set_groups(id, groups).map_err(|error| error.to_string())?;
+            Ok(state.enter(number, id, groups, known))
+        });
+        added.map_err(|message: String| PyValueError::new_err(message))
+    }
+
+    fn remove(&self, py: Python<'_>, number: i64) -> PyResult<()> {
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            state.scene.remove(id).map_err(|error| scene_error(state.refused(error)))?;
+            state.numbers.remove(&id);
+            state.entries.remove(&number);
+            state.allowed.retain(|&(a, b)| a != number && b != number);
+            Ok(())
+        })
+    }
+
+    /// Moves as many instances as there are poses.
+    fn set_poses(
+        &self,
+        py: Python<'_>,
+        numbers: PyReadonlyArray1<'_, i64>,
+        array: PyReadonlyArray3<'_, f64>,
+    ) -> PyResult<()> {
+        let (numbers, poses) = (numbers.as_slice()?.to_vec(), poses(&array, "poses")?);
+        if numbers.len() != poses.len() {
+            let found = format!("poses: expected as many as ids, {}, found {}", numbers.len(), poses.len());
+            return Err(PyValueError::new_err(found));
+        }
+        self.with(py, |state| {
+            let ids = numbers.iter().map(|&number| state.id(number, "ids")).collect::<PyResult<Vec<_>>>()?;
+            let moved = state.scene.set_poses(ids.into_iter().zip(poses));
+            moved.map_err(|error| scene_error(state.refused(error)))
+        })
+    }
+
+    fn set_groups(&self, py: Python<'_>, number: i64, groups: [u32; 2]) -> PyResult<()> {
+        let groups = Groups { member: groups[0], meets: groups[1] };
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            state.scene.set_groups(id, groups).map_err(|error| scene_error(state.refused(error)))?;
+            if let Some(entry) = state.entries.get_mut(&number) {
+                entry.groups = groups;
+            }
+            Ok(())
+        })
+    }
+
+    fn groups(&self, py: Python<'_>, number: i64) -> PyResult<(u32, u32)> {
+        let groups = self.with(py, |state| Ok::<_, PyErr>(state.entry(number, "id")?.groups))?;
+        Ok((groups.member, groups.meets))
+    }
+
+    fn allow(&self, py: Python<'_>, a: i64, b: i64, may_touch: bool) -> PyResult<()> {
+        self.with(py, |state| {
+            let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
+            let allowed = state.scene.allow(first, second, may_touch);
+            allowed.map_err(|error| scene_error(state.refused(error)))?;
+            let pair = (a.min(b), a.max(b));
+            if may_touch {
+                state.allowed.insert(pair)
+            } else {
+                state.allowed.remove(&pair)
+            };
+            Ok(())
+        })
+    }
+
+    /// The pairs that may touch.
+    fn allowed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let allowed = self.with(py, |state| state.allowed.clone());
+        table(py, allowed.into_iter().map(|(a, b)| [a, b]))
+    }
+
+    fn find(&self, py: Python<'_>, name: &str) -> Option<i64> {
+        self.with(py, |state| state.scene.find(name).map(|id| state.number(id)))
+    }
+
+    fn name(&self, py: Python<'_>, number: i64) -> PyResult<Option<String>> {
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            Ok(state.scene.name(id).ok().flatten().map(str::to_owned))
+        })
+    }
+
+    /// What callers know of the mesh of an instance.
+    fn mesh(&self, py: Python<'_>, number: i64) -> PyResult<Py<PyAny>> {
+        let mesh = self.with(py, |state| Ok::<_, PyErr>(state.entry(number, "id")?.mesh.clone()))?;
+        Ok(mesh.clone_ref(py))
+    }
+
+    /// The numbers of all instances, in their order.
+    fn ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let numbers: Vec<i64> =
+            self.with(py, |state| state.scene.instances().map(|id| state.number(id)).collect());
+        array(py, numbers.into_iter())
+    }
+
+    fn has(&self, py: Python<'_>, number: i64) -> bool {
+        self.with(py, |state| state.entries.contains_key(&number))
+    }
+
+    fn count(&self, py: Python<'_>) -> usize {
+        self.with(py, |state| state.entries.len())
+    }
+
+    /// The number that the next instance gets.
+    fn next(&self, py: Python<'_>) -> i64 {
+        self.with(py, |state| state.next)
+    }
+
+    /// Numbers instances from here on, if that many have not been given yet.
+    fn skip_to(&self, py: Python<'_>, next: i64) {
+        self.with(py, |state| state.next = state.next.max(next));
+    }
+
+    fn poses<'py>(
+        &self,
+        py: Python<'py>,
+        numbers: PyReadonlyArray1<'py, i64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let numbers = numbers.as_slice()?.to_vec();
+        let found = self.with(py, |state| {
+            let pose = |&number: &i64| -> PyResult<Pose> {
+                let id = state.id(number, "ids")?;
+                state.scene.pose(id).copied().map_err(|_| no_instance("ids", number))
+            };
+            numbers.iter().map(pose).collect::<PyResult<Vec<_>>>()
+        })?;
+        pose_rows(py, found.into_iter())
+    }
+
+    /// Whether questions use all cores, and whether the scene remembers what it found of each pair.
+    fn switches(&self, py: Python<'_>) -> (bool, bool) {
+        self.with(py, |state| (state.parallel, state.tracking))
+    }
+
+    fn set_switches(&self, py: Python<'_>, parallel: bool, tracking: bool) {
+        self.with(py, |state| {
+            (state.parallel, state.tracking) = (parallel, tracking);
+            state.scene.set_parallel(parallel);
+            state.scene.set_tracking(tracking);
+        });
+    }
+}

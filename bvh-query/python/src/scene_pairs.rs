@@ -1,0 +1,154 @@
+//! Questions about all pairs of a scene, standing still and moving.
+
+use crate::answers::{self, Distances, FREE, HIT, NEAR};
+use crate::arrays::{array, table};
+use crate::pairs::number;
+use crate::paths::{AnyPath, until_raised};
+use crate::scene::{Scene, State, scene_error};
+use bvh_query::{InstanceId, MotionOptions, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+type Pairs<'py> = Bound<'py, PyArray2<i64>>;
+
+/// The pairs and the distance; none where there is no pair.
+type Nearest<'py> = (Pairs<'py>, Distances<'py>);
+
+fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], SceneDistance)>) -> PyResult<Nearest<'py>> {
+    let distances = answers::distances(py, found.iter().map(|(_, found)| Some(found.distance)))?;
+    Ok((table(py, found.iter().map(|(pair, _)| *pair))?, distances))
+}
+
+fn numbered(state: &State, pairs: Vec<ScenePair>) -> Vec<[i64; 2]> {
+    pairs.into_iter().map(|pair| state.pair(pair)).collect()
+}
+
+#[pyfunction]
+pub(crate) fn scene_collide(py: Python<'_>, scene: &Scene) -> PyResult<bool> {
+    scene.ask(py, |scene| scene.collide(), |_, found| found)
+}
+
+#[pyfunction]
+pub(crate) fn scene_within(py: Python<'_>, scene: &Scene, d: f64) -> PyResult<bool> {
+    scene.ask(py, |scene| scene.within(d), |_, found| found)
+}
+
+#[pyfunction]
+pub(crate) fn scene_pairs_in_contact<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Pairs<'py>> {
+    table(py, scene.ask(py, |scene| scene.pairs_in_contact(), numbered)?.into_iter())
+}
+
+#[pyfunction]
+pub(crate) fn scene_pairs_within<'py>(py: Python<'py>, scene: &Scene, d: f64) -> PyResult<Pairs<'py>> {
+    table(py, scene.ask(py, |scene| scene.pairs_within(d), numbered)?.into_iter())
+}
+
+#[pyfunction]
+pub(crate) fn scene_relations<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+) -> PyResult<(Pairs<'py>, Bound<'py, PyArray1<u8>>)> {
+    let found: Vec<_> = scene.ask(
+        py,
+        |scene| scene.relations(),
+        |state, found| {
+            found.into_iter().map(|(pair, relation)| (state.pair(pair), number(relation))).collect()
+        },
+    )?;
+    Ok((table(py, found.iter().map(|row| row.0))?, array(py, found.iter().map(|row| row.1))))
+}
+
+#[pyfunction]
+pub(crate) fn scene_contacts<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+) -> PyResult<(Pairs<'py>, Bound<'py, PyArray2<u32>>)> {
+    let found: Vec<_> = scene.ask(
+        py,
+        |scene| scene.contacts(),
+        |state, found| found.into_iter().map(|row| (state.pair(row.pair), row.contact)).collect(),
+    )?;
+    let triangles = found.iter().map(|(_, contact)| answers::triangles(contact));
+    Ok((table(py, found.iter().map(|row| row.0))?, table(py, triangles)?))
+}
+
+#[pyfunction]
+pub(crate) fn scene_distance<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Nearest<'py>> {
+    let read =
+        |state: &State, found: Option<SceneDistance>| found.map(|found| (state.pair(found.pair), found));
+    nearest(py, scene.ask(py, |scene| scene.distance(), read)?)
+}
+
+/// Instances and their paths.
+struct Ways {
+    numbers: Vec<i64>,
+    paths: Vec<AnyPath>,
+}
+
+impl Ways {
+    /// Asks a question about them. A path of Python code is called without the lock of the scene, on this thread alone.
+    fn ask<A, T: Send>(
+        &self,
+        py: Python<'_>,
+        scene: &Scene,
+        ask: impl Fn(&mut bvh_query::Scene, &[(InstanceId, &(dyn Path + Sync))]) -> Result<A, SceneError> + Sync,
+        read: impl Fn(&State, A) -> T + Sync,
+    ) -> PyResult<T> {
+        let run = |state: &mut State| -> PyResult<T> {
+            let ids = self.numbers.iter().map(|&number| state.id(number, "paths"));
+            let ids = ids.collect::<PyResult<Vec<_>>>()?;
+            let ways: Vec<_> = ids.into_iter().zip(self.paths.iter().map(AnyPath::path)).collect();
+            let answer = until_raised(self.paths.iter(), || ask(&mut state.scene, &ways))?;
+            match answer {
+                Ok(answer) => Ok(read(state, answer)),
+                Err(error) => Err(scene_error(state.refused(error))),
+            }
+        };
+        if !self.paths.iter().any(AnyPath::is_called) {
+            return scene.with(py, run);
+        }
+        let mut own = scene.with(py, |state| state.clone());
+        own.scene.set_parallel(false);
+        py.detach(|| run(&mut own))
+    }
+}
+
+#[pyfunction]
+pub(crate) fn scene_motion<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    numbers: Vec<i64>,
+    paths: Vec<Bound<'py, PyAny>>,
+    clearance: f64,
+    tolerance: Option<f64>,
+) -> PyResult<(u8, f64, f64, Nearest<'py>)> {
+    let ways = Ways { numbers, paths: AnyPath::read(paths) };
+    let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
+    let read = |state: &State, answer: SceneMotion| {
+        let of = |found: SceneDistance| Some((state.pair(found.pair), found));
+        match answer {
+            SceneMotion::Free => (FREE, 1.0, f64::NAN, None),
+            SceneMotion::Hit { free_until, touching_at, contact } => {
+                (HIT, free_until, touching_at, of(contact))
+            }
+            SceneMotion::Near { free_until, at, distance } => (NEAR, free_until, at, of(distance)),
+        }
+    };
+    let (kind, free_until, at, found) =
+        ways.ask(py, scene, |scene, ways| scene.motion(ways, &options), read)?;
+    Ok((kind, free_until, at, nearest(py, found)?))
+}
+
+#[pyfunction]
+pub(crate) fn scene_is_free<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    numbers: Vec<i64>,
+    paths: Vec<Bound<'py, PyAny>>,
+    clearance: f64,
+    tolerance: Option<f64>,
+) -> PyResult<bool> {
+    let ways = Ways { numbers, paths: AnyPath::read(paths) };
+    let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
+    ways.ask(py, scene, |scene, ways| scene.is_free(ways, &options), |_, found| found)
+}

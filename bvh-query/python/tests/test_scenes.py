@@ -1,0 +1,412 @@
+"""Tests of scenes: brute force over all pairs with questions about meshes, the command, threads, copies and pickles."""
+
+import concurrent.futures
+import copy
+import itertools
+import multiprocessing
+import pathlib
+import pickle
+import tempfile
+import unittest
+
+import numpy as np
+
+import cbvh
+from cbvh import MotionKind, Relation, Side
+from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
+from common import ask_command, bottom_row, cube, numbers_of, random_poses, shifts
+
+
+def read_scene(path, folder):
+    """A scene file in words: the scene, and the numbers of what moves."""
+    scene, meshes, moving = cbvh.Scene(), {}, []
+    for line in path.read_text().splitlines():
+        word, *fields = line.split("#")[0].split() or [""]
+        if word == "mesh":
+            meshes[fields[0]] = cbvh.bake_files(path.parent / fields[1], folder / f"{fields[0]}.cbvh")
+        elif word == "instance":
+            scene.add(meshes[fields[1]], bottom_row([float(n) for n in fields[2:14]]), name=fields[0])
+        elif word == "moving":
+            moving += [scene.find(name) for name in fields]
+        elif word == "allow":
+            scene.allow(*map(scene.find, fields))
+    # What stands still is asked about with what moves alone.
+    for number in scene:
+        moves = number in moving
+        scene.set_groups(number, member=2 if moves else 1, meets=3 if moves else 2)
+    return scene, moving
+
+
+class Asked:
+    """All questions over pairs, by asking about each pair of meshes."""
+
+    def __init__(self, scene):
+        order, allowed = list(scene), {tuple(pair) for pair in scene.allowed().tolist()}
+        self.pairs = []
+        for a, b in itertools.combinations(order, 2):
+            (member_a, meets_a), (member_b, meets_b) = scene.groups(a), scene.groups(b)
+            if member_a & meets_b and member_b & meets_a and (min(a, b), max(a, b)) not in allowed:
+                relative = np.linalg.inv(scene.pose(a)) @ scene.pose(b)
+                relative[3] = [0, 0, 0, 1]
+                self.pairs.append((a, b, scene.mesh(a), scene.mesh(b), relative))
+
+    def of(self, ask):
+        return [(a, b, ask(mesh_a, mesh_b, pose)) for a, b, mesh_a, mesh_b, pose in self.pairs]
+
+
+class Pairs(unittest.TestCase):
+    """Questions over all pairs."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.meshes = [cbvh.bake(*cube()), cbvh.bake(*cube(0.25)), cbvh.bake(*cube(3.0))]
+
+    def scene(self, seed, count=30, reach=4.0):
+        scene = cbvh.Scene()
+        poses = random_poses(seed, count, reach)
+        for number, pose in enumerate(poses):
+            groups = {"member": 1 << number % 3, "meets": 0b011 if number % 3 else 0xFFFFFFFF}
+            scene.add(self.meshes[number % 7 % 3], pose, name=f"part {number}" if number % 2 else None, **groups)
+        for a, b in ((0, 1), (9, 3), (4, 25)):
+            scene.allow(a, b)
+        return scene
+
+    def check(self, scene):
+        asked = Asked(scene)
+        self.assertGreater(len(asked.pairs), 50)
+        touching = [[a, b] for a, b, touch in asked.of(lambda a, b, pose: a.collide(b, pose)) if touch]
+        self.assertTrue(touching)
+        self.assertEqual(scene.pairs_in_contact().tolist(), touching)
+        self.assertIs(scene.collide(), True)
+        near = [[a, b] for a, b, touch in asked.of(lambda a, b, pose: a.within(b, pose, 0.5)) if touch]
+        self.assertEqual(scene.pairs_within(0.5).tolist(), near)
+        self.assertIs(scene.within(0.5), True)
+        relations = asked.of(lambda a, b, pose: a.relation(b, pose))
+        expected = [([a, b], relation) for a, b, relation in relations if relation != Relation.APART]
+        found = scene.relations()
+        self.assertEqual(list(zip(found.pairs.tolist(), map(Relation, found.relations))), expected)
+        contacts = scene.contacts()
+        rows = [[a, b, *row] for a, b, rows in asked.of(lambda a, b, pose: a.contacts(b, pose)) for row in rows.tolist()]
+        self.assertEqual(np.hstack([contacts.pairs, contacts.triangles]).tolist(), rows)
+        nearest = scene.distance()
+        self.assertEqual([nearest.a, nearest.b], touching[0])
+        self.assertEqual(nearest.distance.distance, 0.0)
+        # Without those, the nearest is somewhere else.
+        for a, b in touching:
+            scene.allow(a, b)
+        apart = min((of.distance, a, b) for a, b, of in Asked(scene).of(lambda a, b, pose: a.distance(b, pose)))
+        nearest = scene.distance()
+        self.assertEqual((nearest.a, nearest.b), apart[1:])
+        self.assertAlmostEqual(nearest.distance.distance, apart[0], places=12)
+        between = nearest.distance.point_a - nearest.distance.point_b
+        self.assertAlmostEqual(np.linalg.norm(between), apart[0], places=12)
+        self.assertIs(scene.collide(), False)
+        for a, b in touching:
+            scene.allow(a, b, False)
+
+    def test_questions_are_about_all_pairs_that_are_asked_about(self):
+        scene = self.scene(1)
+        for parallel, tracking in itertools.product((False, True), repeat=2):
+            scene.parallel, scene.tracking = parallel, tracking
+            self.assertEqual((scene.parallel, scene.tracking), (parallel, tracking))
+            self.check(scene)
+        # Others move, come and go.
+        scene.set_poses(list(scene)[::3], random_poses(2, 10, 4.0))
+        for number in (0, 5, 20):
+            scene.remove(number)
+        added = [scene.add(self.meshes[2], pose) for pose in random_poses(3, 2, 3.0)]
+        self.assertEqual(added, [30, 31])
+        self.check(scene)
+
+    def test_instances_are_what_was_added(self):
+        scene = cbvh.Scene()
+        poses = random_poses(4, 3, 2.0)
+        a = scene.add(self.meshes[0], poses[0], name="a")
+        b = scene.add(self.meshes[1], name="b", member=1, meets=2)
+        c = scene.add(self.meshes[0], poses[2])
+        self.assertEqual((list(scene), len(scene), a in scene, 7 in scene, "a" in scene), ([a, b, c], 3, True, False, False))
+        self.assertEqual([scene.name(number) for number in scene], ["a", "b", None])
+        self.assertEqual((scene.find("b"), scene.find("c")), (b, None))
+        self.assertEqual((scene.groups(a), scene.groups(b)), ((0xFFFFFFFF, 0xFFFFFFFF), (1, 2)))
+        self.assertIs(scene.mesh(b), self.meshes[1])
+        np.testing.assert_array_equal(scene.poses(), [poses[0], np.eye(4), poses[2]])
+        np.testing.assert_array_equal(scene.poses([c, a]), poses[[2, 0]])
+        scene.set_pose(b, poses[1])
+        np.testing.assert_array_equal(scene.pose(b), poses[1])
+        scene.set_groups(a, member=4)
+        self.assertEqual(scene.groups(a), (4, 0xFFFFFFFF))
+        scene.allow(c, a)
+        self.assertEqual(scene.allowed().tolist(), [[a, c]])
+        scene.remove(a)
+        self.assertEqual((scene.allowed().tolist(), scene.find("a"), list(scene)), ([], None, [b, c]))
+        self.assertEqual(scene.add(self.meshes[0], name="a"), 3)
+
+    def test_an_empty_scene_has_nothing_in_it(self):
+        scene = cbvh.Scene()
+        self.assertEqual((scene.collide(), scene.distance(), len(scene), list(scene)), (False, None, 0, []))
+        self.assertEqual((scene.pairs_within(3).shape, scene.contacts().triangles.shape), ((0, 2), (0, 4)))
+        self.assertEqual((scene.sides([0, 0, 0]), scene.closest_points([0, 0, 0]).instance), (Side.OUTSIDE, -1))
+        self.assertTrue(np.isnan(scene.signed_distances([0, 0, 0])))
+
+    def test_probes_meet_the_nearest_instance(self):
+        scene = cbvh.Scene()
+        poses = random_poses(5, 12, 3.0)
+        for number, pose in enumerate(poses):
+            scene.add(self.meshes[number % 2], pose)
+        random_numbers = np.random.default_rng(6)
+        points, others = random_numbers.uniform(-4, 4, (2, 100, 3))
+        of = [(scene.mesh(number), scene.pose(number)) for number in scene]
+        distances = np.array([mesh.closest_points(points, pose=pose).distance for mesh, pose in of])
+        sides = np.array([mesh.sides(points, pose=pose) for mesh, pose in of])
+        hits = [mesh.first_hits(points, others - points, pose=pose) for mesh, pose in of]
+        ts = np.array([np.where(hit.found, hit.t, np.inf) for hit in hits])
+        meets = np.array([mesh.meet_segments(points, others, pose=pose) for mesh, pose in of]).any(axis=0)
+        for scene.parallel in (False, True):
+            near = scene.closest_points(points)
+            np.testing.assert_array_equal(near.instance, np.argmin(distances, axis=0))
+            np.testing.assert_array_equal(near.closest.distance, distances.min(axis=0))
+            found = scene.sides(points)
+            np.testing.assert_array_equal(found == Side.INSIDE, (sides == Side.INSIDE).any(axis=0))
+            signs = np.where(found == Side.INSIDE, -1, 1)
+            np.testing.assert_array_equal(scene.signed_distances(points), signs * distances.min(axis=0))
+            first = scene.first_hits(points, others - points)
+            np.testing.assert_array_equal(first.hit.found, np.isfinite(ts).any(axis=0))
+            np.testing.assert_array_equal(first.instance, np.where(first.hit.found, np.argmin(ts, axis=0), -1))
+            np.testing.assert_array_equal(first.hit.t[first.hit.found], ts.min(axis=0)[first.hit.found])
+            np.testing.assert_array_equal(scene.any_hits(points, others - points), first.hit.found)
+            np.testing.assert_array_equal(scene.meet_segments(points, others), meets)
+            every = scene.all_hits(points, others - points)
+            expected = np.array([[len(mesh.all_hits(p, o - p, pose=pose).t) for mesh, pose in of] for p, o in zip(points, others)])
+            self.assertEqual([len(hit.instance) for hit in every], expected.sum(axis=1).tolist())
+            self.assertTrue(all(np.all(np.diff(hit.hit.t) >= 0) for hit in every))
+            limited = scene.closest_points(points, within=0.5)
+            np.testing.assert_array_equal(limited.instance >= 0, distances.min(axis=0) <= 0.5)
+        one = scene.first_hits(points[0], others[0] - points[0], until=1)
+        self.assertEqual((type(one.instance), one.hit.found), (int, bool(meets[0])))
+
+
+class Ways(unittest.TestCase):
+    """Instances that move."""
+
+    def setUp(self):
+        self.cube = cbvh.bake(*cube())
+        self.scene = cbvh.Scene()
+        self.wall = self.scene.add(self.cube, shifts((3, 0, 0))[0])
+        self.part = self.scene.add(self.cube, shifts((0, 9, 0))[0])
+        self.other = self.scene.add(self.cube, shifts((0, 0, 9))[0])
+
+    def test_the_earliest_hit_of_all_pairs_is_the_answer(self):
+        way = {self.part: cbvh.Motion.between(*shifts((0, 0, 0), (8, 0, 0)))}
+        hit = self.scene.motion(way)
+        # At 8 t = 2 they touch.
+        self.assertIs(hit.kind, MotionKind.HIT)
+        self.assertTrue(hit.free_until <= 0.25 <= hit.at < 0.25 + 1e-6)
+        self.assertEqual((hit.nearest.a, hit.nearest.b, hit.nearest.distance.distance), (self.wall, self.part, 0.0))
+        self.assertIs(self.scene.is_free(way), False)
+        # The wall moves away as fast.
+        way[self.wall] = cbvh.Motion.between(*shifts((3, 0, 0), (11, 0, 0)))
+        free = self.scene.motion(way)
+        self.assertEqual((free.kind, free.free_until, free.nearest), (MotionKind.FREE, 1.0, None))
+        self.assertIs(self.scene.is_free(way), True)
+        self.assertIs(self.scene.is_free(way, clearance=2.0), False)
+        self.assertIs(self.scene.is_free(way, clearance=1.9), True)
+        self.assertIs(self.scene.is_free({}), True)
+        np.testing.assert_array_equal(self.scene.pose(self.part), shifts((0, 9, 0))[0])
+
+    def test_paths_of_ones_own_may_use_the_scene(self):
+        outer = self
+
+        class Own:
+            def pose(self, t):
+                outer.scene.collide()
+                outer.scene.set_pose(outer.other, shifts((0, 0, 9 + t))[0])
+                return shifts((8 * t, 0, 0))[0]
+
+            def sagitta(self, radius, t0, t1):
+                return 1e-12
+
+        class Falls(Own):
+            def sagitta(self, radius, t0, t1):
+                raise KeyError("beyond")
+
+        for self.scene.parallel in (False, True):
+            self.assertTrue(0.25 <= self.scene.motion({self.part: Own()}).at < 0.25 + 1e-6)
+            self.assertIs(self.scene.is_free({self.part: Own()}), False)
+            for ask in (self.scene.motion, self.scene.is_free):
+                with self.assertRaisesRegex(KeyError, "beyond"):
+                    ask({self.part: Falls()})
+            with concurrent.futures.ThreadPoolExecutor(4) as pool:
+                asked = [pool.submit(self.scene.is_free, {self.part: Own()}) for _ in range(8)]
+                asked += [pool.submit(self.scene.collide) for _ in range(8)]
+                self.assertFalse(any(future.result(60) for future in asked))
+
+
+class Misuse(unittest.TestCase):
+    """Wrong arguments."""
+
+    def test_exceptions_name_what_is_wrong(self):
+        mesh, scene, one = cbvh.bake(*cube()), cbvh.Scene(), np.eye(4)
+        gone = scene.add(mesh, name="gone")
+        scene.remove(gone)
+        here = scene.add(mesh, name="here")
+        skewed = one + np.eye(4, k=1) * [[2**-22], [0], [0], [0]]
+        stale = f"expected an instance of the scene, found {gone}; was it removed?"
+        motion = cbvh.Motion.between(one, one)
+        cases = [
+            (KeyError, f"id: {stale}", scene.remove, gone),
+            (KeyError, f"id: {stale}", scene.name, gone),
+            (KeyError, f"id: {stale}", scene.mesh, gone),
+            (KeyError, f"id: {stale}", scene.groups, gone),
+            (KeyError, f"id: {stale}", scene.set_groups, gone),
+            (KeyError, f"ids: {stale}", scene.pose, gone),
+            (KeyError, f"ids: {stale}", scene.poses, [here, gone]),
+            (KeyError, f"ids: {stale}", scene.set_pose, gone, one),
+            (KeyError, f"ids: {stale}", scene.set_poses, [here, gone], [one, one]),
+            (KeyError, f"b: {stale}", scene.allow, here, gone),
+            (KeyError, f"paths: {stale}", scene.motion, {gone: motion}),
+            (KeyError, "found -1", scene.remove, 2**80),
+            (TypeError, "id: expected the number of an instance, found str", scene.remove, "here"),
+            (TypeError, "mesh: expected a cbvh.Mesh, found str", scene.add, "mesh"),
+            (ValueError, "pose: expected shape (4, 4)", scene.add, mesh, one[:3]),
+            (ValueError, "pose: expected a rotation within 2^-23 of orthonormal", scene.add, mesh, skewed),
+            (ValueError, "pose: row 4", scene.add, mesh, one * np.nan),
+            (ValueError, 'instance "here": expected a rotation within 2^-23', scene.set_pose, here, skewed),
+            (ValueError, "poses[1]: expected a rotation", scene.set_poses, [here, here], [one, np.diag([2.0, 2, 2, 1])]),
+            (ValueError, "poses: expected as many as ids, 1, found 2", scene.set_poses, [here], [one, one]),
+            (ValueError, "ids: expected integers of shape (N,)", scene.set_poses, [0.5], [one]),
+            (ValueError, "d: expected a finite distance of at least 0, found -1", scene.within, -1),
+            (ValueError, "d: expected a finite distance of at least 0, found NaN", scene.pairs_within, np.nan),
+            (ValueError, "points: expected shape (3,) or (N, 3)", scene.sides, [0, 0]),
+            (TypeError, "paths: expected a mapping", scene.motion, [motion]),
+            (TypeError, f"paths[{here}]: expected a cbvh.Motion", scene.is_free, {here: one}),
+            (FileNotFoundError, "no such.cbvh", cbvh.Scene.open, "no such.cbvh"),
+            (cbvh.FormatError, "expected a scene, a file with instances", cbvh.Scene.open, TESTDATA / "ok-plain.cbvh"),
+        ]
+        for kind, message, call, *arguments in cases:
+            with self.subTest(message), self.assertRaises(kind) as caught:
+                call(*arguments)
+            self.assertIn(message, str(caught.exception))
+        with self.assertRaisesRegex(ValueError, 'name: expected one that no instance has, found "here"'):
+            scene.add(mesh, name="here")
+        for groups in ({"member": -1}, {"meets": 1 << 32}):
+            with self.assertRaisesRegex(ValueError, f"{next(iter(groups))}: expected 32 bits of groups"):
+                scene.add(mesh, **groups)
+        self.assertEqual((list(scene), scene.pose(here).tolist()), ([here], one.tolist()))
+
+    def test_damage_names_the_instance(self):
+        whole = cbvh.bake(*cube()).tobytes()
+        damaged = cbvh.Mesh.from_bytes(whole[:8192] + bytes([whole[8192] ^ 1]) + whole[8193:])
+        scene = cbvh.Scene()
+        scene.add(cbvh.bake(*cube(0.5)), name="whole")
+        scene.add(damaged)
+        with self.assertRaisesRegex(cbvh.FormatError, 'instances "whole" and 1: .*R'):
+            scene.contacts()
+
+
+class Sharing(unittest.TestCase):
+    """Files, threads, copies and processes."""
+
+    def scene(self):
+        meshes = cbvh.bake(*cube()), cbvh.bake(*cube(0.5))
+        scene = cbvh.Scene()
+        for number, pose in enumerate(random_poses(8, 20, 3.0)):
+            scene.add(meshes[number % 2], pose, name=f"part {number}", meets=0xFFFFFFFF ^ number)
+        scene.allow(2, 5)
+        scene.remove(3)
+        scene.tracking = True
+        return scene
+
+    def same(self, one, other):
+        self.assertEqual(list(one), list(other))
+        for left, right in zip(map(one.name, one), map(other.name, other)):
+            self.assertEqual(left, right)
+        self.assertEqual([one.groups(number) for number in one], [other.groups(number) for number in other])
+        np.testing.assert_array_equal(one.poses(), other.poses())
+        np.testing.assert_array_equal(one.allowed(), other.allowed())
+        np.testing.assert_array_equal(one.contacts().triangles, other.contacts().triangles)
+        self.assertEqual((one.parallel, one.tracking), (other.parallel, other.tracking))
+
+    def test_copies_and_pickles_are_scenes_of_their_own(self):
+        scene = self.scene()
+        for other in (scene.copy(), copy.copy(scene), copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
+            self.same(scene, other)
+            other.set_pose(0, np.eye(4))
+            other.remove(1)
+            self.assertEqual((other.add(other.mesh(0)), 1 in scene), (20, True))
+        # Each mesh once.
+        size = sum(len(scene.mesh(number).tobytes()) for number in (0, 1))
+        self.assertLess(len(pickle.dumps(scene)), size + 20_000)
+
+    def test_threads_share_a_scene(self):
+        scene = self.scene()
+        expected = scene.pairs_in_contact().tolist()
+        ids, still = list(scene), scene.poses()
+
+        def use(number):
+            if number % 4 == 0:
+                scene.set_poses(ids, still)
+            if number % 4 == 1:
+                scene.remove(scene.add(scene.mesh(0), shifts((99, number, 0))[0]))
+            if number % 4 == 2:
+                scene.parallel = number % 8 == 2
+            return scene.pairs_in_contact().tolist(), scene.distance().distance.distance
+
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            for found in pool.map(use, range(400)):
+                self.assertEqual(found, (expected, 0.0))
+
+    def test_other_processes_open_the_same_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "cube.cbvh"
+            cbvh.bake(*cube()).save(path)
+            mesh, scene = cbvh.open(path), cbvh.Scene()
+            for number in range(50):
+                scene.add(mesh, shifts((number * 0.9, 0, 0))[0])
+            self.assertLess(len(pickle.dumps(scene)), 50 * 300)
+            with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+                found = pool.submit(scene.pairs_in_contact).result()
+            self.assertEqual(found.tolist(), [[number, number + 1] for number in range(49)])
+
+    def test_a_scene_file_is_opened_with_its_meshes(self):
+        scene = cbvh.Scene.open(TESTDATA / "ok-scene.cbvh")
+        self.assertGreater(len(scene), 1)
+        again = pickle.loads(pickle.dumps(scene))
+        self.same(scene, again)
+        meshes = {repr(scene.mesh(number)) for number in scene}
+        self.assertTrue(all("ok-scene.cbvh" in mesh and "object" in mesh for mesh in meshes))
+        asked = Asked(scene).of(lambda a, b, pose: a.collide(b, pose))
+        self.assertEqual(scene.pairs_in_contact().tolist(), [[a, b] for a, b, touch in asked if touch])
+
+
+@unittest.skipUnless(COMMAND, WITHOUT_COMMAND)
+@unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
+class SameAnswers(unittest.TestCase):
+    """Answers about scenes of the folder shared are those of the command."""
+
+    def test_frames_of_shared_scenes(self):
+        with tempfile.TemporaryDirectory() as name:
+            for stem in ("clutter60", "arm"):
+                folder = pathlib.Path(name) / stem
+                folder.mkdir()
+                files = SHARED / "scenes" / f"{stem}.scene", SHARED / "scenes" / f"{stem}_frames.txt"
+                scene, moving = read_scene(files[0], folder)
+                frames = numbers_of(files[1], 20).reshape(-1, len(moving), 12)
+                modes = {
+                    "collide": scene.collide,
+                    "pairs": lambda: len(scene.pairs_in_contact()),
+                    "distance": lambda: scene.distance().distance.distance,
+                    "within": lambda: len(scene.pairs_within(0.05)),
+                }
+                for mode, ask in modes.items():
+                    within = ["--within", "0.05"] if mode == "within" else []
+                    raw = ask_command(folder, "scene", *files, "--mode", mode, "--limit", len(frames), *within)
+                    for scene.parallel, scene.tracking in ((False, False), (True, True)):
+                        found = []
+                        for frame in frames:
+                            scene.set_poses(moving, bottom_row(frame))
+                            found.append(float(ask()))
+                        self.assertEqual(found, [float(line[0]) for line in raw], f"{stem} {mode}")
+
+
+if __name__ == "__main__":
+    unittest.main()
