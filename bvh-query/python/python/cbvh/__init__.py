@@ -45,10 +45,12 @@ from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._scene import Scene, _scene_of
+from .manager import CollisionManager
 
 __all__ = [
     "BakeError",
     "ClosestPoint",
+    "CollisionManager",
     "Distance",
     "FormatError",
     "Mesh",

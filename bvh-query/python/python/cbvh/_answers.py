@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import Any, NamedTuple, Sequence
+from typing import Any, NamedTuple, Sequence, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,7 +181,10 @@ class SceneRayHit(NamedTuple):
     """The answer of `Mesh.first_hits`, in the world."""
 
 
-def as_answer(kind: Any, fields: Sequence[NDArray[Any]], one: bool) -> Any:
+Answer = TypeVar("Answer", bound=tuple[Any, ...])
+
+
+def as_answer(kind: type[Answer], fields: Sequence[NDArray[Any]], one: bool) -> Answer:
     """A named tuple of arrays or, for one question, of its elements."""
     return kind(*(field[0] if field.ndim > 1 else field[0].item() for field in fields)) if one else kind(*fields)
 
@@ -198,7 +201,8 @@ def split_hits(starts: NDArray[np.int64], hits: Sequence[NDArray[Any]]) -> list[
 
 def signed(distances: Floats, sides: NDArray[np.uint8]) -> Floats:
     """Distances, negative inside and NaN where there is no inside."""
-    return distances * np.array([1.0, -1.0, 1.0, np.nan])[sides]
+    found: Floats = distances * np.array([1.0, -1.0, 1.0, np.nan])[sides]
+    return found
 
 
 def as_motion(kinds: NDArray[np.uint8], until: Floats, at: Floats, distance: Sequence[NDArray[Any]], one: bool) -> MotionAnswer:

@@ -42,7 +42,8 @@ def read_pose(value: ArrayLike | None, name: str = "pose") -> Floats:
     pose, one = read_poses(value, name)
     if not one:
         raise ValueError(f"{name}: expected shape (4, 4), found {np.shape(value)}")
-    return pose[0]
+    found: Floats = pose[0]
+    return found
 
 
 def read_rays(

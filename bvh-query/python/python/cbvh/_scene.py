@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import os
-from typing import Any, Iterator, Mapping
+from typing import Any, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -184,11 +184,13 @@ class Scene:
 
     def mesh(self, id: int) -> Mesh:
         """The mesh of an instance."""
-        return self._scene.mesh(_number(id, "id"))
+        found: Mesh = self._scene.mesh(_number(id, "id"))
+        return found
 
     def pose(self, id: int) -> Floats:
         """The pose of an instance (body to world), shape (4, 4)."""
-        return self._scene.poses(np.array([_number(id, "id")]))[0]
+        found: Floats = self._scene.poses(np.array([_number(id, "id")]))[0]
+        return found
 
     def poses(self, ids: ArrayLike | None = None) -> Floats:
         """The poses (body to world) of instances, shape (N, 4, 4); of all, in their order, if ``ids`` is None."""
@@ -260,7 +262,7 @@ class Scene:
         pairs, fields = _cbvh.scene_distance(self._scene)
         if len(pairs) == 0:
             return None
-        return SceneDistance(*pairs[0].tolist(), as_answer(Distance, fields, True))
+        return _placed(pairs, fields)
 
     def closest_points(self, points: ArrayLike, *, within: float = np.inf) -> SceneClosestPoint:
         """The points of all instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
@@ -329,8 +331,7 @@ class Scene:
         kind, until, at, (pairs, fields) = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
         if len(pairs) == 0:
             return SceneMotion(MotionKind(kind), until, at, None)
-        placed = SceneDistance(*pairs[0].tolist(), as_answer(Distance, fields, True))
-        return SceneMotion(MotionKind(kind), until, at, placed)
+        return SceneMotion(MotionKind(kind), until, at, _placed(pairs, fields))
 
     def is_free(
         self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
@@ -342,6 +343,12 @@ class Scene:
 
 def _one(found: NDArray[Any], one: bool) -> Any:
     return found[0].item() if one else found
+
+
+def _placed(pairs: NDArray[np.int64], fields: Sequence[NDArray[Any]]) -> SceneDistance:
+    """The pair of the only row, and its distance."""
+    a, b = pairs[0].tolist()
+    return SceneDistance(a, b, as_answer(Distance, fields, True))
 
 
 def _ways(paths: Mapping[int, Path]) -> tuple[list[int], list[Any]]:

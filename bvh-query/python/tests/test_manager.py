@@ -1,0 +1,190 @@
+"""Tests of the collision manager: what trimesh documents, by brute force over pairs of meshes. It needs no trimesh."""
+
+import itertools
+import threading
+import types
+import unittest
+
+import numpy as np
+
+import cbvh
+from cbvh import manager as module
+from common import cube, random_poses, shifts
+
+
+def solid(size=1.0):
+    """What has vertices and faces, as a mesh of trimesh."""
+    vertices, faces = cube(size)
+    return types.SimpleNamespace(vertices=vertices, faces=np.array(faces))
+
+
+class Manager(unittest.TestCase):
+    def manager(self, seed, count):
+        """A manager, and the meshes and poses of its objects by name."""
+        manager, objects = cbvh.CollisionManager(), {}
+        for number, pose in enumerate(random_poses(seed, count, 3.0)):
+            vertices, faces = cube(1.0 if number % 2 else 0.5)
+            objects[f"part {number}"] = (cbvh.bake(vertices, faces), pose)
+            manager.add_object(f"part {number}", solid(1.0 if number % 2 else 0.5), pose)
+        return manager, objects
+
+    def relative(self, a, b):
+        pose = np.linalg.inv(a) @ b
+        pose[3] = [0, 0, 0, 1]
+        return pose
+
+    def touching(self, pairs):
+        return {names for names, (a, at), (b, bt) in pairs if a.collide(b, self.relative(at, bt))}
+
+    def nearest(self, pairs):
+        return min((a.distance(b, self.relative(at, bt)).distance, names) for names, (a, at), (b, bt) in pairs)
+
+    def test_collisions_are_those_of_all_pairs(self):
+        manager, objects = self.manager(1, 20)
+        other, others = self.manager(2, 10)
+        among = [(tuple(sorted((a, b))), objects[a], objects[b]) for a, b in itertools.combinations(objects, 2)]
+        between = [((a, b), objects[a], others[b]) for a in objects for b in others]
+        expected = self.touching(among)
+        self.assertTrue(0 < len(expected) < len(among))
+        self.assertEqual(manager.in_collision_internal(return_names=True), (True, expected))
+        self.assertIs(manager.in_collision_internal(), True)
+        expected = self.touching(between)
+        self.assertEqual(manager.in_collision_other(other, return_names=True), (True, expected))
+        self.assertEqual(other.in_collision_other(manager, return_names=True)[1], {pair[::-1] for pair in expected})
+        self.assertIs(manager.in_collision_other(other), True)
+        single = {name: manager.in_collision_single(solid(), pose, return_names=True) for name, (_, pose) in others.items()}
+        own = cbvh.bake(*cube())
+        for name, (found, names) in single.items():
+            pose = others[name][1]
+            self.assertEqual(names, self.touching([(of, objects[of], (own, pose)) for of in objects]))
+            self.assertIs(found, bool(names))
+            self.assertIs(manager.in_collision_single(own, pose), found)
+        # Nothing of the questions is left behind.
+        self.assertEqual(manager.in_collision_internal(return_names=True)[1], self.touching(among))
+
+    def test_contacts_are_pairs_of_triangles_in_contact_and_a_point_of_both(self):
+        manager, objects = self.manager(1, 8)
+        found, contacts = manager.in_collision_internal(return_data=True)
+        self.assertIs(found, True)
+        rows = set()
+        for contact in contacts:
+            a, b = sorted(contact.names)
+            rows.add((a, b, contact.index(a), contact.index(b)))
+            for name in (a, b):
+                vertices, faces = cube(0.5 if int(name.split()[1]) % 2 == 0 else 1.0)
+                corners = vertices[faces[contact.index(name)]] @ objects[name][1][:3, :3].T + objects[name][1][:3, 3]
+                normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+                self.assertAlmostEqual((contact.point - corners[0]) @ normal, 0, places=12)
+                weights = np.linalg.lstsq(np.vstack([corners.T, [1, 1, 1]]), [*contact.point, 1], rcond=None)[0]
+                self.assertGreater(weights.min(), -1e-9)
+        expected = set()
+        for a, b in itertools.combinations(sorted(objects), 2):
+            pose = self.relative(objects[a][1], objects[b][1])
+            expected |= {(a, b, of_a, of_b) for _, of_a, _, of_b in objects[a][0].contacts(objects[b][0], pose).tolist()}
+        self.assertEqual(rows, expected)
+        self.assertFalse(hasattr(contacts[0], "depth") or hasattr(contacts[0], "normal"))
+        with self.assertRaisesRegex(KeyError, "expected one of .*found 'no such'"):
+            contacts[0].index("no such")
+        single = manager.in_collision_single(cbvh.bake(*cube(0.5)), objects["part 0"][1], return_names=True, return_data=True)
+        self.assertEqual({name for contact in single[2] for name in contact.names}, single[1] | {"__external"})
+        with self.assertRaisesRegex(AttributeError, "found a cbvh.Mesh"):
+            single[2][0].point
+
+    def test_distances_are_the_least_of_all_pairs(self):
+        manager, other = cbvh.CollisionManager(), cbvh.CollisionManager()
+        meshes = {name: (cbvh.bake(*cube()), pose) for name, pose in zip("abcde", shifts((0, 0, 0), (3, 0, 0), (0, 5, 0), (0, 0, -8), (9, 9, 9)))}
+        for name, (mesh, pose) in meshes.items():
+            (manager if name in "abc" else other).add_object(name, mesh, pose)
+        of = [((a, b), meshes[a], meshes[b]) for a, b in itertools.combinations(meshes, 2)]
+        among = self.nearest([row for row in of if "".join(row[0]) in ("ab", "ac", "bc")])
+        self.assertEqual(manager.min_distance_internal(return_names=True), among)
+        self.assertEqual(manager.min_distance_internal(), 2.0)
+        of_c = self.nearest([row for row in of if "".join(row[0]) in ("ac", "bc")])
+        self.assertEqual(manager.min_distance_internal("c", return_names=True), of_c)
+        between = self.nearest([row for row in of if row[0][0] in "abc" and row[0][1] in "de"])
+        distance, names, data = manager.min_distance_other(other, return_names=True, return_data=True)
+        self.assertEqual((distance, names, data.distance, data.names), (*between, distance, set(names)))
+        self.assertAlmostEqual(np.linalg.norm(data.point(names[0]) - data.point(names[1])), distance, places=12)
+        self.assertEqual(other.min_distance_other(manager, return_names=True), (distance, names[::-1]))
+        distance, name, data = manager.min_distance_single(solid(), shifts((0, 5, 3))[0], return_name=True, return_data=True)
+        self.assertEqual((distance, name, data.names), (2.0, "c", {"c", "__external"}))
+        self.assertEqual((data.point("c")[2], data.point("__external")[2]), (0.5, 2.5))
+        self.assertIn(data.index("c"), range(12))
+        # A cube in another one: 0 where they touch, and no less.
+        self.assertEqual(manager.min_distance_single(solid(), shifts((0.5, 0, 0))[0]), 0.0)
+
+    def test_objects_come_go_and_move(self):
+        manager = cbvh.CollisionManager()
+        self.assertEqual(manager.in_collision_internal(return_names=True, return_data=True), (False, set(), []))
+        self.assertEqual(manager.min_distance_internal(return_names=True, return_data=True), (np.inf, None, None))
+        self.assertEqual(manager.min_distance_single(solid(), return_name=True), (np.inf, None))
+        manager.add_object("a", solid())
+        manager.add_object(("b", 2), solid(), shifts((5, 0, 0))[0])
+        self.assertIs(manager.in_collision_internal(), False)
+        manager.set_transform(("b", 2), shifts((1, 0, 0))[0])
+        self.assertIs(manager.in_collision_internal(), True)
+        manager.add_object("a", solid(0.5))
+        self.assertIs(manager.in_collision_internal(), False)
+        manager.remove_object("a")
+        self.assertEqual(manager.min_distance_single(solid(), return_name=True), (0.0, ("b", 2)))
+        # Transforms of float32, as trimesh rounds them.
+        for pose in random_poses(3, 50, 5.0).astype(np.float32):
+            manager.set_transform(("b", 2), pose)
+            manager.in_collision_single(solid(), pose)
+
+    def test_each_content_is_baked_once(self):
+        manager = cbvh.CollisionManager()
+        calls, bake = [], module.bake
+        module.bake = lambda *arguments: calls.append(arguments) or bake(*arguments)
+        try:
+            own = solid(0.123)
+            for number in range(10):
+                manager.add_object(number, own, shifts((number, 0, 0))[0])
+                manager.in_collision_single(solid(0.123))
+            self.assertEqual(len(calls), 1)
+            own.vertices = own.vertices * 2
+            manager.add_object("larger", own)
+            self.assertEqual(len(calls), 2)
+        finally:
+            module.bake = bake
+
+    def test_bad_arguments_are_named(self):
+        manager = cbvh.CollisionManager()
+        manager.add_object("a", solid())
+        cases = [
+            (ValueError, "name: expected that of an object of the manager, found 'b'", manager.remove_object, "b"),
+            (ValueError, "name: expected that of an object", manager.set_transform, "b", np.eye(4)),
+            (ValueError, "name: expected that of an object", manager.min_distance_internal, "b"),
+            (ValueError, "transform: expected shape (4, 4)", manager.add_object, "b", solid(), np.eye(3)),
+            (ValueError, "expected a rotation", manager.add_object, "b", solid(), np.diag([2.0, 2, 2, 1])),
+            (TypeError, "mesh: expected a cbvh.Mesh or an object with vertices and faces, found str", manager.add_object, "b", "x"),
+            (ValueError, "vertices: expected shape (V, 3)", manager.in_collision_single, types.SimpleNamespace(vertices=[1], faces=[[0]])),
+            (TypeError, "other_manager: expected a cbvh.CollisionManager, found int", manager.in_collision_other, 3),
+        ]
+        for kind, message, call, *arguments in cases:
+            with self.subTest(message), self.assertRaises(kind) as caught:
+                call(*arguments)
+            self.assertIn(message, str(caught.exception))
+        self.assertEqual(manager.min_distance_internal(), np.inf)
+
+    def test_threads_share_a_manager(self):
+        manager, objects = self.manager(4, 20)
+        expected, failures = manager.in_collision_single(solid(), return_names=True), []
+
+        def use(number):
+            for _ in range(30):
+                if number % 2:
+                    manager.add_object(number, solid(), shifts((99, number * 3, 0))[0])
+                elif manager.in_collision_single(solid(), return_names=True) != expected:
+                    failures.append(number)
+
+        threads = [threading.Thread(target=use, args=(number,)) for number in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+        self.assertFalse(failures or any(thread.is_alive() for thread in threads))
+
+
+if __name__ == "__main__":
+    unittest.main()
