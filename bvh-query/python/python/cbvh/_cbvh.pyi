@@ -19,6 +19,46 @@ _Distances = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Ids, _Ids, _Ids
 _Motions = tuple[_Bytes, _Floats, _Floats, _Distances]
 
 __version__: str
+__all__ = [
+    "__version__",
+    "BakeError",
+    "FormatError",
+    "Mesh",
+    "Paths",
+    "Scene",
+    "all_hits",
+    "any_hits",
+    "bake",
+    "bake_files",
+    "closest_points",
+    "collide",
+    "contacts",
+    "distance",
+    "distance_with",
+    "first_hits",
+    "is_free",
+    "meet_segments",
+    "motion",
+    "relation",
+    "scene_all_hits",
+    "scene_any_hits",
+    "scene_closest_points",
+    "scene_collide",
+    "scene_contacts",
+    "scene_distance",
+    "scene_first_hits",
+    "scene_is_free",
+    "scene_meet_segments",
+    "scene_motion",
+    "scene_pairs_in_contact",
+    "scene_pairs_within",
+    "scene_relations",
+    "scene_sides",
+    "scene_signed_distances",
+    "scene_within",
+    "sides",
+    "within",
+]
 
 class FormatError(ValueError): ...
 class BakeError(ValueError): ...

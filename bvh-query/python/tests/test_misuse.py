@@ -1,0 +1,127 @@
+"""Tests of wrong arguments: each gives an exception that says what is wrong, and none a crash."""
+
+import random
+import unittest
+
+import numpy as np
+
+import cbvh
+from cbvh import _cbvh
+from common import cube, random_poses, shifts
+
+
+class BadArguments(unittest.TestCase):
+    """Each gives an exception that names the argument, what was expected, and what was found."""
+
+    def setUp(self):
+        self.cube = cbvh.bake(*cube())
+
+    def test_exceptions_name_what_is_wrong(self):
+        mesh, one = self.cube, np.eye(4)
+        nan, scaled, mirrored = np.full((4, 4), np.nan), np.diag([2.0, 2, 2, 1]), np.diag([1.0, 1, -1, 1])
+        vertices, faces = cube()
+        cases = [
+            (ValueError, "poses: expected shape (4, 4) or (N, 4, 4), found (3, 4)", mesh.collide, mesh, one[:3]),
+            (ValueError, "poses[1]: ", mesh.collide, mesh, np.stack([one, nan])),
+            (ValueError, "poses[0]: ", mesh.distance, mesh, scaled),
+            (ValueError, "reflection", mesh.contacts, mesh, mirrored),
+            (TypeError, "poses: expected numbers, found dtype <U1", mesh.within, mesh, "x", 1),
+            (TypeError, "poses: expected numbers, found dtype object", mesh.relation, mesh, None),
+            (TypeError, "expected numbers, found dtype complex128", mesh.collide, mesh, one * 1j),
+            (TypeError, "other: expected a cbvh.Mesh, found str", mesh.collide, "mesh", one),
+            (ValueError, "NaN", mesh.within, mesh, one, np.nan),
+            (ValueError, "-1", mesh.within, mesh, one, -1),
+            (ValueError, "points: expected shape (3,) or (N, 3), found (2,)", mesh.sides, [0, 0]),
+            (ValueError, "pose: expected shape (4, 4)", mesh.sides, [0, 0, 0], ),
+            (ValueError, "inf", mesh.sides, [0, 0, np.inf]),
+            (ValueError, "as many directions", mesh.first_hits, np.zeros((2, 3)), np.ones((3, 3))),
+            (ValueError, "as many ends", mesh.meet_segments, np.zeros((2, 3)), np.ones((3, 3))),
+            (ValueError, "direction", mesh.first_hits, [0, 0, 0], [0, 0, 0]),
+            (ValueError, "vertices: expected shape (V, 3), found (8, 2)", cbvh.bake, vertices[:, :2], faces),
+            (ValueError, "faces: expected numbers from 0 to 7, found 0 to 8", cbvh.bake, vertices, [[0, 1, 8]]),
+            (ValueError, "faces: expected numbers from 0 to 7, found -1 to 2", cbvh.bake, vertices, [[0, -1, 2]]),
+            (TypeError, "faces: expected integers, found dtype float64", cbvh.bake, vertices, [[0.0, 1, 2]]),
+            (cbvh.BakeError, "", cbvh.bake, vertices * np.nan, faces),
+            (cbvh.BakeError, "", cbvh.bake, np.zeros((0, 3)), np.zeros((0, 3), int)),
+            (IndexError, "object: expected a number below 1, found 1", mesh.object, 1),
+            (ValueError, "object: expected one name", mesh.object, "no such"),
+            (cbvh.FormatError, "R01", cbvh.Mesh.from_bytes, b"nothing of the kind"),
+            (FileNotFoundError, "no such.cbvh", cbvh.open, "no such.cbvh"),
+            (cbvh.FormatError, "R0", cbvh.open, __file__),
+            (cbvh.BakeError, "no such.obj", cbvh.bake_files, "no such.obj", "x.cbvh"),
+        ]
+        for kind, message, call, *arguments in cases:
+            keywords = {"pose": np.eye(3)} if message.startswith("pose: ") else {}
+            with self.subTest(message), self.assertRaises(kind) as caught:
+                call(*arguments, **keywords)
+            self.assertIn(message, str(caught.exception))
+        for options in ({"profile": "dop7"}, {"triangles": "small"}, {"effort": "low"}):
+            with self.assertRaisesRegex(ValueError, f"{next(iter(options))}: expected one of"):
+                cbvh.bake(vertices, faces, **options)
+        with self.assertRaisesRegex(ValueError, "parallel"):
+            mesh.distance(mesh, one, rel_err=0.1, parallel=True)
+
+    def test_the_compiled_module_checks_shapes_itself(self):
+        for call, array in (
+            (lambda rows: _cbvh.sides(self.cube._mesh, rows, np.eye(4), False), np.zeros((3, 2))),
+            (lambda pose: _cbvh.sides(self.cube._mesh, np.zeros((1, 3)), pose, False), np.zeros((2, 8))),
+            (lambda poses: _cbvh.collide(self.cube._mesh, self.cube._mesh, poses, False), np.zeros((1, 2, 8))),
+        ):
+            with self.assertRaisesRegex(ValueError, "expected rows of shape"):
+                call(array)
+
+    def test_damage_is_an_exception(self):
+        whole = self.cube.tobytes()
+        random_numbers = random.Random(3)
+        found = 0
+        for _ in range(300):
+            damaged = bytearray(whole)
+            damaged[random_numbers.randrange(len(whole))] ^= 1 << random_numbers.randrange(8)
+            try:
+                mesh = cbvh.Mesh.from_bytes(bytes(damaged))
+                mesh.contacts(mesh, np.eye(4))
+                mesh.check()
+            except cbvh.FormatError:
+                found += 1
+        self.assertGreater(found, 50)
+
+    def test_ten_thousand_misuses_raise_nothing_unexpected(self):
+        random_numbers = random.Random(5)
+        mesh, scene, manager = self.cube, cbvh.Scene(), cbvh.CollisionManager()
+        poses = random_poses(1, 3, 2.0)
+        for number, pose in enumerate(poses):
+            scene.add(mesh, pose, name=f"part {number}")
+            manager.add_object(number, mesh, pose)
+        motion, line = cbvh.Motion.between(poses[0], poses[1:]), cbvh.Polyline(poses)
+        odd = [None, "x", b"", 0, -1, 1e308, np.nan, np.inf, True, [], [[]], {}, mesh, object(), np.zeros((2, 0))]
+        odd += [np.eye(4), np.eye(3), shifts((0, 0, 0)), np.zeros((4, 4)), np.ones((3, 3)), np.zeros(3), np.zeros(2**12)]
+        odd += [np.eye(4) * np.nan, np.eye(4, dtype=np.float16), np.eye(4, dtype=complex), np.array(["a"]), 2**70, "a\0b"]
+        odd += [np.zeros((1, 1, 1, 1)), np.eye(4) * 1e300, [0, 0, 0], [[0, 0, 0], [1, 1, 1]], np.zeros((0, 3)), range(3)]
+        odd += [scene, manager, motion, motion[0], line, {0: line}, {1: motion, "x": line}, [line, motion[1]], 2**63, 1.5]
+        odd += [mesh._mesh, scene._scene, line._paths, np.arange(3), poses, "part 1"]
+        things = [(mesh, 4), (scene, 4), (manager, 2), (motion, 1), (line, 1), (_cbvh, 3), (cbvh.Motion, 1), (cbvh, 1)]
+        methods = []
+        for thing, share in things:
+            names = [name for name in dir(thing) if not name.startswith("_") and callable(getattr(thing, name))]
+            # Those that write files are not asked with random names.
+            calls = [getattr(thing, name) for name in names if name not in ("save", "bake_files", "open", "Path")]
+            methods += [(share / len(calls), call) for call in calls]
+        shares = [share for share, _ in methods]
+        allowed = (TypeError, ValueError, LookupError, OverflowError, OSError, AttributeError)
+        answered = set()
+        for _ in range(10_000):
+            (_, call), = random_numbers.choices(methods, shares)
+            arguments = [random_numbers.choice(odd) for _ in range(random_numbers.randrange(6))]
+            try:
+                call(*arguments)
+                answered.add(getattr(call, "__qualname__", call))
+            except allowed:
+                pass
+        self.assertGreater(len(answered), 40)
+        # All are still whole.
+        self.assertIs(mesh.collide(mesh, np.eye(4)), True)
+        scene.distance(), manager.in_collision_internal()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,89 @@
+"""Tests of questions about points, rays and segments: plain geometry, and the bits of the command."""
+
+import pathlib
+import tempfile
+import unittest
+
+import numpy as np
+
+import cbvh
+from common import COMMAND, SHARED, WITHOUT_COMMAND, WITHOUT_SHARED
+from common import ask_command, cube, numbers_of, shifts
+
+
+class Geometry(unittest.TestCase):
+    """A cube, whose answers are known."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.cube = cbvh.bake(*cube())
+
+    def test_probes(self):
+        points = np.random.default_rng(1).uniform(-1, 1, (200, 3))
+        outside = np.maximum(np.abs(points) - 0.5, 0)
+        inside = np.min(0.5 - np.abs(points), axis=1)
+        expected = np.where(inside > 0, -inside, np.linalg.norm(outside, axis=1))
+        placed = shifts((1, 2, 3))[0]
+        for parallel in (False, True):
+            for pose, moved in ((None, points), (placed, points + [1, 2, 3])):
+                found = self.cube.signed_distances(moved, pose=pose, parallel=parallel)
+                np.testing.assert_allclose(found, expected, atol=1e-14)
+                sides = self.cube.sides(moved, pose=pose, parallel=parallel)
+                np.testing.assert_array_equal(sides == cbvh.Side.INSIDE, inside > 0)
+            near = self.cube.closest_points(points, within=0.1, parallel=parallel)
+            np.testing.assert_array_equal(near.found, np.abs(expected) <= 0.1)
+            self.assertTrue(np.all(np.isnan(near.distance[~near.found])))
+            # A ray along z hits both faces if it is inside in x and y.
+            above = points * [1, 1, 0] + [0, 0, 2]
+            hits = self.cube.first_hits(above, np.tile([0, 0, -1], (200, 1)), parallel=parallel)
+            crosses = np.all(np.abs(points[:, :2]) < 0.5, axis=1)
+            np.testing.assert_array_equal(hits.found, crosses)
+            np.testing.assert_array_equal(hits.t[crosses], 1.5)
+            every = self.cube.all_hits(above, np.tile([0, 0, -1], (200, 1)), until=2, parallel=parallel)
+            self.assertEqual([len(hit.t) for hit in every], crosses.astype(int).tolist())
+            below = above * [1, 1, -1]
+            np.testing.assert_array_equal(self.cube.meet_segments(above, below, parallel=parallel), crosses)
+
+    def test_as_many_ends_as_rays(self):
+        above, down = [[0.1, 0.2, 5], [0.1, 0.2, 5]], [[0, 0, -1], [0, 0, -1]]
+        found = self.cube.first_hits(above, down, until=[4, 5])
+        self.assertEqual(found.found.tolist(), [False, True])
+        with self.assertRaisesRegex(ValueError, r"until: expected shape \(\) or \(2,\), found \(3,\)"):
+            self.cube.any_hits(above, down, until=[1, 2, 3])
+
+
+@unittest.skipUnless(COMMAND, WITHOUT_COMMAND)
+@unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
+class SameBits(unittest.TestCase):
+    """Answers about meshes and probes of the folder shared are those of the command, bit for bit."""
+
+    def test_probes_of_shared_meshes(self):
+        ways = {"closest": "points", "side": "points", "ray": "rays", "segment": "segments"}
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for mesh_name in ("apollo", "bunny", "nao"):
+                file = folder / f"{mesh_name}.cbvh"
+                mesh = cbvh.bake_files(SHARED / "meshes" / f"{mesh_name}.obj", file)
+                for mode, kind in ways.items():
+                    probes = SHARED / "probes" / f"{mesh_name}_{kind}.txt"
+                    raw = ask_command(folder, "probe", file, probes, "--mode", mode, "--limit", 200)
+                    raw = np.array([float(line[0]) for line in raw])
+                    rows = numbers_of(probes, 200)
+                    first, last = rows[:, :3], rows[:, 3:6]
+                    for parallel in (False, True):
+                        # The command prints -1 for no hit.
+                        found = {
+                            "closest": lambda: mesh.closest_points(first, parallel=parallel).distance,
+                            "side": lambda: SIDES[mesh.sides(first, parallel=parallel)],
+                            "ray": lambda: np.nan_to_num(mesh.first_hits(first, last, parallel=parallel).t, nan=-1.0),
+                            "segment": lambda: mesh.meet_segments(first, last, parallel=parallel),
+                        }[mode]()
+                        np.testing.assert_array_equal(np.asarray(found, float), raw, f"{mesh_name}, {mode}")
+
+
+# What the command prints for `Side.OUTSIDE`, `INSIDE`, `ON` and `UNDEFINED`.
+SIDES = np.array([-1, 1, 0, 2])
+
+
+if __name__ == "__main__":
+    unittest.main()

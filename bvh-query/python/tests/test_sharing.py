@@ -1,0 +1,102 @@
+"""Tests of files, threads, processes, and of what the module says about itself."""
+
+import ast
+import concurrent.futures
+import doctest
+import inspect
+import multiprocessing
+import os
+import pathlib
+import pickle
+import tempfile
+import unittest
+
+import numpy as np
+
+import cbvh
+from cbvh import _cbvh
+from common import TESTDATA, cube, random_poses, shifts
+
+
+class Sharing(unittest.TestCase):
+    """Files, threads and processes."""
+
+    def test_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            output = pathlib.Path(folder) / "environment.cbvh"
+            mesh = cbvh.bake_files(TESTDATA / "fclenv.obj", output, triangles="packed")
+            self.assertEqual((mesh.nbytes, mesh.names), (output.stat().st_size, [""]))
+            changed = output.stat().st_mtime_ns
+            cbvh.bake_files([TESTDATA / "fclenv.obj"], output, triangles="packed")
+            self.assertEqual(output.stat().st_mtime_ns, changed)
+            copy = pathlib.Path(folder) / "copy.cbvh"
+            mesh.save(copy)
+            self.assertEqual(copy.read_bytes(), output.read_bytes())
+            self.assertEqual(sorted(os.listdir(folder)), ["copy.cbvh", "environment.cbvh"])
+            mesh.check()
+
+    def test_pickles_lead_to_the_same_file_and_to_the_same_bytes(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "cube.cbvh")
+            cbvh.bake(*cube()).save(path)
+            mapped = cbvh.open(path)
+            self.assertLess(len(pickle.dumps(mapped)), 300)
+            again = pickle.loads(pickle.dumps(mapped.object(0)))
+            self.assertEqual(repr(again), repr(mapped.object(0)))
+            held = pickle.loads(pickle.dumps(cbvh.bake(*cube())))
+            self.assertEqual(held.tobytes(), mapped.tobytes())
+            with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+                poses = shifts((0, 0, 0), (3, 0, 0))
+                answers = pool.submit(mapped.collide, mapped, poses).result()
+            self.assertEqual(answers.tolist(), [True, False])
+
+    def test_threads_get_the_same_answers(self):
+        mesh = cbvh.bake(*cube())
+        poses = random_poses(2, 400, 1.5)
+        expected = mesh.distance(mesh, poses)
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            for found in pool.map(lambda _: mesh.distance(mesh, poses), range(8)):
+                for one, other in zip(found, expected):
+                    np.testing.assert_array_equal(one, other)
+
+
+class Stubs(unittest.TestCase):
+    """The stubs of the compiled module state what is there, and everything public is documented."""
+
+    def test_stubs_state_what_is_there(self):
+        stubs = ast.parse((pathlib.Path(cbvh.__file__).parent / "_cbvh.pyi").read_text())
+        functions = {node.name: node for node in stubs.body if isinstance(node, ast.FunctionDef)}
+        classes = {node.name: node for node in stubs.body if isinstance(node, ast.ClassDef)}
+        there = {name for name in dir(_cbvh) if not name.startswith("_")}
+        self.assertEqual(there, functions.keys() | classes.keys())
+        holders = [(_cbvh, functions)]
+        for name in ("Mesh", "Paths", "Scene"):
+            methods = {node.name: node for node in classes[name].body if isinstance(node, ast.FunctionDef)}
+            methods.pop("__new__", None)
+            there = {method for method in dir(getattr(_cbvh, name)) if not method.startswith("_")}
+            self.assertEqual(there, methods.keys(), name)
+            holders.append((getattr(_cbvh, name), methods))
+        for holder, stated in holders:
+            for name, node in stated.items():
+                parameters = list(inspect.signature(getattr(holder, name)).parameters)
+                self.assertEqual(parameters, [argument.arg for argument in node.args.args], name)
+
+    def test_everything_public_is_documented(self):
+        for name in cbvh.__all__:
+            if name.startswith("_"):
+                continue
+            thing = getattr(cbvh, name)
+            self.assertTrue(thing.__doc__, name)
+            for member, value in vars(thing).items() if inspect.isclass(thing) else ():
+                if not member.startswith("_") and callable(value):
+                    self.assertTrue(inspect.getdoc(value), f"{name}.{member}")
+
+    def test_examples_of_the_documentation(self):
+        failed, attempted = doctest.testmod(cbvh)
+        # With what the classes say.
+        self.assertEqual(failed, 0)
+        self.assertGreater(attempted, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()
