@@ -2,8 +2,9 @@
 
     python compare.py pairs.txt --meshes MESHES --poses POSES [--presets d0sep,d1] [--limit 50] [--only bunny,fcl]
 
-A line of ``pairs.txt`` is NAME A B: meshes as OBJ in the folder MESHES. ``POSES/NAME_PRESET.txt`` has a pose of B in the frame
-of A per line, 12 numbers row by row. pip install trimesh python-fcl coal; libraries that are missing are left out.
+A line of ``pairs.txt`` is NAME A B: meshes as OBJ in the folder MESHES. ``POSES/NAME_PRESET.txt`` has a pose of B in
+the frame of A per line, 12 numbers row by row. pip install trimesh python-fcl coal; libraries that are missing are left
+out.
 
 How each is asked, one pose per call, each call timed alone after three that are not:
 
@@ -13,9 +14,9 @@ How each is asked, one pose per call, each call timed alone after three that are
 - coal: BVHModelOBBRSS, ``coal.collide`` and ``coal.distance`` with the same, and with break_distance 0.
 - trimesh: a CollisionManager with both meshes, ``set_transform`` and ``in_collision_internal`` or ``min_distance_internal``.
 
-The figures are medians over the poses of a preset, in microseconds, with what Python costs. Ratios are to "cbvh". "differ" counts
-poses with another answer: of contact, or a distance off by more than a millionth of it and of 1e-9 of the size of A. fcl,
-coal and trimesh answer 0 or less for the distance where meshes meet, which counts as 0.
+The figures are medians over the poses of a preset, in microseconds, with what Python costs. Ratios are to "cbvh".
+"differ" counts poses with another answer: of contact, or a distance off by more than a millionth of it and of 1e-9 of
+the size of A. fcl, coal and trimesh answer 0 or less for the distance where meshes meet, which counts as 0.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ with tempfile.TemporaryDirectory() as folder:
 
     # The whole way, at every moment.
     way = walls.motion(robot, cbvh.Motion.between(poses[0], poses[-1]))
-    print(f"the way is {way.kind.name}" + ("" if way.kind == cbvh.MotionKind.FREE else f", surely free until {way.free_until:.9f}"))
+    print(f"the way is a {way.kind.name}, surely free until {way.free_until:.9f}")
 
     # Points, rays, and many placed meshes at once.
     print(f"a wall below the origin is {walls.first_hits([0, 0, 0], [0, 0, -1]).t} away")

@@ -97,7 +97,8 @@ for number in range(0, len(times), 200):
 place.plot(*poses[:, :2, 3].T, color="black", linewidth=0.8, linestyle=":")
 place.set(aspect="equal", xlabel="x", ylabel="y", title="The robot on its way, and a slice of the walls")
 course.plot(times, found.distance, color="navy", label="distance")
-course.fill_between(times, 0, found.distance.max(), where=touching, step="mid", color="crimson", alpha=0.2, label="contact")
+shade = {"color": "crimson", "alpha": 0.2, "label": "contact"}
+course.fill_between(times, 0, found.distance.max(), where=touching, step="mid", **shade)
 course.axvline(answer.free_until, color="black", linewidth=0.9, linestyle="--", label="surely free until")
 course.set(xlabel="time", ylabel="mesh units", xlim=(0, 1), ylim=(0, 1.4 * found.distance.max()))
 pairs = course.twinx()

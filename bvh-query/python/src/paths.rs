@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A path of the library.
 #[derive(Clone)]
+#[expect(clippy::large_enum_variant, reason = "nearly all paths are motions, which stand side by side")]
 pub(crate) enum Own {
     Motion(Motion),
     Polyline(Arc<Polyline>),
@@ -175,6 +176,7 @@ impl Path for Called {
 }
 
 /// A path of either kind.
+#[expect(clippy::large_enum_variant, reason = "nearly all paths are motions, which stand side by side")]
 pub(crate) enum AnyPath {
     Own(Own),
     Called(Called),

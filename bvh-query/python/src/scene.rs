@@ -1,8 +1,8 @@
 //! Scenes: placed meshes under numbers of their own, and questions about all of them.
 //!
-//! A number is given once and never again. The scene is locked while a question runs, without Python's lock, so that threads
-//! wait for each other there and nowhere else. Paths of Python code are asked about with a copy of the scene: they may then
-//! ask the scene themselves.
+//! A number is given once and never again. The scene is locked while a question runs, without Python's lock, so that
+//! threads wait for each other there and nowhere else. Paths of Python code are asked about with a copy of the scene:
+//! they may then ask the scene themselves.
 
 use crate::arrays::{array, one_pose, pose_rows, poses, table};
 use crate::errors::{FormatError, open_error, query_error};
@@ -39,7 +39,10 @@ pub(crate) struct State {
 }
 
 /// Why a scene refuses something: what callers have to be told is made of it while the scene is locked.
-pub(crate) type Refused = (SceneError, String);
+pub(crate) struct Refused {
+    error: Box<SceneError>,
+    message: String,
+}
 
 impl State {
     fn new(scene: bvh_query::Scene) -> Self {
@@ -102,7 +105,7 @@ impl State {
             }
             error => error.to_string(),
         };
-        (error, message)
+        Refused { error: Box::new(error), message }
     }
 }
 
@@ -112,8 +115,8 @@ fn no_instance(name: &str, found: i64) -> PyErr {
 }
 
 /// The exception of what a scene refuses.
-pub(crate) fn scene_error((error, message): Refused) -> PyErr {
-    match error {
+pub(crate) fn scene_error(Refused { error, message }: Refused) -> PyErr {
+    match *error {
         SceneError::Pair { source, .. } | SceneError::Instance { source, .. } => {
             let kind = query_error(source);
             Python::attach(|py| PyErr::from_type(kind.get_type(py), message))
@@ -176,7 +179,7 @@ impl Scene {
                 Some(mesh) => mesh,
                 None => {
                     let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
-                    let own = shape.map_or_else(|| OwnedShape::from(bvh.clone()), |shape| shape);
+                    let own = shape.unwrap_or_else(|| OwnedShape::from(bvh.clone()));
                     let made = mesh.call1((Mesh::of(own), instance.object))?.unbind();
                     meshes.insert(instance.object, made.clone_ref(py));
                     made
@@ -217,7 +220,7 @@ impl Scene {
                 SceneError::NameTaken(name) => {
                     format!("name: expected one that no instance has, found {name:?}")
                 }
-                error => state.refused(error).1,
+                error => state.refused(error).message,
             })?;
             // The instance is there.
             state.scene.set_groups(id, groups).map_err(|error| error.to_string())?;

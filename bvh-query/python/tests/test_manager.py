@@ -85,14 +85,16 @@ class Manager(unittest.TestCase):
         self.assertFalse(hasattr(contacts[0], "depth") or hasattr(contacts[0], "normal"))
         with self.assertRaisesRegex(KeyError, "expected one of .*found 'no such'"):
             contacts[0].index("no such")
-        single = manager.in_collision_single(cbvh.bake(*cube(0.5)), objects["part 0"][1], return_names=True, return_data=True)
+        mesh, pose = objects["part 0"]
+        single = manager.in_collision_single(mesh, pose, return_names=True, return_data=True)
         self.assertEqual({name for contact in single[2] for name in contact.names}, single[1] | {"__external"})
         with self.assertRaisesRegex(AttributeError, "found a cbvh.Mesh"):
             single[2][0].point
 
     def test_distances_are_the_least_of_all_pairs(self):
         manager, other = cbvh.CollisionManager(), cbvh.CollisionManager()
-        meshes = {name: (cbvh.bake(*cube()), pose) for name, pose in zip("abcde", shifts((0, 0, 0), (3, 0, 0), (0, 5, 0), (0, 0, -8), (9, 9, 9)))}
+        poses = shifts((0, 0, 0), (3, 0, 0), (0, 5, 0), (0, 0, -8), (9, 9, 9))
+        meshes = {name: (cbvh.bake(*cube()), pose) for name, pose in zip("abcde", poses)}
         for name, (mesh, pose) in meshes.items():
             (manager if name in "abc" else other).add_object(name, mesh, pose)
         of = [((a, b), meshes[a], meshes[b]) for a, b in itertools.combinations(meshes, 2)]
@@ -106,7 +108,8 @@ class Manager(unittest.TestCase):
         self.assertEqual((distance, names, data.distance, data.names), (*between, distance, set(names)))
         self.assertAlmostEqual(np.linalg.norm(data.point(names[0]) - data.point(names[1])), distance, places=12)
         self.assertEqual(other.min_distance_other(manager, return_names=True), (distance, names[::-1]))
-        distance, name, data = manager.min_distance_single(solid(), shifts((0, 5, 3))[0], return_name=True, return_data=True)
+        asked = manager.min_distance_single(solid(), shifts((0, 5, 3))[0], return_name=True, return_data=True)
+        distance, name, data = asked
         self.assertEqual((distance, name, data.names), (2.0, "c", {"c", "__external"}))
         self.assertEqual((data.point("c")[2], data.point("__external")[2]), (0.5, 2.5))
         self.assertIn(data.index("c"), range(12))
@@ -151,14 +154,15 @@ class Manager(unittest.TestCase):
     def test_bad_arguments_are_named(self):
         manager = cbvh.CollisionManager()
         manager.add_object("a", solid())
+        flat, add = types.SimpleNamespace(vertices=[1], faces=[[0]]), manager.add_object
         cases = [
             (ValueError, "name: expected that of an object of the manager, found 'b'", manager.remove_object, "b"),
             (ValueError, "name: expected that of an object", manager.set_transform, "b", np.eye(4)),
             (ValueError, "name: expected that of an object", manager.min_distance_internal, "b"),
             (ValueError, "transform: expected shape (4, 4)", manager.add_object, "b", solid(), np.eye(3)),
             (ValueError, "expected a rotation", manager.add_object, "b", solid(), np.diag([2.0, 2, 2, 1])),
-            (TypeError, "mesh: expected a cbvh.Mesh or an object with vertices and faces, found str", manager.add_object, "b", "x"),
-            (ValueError, "vertices: expected shape (V, 3)", manager.in_collision_single, types.SimpleNamespace(vertices=[1], faces=[[0]])),
+            (TypeError, "mesh: expected a cbvh.Mesh or an object with vertices and faces, found str", add, "b", "x"),
+            (ValueError, "vertices: expected shape (V, 3)", manager.in_collision_single, flat),
             (TypeError, "other_manager: expected a cbvh.CollisionManager, found int", manager.in_collision_other, 3),
         ]
         for kind, message, call, *arguments in cases:

@@ -77,7 +77,8 @@ class Paths(unittest.TestCase):
 
     def test_no_point_leaves_the_straight_way_by_more_than_the_sagitta(self):
         starts, ends = random_poses(6, 20, 3.0), random_poses(7, 20, 3.0)
-        paths = [*cbvh.Motion.between(starts, ends), cbvh.Polyline(starts), cbvh.Motion.screw(starts[0], [1, 0, 0], [1, 1, 0], 5, 1)]
+        paths = [*cbvh.Motion.between(starts, ends), cbvh.Polyline(starts)]
+        paths.append(cbvh.Motion.screw(starts[0], [1, 0, 0], [1, 1, 0], 5, 1))
         random_numbers = np.random.default_rng(8)
         nearest = 0.0
         for path in paths:

@@ -176,8 +176,9 @@ class Pairs(unittest.TestCase):
             np.testing.assert_array_equal(scene.any_hits(points, others - points), first.hit.found)
             np.testing.assert_array_equal(scene.meet_segments(points, others), meets)
             every = scene.all_hits(points, others - points)
-            expected = np.array([[len(mesh.all_hits(p, o - p, pose=pose).t) for mesh, pose in of] for p, o in zip(points, others)])
-            self.assertEqual([len(hit.instance) for hit in every], expected.sum(axis=1).tolist())
+            of_each = [mesh.all_hits(points, others - points, pose=pose) for mesh, pose in of]
+            expected = [sum(len(hit.t) for hit in hits) for hits in zip(*of_each)]
+            self.assertEqual([len(hit.instance) for hit in every], expected)
             self.assertTrue(all(np.all(np.diff(hit.hit.t) >= 0) for hit in every))
             limited = scene.closest_points(points, within=0.5)
             np.testing.assert_array_equal(limited.instance >= 0, distances.min(axis=0) <= 0.5)

@@ -11,18 +11,24 @@ False
 >>> tetrahedron.distance(tetrahedron, pose).distance
 2.0
 
-**Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a point
-``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the frame of
-the first one. Rotations must be rigid to within 2^-20.
+**Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a
+point ``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the
+frame of the first one. Rotations must be rigid to within 2^-20.
 
-**Answers** to one question are plain values; answers to N questions are arrays of N elements or rows. Lengths are in mesh
-units. Contact and insides are decided exactly: touching is contact, and the surface of a mesh is what collides.
+**Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are ways of a body.
+`Mesh.motion` and `Mesh.is_free` tell whether a way is free, certainly at every moment. **Scenes** are many placed
+meshes (`Scene`), and `CollisionManager` asks about them as trimesh does.
+
+**Answers** to one question are plain values; answers to N questions are arrays of N elements or rows. Lengths are in
+mesh units. Contact and insides are decided exactly: touching is contact, and the surface of a mesh is what collides.
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
-``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits.
+``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about
+one `Scene` wait for each other, and a path of your own is called on the thread of its question.
 
-Errors are exceptions: ``ValueError`` for arguments that mean nothing, ``OSError`` for files that the system refuses,
-``FormatError`` for files that are damaged or no .cbvh files, ``BakeError`` for meshes that cannot be baked.
+Errors are exceptions: ``ValueError`` for arguments that mean nothing, ``TypeError`` for those of another kind,
+``KeyError`` for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError``
+for files that are damaged or no .cbvh files, ``BakeError`` for meshes that cannot be baked.
 """
 
 from ._answers import (

@@ -78,9 +78,11 @@ class MotionAnswer(NamedTuple):
     free_until: Any
     """Before this time, from 0 to 1, the meshes certainly are not within the clearance. 1 where the way is free."""
     at: Any
-    """Of a hit, a time at which they are, the earliest one found; of NEAR, that of the first undecided pose; else NaN."""
+    """Of a hit, a time at which they are, the earliest one found; of NEAR, that of the first undecided pose; else
+    NaN."""
     distance: Distance
-    """Their distance at the time `at`, where the way is not free: 0 where they touch. Else its numbers are NaN and 0."""
+    """Their distance at the time `at`, where the way is not free: 0 where they touch. Else its numbers are NaN and
+    0."""
 
 
 class ClosestPoint(NamedTuple):
@@ -157,10 +159,11 @@ class SceneMotion(NamedTuple):
     free_until: float
     """Before this time, from 0 to 1, certainly no pair is within the clearance. 1 where the ways are free."""
     at: float
-    """Of a hit, a time at which a pair is, the earliest one found; of NEAR, that of the first undecided pose; else NaN."""
+    """Of a hit, a time at which a pair is, the earliest one found; of NEAR, that of the first undecided pose; else
+    NaN."""
     nearest: SceneDistance | None
-    """The pair, and its distance at that time; A is the one that stands still or, if both move, the first one. None where the
-    ways are free."""
+    """The pair, and its distance at that time; A is the one that stands still or, if both move, the first one. None
+    where the ways are free."""
 
 
 class SceneClosestPoint(NamedTuple):
@@ -205,7 +208,9 @@ def signed(distances: Floats, sides: NDArray[np.uint8]) -> Floats:
     return found
 
 
-def as_motion(kinds: NDArray[np.uint8], until: Floats, at: Floats, distance: Sequence[NDArray[Any]], one: bool) -> MotionAnswer:
+def as_motion(
+    kinds: NDArray[np.uint8], until: Floats, at: Floats, distance: Sequence[NDArray[Any]], one: bool
+) -> MotionAnswer:
     """Answers about ways: of plain values for one question."""
     placed = as_answer(Distance, distance, one)
     if one:

@@ -45,9 +45,9 @@ def bake(
     """Bakes a mesh in memory.
 
     ``vertices`` have shape (V, 3), in any unit of length; ``faces`` have shape (F, 3), three numbers of vertices each.
-    ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose. Without
-    ``ids`` triangles are numbered in an order of the baker's; without ``topology`` there are no answers about insides.
-    Baking takes about a microsecond a triangle. `Mesh.save` writes the result.
+    ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
+    Without ``ids`` triangles are numbered in an order of the baker's; without ``topology`` there are no answers about
+    insides. Baking takes about a microsecond a triangle. `Mesh.save` writes the result.
     """
     points = read_numbers(vertices, "vertices", np.float64)
     numbers = np.asarray(faces)
@@ -78,8 +78,8 @@ def bake_files(
 ) -> Mesh:
     """Bakes mesh files (OBJ, STL, PLY, glTF) into a ``.cbvh`` file, and opens it.
 
-    Nothing is done if the file is up to date, unless ``force``. ``max_memory``: stay within so many bytes; the rest goes to
-    scratch files, so that a mesh may be larger than memory. The other options are those of `bake`.
+    Nothing is done if the file is up to date, unless ``force``. ``max_memory``: stay within so many bytes; the rest
+    goes to scratch files, so that a mesh may be larger than memory. The other options are those of `bake`.
     """
     files = [inputs] if isinstance(inputs, (str, os.PathLike)) else list(inputs)
     options = _options(profile, triangles, max_error, effort, ids, topology)

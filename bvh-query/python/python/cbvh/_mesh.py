@@ -35,8 +35,8 @@ def _other(mesh: Mesh) -> _cbvh.Mesh:
 class Mesh:
     """A mesh in a ``.cbvh`` file: all objects of the file, or one. Made by `open` and `bake`.
 
-    It is never changed, so threads may share it. Pickling one that was opened from a file stores the path alone, so that
-    other processes map the same file; pickling one in memory stores its bytes.
+    It is never changed, so threads may share it. Pickling one that was opened from a file stores the path alone, so
+    that other processes map the same file; pickling one in memory stores its bytes.
     """
 
     __slots__ = ("_mesh", "_path", "_object")
@@ -178,11 +178,11 @@ class Mesh:
     ) -> MotionAnswer:
         """Is the way of ``other`` free, with it moving in the frame of this mesh, and where does it end if it is not?
 
-        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or a list of N paths, the
-        answer has arrays of N elements. The answer is certain at every moment, not at samples. ``clearance``: meshes that come
-        as near as this, in mesh units, hit. ``tolerance``: how near they may come to a hit, beyond the clearance, without an
-        answer that says free or hit, in mesh units; None: a millionth of the diagonal of the larger object's box. ``parallel``
-        does nothing where a path is your own.
+        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or a list of N
+        paths, the answer has arrays of N elements. The answer is certain at every moment, not at samples.
+        ``clearance``: meshes that come as near as this, in mesh units, hit. ``tolerance``: how near they may come to a
+        hit, beyond the clearance, without an answer that says free or hit, in mesh units; None: a millionth of the
+        diagonal of the larger object's box. ``parallel`` does nothing where a path is your own.
         """
         paths, one = read_paths(motion)
         found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)
@@ -235,8 +235,8 @@ class Mesh:
     ) -> Any:
         """Distances of points from the surface, negative inside: a float, or an array of shape (N,).
 
-        NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of this
-        mesh in the frame of the points (body to world).
+        NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of
+        this mesh in the frame of the points (body to world).
         """
         rows, one = read_rows(points, "points", 3)
         placed = read_pose(pose)
@@ -256,8 +256,9 @@ class Mesh:
     ) -> RayHit:
         """Where rays first hit the surface: which triangle, and at which parameter.
 
-        ``origins`` and ``directions`` have shape (3,) or (N, 3); directions of any length are the unit of ``t``. ``until``:
-        the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to world).
+        ``origins`` and ``directions`` have shape (3,) or (N, 3); directions of any length are the unit of ``t``.
+        ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
+        world).
         """
         rays, one = read_rays(origins, directions, until)
         return as_answer(RayHit, _cbvh.first_hits(self._mesh, *rays, read_pose(pose), parallel), one)
@@ -271,7 +272,8 @@ class Mesh:
         pose: ArrayLike | None = None,
         parallel: bool = False,
     ) -> Any:
-        """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of `first_hits`."""
+        """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of
+        `first_hits`."""
         rays, one = read_rays(origins, directions, until)
         found = _cbvh.any_hits(self._mesh, *rays, read_pose(pose), parallel)
         return bool(found[0]) if one else found
@@ -285,7 +287,8 @@ class Mesh:
         pose: ArrayLike | None = None,
         parallel: bool = False,
     ) -> Any:
-        """All triangles that rays hit, in the exact order along each: a `RayHit` of arrays of K elements, or a list of N.
+        """All triangles that rays hit, in the exact order along each: a `RayHit` of arrays of K elements, or a list of
+        N.
 
         Arguments are those of `first_hits`.
         """

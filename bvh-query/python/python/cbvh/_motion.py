@@ -14,20 +14,22 @@ from ._arrays import Floats, read_numbers, read_pose, read_poses
 class Path(Protocol):
     """What a path of your own has to be: any object with these two methods. `Motion` and `Polyline` are paths.
 
-    Both are called with Python's lock, on the thread of the question. An exception ends the question, and is raised by it.
+    Both are called with Python's lock, on the thread of the question. An exception ends the question, and is raised by
+    it.
     """
 
     def pose(self, t: float, /) -> ArrayLike:
-        """Where the body is at a time from 0 to 1 (body to world), shape (4, 4). The same time gives the same pose, to the bit."""
+        """Where the body is at a time from 0 to 1 (body to world), shape (4, 4). The same time gives the same pose, to
+        the bit."""
 
     def sagitta(self, radius: float, t0: float, t1: float, /) -> float:
         """A bound, in mesh units, of how far the path departs from a straight one between two times.
 
-        That is how far any point at most ``radius`` mesh units from the origin of the body's frame is, at any time from ``t0``
-        to ``t1``, from where it would be if it went straight, at a constant rate, from its place at ``t0`` to that at ``t1``:
-        at most an eighth of the greatest acceleration times the square of the time. It must hold for poses as computed, with
-        all rounding. Answers are only as certain as this bound, and the smaller it is, the less work they take. Infinity says
-        that nothing is known; on every interval, it would keep a question busy for ever.
+        That is how far any point at most ``radius`` mesh units from the origin of the body's frame is, at any time from
+        ``t0`` to ``t1``, from where it would be if it went straight, at a constant rate, from its place at ``t0`` to
+        that at ``t1``: at most an eighth of the greatest acceleration times the square of the time. It must hold for
+        poses as computed, with all rounding. Answers are only as certain as this bound, and the smaller it is, the less
+        work they take. Infinity says that nothing is known; on every interval, it would keep a question busy for ever.
         """
 
 
@@ -41,7 +43,8 @@ class _Own:
     _made: tuple[Any, ...]
 
     def pose(self, t: ArrayLike) -> Floats:
-        """Where the body is at ``t``, from 0 to 1, of shape () or (T,): poses (body to world) of shape (4, 4) or (T, 4, 4).
+        """Where the body is at ``t``, from 0 to 1, of shape () or (T,): poses (body to world) of shape (4, 4) or (T, 4,
+        4).
 
         Times before 0 and NaN count as 0, times after 1 as 1. Of N motions, the poses have N in front of their shape.
         """
@@ -73,11 +76,11 @@ class Motion(_Own):
 
     @staticmethod
     def between(start: ArrayLike, end: ArrayLike) -> Motion:
-        """What planners call interpolation in SE(3): the origin of the body's frame moves on a line, and the body turns about
-        one axis the shorter way (slerp), both at a constant rate.
+        """What planners call interpolation in SE(3): the origin of the body's frame moves on a line, and the body turns
+        about one axis the shorter way (slerp), both at a constant rate.
 
-        ``start`` and ``end`` are poses (body to world) of shape (4, 4) or (N, 4, 4); one start or end serves N of the other.
-        Raises ValueError for poses that are half a turn apart, to within 2e-9 radians.
+        ``start`` and ``end`` are poses (body to world) of shape (4, 4) or (N, 4, 4); one start or end serves N of the
+        other. Raises ValueError for poses that are half a turn apart, to within 2e-9 radians.
         """
         starts, one_start = read_poses(start, "start")
         ends, one_end = read_poses(end, "end")
@@ -93,16 +96,18 @@ class Motion(_Own):
     def screw(
         start: ArrayLike, point: ArrayLike, direction: ArrayLike, angle: float, shift: float = 0.0
     ) -> Motion:
-        """A screw motion from a pose: a rotation by ``angle`` radians, any number of turns, about the axis through ``point``
-        with ``direction`` (of any length), and a shift by ``shift`` mesh units along it.
+        """A screw motion from a pose: a rotation by ``angle`` radians, any number of turns, about the axis through
+        ``point`` with ``direction`` (of any length), and a shift by ``shift`` mesh units along it.
 
         ``start`` (body to world) has shape (4, 4); ``point`` and ``direction``, in the world, have shape (3,).
         """
         placed = read_pose(start, "start")
-        vectors = [read_numbers(vector, name, np.float64) for vector, name in ((point, "point"), (direction, "direction"))]
-        for vector, name in zip(vectors, ("point", "direction")):
+        vectors = []
+        for value, name in ((point, "point"), (direction, "direction")):
+            vector = read_numbers(value, name, np.float64)
             if vector.shape != (3,):
                 raise ValueError(f"{name}: expected shape (3,), found {vector.shape}")
+            vectors.append(vector)
         paths = _cbvh.Paths.screw(placed, vectors[0].tolist(), vectors[1].tolist(), angle, shift)
         return Motion(paths, True, (Motion.screw, (placed, *vectors, angle, shift)))
 

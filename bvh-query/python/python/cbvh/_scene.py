@@ -57,18 +57,20 @@ def _groups(value: Any, name: str) -> int:
 class Scene:
     """Many placed meshes, and questions over all pairs that are asked about.
 
-    An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given again: of
-    an instance that was removed, it is a KeyError. Iterating over a scene gives the numbers of its instances, in their order,
-    and of a pair the one that comes first is A. A question is over each pair of instances whose groups meet and whose contact
-    is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the pose of B in A's frame, to the
-    bit.
+    An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given
+    again: of an instance that was removed, it is a KeyError. Iterating over a scene gives the numbers of its instances,
+    in their order, and of a pair the one that comes first is A. A question is over each pair of instances whose groups
+    meet and whose contact is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the
+    pose of B in A's frame, to the bit.
 
     **Threads** may share a scene: a question waits until the one before is answered, and other threads of Python run
-    meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers. Pickling
-    keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone, each once.
+    meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers.
+    Pickling keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone,
+    each once.
 
     >>> import cbvh, numpy as np
-    >>> tetrahedron = cbvh.bake([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> tetrahedron = cbvh.bake(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     >>> pose = np.eye(4)
     >>> pose[:3, 3] = [0, 0, 3]
     >>> scene = cbvh.Scene()
@@ -88,7 +90,8 @@ class Scene:
 
     @staticmethod
     def open(path: str | os.PathLike[str]) -> Scene:
-        """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the size."""
+        """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the
+        size."""
         whole = os.path.abspath(path)
         scene = Scene.__new__(Scene)
         scene._scene = _cbvh.Scene.open(os.fspath(path), lambda mesh, object: Mesh(mesh, whole, object))
@@ -131,9 +134,9 @@ class Scene:
     ) -> int:
         """Adds an instance, and returns its number.
 
-        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: one that no
-        other instance has. ``member`` are the groups that the instance is in, ``meets`` those it is asked about with, a bit for
-        each of 32: two instances are asked about if each is in a group that the other meets.
+        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: one
+        that no other instance has. ``member`` are the groups that the instance is in, ``meets`` those it is asked about
+        with, a bit for each of 32: two instances are asked about if each is in a group that the other meets.
         """
         if not isinstance(mesh, Mesh):
             raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
@@ -151,8 +154,8 @@ class Scene:
         self._scene.set_poses(np.array([_number(id, "id")]), read_pose(pose)[None])
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
-        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). If an argument is wrong,
-        none has moved."""
+        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). If an argument is
+        wrong, none has moved."""
         rows, one = read_poses(poses)
         if one:
             raise ValueError("poses: expected shape (N, 4, 4), found (4, 4)")
@@ -167,7 +170,8 @@ class Scene:
         return self._scene.groups(_number(id, "id"))
 
     def allow(self, a: int, b: int, may_touch: bool = True) -> None:
-        """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a robot."""
+        """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a
+        robot."""
         self._scene.allow(_number(a, "a"), _number(b, "b"), bool(may_touch))
 
     def allowed(self) -> NDArray[np.int64]:
@@ -225,8 +229,8 @@ class Scene:
 
     @property
     def tracking(self) -> bool:
-        """Whether the scene remembers of each pair what it last found, which changes no answer, and saves time where instances
-        move little from question to question. False at first."""
+        """Whether the scene remembers of each pair what it last found, which changes no answer, and saves time where
+        instances move little from question to question. False at first."""
         return self._scene.switches()[1]
 
     @tracking.setter
@@ -274,16 +278,19 @@ class Scene:
         return SceneClosestPoint(_one(instances, one), as_answer(ClosestPoint, fields, one))
 
     def sides(self, points: ArrayLike) -> Any:
-        """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers, shape (N,).
+        """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers,
+        shape (N,).
 
-        INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no inside.
+        INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no
+        inside.
         """
         rows, one = read_rows(points, "points", 3)
         found = _cbvh.scene_sides(self._scene, rows)
         return Side(int(found[0])) if one else found
 
     def signed_distances(self, points: ArrayLike) -> Any:
-        """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape (N,).
+        """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
+        (N,).
 
         NaN where the side is UNDEFINED, and without instances.
         """
@@ -323,9 +330,9 @@ class Scene:
     ) -> SceneMotion:
         """Are the ways of some instances free, while they move in the world at the same time and the rest stands still?
 
-        ``paths`` has a `Motion`, a `Polyline` or a path of your own (body to world) for the number of each that moves. Asked
-        about are all pairs of which one moves. ``clearance`` and ``tolerance`` are those of `Mesh.motion`. Where a moving
-        instance stands now does not matter, and it stays there.
+        ``paths`` has a `Motion`, a `Polyline` or a path of your own (body to world) for the number of each that moves.
+        Asked about are all pairs of which one moves. ``clearance`` and ``tolerance`` are those of `Mesh.motion`. Where
+        a moving instance stands now does not matter, and it stays there.
         """
         numbers, ways = _ways(paths)
         kind, until, at, (pairs, fields) = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)

@@ -1,4 +1,5 @@
-"""A collision manager for users of trimesh: the methods, arguments and return values of `trimesh.collision.CollisionManager`.
+"""A collision manager for users of trimesh: the methods, arguments and return values of
+`trimesh.collision.CollisionManager`.
 
 It stands on `Scene` and needs neither trimesh nor FCL. What differs:
 
@@ -154,9 +155,9 @@ class DistanceData:
 class CollisionManager:
     """Named objects, and whether they collide or how far apart they are, as `trimesh.collision.CollisionManager` asks.
 
-    An object is a `Mesh`, or anything with ``vertices`` and ``faces``, such as a ``trimesh.Trimesh``. Each distinct mesh is
-    baked once. Transforms map body to world, shape (4, 4), and are rigid. The module `cbvh.manager` states what differs from
-    trimesh.
+    An object is a `Mesh`, or anything with ``vertices`` and ``faces``, such as a ``trimesh.Trimesh``. Each distinct
+    mesh is baked once. Transforms map body to world, shape (4, 4), and are rigid. The module `cbvh.manager` states what
+    differs from trimesh.
     """
 
     def __init__(self) -> None:
@@ -200,8 +201,9 @@ class CollisionManager:
     ) -> Any:
         """Whether an object collides with any of the manager's.
 
-        The answer is a bool; with ``return_names``, the set of names of those that it collides with; and with ``return_data``,
-        a list of `ContactData`, in which the object is called ``"__external"``: a tuple of what is asked for.
+        The answer is a bool; with ``return_names``, the set of names of those that it collides with; and with
+        ``return_data``, a list of `ContactData`, in which the object is called ``"__external"``: a tuple of what is
+        asked for.
         """
         others = [(EXTERNAL, _geometry(mesh), _transform(transform))]
         found, pairs, data = self._collisions_with(others, return_names, return_data)
