@@ -9,11 +9,13 @@ out.
 How each is asked, one pose per call: all poses once untimed, so that everything is in caches, then up to three times
 with each call timed alone, of which the least counts:
 
-- cbvh: ``a.collide(b, pose)`` and ``a.distance(b, pose)``, baked with default options. "cbvh, all at once" is one call with
-  all poses, on one core, divided by their number.
-- fcl: BVHModel (OBBRSS), ``fcl.collide`` with one contact at most and none described, ``fcl.distance`` with nearest points.
+- cbvh: ``a.collide(b, pose)`` and ``a.distance(b, pose)``, baked with default options. "cbvh, all at once" is one
+  call with all poses, on one core, divided by their number.
+- fcl: BVHModel (OBBRSS), ``fcl.collide`` with one contact at most and none described, ``fcl.distance`` with nearest
+  points.
 - coal: BVHModelOBBRSS, ``coal.collide`` and ``coal.distance`` with the same, and with break_distance 0.
-- trimesh: a CollisionManager with both meshes, ``set_transform`` and ``in_collision_internal`` or ``min_distance_internal``.
+- trimesh: a CollisionManager with both meshes, ``set_transform`` and ``in_collision_internal`` or
+  ``min_distance_internal``.
 
 The figures are medians over the poses of a preset, in microseconds, with what Python costs. Ratios are to "cbvh".
 "differ" counts poses with another answer: of contact, or a distance off by more than a millionth of it and of 1e-9 of

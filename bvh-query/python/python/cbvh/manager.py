@@ -4,8 +4,8 @@
 It stands on `Scene` and needs neither trimesh nor FCL. What differs:
 
 - Meshes are surfaces, whether convex or not. One that is inside another without touching it does not collide with it.
-- Contact is exact, and distances are 0 where meshes touch. There is no penetration depth and no normal: answers do not have
-  the attributes ``depth`` and ``normal``, and no distance is negative.
+- Contact is exact, and distances are 0 where meshes touch. There is no penetration depth and no normal: answers do not
+  have the attributes ``depth`` and ``normal``, and no distance is negative.
 - Contacts are all pairs of triangles that touch, each once.
 - `add_object` returns None, not an object of FCL.
 - Without any pair of objects, a distance is infinite, and the names and the data are None.
