@@ -417,6 +417,36 @@ fn numbers_that_mean_nothing_are_refused() {
     assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(MotionError::HalfTurn(_))));
 }
 
+/// Paths that break their promise: answers about them are as wrong as they are, but they end.
+#[test]
+fn a_path_that_jumps_keeps_no_question_busy() {
+    struct Jump {
+        to: f64,
+        sagitta: f64,
+    }
+    impl Path for Jump {
+        fn pose(&self, t: f64) -> Pose {
+            at(if t < 0.3 { 9.0 } else { self.to }, 0.0, 0.0)
+        }
+        fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
+            self.sagitta
+        }
+    }
+    let block = baked(&cube());
+    for querier in &mut queriers() {
+        querier.set_budget(1 << 20);
+        for (to, sagitta) in
+            [(0.0, 0.0), (-9.0, 0.0), (0.0, 1e-3), (0.0, f64::INFINITY), (8.0, f64::INFINITY)]
+        {
+            let jump = Jump { to, sagitta };
+            let answer = querier.motion(&block, &block, &jump, &MotionOptions::new());
+            assert!(matches!(answer, Err(QueryError::Number { name: "tolerance", .. })), "{to}: {answer:?}");
+            let is_free = querier.is_free(&block, &block, &jump, &MotionOptions::new());
+            assert!(!matches!(is_free, Err(QueryError::Budget { .. })), "{to}: {is_free:?}");
+        }
+    }
+}
+
 /// Motions of a pair of meshes with labels: `# hit T clear C` or `# free? D [proven]`. The labels are about coordinates
 /// rounded to f32.
 #[test]

@@ -220,8 +220,10 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         middle: &Middle,
         todo: &mut Vec<Interval>,
     ) -> Result<(), QueryError> {
+        // An interval that cannot be halved is not gone down: it would come back as it is.
+        let can_halve = interval.depth < MAX_DEPTH;
         let ends_within = interval.pairs.is_none() && interval.ends_within == Some(true);
-        if ends_within && middle.reach > FINE * self.question.size {
+        if can_halve && ends_within && middle.reach > FINE * self.question.size {
             return self.descend(interval, None, todo);
         }
         interval.pairs = self.not_apart(&interval, &middle.pose)?;
@@ -229,7 +231,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             if pairs.left().is_empty() {
                 return Ok(());
             }
-            if middle.reach > LEAST_GUESSED * self.question.tolerance
+            if can_halve
+                && middle.reach > LEAST_GUESSED * self.question.tolerance
                 && let Some(time) = self.querier.contact_time(self.question, &interval.stretch, pairs.left())
             {
                 return self.descend(interval, Some(time), todo);
