@@ -27,13 +27,8 @@ WAYS = 3
 def pose_of(state):
     """The pose of a state (body to world), shape (4, 4)."""
     turn = state.rotation()
-    x, y, z, w = np.array([turn.x, turn.y, turn.z, turn.w]) / np.linalg.norm([turn.x, turn.y, turn.z, turn.w])
-    pose = np.eye(4)
-    pose[0, :3] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    pose[1, :3] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    pose[2, :3] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-    pose[:3, 3] = state.getX(), state.getY(), state.getZ()
-    return pose
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    return cbvh.pose([state.getX(), state.getY(), state.getZ()], quaternion / np.linalg.norm(quaternion))
 
 
 class Certified(base.MotionValidator):

@@ -35,10 +35,13 @@ fn pose(matrix: &[f64; 16]) -> Result<Pose, bvh_query::PoseError> {
     Pose::from_matrix(&[0, 1, 2, 3].map(row))
 }
 
-/// Reads rows of three numbers from an array of shape (N, 3).
-pub(crate) fn rows<T: Element + Copy>(array: &PyReadonlyArray2<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
-    expect(name, &array.shape()[1..], &[3])?;
-    Ok(array.as_slice()?.as_chunks::<3>().0.to_vec())
+/// Reads rows of K numbers from an array of shape (N, K).
+pub(crate) fn rows<T: Element + Copy, const K: usize>(
+    array: &PyReadonlyArray2<'_, T>,
+    name: &str,
+) -> PyResult<Vec<[T; K]>> {
+    expect(name, &array.shape()[1..], &[K])?;
+    Ok(array.as_slice()?.as_chunks::<K>().0.to_vec())
 }
 
 /// Compares the shape of one row of an array.

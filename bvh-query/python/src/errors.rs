@@ -1,9 +1,11 @@
 //! Errors of the libraries as exceptions with the same messages.
 
+use bvh_bake::ReadError;
 use bvh_query::{MotionError, OpenError, PoseError, QueryError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
+use std::path::Path;
 
 create_exception!(cbvh, FormatError, PyValueError, "A file is not a valid .cbvh file, or is damaged.");
 create_exception!(cbvh, BakeError, PyValueError, "A mesh cannot be baked.");
@@ -12,16 +14,21 @@ create_exception!(cbvh, BakeError, PyValueError, "A mesh cannot be baked.");
 pub(crate) fn open_error(error: OpenError) -> PyErr {
     let message = error.to_string();
     match error {
-        OpenError::Io { path, source } => match source.raw_os_error() {
-            // With its number, `OSError` picks the class.
-            Some(number) => {
-                let text = source.to_string();
-                let text = text.split(" (os error").next().unwrap_or_default().to_owned();
-                PyOSError::new_err((number, text, path))
-            }
-            None => PyOSError::new_err(message),
-        },
+        OpenError::Io { path, source } => system_error(&path, &source, message),
         _ => FormatError::new_err(message),
+    }
+}
+
+/// The exception of what the system refuses, such as `FileNotFoundError`.
+fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr {
+    match source.raw_os_error() {
+        // With its number, `OSError` picks the class.
+        Some(number) => {
+            let text = source.to_string();
+            let text = text.split(" (os error").next().unwrap_or_default().to_owned();
+            PyOSError::new_err((number, text, path.to_owned()))
+        }
+        None => PyOSError::new_err(message),
     }
 }
 
@@ -39,9 +46,16 @@ pub(crate) fn pose_error(place: &str, error: PoseError) -> PyErr {
     PyValueError::new_err(format!("{place}: {error}"))
 }
 
-/// The exception of a mesh that cannot be baked.
+/// The exception of a mesh that cannot be baked, or of a file that the system refuses.
 pub(crate) fn bake_error(error: bvh_bake::BakeError) -> PyErr {
-    BakeError::new_err(error.to_string())
+    use bvh_bake::BakeError as Error;
+    let message = error.to_string();
+    match &error {
+        Error::Read(ReadError::Io { path, source })
+        | Error::Write { path, source, .. }
+        | Error::Scratch { directory: path, source, .. } => system_error(path, source, message),
+        _ => BakeError::new_err(message),
+    }
 }
 
 /// The exception of poses or numbers that make no motion.

@@ -11,6 +11,7 @@ mod mesh;
 mod motions;
 mod pairs;
 mod paths;
+mod poses;
 mod probes;
 mod scene;
 mod scene_pairs;
@@ -36,6 +37,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         pairs::contacts
     ];
     functions![motions::motion, motions::is_free];
+    functions![poses::poses_of, poses::relative_poses];
     functions![
         probes::closest_points,
         probes::sides,

@@ -1,7 +1,9 @@
 //! A mesh in a `.cbvh` file, mapped or in memory: what Python code holds.
 
+use crate::arrays::table;
 use crate::errors::{FormatError, open_error};
-use bvh_query::{Bvh, OwnedShape};
+use bvh_query::{Bvh, Object, OwnedShape};
+use numpy::PyArray2;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -61,6 +63,17 @@ impl Mesh {
     /// The triangles stored.
     fn triangles(&self) -> u64 {
         self.shape.shape().triangles()
+    }
+
+    /// The lower and the upper corner of the box of all objects.
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let boxes = self.shape.shape().objects().iter().map(Object::bounding_box);
+        let joined = boxes.reduce(|[lo_a, hi_a], [lo_b, hi_b]| {
+            [0, 1].map(|end| {
+                [0, 1, 2].map(|k| if end == 0 { lo_a[k].min(lo_b[k]) } else { hi_a[k].max(hi_b[k]) })
+            })
+        });
+        table(py, joined.into_iter().flatten())
     }
 
     /// The bytes of the file.

@@ -7,7 +7,7 @@ import numpy as np
 
 import cbvh
 from cbvh import _cbvh
-from common import cube, random_poses, shifts
+from common import TESTDATA, cube, random_poses, shifts
 
 
 class BadArguments(unittest.TestCase):
@@ -48,7 +48,13 @@ class BadArguments(unittest.TestCase):
             (cbvh.FormatError, "R01", cbvh.Mesh.from_bytes, b"nothing of the kind"),
             (FileNotFoundError, "no such.cbvh", cbvh.open, "no such.cbvh"),
             (cbvh.FormatError, "R0", cbvh.open, __file__),
-            (cbvh.BakeError, "no such.obj", cbvh.bake_files, "no such.obj", "x.cbvh"),
+            (FileNotFoundError, "no such.obj", cbvh.bake_files, "no such.obj", "x.cbvh"),
+            (FileNotFoundError, "no such folder", cbvh.bake_files, TESTDATA / "fclrob.obj", "no such folder/x.cbvh"),
+            (cbvh.BakeError, "expected", cbvh.bake_files, __file__, "x.cbvh"),
+            (ValueError, "position: expected shape (3,) or (N, 3), found (4,)", cbvh.pose, [0, 0, 0, 1]),
+            (ValueError, "quaternion[0]", cbvh.pose, [0, 0, 0], [0, 0, 0, 2]),
+            (ValueError, "quaternion: expected as many as of position, 2, found 3", cbvh.pose, np.zeros((2, 3)), np.eye(4)[:3]),
+            (ValueError, "b[0]: ", cbvh.relative, one, scaled),
         ]
         for kind, message, call, *arguments in cases:
             keywords = {"pose": np.eye(3)} if message.startswith("pose: ") else {}

@@ -50,6 +50,7 @@ from ._baking import bake, bake_files
 from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
+from ._poses import pose, relative
 from ._scene import Scene, _scene_of
 from .manager import CollisionManager
 
@@ -78,6 +79,8 @@ __all__ = [
     "bake",
     "bake_files",
     "open",
+    "pose",
+    "relative",
     "__version__",
 ]
 

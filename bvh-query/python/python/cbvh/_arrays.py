@@ -11,12 +11,11 @@ Floats = NDArray[np.float64]
 
 
 def read_numbers(value: ArrayLike, name: str, dtype: Any) -> NDArray[Any]:
-    """An array of numbers as C-contiguous ``dtype``, without a copy where it is one already."""
+    """An array of numbers as contiguous and aligned ``dtype``, without a copy where it is one already."""
     array = np.asarray(value)
     if array.dtype.kind not in "fiu" and array.size > 0:
         raise TypeError(f"{name}: expected numbers, found dtype {array.dtype}")
-    # Not ascontiguousarray, which gives numbers alone a dimension.
-    return np.asarray(array, dtype=dtype, order="C")
+    return np.require(array, dtype, ["C", "ALIGNED"])
 
 
 def read_rows(value: ArrayLike, name: str, *row: int) -> tuple[Floats, bool]:
@@ -28,6 +27,16 @@ def read_rows(value: ArrayLike, name: str, *row: int) -> tuple[Floats, bool]:
         comma = "," if len(row) == 1 else ""
         raise ValueError(f"{name}: expected shape ({shape}{comma}) or (N, {shape}), found {array.shape}")
     return array.reshape(-1, *row), one
+
+
+def broadcast_rows(a: tuple[Floats, bool], b: tuple[Floats, bool]) -> tuple[Floats, Floats]:
+    """Two arrays of rows, of which one row alone serves all rows of the other."""
+    (rows_a, one_a), (rows_b, one_b) = a, b
+    if one_a and not one_b:
+        rows_a = np.repeat(rows_a, len(rows_b), axis=0)
+    elif one_b and not one_a:
+        rows_b = np.repeat(rows_b, len(rows_a), axis=0)
+    return rows_a, rows_b
 
 
 def read_poses(value: ArrayLike, name: str = "poses") -> tuple[Floats, bool]:

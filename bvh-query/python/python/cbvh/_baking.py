@@ -60,7 +60,7 @@ def bake(
         found = f"{numbers.min()} to {numbers.max()}"
         raise ValueError(f"faces: expected numbers from 0 to {len(points) - 1}, found {found}")
     options = _options(profile, triangles, max_error, effort, ids, topology)
-    return Mesh(_cbvh.bake(points, np.ascontiguousarray(numbers, dtype=np.uint32), options))
+    return Mesh(_cbvh.bake(points, np.require(numbers, np.uint32, ["C", "ALIGNED"]), options))
 
 
 def bake_files(
@@ -79,7 +79,9 @@ def bake_files(
     """Bakes mesh files (OBJ, STL, PLY, glTF) into a ``.cbvh`` file, and opens it.
 
     Nothing is done if the file is up to date, unless ``force``. ``max_memory``: stay within so many bytes; the rest
-    goes to scratch files, so that a mesh may be larger than memory. The other options are those of `bake`.
+    goes to scratch files, so that a mesh may be larger than memory. The other options are those of `bake`. The
+    environment variable ``RAYON_NUM_THREADS`` tells how many threads bake; without it, as many as there are cores.
+    Raises OSError if the system refuses a file, and BakeError if a mesh cannot be baked.
     """
     files = [inputs] if isinstance(inputs, (str, os.PathLike)) else list(inputs)
     options = _options(profile, triangles, max_error, effort, ids, topology)

@@ -22,7 +22,7 @@ from ._answers import (
     split_hits,
     split_rows,
 )
-from ._arrays import read_pose, read_poses, read_rays, read_rows
+from ._arrays import Floats, read_pose, read_poses, read_rays, read_rows
 from ._motion import Path, read_paths
 
 
@@ -63,6 +63,11 @@ class Mesh:
     def triangles(self) -> int:
         """The number of triangles, without exact duplicates."""
         return self._mesh.triangles()
+
+    @property
+    def bounds(self) -> Floats:
+        """The lower and the upper corner of the axis-aligned box of all vertices, in mesh units, shape (2, 3)."""
+        return self._mesh.bounds()
 
     @property
     def names(self) -> list[str]:

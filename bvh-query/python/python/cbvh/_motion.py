@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _cbvh
-from ._arrays import Floats, read_numbers, read_pose, read_poses
+from ._arrays import Floats, broadcast_rows, read_numbers, read_pose, read_poses
 
 
 class Path(Protocol):
@@ -84,10 +84,7 @@ class Motion(_Own):
         """
         starts, one_start = read_poses(start, "start")
         ends, one_end = read_poses(end, "end")
-        if one_start:
-            starts = np.ascontiguousarray(np.broadcast_to(starts, ends.shape))
-        elif one_end:
-            ends = np.ascontiguousarray(np.broadcast_to(ends, starts.shape))
+        starts, ends = broadcast_rows((starts, one_start), (ends, one_end))
         one = one_start and one_end
         made = (Motion.between, (start, end) if one else (starts, ends))
         return Motion(_cbvh.Paths.between(starts, ends), one, made)

@@ -204,7 +204,7 @@ class Scene:
         array = np.asarray(ids)
         if array.ndim != 1 or array.size > 0 and array.dtype.kind not in "iu":
             raise ValueError(f"ids: expected integers of shape (N,), found dtype {array.dtype} of shape {array.shape}")
-        return np.asarray(array, dtype=np.int64, order="C")
+        return np.require(array, np.int64, ["C", "ALIGNED"])
 
     def __len__(self) -> int:
         return self._scene.count()
