@@ -189,7 +189,7 @@ Answer = TypeVar("Answer", bound=tuple[Any, ...])
 
 def as_answer(kind: type[Answer], fields: Sequence[NDArray[Any]], one: bool) -> Answer:
     """A named tuple of arrays or, for one question, of its elements."""
-    return kind(*(field[0] if field.ndim > 1 else field[0].item() for field in fields)) if one else kind(*fields)
+    return kind(*[field.item() if field.ndim == 1 else field[0] for field in fields] if one else fields)
 
 
 def split_rows(starts: NDArray[np.int64], rows: NDArray[Any]) -> list[NDArray[Any]]:
