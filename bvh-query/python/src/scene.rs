@@ -12,7 +12,7 @@ use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, SceneError, ScenePair
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
@@ -20,7 +20,6 @@ use std::sync::{Arc, Mutex};
 #[derive(Clone)]
 struct Entry {
     id: InstanceId,
-    groups: Groups,
     /// What the caller added.
     mesh: Arc<Py<PyAny>>,
 }
@@ -31,8 +30,6 @@ pub(crate) struct State {
     pub(crate) scene: bvh_query::Scene,
     entries: HashMap<i64, Entry>,
     numbers: HashMap<InstanceId, i64>,
-    /// Pairs that may touch, the lower number first.
-    allowed: BTreeSet<(i64, i64)>,
     next: i64,
     parallel: bool,
     tracking: bool,
@@ -50,16 +47,15 @@ impl State {
             scene,
             entries: HashMap::new(),
             numbers: HashMap::new(),
-            allowed: BTreeSet::new(),
             next: 0,
             parallel: false,
             tracking: false,
         }
     }
 
-    fn enter(&mut self, number: Option<i64>, id: InstanceId, groups: Groups, mesh: Py<PyAny>) -> i64 {
+    fn enter(&mut self, number: Option<i64>, id: InstanceId, mesh: Py<PyAny>) -> i64 {
         let number = number.filter(|number| !self.entries.contains_key(number)).unwrap_or(self.next);
-        self.entries.insert(number, Entry { id, groups, mesh: Arc::new(mesh) });
+        self.entries.insert(number, Entry { id, mesh: Arc::new(mesh) });
         self.numbers.insert(id, number);
         self.next = self.next.max(number.saturating_add(1));
         number
@@ -185,7 +181,7 @@ impl Scene {
                     made
                 }
             };
-            state.enter(None, id, Groups { member: instance.member, meets: instance.meets }, mesh);
+            state.enter(None, id, mesh);
         }
         Ok(Self(Mutex::new(state)))
     }
@@ -224,7 +220,7 @@ impl Scene {
             })?;
             // The instance is there.
             state.scene.set_groups(id, groups).map_err(|error| error.to_string())?;
-            Ok(state.enter(number, id, groups, known))
+            Ok(state.enter(number, id, known))
         });
         added.map_err(|message: String| PyValueError::new_err(message))
     }
@@ -235,7 +231,6 @@ impl Scene {
             state.scene.remove(id).map_err(|error| scene_error(state.refused(error)))?;
             state.numbers.remove(&id);
             state.entries.remove(&number);
-            state.allowed.retain(|&(a, b)| a != number && b != number);
             Ok(())
         })
     }
@@ -263,38 +258,33 @@ impl Scene {
         let groups = Groups { member: groups[0], meets: groups[1] };
         self.with(py, |state| {
             let id = state.id(number, "id")?;
-            state.scene.set_groups(id, groups).map_err(|error| scene_error(state.refused(error)))?;
-            if let Some(entry) = state.entries.get_mut(&number) {
-                entry.groups = groups;
-            }
-            Ok(())
+            state.scene.set_groups(id, groups).map_err(|error| scene_error(state.refused(error)))
         })
     }
 
     fn groups(&self, py: Python<'_>, number: i64) -> PyResult<(u32, u32)> {
-        let groups = self.with(py, |state| Ok::<_, PyErr>(state.entry(number, "id")?.groups))?;
-        Ok((groups.member, groups.meets))
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            let groups = state.scene.groups(id).map_err(|error| scene_error(state.refused(error)))?;
+            Ok((groups.member, groups.meets))
+        })
     }
 
     fn allow(&self, py: Python<'_>, a: i64, b: i64, may_touch: bool) -> PyResult<()> {
         self.with(py, |state| {
             let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
             let allowed = state.scene.allow(first, second, may_touch);
-            allowed.map_err(|error| scene_error(state.refused(error)))?;
-            let pair = (a.min(b), a.max(b));
-            if may_touch {
-                state.allowed.insert(pair)
-            } else {
-                state.allowed.remove(&pair)
-            };
-            Ok(())
+            allowed.map_err(|error| scene_error(state.refused(error)))
         })
     }
 
-    /// The pairs that may touch.
+    /// The pairs that may touch, lower numbers first: the order of instances depends on which were removed before.
     fn allowed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let allowed = self.with(py, |state| state.allowed.clone());
-        table(py, allowed.into_iter().map(|(a, b)| [a, b]))
+        let mut allowed: Vec<_> =
+            self.with(py, |state| state.scene.allowed().map(|pair| state.pair(pair)).collect());
+        allowed.iter_mut().for_each(|pair| pair.sort_unstable());
+        allowed.sort_unstable();
+        table(py, allowed.into_iter())
     }
 
     fn find(&self, py: Python<'_>, name: &str) -> Option<i64> {
