@@ -23,7 +23,7 @@ impl PlacedPair<'_> {
 }
 
 /// The triangles of a side that were placed last, one for each lane. Candidates of two packets name a triangle up to four
-/// times, and unpacking it takes a third of an exact test.
+/// times, and to unpack and place it takes a good part of an exact test.
 pub(super) struct RecentTriangles([(Option<(u32, u16)>, Triangle); PACKET]);
 
 impl Default for RecentTriangles {
