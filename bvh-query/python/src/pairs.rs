@@ -4,7 +4,7 @@ use crate::answers::{self, Distances, Lists};
 use crate::arrays::{array, poses};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
-use bvh_query::{Batch, DistanceOptions, Pose, Querier, QueryError, Relation, Shape};
+use bvh_query::{Batch, DistanceOptions, Pose, Querier, QueryError, Shape};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use std::sync::Mutex;
@@ -59,18 +59,6 @@ impl<'a> Question<'a> {
     }
 }
 
-/// The number of a relation, as `cbvh query` prints it.
-pub(crate) fn number(relation: Relation) -> u8 {
-    match relation {
-        Relation::Touching => 0,
-        Relation::Apart => 1,
-        Relation::AInB => 2,
-        Relation::BInA => 3,
-        Relation::Mixed => 4,
-        Relation::Undefined => 5,
-    }
-}
-
 #[pyfunction]
 pub(crate) fn collide<'py>(
     py: Python<'py>,
@@ -109,7 +97,7 @@ pub(crate) fn relation<'py>(
     let question = Question::new(a, b, &poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.relation(a, b, pose);
     let answers = question.ask(py, |batch, poses| batch.relation(poses), one)?;
-    Ok(array(py, answers.into_iter().map(number)))
+    Ok(array(py, answers.into_iter().map(|relation| relation as u8)))
 }
 
 #[pyfunction]

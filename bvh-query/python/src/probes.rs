@@ -5,7 +5,7 @@ use crate::arrays::{array, one_pose, rows};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
 use crate::pairs::with_querier;
-use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, Side};
+use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,16 +38,6 @@ impl Place {
             with_querier(|querier| probes.iter().map(|probe| one(querier, placed, probe)).collect())
         })
         .map_err(query_error)
-    }
-}
-
-/// The number of a side.
-pub(crate) fn number(side: Side) -> u8 {
-    match side {
-        Side::Outside => 0,
-        Side::Inside => 1,
-        Side::On => 2,
-        Side::Undefined => 3,
     }
 }
 
@@ -85,7 +75,7 @@ pub(crate) fn sides<'py>(
         |batch| batch.sides(&points),
         |querier, shape, &point| querier.side(shape, point),
     )?;
-    Ok(array(py, found.into_iter().map(number)))
+    Ok(array(py, found.into_iter().map(|side| side as u8)))
 }
 
 /// Reads rays: origins and directions of shape (N, 3), and the greatest parameter of each of shape (N,).

@@ -2,7 +2,6 @@
 
 use crate::answers::{self, Distances, FREE, HIT, NEAR};
 use crate::arrays::{array, table};
-use crate::pairs::number;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
 use bvh_query::{InstanceId, MotionOptions, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
@@ -51,9 +50,7 @@ pub(crate) fn scene_relations<'py>(
     let found: Vec<_> = scene.ask(
         py,
         |scene| scene.relations(),
-        |state, found| {
-            found.into_iter().map(|(pair, relation)| (state.pair(pair), number(relation))).collect()
-        },
+        |state, found| found.into_iter().map(|(pair, relation)| (state.pair(pair), relation as u8)).collect(),
     )?;
     Ok((table(py, found.iter().map(|row| row.0))?, array(py, found.iter().map(|row| row.1))))
 }

@@ -2,7 +2,7 @@
 
 use crate::answers::{self, Found, Lists, starts};
 use crate::arrays::{array, rows};
-use crate::probes::{number, rays, segments};
+use crate::probes::{rays, segments};
 use crate::scene::{Scene, State};
 use bvh_query::{InstanceId, SceneRayHit};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -44,7 +44,7 @@ pub(crate) fn scene_sides<'py>(
 ) -> PyResult<Bound<'py, PyArray1<u8>>> {
     let points = rows(&points, "points")?;
     let found = scene.ask(py, |scene| scene.sides(&points), |_, found| found)?;
-    Ok(array(py, found.into_iter().map(number)))
+    Ok(array(py, found.into_iter().map(|side| side as u8)))
 }
 
 /// NaN where there is no inside, and where there is nothing.

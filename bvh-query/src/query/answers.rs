@@ -75,34 +75,36 @@ pub struct RayHit {
     pub triangle: u32,
 }
 
-/// How two meshes lie.
+/// How two meshes lie. The command and the bindings of other languages use its numbers: `relation as u8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
 pub enum Relation {
     /// Their surfaces have a point in common: [`Querier::collide`](crate::Querier::collide) is true.
-    Touching,
+    Touching = 0,
     /// They have nothing in common, insides included.
-    Apart,
+    Apart = 1,
     /// All of A is inside B.
-    AInB,
+    AInB = 2,
     /// All of B is inside A.
-    BInA,
+    BInA = 3,
     /// Some connected components are inside the other mesh and some are not, or some of each mesh are.
-    Mixed,
+    Mixed = 4,
     /// A mesh that is not closed would have to contain something.
-    Undefined,
+    Undefined = 5,
 }
 
-/// Where a point is with regard to a mesh.
+/// Where a point is with regard to a mesh. Bindings of other languages use its numbers: `side as u8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
 pub enum Side {
-    /// The surface winds around the point.
-    Inside,
-    /// The point is on the surface.
-    On,
     /// The point is neither on the surface nor inside.
-    Outside,
+    Outside = 0,
+    /// The surface winds around the point.
+    Inside = 1,
+    /// The point is on the surface.
+    On = 2,
     /// The point is not on the surface, and the mesh is not closed and consistently oriented: it has no inside.
-    Undefined,
+    Undefined = 3,
 }
 
 /// The distance of a point from a mesh, and the side that it is on.

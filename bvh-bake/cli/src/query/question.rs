@@ -118,7 +118,7 @@ impl asking::Answer for Answer {
             Self::Flag(flag) => f64::from(u8::from(flag)),
             Self::Count(count) => count as f64,
             Self::Length(length) => length,
-            Self::Relation(relation) => f64::from(number(relation)),
+            Self::Relation(relation) => f64::from(relation as u8),
         }
     }
 
@@ -128,20 +128,8 @@ impl asking::Answer for Answer {
             Self::Flag(flag) => hasher.update(&[u8::from(flag)]),
             Self::Count(count) => hasher.update(&count.to_le_bytes()),
             Self::Length(length) => hasher.update(&length.to_bits().to_le_bytes()),
-            Self::Relation(relation) => hasher.update(&[number(relation)]),
+            Self::Relation(relation) => hasher.update(&[relation as u8]),
         }
-    }
-}
-
-/// Returns the number of a relation in raw lines.
-fn number(relation: Relation) -> u8 {
-    match relation {
-        Relation::Touching => 0,
-        Relation::Apart => 1,
-        Relation::AInB => 2,
-        Relation::BInA => 3,
-        Relation::Mixed => 4,
-        Relation::Undefined => 5,
     }
 }
 
