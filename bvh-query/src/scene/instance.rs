@@ -22,6 +22,18 @@ pub struct InstanceId {
     pub(super) generation: u32,
 }
 
+impl InstanceId {
+    /// Returns the identifier as a number, for what cannot hold the type: bindings of other languages, or a message.
+    pub fn to_bits(self) -> u64 {
+        u64::from(self.generation) << 32 | u64::from(self.place)
+    }
+
+    /// Returns the identifier that a number stands for. Any number does; a scene refuses one of no instance.
+    pub fn from_bits(bits: u64) -> Self {
+        Self { place: bits as u32, generation: (bits >> 32) as u32 }
+    }
+}
+
 impl fmt::Display for InstanceId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.generation == 0 {

@@ -409,6 +409,11 @@ fn an_empty_scene_and_one_instance_have_no_pairs() {
     let next = scene.add(shape(&sphere(1)), Pose::IDENTITY).unwrap();
     assert!(next != id && scene.remove(id) == Err(SceneError::NoInstance(id)));
     assert_eq!(scene.instances().collect::<Vec<_>>(), [next]);
+    // Numbers stand for identifiers, removed ones included.
+    assert_eq!([id, next].map(|id| InstanceId::from_bits(id.to_bits())), [id, next]);
+    assert_eq!((id.to_bits(), next.to_bits()), (0, 1 << 32));
+    let never = InstanceId::from_bits(u64::MAX);
+    assert_eq!(scene.remove(never), Err(SceneError::NoInstance(never)));
 }
 
 #[test]

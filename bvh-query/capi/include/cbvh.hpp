@@ -1,0 +1,916 @@
+// cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. All of it is in this header, and
+// stands on cbvh.h, which documents what questions mean: shapes, units, costs, threads.
+//
+// Meshes and paths may be shared by threads; make a Querier and a Scene for each thread. Objects that were moved from hold no
+// handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
+#ifndef CBVH_HPP
+#define CBVH_HPP
+
+#include "cbvh.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+inline bool operator==(cbvh_instance a, cbvh_instance b) { return a.id == b.id; }
+inline bool operator!=(cbvh_instance a, cbvh_instance b) { return a.id != b.id; }
+inline bool operator<(cbvh_instance a, cbvh_instance b) { return a.id < b.id; }
+
+namespace cbvh {
+
+/// A failure: its text is the message of the library, which names the argument, what was expected and what was found.
+class Error : public std::runtime_error {
+public:
+    Error(cbvh_status status, const char *message) : std::runtime_error(message), status_(status) {}
+    /// CBVH_INVALID_ARGUMENT and so on.
+    cbvh_status status() const noexcept { return status_; }
+
+private:
+    cbvh_status status_;
+};
+
+/// Throws unless a function of cbvh.h succeeded.
+inline void check(cbvh_status status) {
+    if (status != CBVH_OK) {
+        throw Error(status, cbvh_last_message());
+    }
+}
+
+using Point = std::array<double, 3>;
+using Contact = cbvh_contact;
+using DistanceAnswer = cbvh_distance_answer;
+using ClosestPoint = cbvh_closest_point;
+using RayHit = cbvh_ray_hit;
+using Segment = cbvh_segment;
+using MotionAnswer = cbvh_motion_answer;
+using Instance = cbvh_instance;
+using Stats = cbvh_stats;
+
+/// A rigid placement, body to world: see cbvh_pose. Questions check that it is rigid.
+struct Pose : cbvh_pose {
+    /// No motion.
+    Pose() : cbvh_pose CBVH_IDENTITY {}
+    /// From the rows of the 3 by 4 matrix [R | t], also in braces: Pose({1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}).
+    Pose(const cbvh_pose &pose) : cbvh_pose(pose) {}
+    /// The same from an array. It is a template so that braces mean the one above.
+    template <class Array, class = std::enable_if_t<std::is_same<Array, std::array<double, 12>>::value>>
+    explicit Pose(const Array &matrix) {
+        for (std::size_t k = 0; k < 12; k++) {
+            rows[k] = matrix[k];
+        }
+    }
+    /// A translation.
+    static Pose translation(double x, double y, double z) { return Pose({1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}); }
+    /// From a matrix whose entries are m(row, column): Eigen::Isometry3d, Eigen::Matrix4d, a 3 by 4 matrix. Of the fourth row
+    /// nothing is read.
+    template <class Matrix> static Pose from_matrix(const Matrix &m) {
+        Pose pose;
+        for (int row = 0; row < 3; row++) {
+            for (int column = 0; column < 4; column++) {
+                pose.rows[4 * row + column] = static_cast<double>(m(row, column));
+            }
+        }
+        return pose;
+    }
+    /// From the 16 numbers of a 4 by 4 matrix, row by row. Throws unless the last row is 0 0 0 1.
+    static Pose from_rows(const std::array<double, 16> &m) {
+        return from_16([&](std::size_t row, std::size_t column) { return m[4 * row + column]; });
+    }
+    /// From the 16 numbers of a 4 by 4 matrix, column by column, as graphics libraries and Eigen keep them.
+    static Pose from_columns(const std::array<double, 16> &m) {
+        return from_16([&](std::size_t row, std::size_t column) { return m[4 * column + row]; });
+    }
+    /// From a quaternion x, y, z, w of length 1, the real part last, and a translation.
+    static Pose from_quaternion(const std::array<double, 4> &quaternion, const Point &translation) {
+        Pose pose;
+        check(cbvh_pose_from_quaternion(quaternion.data(), translation.data(), &pose));
+        return pose;
+    }
+    /// The rigid pose nearest to this one, which is off by at most 2^-6.
+    Pose nearest() const { return made([&](cbvh_pose *pose) { return cbvh_pose_nearest(this, pose); }); }
+    /// The pose that takes back what this one does.
+    Pose inverse() const { return made([&](cbvh_pose *pose) { return cbvh_pose_inverse(this, pose); }); }
+    /// The pose that does what this one does and then what `next` does.
+    Pose then(const Pose &next) const {
+        return made([&](cbvh_pose *pose) { return cbvh_pose_then(this, &next, pose); });
+    }
+    /// The pose of B in A's frame, from the poses of both in the world.
+    static Pose relative(const Pose &world_a, const Pose &world_b) {
+        return made([&](cbvh_pose *pose) { return cbvh_pose_relative(&world_a, &world_b, pose); });
+    }
+
+private:
+    template <class Make> static Pose made(Make make) {
+        Pose pose;
+        check(make(&pose));
+        return pose;
+    }
+    template <class Entry> static Pose from_16(Entry entry) {
+        const auto is = [](double found, double expected) { return !(found < expected) && !(found > expected); };
+        if (!is(entry(3, 0), 0) || !is(entry(3, 1), 0) || !is(entry(3, 2), 0) || !is(entry(3, 3), 1)) {
+            throw Error(CBVH_INVALID_ARGUMENT, "row 4: expected 0 0 0 1, found another one; is the matrix transposed?");
+        }
+        Pose pose;
+        for (std::size_t row = 0; row < 3; row++) {
+            for (std::size_t column = 0; column < 4; column++) {
+                pose.rows[4 * row + column] = entry(row, column);
+            }
+        }
+        return pose;
+    }
+};
+
+/// A ray from an origin; without an end unless `until` is given.
+struct Ray : cbvh_ray {
+    Ray(const Point &from, const Point &to, double end = std::numeric_limits<double>::infinity()) : cbvh_ray{} {
+        for (std::size_t k = 0; k < 3; k++) {
+            origin[k] = from[k];
+            direction[k] = to[k];
+        }
+        until = end;
+    }
+};
+
+// Arrays of these are given to functions that take arrays of what they derive from.
+static_assert(sizeof(Pose) == sizeof(cbvh_pose) && std::is_standard_layout<Pose>::value, "a pose is its numbers");
+static_assert(sizeof(Ray) == sizeof(cbvh_ray) && std::is_standard_layout<Ray>::value, "a ray is its numbers");
+static_assert(sizeof(Point) == 3 * sizeof(double), "a point is three numbers");
+
+/// Options, whose defaults are those of the library.
+struct MotionOptions {
+    double clearance = 0;
+    double tolerance = 0;
+
+    cbvh_motion_options raw() const { return {sizeof(cbvh_motion_options), clearance, tolerance}; }
+};
+
+struct DistanceOptions {
+    double rel_err = 0;
+    double abs_err = 0;
+
+    cbvh_distance_options raw() const { return {sizeof(cbvh_distance_options), rel_err, abs_err}; }
+};
+
+/// See cbvh_bake_options. Empty text stands for the default.
+struct BakeOptions {
+    std::string profile;
+    std::string triangles;
+    std::string effort;
+    std::string scratch;
+    double max_error = 0;
+    std::uint64_t max_memory = 0;
+    bool split_objects = false;
+    bool scene = false;
+    bool ids = true;
+    bool turning_slabs = true;
+    bool topology = true;
+    bool force = false;
+
+    /// The texts stay those of this object.
+    cbvh_bake_options raw() const {
+        const auto text = [](const std::string &of) { return of.empty() ? nullptr : of.c_str(); };
+        cbvh_bake_options options{};
+        options.size = sizeof options;
+        options.profile = text(profile);
+        options.triangles = text(triangles);
+        options.effort = text(effort);
+        options.scratch = text(scratch);
+        options.max_error = max_error;
+        options.max_memory = max_memory;
+        options.split_objects = split_objects;
+        options.scene = scene;
+        options.no_ids = !ids;
+        options.no_turning_slabs = !turning_slabs;
+        options.no_topology = !topology;
+        options.force = force;
+        return options;
+    }
+};
+
+namespace detail {
+
+/// A handle that is freed with its object.
+template <class Raw, cbvh_status (*Free)(Raw)> class Handle {
+public:
+    Handle() = default;
+    explicit Handle(Raw raw) : raw_(raw) {}
+    Handle(Handle &&other) noexcept : raw_(std::exchange(other.raw_, Raw{0})) {}
+    Handle &operator=(Handle &&other) noexcept {
+        if (this != &other) {
+            static_cast<void>(Free(raw_));
+            raw_ = std::exchange(other.raw_, Raw{0});
+        }
+        return *this;
+    }
+    Handle(const Handle &) = delete;
+    Handle &operator=(const Handle &) = delete;
+    ~Handle() { static_cast<void>(Free(raw_)); }
+    /// The handle for functions of cbvh.h. It stays this object's.
+    Raw raw() const noexcept { return raw_; }
+
+private:
+    Raw raw_{0};
+};
+
+/// Asks for `count` answers.
+template <class Answer, class Ask> std::vector<Answer> answers(std::size_t count, Ask ask) {
+    std::vector<Answer> found(count);
+    check(ask(found.data()));
+    return found;
+}
+
+/// The same, of answers of yes and no.
+template <class Ask> std::vector<bool> choices(std::size_t count, Ask ask) {
+    const std::unique_ptr<bool[]> found(new bool[count + 1]());
+    check(ask(found.get()));
+    return std::vector<bool>(found.get(), found.get() + count);
+}
+
+/// Asks for a list, and once more where it was longer than expected.
+template <class Element, class Ask> std::vector<Element> list(Ask ask) {
+    std::vector<Element> found(64);
+    std::size_t count = 0;
+    cbvh_status status = ask(found.data(), found.size(), &count);
+    if (status == CBVH_BUFFER_TOO_SMALL) {
+        found.resize(count);
+        status = ask(found.data(), found.size(), &count);
+    }
+    check(status);
+    found.resize(count);
+    return found;
+}
+
+/// Asks for text.
+template <class Ask> std::string text(Ask ask) {
+    std::string found(64, '\0');
+    std::size_t length = 0;
+    cbvh_status status = ask(&found[0], found.size(), &length);
+    if (status == CBVH_BUFFER_TOO_SMALL) {
+        found.resize(length + 1);
+        status = ask(&found[0], found.size(), &length);
+    }
+    check(status);
+    found.resize(length);
+    return found;
+}
+
+/// Divides a list into one for each question.
+template <class Element>
+std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const std::vector<std::size_t> &counts) {
+    std::vector<std::vector<Element>> lists;
+    lists.reserve(counts.size());
+    auto start = all.begin();
+    for (const std::size_t count : counts) {
+        const auto end = start + static_cast<std::ptrdiff_t>(count);
+        lists.emplace_back(start, end);
+        start = end;
+    }
+    return lists;
+}
+
+/// Lists of many questions.
+template <class Element, class Ask> std::vector<std::vector<Element>> lists(std::size_t questions, Ask ask) {
+    std::vector<std::size_t> counts(questions);
+    const auto all = list<Element>([&](Element *elements, std::size_t capacity, std::size_t *count) {
+        return ask(counts.data(), elements, capacity, count);
+    });
+    return divided(all, counts);
+}
+
+inline void same_length(std::size_t one, std::size_t other, const char *message) {
+    if (one != other) {
+        throw Error(CBVH_INVALID_ARGUMENT, message);
+    }
+}
+
+inline const double *numbers(const std::vector<Point> &points) { return points.empty() ? nullptr : points[0].data(); }
+
+/// The answer, if there is one.
+template <class Answer> std::optional<Answer> found(const Answer &answer) {
+    return answer.found ? std::optional<Answer>(answer) : std::nullopt;
+}
+
+} // namespace detail
+
+/// A baked mesh. Copies share it.
+class Mesh {
+public:
+    /// Opens a .cbvh file.
+    static Mesh open(const std::string &path, cbvh_open_mode mode = CBVH_MAP) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_open(path.c_str(), mode, mesh); });
+    }
+    /// Opens the bytes of a .cbvh file, which are copied.
+    static Mesh from_bytes(const void *bytes, std::size_t size) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_from_bytes(bytes, size, mesh); });
+    }
+    /// Opens bytes where they are: see cbvh_mesh_borrow_bytes.
+    static Mesh borrow_bytes(const void *bytes, std::size_t size, void (*release)(void *), void *user) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_borrow_bytes(bytes, size, release, user, mesh); });
+    }
+    /// Bakes triangles.
+    static Mesh bake(const std::vector<Point> &vertices, const std::vector<std::array<std::uint32_t, 3>> &faces,
+                     const BakeOptions &options = {}) {
+        const cbvh_bake_options raw = options.raw();
+        const std::uint32_t *corners = faces.empty() ? nullptr : faces[0].data();
+        return made([&](cbvh_mesh *mesh) {
+            return cbvh_bake(detail::numbers(vertices), vertices.size(), corners, faces.size(), &raw, mesh);
+        });
+    }
+    /// Bakes mesh files into a .cbvh file, unless it is up to date, and opens it.
+    static Mesh bake_files(const std::vector<std::string> &inputs, const std::string &output,
+                           const BakeOptions &options = {}) {
+        std::vector<const char *> paths;
+        for (const std::string &input : inputs) {
+            paths.push_back(input.c_str());
+        }
+        const cbvh_bake_options raw = options.raw();
+        check(cbvh_bake_files(paths.data(), paths.size(), output.c_str(), &raw, nullptr));
+        return open(output);
+    }
+
+    Mesh(Mesh &&) noexcept = default;
+    Mesh &operator=(Mesh &&) noexcept = default;
+    Mesh(const Mesh &other) : Mesh(made([&](cbvh_mesh *mesh) { return cbvh_mesh_clone(other.raw(), mesh); })) {}
+    Mesh &operator=(const Mesh &other) {
+        *this = Mesh(other);
+        return *this;
+    }
+    ~Mesh() = default;
+    /// Takes a handle, which is freed with this object.
+    explicit Mesh(cbvh_mesh raw) : handle_(raw) {}
+    cbvh_mesh raw() const noexcept { return handle_.raw(); }
+
+    /// One object of the file.
+    Mesh object(std::size_t number) const {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_object(raw(), number, mesh); });
+    }
+    /// The number of objects in the file.
+    std::size_t object_count() const {
+        std::size_t count = 0;
+        check(cbvh_mesh_object_count(raw(), &count));
+        return count;
+    }
+    std::string object_name(std::size_t number) const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_mesh_object_name(raw(), number, buffer, capacity, length);
+        });
+    }
+    /// The number of the first object with a name.
+    std::optional<std::size_t> find(const std::string &name) const {
+        std::size_t number = 0;
+        const cbvh_status status = cbvh_mesh_find(raw(), name.c_str(), &number);
+        if (status == CBVH_NOT_FOUND) {
+            return std::nullopt;
+        }
+        check(status);
+        return number;
+    }
+    std::uint64_t triangle_count() const {
+        std::uint64_t count = 0;
+        check(cbvh_mesh_triangle_count(raw(), &count));
+        return count;
+    }
+    /// The triangles of the input that are exact duplicates of a triangle.
+    std::vector<std::uint32_t> duplicates(std::uint32_t triangle) const {
+        return detail::list<std::uint32_t>([&](std::uint32_t *triangles, std::size_t capacity, std::size_t *count) {
+            return cbvh_mesh_duplicates(raw(), triangle, triangles, capacity, count);
+        });
+    }
+    std::vector<std::uint8_t> bytes() const {
+        return detail::list<std::uint8_t>([&](std::uint8_t *buffer, std::size_t capacity, std::size_t *size) {
+            return cbvh_mesh_bytes(raw(), buffer, capacity, size);
+        });
+    }
+    void save(const std::string &path) const { check(cbvh_mesh_save(raw(), path.c_str())); }
+    /// Throws with the first rule that the file breaks.
+    void check_all() const { check(cbvh_mesh_check(raw())); }
+    /// A bound of how far any point moves from one pose to another.
+    double displacement(const Pose &from, const Pose &to) const {
+        double bound = 0;
+        check(cbvh_displacement(raw(), &from, &to, &bound));
+        return bound;
+    }
+
+private:
+    template <class Make> static Mesh made(Make make) {
+        cbvh_mesh mesh{0};
+        check(make(&mesh));
+        return Mesh(mesh);
+    }
+    detail::Handle<cbvh_mesh, cbvh_mesh_free> handle_;
+};
+
+/// A way over times from 0 to 1.
+class Path {
+public:
+    /// On a line, and the shorter way round.
+    static Path between(const Pose &start, const Pose &end) {
+        return made([&](cbvh_path *path) { return cbvh_path_between(&start, &end, path); });
+    }
+    static Path screw(const Pose &start, const Point &point, const Point &direction, double angle, double shift) {
+        return made([&](cbvh_path *path) {
+            return cbvh_path_screw(&start, point.data(), direction.data(), angle, shift, path);
+        });
+    }
+    static Path polyline(const std::vector<Pose> &poses) {
+        return made([&](cbvh_path *path) { return cbvh_path_polyline(poses.data(), poses.size(), path); });
+    }
+    /// A path of one's own: an object with `Pose pose(double t) const` and `double sagitta(double radius, double t0, double t1)
+    /// const`, which cbvh_sagitta_function explains. It is copied. What it throws becomes an Error of CBVH_CALLBACK_FAILED.
+    template <class Own> static Path of(Own own) {
+        auto kept = std::make_shared<const Own>(std::move(own));
+        Path path = made([&](cbvh_path *made) {
+            return cbvh_path_from_functions(pose_of<Own>, sagitta_of<Own>, const_cast<Own *>(kept.get()), made);
+        });
+        path.kept_ = std::move(kept);
+        return path;
+    }
+    cbvh_path raw() const noexcept { return handle_.raw(); }
+    Pose pose(double t) const {
+        Pose pose;
+        check(cbvh_path_pose(raw(), t, &pose));
+        return pose;
+    }
+    /// A bound of how far any point of a mesh is, from t0 to t1, from where it is in the middle of that time.
+    double reach(const Mesh &b, double t0, double t1) const {
+        double bound = 0;
+        check(cbvh_path_reach(b.raw(), raw(), t0, t1, &bound));
+        return bound;
+    }
+
+private:
+    explicit Path(cbvh_path raw) : handle_(raw) {}
+    template <class Make> static Path made(Make make) {
+        cbvh_path path{0};
+        check(make(&path));
+        return Path(path);
+    }
+    template <class Own> static std::int32_t pose_of(void *user, double t, cbvh_pose *pose) {
+        try {
+            *pose = static_cast<const Own *>(user)->pose(t);
+            return 0;
+        } catch (...) {
+            return 1;
+        }
+    }
+    template <class Own> static double sagitta_of(void *user, double radius, double t0, double t1) {
+        try {
+            return static_cast<const Own *>(user)->sagitta(radius, t0, t1);
+        } catch (...) {
+            return std::numeric_limits<double>::infinity();
+        }
+    }
+    // Declared before the handle, so that it is there until the handle is freed.
+    std::shared_ptr<const void> kept_;
+    detail::Handle<cbvh_path, cbvh_path_free> handle_;
+};
+
+/// Answers questions about meshes: one for each thread.
+class Querier {
+public:
+    explicit Querier(cbvh_backend backend = CBVH_BACKEND_BEST) {
+        cbvh_querier querier{0};
+        check(cbvh_querier_new(backend, &querier));
+        handle_ = Owned(querier);
+    }
+    cbvh_querier raw() const noexcept { return handle_.raw(); }
+    /// Lets questions about many poses, paths or probes use all cores.
+    void set_parallel(bool parallel) { check(cbvh_querier_set_parallel(raw(), parallel)); }
+    void set_budget(std::uint64_t visits) { check(cbvh_querier_set_budget(raw(), visits)); }
+    Stats stats() const {
+        Stats stats{};
+        check(cbvh_querier_stats(raw(), &stats));
+        return stats;
+    }
+
+    /// Do the meshes touch? Poses are of B in A's frame.
+    bool collide(const Mesh &a, const Mesh &b, const Pose &pose) {
+        bool answer = false;
+        check(cbvh_collide(raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        return answer;
+    }
+    std::vector<bool> collide(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        return detail::choices(poses.size(), [&](bool *answers) {
+            return cbvh_collide(raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+        });
+    }
+    /// Are they at most d apart?
+    bool within(const Mesh &a, const Mesh &b, const Pose &pose, double d) {
+        bool answer = false;
+        check(cbvh_within(raw(), a.raw(), b.raw(), &pose, 1, d, &answer));
+        return answer;
+    }
+    std::vector<bool> within(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses, double d) {
+        return detail::choices(poses.size(), [&](bool *answers) {
+            return cbvh_within(raw(), a.raw(), b.raw(), poses.data(), poses.size(), d, answers);
+        });
+    }
+    /// Do they touch, or is one inside the other?
+    cbvh_relation relate(const Mesh &a, const Mesh &b, const Pose &pose) {
+        cbvh_relation answer = CBVH_RELATION_UNDEFINED;
+        check(cbvh_relate(raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        return answer;
+    }
+    std::vector<cbvh_relation> relate(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        return detail::answers<cbvh_relation>(poses.size(), [&](cbvh_relation *answers) {
+            return cbvh_relate(raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+        });
+    }
+    /// How far apart are they, and where?
+    DistanceAnswer distance(const Mesh &a, const Mesh &b, const Pose &pose, const DistanceOptions &options = {}) {
+        const cbvh_distance_options raw_options = options.raw();
+        DistanceAnswer answer{};
+        check(cbvh_distance(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<DistanceAnswer> distance(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                                         const DistanceOptions &options = {}) {
+        const cbvh_distance_options raw_options = options.raw();
+        return detail::answers<DistanceAnswer>(poses.size(), [&](DistanceAnswer *answers) {
+            return cbvh_distance(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+        });
+    }
+    /// Which triangles touch?
+    std::vector<Contact> contacts(const Mesh &a, const Mesh &b, const Pose &pose) {
+        return detail::list<Contact>([&](Contact *contacts, std::size_t capacity, std::size_t *count) {
+            return cbvh_contacts(raw(), a.raw(), b.raw(), &pose, 1, nullptr, contacts, capacity, count);
+        });
+    }
+    std::vector<std::vector<Contact>> contacts(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        return detail::lists<Contact>(
+            poses.size(), [&](std::size_t *counts, Contact *contacts, std::size_t capacity, std::size_t *count) {
+                return cbvh_contacts(raw(), a.raw(), b.raw(), poses.data(), poses.size(), counts, contacts, capacity,
+                                     count);
+            });
+    }
+    /// The first pose in which they touch.
+    std::optional<std::size_t> first_collision(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        std::size_t number = 0;
+        check(cbvh_first_collision(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &number));
+        return number < poses.size() ? std::optional<std::size_t>(number) : std::nullopt;
+    }
+
+    /// Where does the way end?
+    MotionAnswer motion(const Mesh &a, const Mesh &b, const Path &path, const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        const cbvh_path raw_path = path.raw();
+        MotionAnswer answer{};
+        check(cbvh_motions(raw(), a.raw(), b.raw(), &raw_path, 1, &raw_options, &answer));
+        return answer;
+    }
+    /// Is the way certainly free?
+    bool is_free(const Mesh &a, const Mesh &b, const Path &path, const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        const cbvh_path raw_path = path.raw();
+        bool answer = false;
+        check(cbvh_are_free(raw(), a.raw(), b.raw(), &raw_path, 1, &raw_options, &answer));
+        return answer;
+    }
+    /// The same about the ways between poses.
+    MotionAnswer motion(const Mesh &a, const Mesh &b, const Pose &start, const Pose &end,
+                        const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        MotionAnswer answer{};
+        check(cbvh_edge_motions(raw(), a.raw(), b.raw(), &start, &end, 1, &raw_options, &answer));
+        return answer;
+    }
+    bool is_free(const Mesh &a, const Mesh &b, const Pose &start, const Pose &end, const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        bool answer = false;
+        check(cbvh_edges_are_free(raw(), a.raw(), b.raw(), &start, &end, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<MotionAnswer> edge_motions(const Mesh &a, const Mesh &b, const std::vector<Pose> &starts,
+                                           const std::vector<Pose> &ends, const MotionOptions &options = {}) {
+        detail::same_length(starts.size(), ends.size(), "expected as many ends as starts");
+        const cbvh_motion_options raw_options = options.raw();
+        return detail::answers<MotionAnswer>(starts.size(), [&](MotionAnswer *answers) {
+            return cbvh_edge_motions(raw(), a.raw(), b.raw(), starts.data(), ends.data(), starts.size(), &raw_options,
+                                     answers);
+        });
+    }
+    std::vector<bool> edges_are_free(const Mesh &a, const Mesh &b, const std::vector<Pose> &starts,
+                                     const std::vector<Pose> &ends, const MotionOptions &options = {}) {
+        detail::same_length(starts.size(), ends.size(), "expected as many ends as starts");
+        const cbvh_motion_options raw_options = options.raw();
+        return detail::choices(starts.size(), [&](bool *answers) {
+            return cbvh_edges_are_free(raw(), a.raw(), b.raw(), starts.data(), ends.data(), starts.size(), &raw_options,
+                                       answers);
+        });
+    }
+
+    /// The closest surface to each point, if it is at most `within` away; `pose` places the mesh among the points.
+    std::vector<std::optional<ClosestPoint>>
+    closest_points(const Mesh &mesh, const std::vector<Point> &points,
+                   double within = std::numeric_limits<double>::infinity(), const Pose &pose = {}) {
+        return optional<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+            return cbvh_closest_points(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within, answers);
+        });
+    }
+    std::optional<ClosestPoint> closest_point(const Mesh &mesh, const Point &point,
+                                              double within = std::numeric_limits<double>::infinity(),
+                                              const Pose &pose = {}) {
+        ClosestPoint answer{};
+        check(cbvh_closest_points(raw(), mesh.raw(), &pose, point.data(), 1, within, &answer));
+        return detail::found(answer);
+    }
+    /// The side that each point is on.
+    std::vector<cbvh_side> sides(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {}) {
+        return detail::answers<cbvh_side>(points.size(), [&](cbvh_side *answers) {
+            return cbvh_sides(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), answers);
+        });
+    }
+    /// Distances that are negative inside; NaN where the mesh has no inside.
+    std::vector<double> signed_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {}) {
+        const auto found = detail::answers<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+            return cbvh_signed_distances(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(),
+                                         std::numeric_limits<double>::infinity(), answers);
+        });
+        std::vector<double> values;
+        for (const ClosestPoint &closest : found) {
+            values.push_back(closest.side == CBVH_INSIDE           ? -closest.distance
+                             : closest.side == CBVH_SIDE_UNDEFINED ? std::numeric_limits<double>::quiet_NaN()
+                                                                   : closest.distance);
+        }
+        return values;
+    }
+    /// Where rays first hit, whether they hit, and all hits.
+    std::vector<std::optional<RayHit>> first_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
+        return optional<RayHit>(rays.size(), [&](RayHit *answers) {
+            return cbvh_first_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), answers);
+        });
+    }
+    std::vector<bool> any_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
+        return detail::choices(rays.size(), [&](bool *answers) {
+            return cbvh_any_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), answers);
+        });
+    }
+    std::vector<std::vector<RayHit>> all_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
+        return detail::lists<RayHit>(
+            rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
+                return cbvh_all_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), counts, hits, capacity, count);
+            });
+    }
+    std::vector<bool> meet_segments(const Mesh &mesh, const std::vector<Segment> &segments, const Pose &pose = {}) {
+        return detail::choices(segments.size(), [&](bool *answers) {
+            return cbvh_meet_segments(raw(), mesh.raw(), &pose, segments.data(), segments.size(), answers);
+        });
+    }
+
+private:
+    using Owned = detail::Handle<cbvh_querier, cbvh_querier_free>;
+
+    template <class Answer, class Ask> static std::vector<std::optional<Answer>> optional(std::size_t count, Ask ask) {
+        std::vector<std::optional<Answer>> found;
+        for (const Answer &answer : detail::answers<Answer>(count, ask)) {
+            found.push_back(detail::found(answer));
+        }
+        return found;
+    }
+    Owned handle_;
+};
+
+/// Remembers what it found from pose to pose of one pair: faster where a mesh moves little by little. One for each thread.
+class Tracker {
+public:
+    Tracker() {
+        cbvh_tracker tracker{0};
+        check(cbvh_tracker_new(&tracker));
+        handle_ = Owned(tracker);
+    }
+    cbvh_tracker raw() const noexcept { return handle_.raw(); }
+    bool collide(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose) {
+        bool answer = false;
+        check(cbvh_tracker_collide(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        return answer;
+    }
+    bool within(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose, double d) {
+        bool answer = false;
+        check(cbvh_tracker_within(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, d, &answer));
+        return answer;
+    }
+    DistanceAnswer distance(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose) {
+        DistanceAnswer answer{};
+        check(cbvh_tracker_distance(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        return answer;
+    }
+
+private:
+    using Owned = detail::Handle<cbvh_tracker, cbvh_tracker_free>;
+    Owned handle_;
+};
+
+/// Many placed meshes. One for each thread; copies share the meshes.
+class Scene {
+public:
+    explicit Scene(cbvh_backend backend = CBVH_BACKEND_BEST)
+        : Scene(made([&](cbvh_scene *scene) { return cbvh_scene_new(backend, scene); })) {}
+    /// Opens a scene file.
+    static Scene open(const std::string &path) {
+        return made([&](cbvh_scene *scene) { return cbvh_scene_open(path.c_str(), scene); });
+    }
+    /// Makes a scene of the instances in the file of a mesh.
+    static Scene of_mesh(const Mesh &mesh) {
+        return made([&](cbvh_scene *scene) { return cbvh_scene_of_mesh(mesh.raw(), scene); });
+    }
+    Scene(Scene &&) noexcept = default;
+    Scene &operator=(Scene &&) noexcept = default;
+    Scene(const Scene &other)
+        : Scene(made([&](cbvh_scene *scene) { return cbvh_scene_clone(other.raw(), scene); })) {}
+    Scene &operator=(const Scene &other) {
+        *this = Scene(other);
+        return *this;
+    }
+    ~Scene() = default;
+    cbvh_scene raw() const noexcept { return handle_.raw(); }
+
+    void set_parallel(bool parallel) { check(cbvh_scene_set_parallel(raw(), parallel)); }
+    void set_tracking(bool tracking) { check(cbvh_scene_set_tracking(raw(), tracking)); }
+    void set_budget(std::uint64_t visits) { check(cbvh_scene_set_budget(raw(), visits)); }
+    Stats stats() const {
+        Stats stats{};
+        check(cbvh_scene_stats(raw(), &stats));
+        return stats;
+    }
+
+    /// Places a mesh in the world; a name that is empty is none.
+    Instance add(const Mesh &mesh, const Pose &world, const std::string &name = {}) {
+        Instance instance{0};
+        check(cbvh_scene_add(raw(), mesh.raw(), &world, name.empty() ? nullptr : name.c_str(), &instance));
+        return instance;
+    }
+    void remove(Instance instance) { check(cbvh_scene_remove(raw(), instance)); }
+    void set_pose(Instance instance, const Pose &world) { check(cbvh_scene_set_poses(raw(), &instance, &world, 1)); }
+    /// Moves many, or none where it throws.
+    void set_poses(const std::vector<std::pair<Instance, Pose>> &poses) {
+        std::vector<Instance> instances;
+        std::vector<Pose> worlds;
+        for (const auto &[instance, world] : poses) {
+            instances.push_back(instance);
+            worlds.push_back(world);
+        }
+        check(cbvh_scene_set_poses(raw(), instances.data(), worlds.data(), instances.size()));
+    }
+    void set_groups(Instance instance, std::uint32_t member, std::uint32_t meets) {
+        check(cbvh_scene_set_groups(raw(), instance, member, meets));
+    }
+    void allow(Instance a, Instance b, bool may_touch) { check(cbvh_scene_allow(raw(), a, b, may_touch)); }
+    std::optional<Instance> find(const std::string &name) const {
+        Instance instance{0};
+        const cbvh_status status = cbvh_scene_find(raw(), name.c_str(), &instance);
+        if (status == CBVH_NOT_FOUND) {
+            return std::nullopt;
+        }
+        check(status);
+        return instance;
+    }
+    std::vector<Instance> instances() const {
+        return detail::list<Instance>([&](Instance *instances, std::size_t capacity, std::size_t *count) {
+            return cbvh_scene_instances(raw(), instances, capacity, count);
+        });
+    }
+    std::string name(Instance instance) const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_scene_instance_name(raw(), instance, buffer, capacity, length);
+        });
+    }
+    Pose pose(Instance instance) const {
+        Pose world;
+        check(cbvh_scene_instance_pose(raw(), instance, &world));
+        return world;
+    }
+    Mesh mesh(Instance instance) const {
+        cbvh_mesh mesh{0};
+        check(cbvh_scene_instance_mesh(raw(), instance, &mesh));
+        return Mesh(mesh);
+    }
+
+    bool collide() {
+        bool answer = false;
+        check(cbvh_scene_collide(raw(), &answer));
+        return answer;
+    }
+    bool within(double d) {
+        bool answer = false;
+        check(cbvh_scene_within(raw(), d, &answer));
+        return answer;
+    }
+    /// The nearest pair, if there is any pair.
+    std::optional<cbvh_scene_distance_answer> distance() {
+        cbvh_scene_distance_answer answer{};
+        check(cbvh_scene_distance(raw(), &answer));
+        return detail::found(answer);
+    }
+    std::vector<cbvh_scene_pair> pairs_in_contact() {
+        return detail::list<cbvh_scene_pair>([&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return cbvh_scene_pairs_in_contact(raw(), pairs, capacity, count);
+        });
+    }
+    std::vector<cbvh_scene_pair> pairs_within(double d) {
+        return detail::list<cbvh_scene_pair>([&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return cbvh_scene_pairs_within(raw(), d, pairs, capacity, count);
+        });
+    }
+    std::vector<cbvh_scene_relation> relations() {
+        return detail::list<cbvh_scene_relation>([&](cbvh_scene_relation *found, std::size_t capacity, std::size_t *count) {
+            return cbvh_scene_relations(raw(), found, capacity, count);
+        });
+    }
+    std::vector<cbvh_scene_contact> contacts() {
+        return detail::list<cbvh_scene_contact>([&](cbvh_scene_contact *found, std::size_t capacity, std::size_t *count) {
+            return cbvh_scene_contacts(raw(), found, capacity, count);
+        });
+    }
+
+    /// An instance, and the path in the world that it moves along.
+    struct Way {
+        Instance instance;
+        const Path &path;
+    };
+    MotionAnswer motion(const std::vector<Way> &ways, const MotionOptions &options = {}) {
+        MotionAnswer answer{};
+        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+            return cbvh_scene_motion(raw(), instances, paths, ways.size(), raw_options, &answer);
+        });
+        return answer;
+    }
+    bool is_free(const std::vector<Way> &ways, const MotionOptions &options = {}) {
+        bool answer = false;
+        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+            return cbvh_scene_is_free(raw(), instances, paths, ways.size(), raw_options, &answer);
+        });
+        return answer;
+    }
+
+    std::optional<ClosestPoint> closest_point(const Point &point,
+                                              double within = std::numeric_limits<double>::infinity()) {
+        ClosestPoint answer{};
+        check(cbvh_scene_closest_points(raw(), point.data(), 1, within, &answer));
+        return detail::found(answer);
+    }
+    std::vector<cbvh_side> sides(const std::vector<Point> &points) {
+        return detail::answers<cbvh_side>(points.size(), [&](cbvh_side *answers) {
+            return cbvh_scene_sides(raw(), detail::numbers(points), points.size(), answers);
+        });
+    }
+    std::optional<ClosestPoint> signed_distance(const Point &point,
+                                                double within = std::numeric_limits<double>::infinity()) {
+        ClosestPoint answer{};
+        check(cbvh_scene_signed_distances(raw(), point.data(), 1, within, &answer));
+        return detail::found(answer);
+    }
+    std::optional<RayHit> first_hit(const Ray &ray) {
+        RayHit answer{};
+        check(cbvh_scene_first_hits(raw(), &ray, 1, &answer));
+        return detail::found(answer);
+    }
+    std::vector<bool> any_hits(const std::vector<Ray> &rays) {
+        return detail::choices(rays.size(), [&](bool *answers) {
+            return cbvh_scene_any_hits(raw(), rays.data(), rays.size(), answers);
+        });
+    }
+    std::vector<std::vector<RayHit>> all_hits(const std::vector<Ray> &rays) {
+        return detail::lists<RayHit>(
+            rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_all_hits(raw(), rays.data(), rays.size(), counts, hits, capacity, count);
+            });
+    }
+    std::vector<bool> meet_segments(const std::vector<Segment> &segments) {
+        return detail::choices(segments.size(), [&](bool *answers) {
+            return cbvh_scene_meet_segments(raw(), segments.data(), segments.size(), answers);
+        });
+    }
+
+private:
+    using Owned = detail::Handle<cbvh_scene, cbvh_scene_free>;
+
+    explicit Scene(cbvh_scene raw) : handle_(raw) {}
+    template <class Make> static Scene made(Make make) {
+        cbvh_scene scene{0};
+        check(make(&scene));
+        return Scene(scene);
+    }
+    template <class Ask> static void ask(const std::vector<Way> &ways, const MotionOptions &options, Ask ask) {
+        const cbvh_motion_options raw_options = options.raw();
+        std::vector<Instance> instances;
+        std::vector<cbvh_path> paths;
+        for (const Way &way : ways) {
+            instances.push_back(way.instance);
+            paths.push_back(way.path.raw());
+        }
+        check(ask(instances.data(), paths.data(), &raw_options));
+    }
+    Owned handle_;
+};
+
+} // namespace cbvh
+
+#endif

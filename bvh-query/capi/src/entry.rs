@@ -1,0 +1,136 @@
+//! The boundary: runs a function, catches panics, and keeps the message of the last failure of each thread.
+
+use crate::output::One;
+use crate::status::{Failure, Status};
+use std::any::Any;
+use std::cell::{Cell, RefCell};
+use std::ffi::c_char;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Once;
+
+thread_local! {
+    /// The last message of this thread, which ends with a zero byte.
+    static MESSAGE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    /// How many functions of the interface this thread is in: more than one where a callback calls the library.
+    static DEPTH: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Counts a thread as inside the interface while it lives.
+struct Inside;
+
+impl Inside {
+    fn new() -> Self {
+        DEPTH.with(|depth| depth.set(depth.get() + 1));
+        Self
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        DEPTH.with(|depth| depth.set(depth.get() - 1));
+    }
+}
+
+/// Keeps panics inside the interface off standard error: their text is in the message that the caller gets.
+fn quiet_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if DEPTH.with(Cell::get) == 0 {
+                usual(panic);
+            }
+        }));
+    });
+}
+
+/// Runs the body of a function of the interface. Nothing unwinds out of it.
+pub(crate) fn entry(body: impl FnOnce() -> Result<(), Failure>) -> i32 {
+    let run = || {
+        quiet_panics();
+        let inside = Inside::new();
+        let result = body();
+        drop(inside);
+        result
+    };
+    // What a panic leaves behind is not used again: a handle that was in use is refused from then on.
+    let failure = match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(Ok(())) => return Status::Ok as i32,
+        Ok(Err(failure)) => failure,
+        Err(panic) => Failure::new(Status::Internal, describe(panic)),
+    };
+    let status = failure.status as i32;
+    // Not even a failure to allocate the message may leave.
+    let _ = catch_unwind(AssertUnwindSafe(|| keep(failure.message)));
+    status
+}
+
+/// Describes what a panic was about, and drops what it carried where a panic of that is caught, too.
+fn describe(panic: Box<dyn Any + Send>) -> String {
+    let text = match (panic.downcast_ref::<&str>(), panic.downcast_ref::<String>()) {
+        (Some(text), _) => (*text).to_owned(),
+        (_, Some(text)) => text.clone(),
+        _ => "an unknown panic".to_owned(),
+    };
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(panic)));
+    format!("a defect of cbvh, please report it: {text}")
+}
+
+fn keep(message: String) {
+    // A zero byte would end the message early.
+    let mut bytes: Vec<u8> = message.into_bytes().into_iter().filter(|&byte| byte != 0).collect();
+    bytes.push(0);
+    // Within a thread that is ending there is no message to keep.
+    let _ = MESSAGE.try_with(|last| *last.borrow_mut() = bytes);
+}
+
+/// Returns this thread's last message: text in UTF-8 that ends with a zero byte, valid until the next failure of a function
+/// of the interface on this thread.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_last_message() -> *const c_char {
+    let kept = MESSAGE.try_with(|last| {
+        let last = last.borrow();
+        if last.is_empty() { c"".as_ptr() } else { last.as_ptr().cast() }
+    });
+    kept.unwrap_or(c"".as_ptr())
+}
+
+/// The number of the binary interface, which is part of the name of the shared library: `build.rs` has it, too.
+pub(crate) const ABI: u32 = 0;
+
+/// `cbvh_abi`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_abi(abi: *mut u32) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        unsafe { One::new("abi", abi) }?.set(ABI);
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ffi::CStr;
+
+    fn last() -> String {
+        // SAFETY: the message ends with a zero byte and stays until the next failure.
+        unsafe { CStr::from_ptr(cbvh_last_message()) }.to_string_lossy().into_owned()
+    }
+
+    #[test]
+    #[allow(clippy::panic, reason = "panics are what is tested")]
+    fn panics_become_a_status_and_a_message() {
+        assert_eq!(entry(|| panic!("of {}", 7)), Status::Internal as i32);
+        assert_eq!(last(), "a defect of cbvh, please report it: of 7");
+        assert_eq!(entry(|| std::panic::panic_any(7)), Status::Internal as i32);
+        assert!(last().ends_with("an unknown panic"));
+        assert_eq!(DEPTH.with(Cell::get), 0);
+        assert_eq!(entry(|| Ok(())), 0);
+        assert_eq!(entry(|| Err(Failure::argument("x\0y", "one", 2))), Status::InvalidArgument as i32);
+        assert_eq!(last(), "xy: expected one, found 2");
+        std::thread::spawn(|| assert_eq!(last(), ""))
+            .join()
+            .unwrap_or_else(|_| panic!("another thread's message"));
+    }
+}

@@ -1,0 +1,81 @@
+//! The tables of all handles, and the meshes that a querier keeps at hand.
+
+use crate::paths::PathValue;
+use crate::queriers::Asker;
+use crate::status::Failure;
+use crate::table::{Kind, Table};
+use crate::types::MeshHandle;
+use bvh_query::{OwnedShape, Scene, Shape, Tracker};
+use std::sync::Arc;
+
+pub(crate) static MESHES: Table<OwnedShape> = Table::new(Kind::Mesh);
+pub(crate) static QUERIERS: Table<Box<Asker>> = Table::new(Kind::Querier);
+pub(crate) static TRACKERS: Table<Box<Tracker>> = Table::new(Kind::Tracker);
+pub(crate) static PATHS: Table<Arc<PathValue>> = Table::new(Kind::Path);
+pub(crate) static SCENES: Table<Box<Scene>> = Table::new(Kind::Scene);
+
+/// How many meshes a querier keeps at hand.
+const MOST_AT_HAND: usize = 8;
+
+/// Meshes that a querier was last asked about.
+///
+/// Threads that ask about one mesh would otherwise count its uses in the same word of memory, twice a question. A mesh at
+/// hand is compared with its place in the table by reading alone. One that was freed is let go when the querier is asked
+/// about a mesh that it does not have at hand, or is freed.
+#[derive(Default)]
+pub(crate) struct AtHand {
+    meshes: [Option<(u64, OwnedShape)>; MOST_AT_HAND],
+    /// Where the next mesh goes when all places are taken.
+    next: usize,
+}
+
+impl AtHand {
+    /// Returns both meshes of a question.
+    pub(crate) fn pair(&mut self, a: MeshHandle, b: MeshHandle) -> Result<(Shape<'_>, Shape<'_>), Failure> {
+        let place_a = self.place("a", a.id, MOST_AT_HAND)?;
+        let place_b = self.place("b", b.id, place_a)?;
+        Ok((self.at(place_a)?, self.at(place_b)?))
+    }
+
+    /// Returns the mesh of a question about one.
+    pub(crate) fn one(&mut self, name: &str, mesh: MeshHandle) -> Result<Shape<'_>, Failure> {
+        let place = self.place(name, mesh.id, MOST_AT_HAND)?;
+        self.at(place)
+    }
+
+    fn at(&self, place: usize) -> Result<Shape<'_>, Failure> {
+        let mesh = self.meshes.get(place).and_then(Option::as_ref);
+        let (_, shape) =
+            mesh.ok_or_else(|| Failure::new(crate::status::Status::Internal, "a mesh that is not at hand"))?;
+        Ok(shape.shape())
+    }
+
+    /// Returns the place of a mesh, after taking it to hand in another place than `taken`.
+    #[inline]
+    fn place(&mut self, name: &str, handle: u64, taken: usize) -> Result<usize, Failure> {
+        let is_it = |mesh: &Option<(u64, OwnedShape)>| mesh.as_ref().is_some_and(|(id, _)| *id == handle);
+        match self.meshes.iter().position(is_it) {
+            Some(place) if MESHES.is_open(handle) => Ok(place),
+            _ => self.take(name, handle, taken),
+        }
+    }
+
+    #[cold]
+    fn take(&mut self, name: &str, handle: u64, taken: usize) -> Result<usize, Failure> {
+        for (place, mesh) in self.meshes.iter_mut().enumerate() {
+            if place != taken && mesh.as_ref().is_some_and(|(id, _)| !MESHES.is_open(*id)) {
+                *mesh = None;
+            }
+        }
+        let shape = MESHES.share(name, handle)?;
+        let place = self.meshes.iter().position(Option::is_none).unwrap_or_else(|| {
+            self.next = (self.next + 1) % MOST_AT_HAND;
+            if self.next == taken {
+                self.next = (self.next + 1) % MOST_AT_HAND;
+            }
+            self.next
+        });
+        self.meshes[place] = Some((handle, shape));
+        Ok(place)
+    }
+}

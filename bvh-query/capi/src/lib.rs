@@ -1,0 +1,28 @@
+//! The C interface of cbvh: what `include/cbvh.h` declares, function by function.
+//!
+//! The header documents every function for its users, and is written by hand; `tests/check_header.sh` compares it with
+//! what is here. Below the functions there are four ideas:
+//!
+//! - `entry`: nothing unwinds out of a function; it returns a status, and a message stays with the thread.
+//! - `table`: a handle is a number, looked up in a table, so that a freed or foreign one is recognised and never followed.
+//! - `input`: pointers are checked for null, alignment and length before anything is read, and what they point to is
+//!   copied before anything is written.
+//! - `output`: answers are written through raw pointers, because C's memory may hold no values yet and may overlap.
+
+mod bake;
+mod entry;
+mod handles;
+mod input;
+mod mesh;
+mod motions;
+mod output;
+mod pairs;
+mod paths;
+mod poses;
+mod probes;
+mod queriers;
+mod scene;
+mod status;
+mod table;
+mod trackers;
+mod types;

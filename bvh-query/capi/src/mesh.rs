@@ -1,0 +1,285 @@
+//! Meshes: opened files, whole or object by object.
+
+use crate::entry::entry;
+use crate::handles::MESHES;
+use crate::input::{array, path, text};
+use crate::output::{self, List, One, Room};
+use crate::status::{Failure, Status};
+use crate::types::MeshHandle;
+use bvh_query::{Bvh, OpenError, OwnedShape, ReadAhead};
+use std::ffi::{c_char, c_void};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Room for the handle of a new mesh, which holds no handle until there is one.
+///
+/// # Safety
+/// As for `One::new`.
+pub(crate) unsafe fn new_mesh<'a>(out: *mut MeshHandle) -> Result<One<'a, MeshHandle>, Failure> {
+    // SAFETY: the caller vouches for it.
+    let mut out = unsafe { One::new("mesh", out) }?;
+    out.set(MeshHandle { id: 0 });
+    Ok(out)
+}
+
+pub(crate) fn hand_out(mut out: One<'_, MeshHandle>, shape: OwnedShape) -> Result<(), Failure> {
+    out.set(MeshHandle { id: MESHES.insert(shape)? });
+    Ok(())
+}
+
+fn damaged(error: bvh_query::FormatError) -> Failure {
+    Failure::new(Status::Damaged, format!("bytes: {error}"))
+}
+
+/// `cbvh_mesh_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *mut MeshHandle) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let (out, file) = unsafe { (new_mesh(mesh)?, path("path", file)?) };
+        let opened: Result<Bvh, OpenError> = match mode {
+            0 => Bvh::open_with(file, ReadAhead::Usual),
+            1 => Bvh::open_with(file, ReadAhead::Sparse),
+            2 => Bvh::open_with(file, ReadAhead::Whole),
+            3 => Bvh::read(file),
+            _ => return Err(Failure::argument("mode", "a number of cbvh_open_mode, 0 to 3", mode)),
+        };
+        hand_out(out, opened?.into())
+    })
+}
+
+/// `cbvh_mesh_from_bytes`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_from_bytes(bytes: *const u8, size: usize, mesh: *mut MeshHandle) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let (out, bytes) = unsafe { (new_mesh(mesh)?, array("bytes", bytes, size)?) };
+        hand_out(out, Bvh::from_bytes(bytes.to_vec()).map_err(damaged)?.into())
+    })
+}
+
+/// The function that tells a caller that borrowed bytes are no longer used.
+type Release = Option<unsafe extern "C" fn(user: *mut c_void)>;
+
+/// Bytes of the caller.
+struct Borrowed {
+    start: *const u8,
+    size: usize,
+    release: Release,
+    user: *mut c_void,
+    /// Whether the bytes have been taken: until then nothing is released.
+    is_taken: Arc<AtomicBool>,
+    /// Whether they were dropped before that.
+    is_over: Arc<AtomicBool>,
+}
+
+// SAFETY: the header asks that the bytes do not change and that `release` may be called on any thread.
+unsafe impl Send for Borrowed {}
+// SAFETY: as above.
+unsafe impl Sync for Borrowed {}
+
+impl AsRef<[u8]> for Borrowed {
+    fn as_ref(&self) -> &[u8] {
+        // SAFETY: the pointer was checked; the caller keeps the bytes until they are released.
+        unsafe { std::slice::from_raw_parts(self.start, self.size) }
+    }
+}
+
+impl Drop for Borrowed {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
+        if self.is_taken.load(Ordering::Acquire)
+            && let Some(release) = self.release
+        {
+            // SAFETY: the header asks for a function that may be called here.
+            unsafe { release(self.user) };
+        }
+    }
+}
+
+/// `cbvh_mesh_borrow_bytes`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_borrow_bytes(
+    bytes: *const u8,
+    size: usize,
+    release: Release,
+    user: *mut c_void,
+    mesh: *mut MeshHandle,
+) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let (out, bytes) = unsafe { (new_mesh(mesh)?, array("bytes", bytes, size)?) };
+        let (is_taken, is_over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let borrowed = Borrowed {
+            start: bytes.as_ptr(),
+            size,
+            release,
+            user,
+            is_taken: is_taken.clone(),
+            is_over: is_over.clone(),
+        };
+        let bvh = Bvh::from_bytes(borrowed).map_err(damaged)?;
+        hand_out(out, bvh.into())?;
+        is_taken.store(true, Ordering::Release);
+        // A large file has been copied to large pages by now.
+        if is_over.load(Ordering::Acquire)
+            && let Some(release) = release
+        {
+            // SAFETY: as in `drop`.
+            unsafe { release(user) };
+        }
+        Ok(())
+    })
+}
+
+/// Asks about a mesh.
+fn ask(mesh: MeshHandle, ask: impl FnOnce(OwnedShape) -> Result<(), Failure>) -> i32 {
+    entry(|| ask(MESHES.share("mesh", mesh.id)?))
+}
+
+/// `cbvh_mesh_clone`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_clone(mesh: MeshHandle, other: *mut MeshHandle) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let out = unsafe { new_mesh(other) }.map_err(|failure| failure.at("other"))?;
+        hand_out(out, MESHES.share("mesh", mesh.id)?)
+    })
+}
+
+/// `cbvh_mesh_free`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_mesh_free(mesh: MeshHandle) -> i32 {
+    entry(|| if mesh.id == 0 { Ok(()) } else { MESHES.remove("mesh", mesh.id).map(drop) })
+}
+
+/// `cbvh_mesh_object`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_object(mesh: MeshHandle, number: usize, object: *mut MeshHandle) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        let out = unsafe { new_mesh(object) }.map_err(|failure| failure.at("object"))?;
+        let bvh = shape.bvh().clone();
+        let objects = bvh.objects().len();
+        let found = OwnedShape::object(bvh, number);
+        let object = found.ok_or_else(|| {
+            Failure::new(
+                Status::NotFound,
+                format!("number: expected a number below {objects}, found {number}"),
+            )
+        })?;
+        hand_out(out, object)
+    })
+}
+
+/// `cbvh_mesh_find`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_find(mesh: MeshHandle, name: *const c_char, number: *mut usize) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        let (name, mut number) = unsafe { (text("name", name)?, One::new("number", number)?) };
+        let found = shape.bvh().find(name);
+        number.set(found.ok_or_else(|| {
+            Failure::new(Status::NotFound, format!("name: expected the name of an object, found {name:?}"))
+        })?);
+        Ok(())
+    })
+}
+
+/// `cbvh_mesh_object_count`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_object_count(mesh: MeshHandle, count: *mut usize) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        unsafe { One::new("count", count) }?.set(shape.bvh().objects().len());
+        Ok(())
+    })
+}
+
+/// `cbvh_mesh_object_name`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_object_name(
+    mesh: MeshHandle,
+    number: usize,
+    buffer: *mut c_char,
+    capacity: usize,
+    length: *mut usize,
+) -> i32 {
+    ask(mesh, |shape| {
+        let objects = shape.bvh().objects();
+        let object = objects.get(number).ok_or_else(|| {
+            let objects = objects.len();
+            Failure::new(
+                Status::NotFound,
+                format!("number: expected a number below {objects}, found {number}"),
+            )
+        })?;
+        // SAFETY: the header asks for it.
+        unsafe { output::text("buffer", object.name(), buffer, capacity, length) }
+    })
+}
+
+/// `cbvh_mesh_triangle_count`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_triangle_count(mesh: MeshHandle, count: *mut u64) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        unsafe { One::new("count", count) }?.set(shape.shape().triangles());
+        Ok(())
+    })
+}
+
+/// `cbvh_mesh_duplicates`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_duplicates(
+    mesh: MeshHandle,
+    triangle: u32,
+    triangles: *mut u32,
+    capacity: usize,
+    count: *mut usize,
+) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        let mut list = unsafe { List::new("triangles", triangles, capacity, count) }?;
+        shape.bvh().duplicates_of(triangle)?.for_each(|id| list.push(id));
+        list.finish()
+    })
+}
+
+/// `cbvh_mesh_bytes`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_bytes(
+    mesh: MeshHandle,
+    buffer: *mut u8,
+    capacity: usize,
+    size: *mut usize,
+) -> i32 {
+    ask(mesh, |shape| {
+        let bytes = shape.bvh().bytes();
+        // SAFETY: the header asks for it.
+        let (mut size, room) = unsafe { (One::new("size", size)?, Room::new("buffer", buffer, capacity)?) };
+        size.set(bytes.len());
+        room.fill(&bytes[..bytes.len().min(capacity)]);
+        if bytes.len() <= capacity {
+            return Ok(());
+        }
+        let message = format!("buffer: expected room for {} bytes, found room for {capacity}", bytes.len());
+        Err(Failure::new(Status::BufferTooSmall, message))
+    })
+}
+
+/// `cbvh_mesh_save`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, file: *const c_char) -> i32 {
+    ask(mesh, |shape| {
+        // SAFETY: the header asks for it.
+        let file = unsafe { path("path", file) }?;
+        Ok(bvh_bake::write_atomically(&file, shape.bvh().bytes())?)
+    })
+}
+
+/// `cbvh_mesh_check`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_mesh_check(mesh: MeshHandle) -> i32 {
+    ask(mesh, |shape| Ok(shape.bvh().check_all()?))
+}

@@ -1,0 +1,223 @@
+//! Questions about the ways of one mesh in the frame of another.
+
+use crate::entry::entry;
+use crate::handles::QUERIERS;
+use crate::input::{array, options, poses};
+use crate::output::Room;
+use crate::paths::AskedPath;
+use crate::queriers::Asker;
+use crate::status::Failure;
+use crate::types::{MeshHandle, MotionChoices, MotionRow, PathHandle, PoseRows, QuerierHandle};
+use bvh_query::{Batch, Motion, MotionOptions, Path, Querier, QueryError, Shape};
+
+/// A querier, two meshes and what counts as a hit.
+struct Question {
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    choices: *const MotionChoices,
+}
+
+/// How many paths are asked about, on one core or on all.
+trait Ask<R> {
+    fn all<P: Path + Sync>(
+        batch: &Batch<'_>,
+        paths: &[P],
+        options: &MotionOptions,
+    ) -> Result<Vec<R>, QueryError>;
+    fn one(
+        querier: &mut Querier,
+        meshes: [Shape<'_>; 2],
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<R, QueryError>;
+}
+
+/// Where a way ends.
+struct WhereItEnds;
+
+impl Ask<MotionRow> for WhereItEnds {
+    fn all<P: Path + Sync>(
+        batch: &Batch<'_>,
+        paths: &[P],
+        options: &MotionOptions,
+    ) -> Result<Vec<MotionRow>, QueryError> {
+        Ok(batch.motion(paths, options)?.into_iter().map(MotionRow::from).collect())
+    }
+
+    fn one(
+        querier: &mut Querier,
+        [a, b]: [Shape<'_>; 2],
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<MotionRow, QueryError> {
+        querier.motion(a, b, path, options).map(MotionRow::from)
+    }
+}
+
+/// Whether a way is free.
+struct WhetherFree;
+
+impl Ask<bool> for WhetherFree {
+    fn all<P: Path + Sync>(
+        batch: &Batch<'_>,
+        paths: &[P],
+        options: &MotionOptions,
+    ) -> Result<Vec<bool>, QueryError> {
+        batch.is_free(paths, options)
+    }
+
+    fn one(
+        querier: &mut Querier,
+        [a, b]: [Shape<'_>; 2],
+        path: &dyn Path,
+        options: &MotionOptions,
+    ) -> Result<bool, QueryError> {
+        querier.is_free(a, b, path, options)
+    }
+}
+
+impl Question {
+    /// Asks about paths that `read` reads, and lets `check` refuse the answers.
+    ///
+    /// # Safety
+    /// As for `options` and `Room::new`.
+    unsafe fn ask<A: Ask<R>, R: Copy, P: Path + Sync>(
+        &self,
+        (answers, count): (*mut R, usize),
+        read: impl FnOnce(&mut Asker) -> Result<Vec<P>, Failure>,
+        check: impl Fn(&P) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let mut held = QUERIERS.hold("querier", self.querier.id)?;
+        let asker = &mut **held.value()?;
+        // Both meshes come before the paths in the list of arguments, and so do their errors.
+        asker.at_hand.pair(self.a, self.b)?;
+        let paths = read(asker)?;
+        // SAFETY: the caller vouches for it.
+        let (options, mut room) =
+            unsafe { (options("options", self.choices)?.read(), Room::new("answers", answers, count)?) };
+        let Asker { querier, parallel, budget, at_hand, .. } = asker;
+        let (a, b) = at_hand.pair(self.a, self.b)?;
+        if *parallel {
+            let mut batch = Batch::with_backend(a, b, querier.backend());
+            batch.set_budget(*budget);
+            let found = A::all(&batch, &paths, &options);
+            paths.iter().try_for_each(&check)?;
+            found?.into_iter().enumerate().for_each(|(number, answer)| room.set(number, answer));
+            return Ok(());
+        }
+        for (number, path) in paths.iter().enumerate() {
+            let found = A::one(querier, [a, b], path, &options);
+            check(path)?;
+            room.set(number, found?);
+        }
+        Ok(())
+    }
+
+    /// Asks about paths of handles.
+    ///
+    /// # Safety
+    /// As for `array`, `options` and `Room::new`.
+    unsafe fn paths<A: Ask<R>, R: Copy>(
+        &self,
+        paths: *const PathHandle,
+        count: usize,
+        answers: *mut R,
+    ) -> i32 {
+        // SAFETY: the caller vouches for it.
+        let read = |_: &mut Asker| AskedPath::many("paths", unsafe { array("paths", paths, count) }?);
+        // SAFETY: as above.
+        entry(|| unsafe { self.ask::<A, R, _>((answers, count), read, AskedPath::failure) })
+    }
+
+    /// Asks about motions between poses.
+    ///
+    /// # Safety
+    /// As for `poses`, `options` and `Room::new`.
+    unsafe fn edges<A: Ask<R>, R: Copy>(
+        &self,
+        starts: *const PoseRows,
+        ends: *const PoseRows,
+        count: usize,
+        answers: *mut R,
+    ) -> i32 {
+        let read = |asker: &mut Asker| {
+            let probes = &mut asker.probes;
+            // SAFETY: the caller vouches for it.
+            unsafe {
+                poses("starts", starts, count, &mut probes.poses)?;
+                poses("ends", ends, count, &mut probes.ends)?;
+            }
+            let both = probes.poses.iter().zip(&probes.ends).enumerate();
+            let between = both.map(|(number, (start, end))| {
+                let place = format_args!("starts[{number}] and ends[{number}]");
+                Motion::between(start, end).map_err(|error| Failure::from(error).at(place))
+            });
+            between.collect()
+        };
+        // SAFETY: as above.
+        entry(|| unsafe { self.ask::<A, R, Motion>((answers, count), read, |_| Ok(())) })
+    }
+}
+
+/// `cbvh_motions`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_motions(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    paths: *const PathHandle,
+    count: usize,
+    choices: *const MotionChoices,
+    answers: *mut MotionRow,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { Question { querier, a, b, choices }.paths::<WhereItEnds, _>(paths, count, answers) }
+}
+
+/// `cbvh_are_free`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_are_free(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    paths: *const PathHandle,
+    count: usize,
+    choices: *const MotionChoices,
+    answers: *mut bool,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { Question { querier, a, b, choices }.paths::<WhetherFree, _>(paths, count, answers) }
+}
+
+/// `cbvh_edge_motions`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_edge_motions(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    starts: *const PoseRows,
+    ends: *const PoseRows,
+    count: usize,
+    choices: *const MotionChoices,
+    answers: *mut MotionRow,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { Question { querier, a, b, choices }.edges::<WhereItEnds, _>(starts, ends, count, answers) }
+}
+
+/// `cbvh_edges_are_free`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_edges_are_free(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    starts: *const PoseRows,
+    ends: *const PoseRows,
+    count: usize,
+    choices: *const MotionChoices,
+    answers: *mut bool,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { Question { querier, a, b, choices }.edges::<WhetherFree, _>(starts, ends, count, answers) }
+}

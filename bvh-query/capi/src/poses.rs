@@ -1,0 +1,102 @@
+//! Poses: checks, and what composes them.
+
+use crate::entry::entry;
+use crate::input::{array, pose, triple, value};
+use crate::output::One;
+use crate::status::Failure;
+use crate::types::PoseRows;
+use bvh_query::Pose;
+
+/// Makes a pose, and writes it.
+///
+/// # Safety
+/// As for `One::new`.
+unsafe fn make(result: *mut PoseRows, make: impl FnOnce() -> Result<Pose, Failure>) -> i32 {
+    entry(|| {
+        // SAFETY: the caller vouches for it.
+        let mut out = unsafe { One::new("result", result) }?;
+        out.set(PoseRows::from(&make()?));
+        Ok(())
+    })
+}
+
+/// `cbvh_pose_check`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_check(checked: *const PoseRows) -> i32 {
+    // SAFETY: the header asks for it.
+    entry(|| unsafe { pose("pose", checked) }.map(drop))
+}
+
+/// `cbvh_pose_from_quaternion`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_from_quaternion(
+    quaternion: *const f64,
+    translation: *const f64,
+    result: *mut PoseRows,
+) -> i32 {
+    let made = || {
+        // SAFETY: the header asks for it.
+        let (quaternion, translation) =
+            unsafe { (array("quaternion", quaternion, 4)?, triple("translation", translation)?) };
+        let [x, y, z, w] = [0, 1, 2, 3].map(|k| quaternion[k]);
+        let made = Pose::from_quaternion([x, y, z, w], translation);
+        made.map_err(|error| Failure::from(error).at("quaternion and translation"))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { make(result, made) }
+}
+
+/// `cbvh_pose_nearest`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_nearest(rounded: *const PoseRows, result: *mut PoseRows) -> i32 {
+    let made = || {
+        // SAFETY: the header asks for it.
+        let m = unsafe { value("pose", rounded) }?.rows;
+        let rotation = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]];
+        Pose::nearest(rotation, [m[3], m[7], m[11]]).map_err(|error| Failure::from(error).at("pose"))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { make(result, made) }
+}
+
+/// `cbvh_pose_inverse`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_inverse(of: *const PoseRows, result: *mut PoseRows) -> i32 {
+    // SAFETY: the header asks for it.
+    let made =
+        || unsafe { pose("pose", of) }?.inverse().map_err(|error| Failure::from(error).at("the inverse"));
+    // SAFETY: the header asks for it.
+    unsafe { make(result, made) }
+}
+
+/// `cbvh_pose_then`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_then(
+    first: *const PoseRows,
+    next: *const PoseRows,
+    result: *mut PoseRows,
+) -> i32 {
+    let made = || {
+        // SAFETY: the header asks for it.
+        let (first, next) = unsafe { (pose("first", first)?, pose("next", next)?) };
+        first.then(&next).map_err(|error| Failure::from(error).at("both poses"))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { make(result, made) }
+}
+
+/// `cbvh_pose_relative`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_pose_relative(
+    world_a: *const PoseRows,
+    world_b: *const PoseRows,
+    result: *mut PoseRows,
+) -> i32 {
+    let made = || {
+        // SAFETY: the header asks for it.
+        let (a, b) = unsafe { (pose("world_a", world_a)?, pose("world_b", world_b)?) };
+        Pose::relative(&a, &b).map_err(|error| Failure::from(error).at("both poses"))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { make(result, made) }
+}

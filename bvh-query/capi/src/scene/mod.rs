@@ -1,0 +1,267 @@
+//! Scenes: many placed meshes.
+
+mod probes;
+mod questions;
+
+use crate::entry::entry;
+use crate::handles::{MESHES, SCENES};
+use crate::input::{array, flag, optional_text, path, pose, poses, text};
+use crate::mesh::{hand_out, new_mesh};
+use crate::output::{self, List, One};
+use crate::status::{Failure, Status};
+use crate::types::{Instance, MeshHandle, PoseRows, SceneHandle, StatsRow, backend};
+use bvh_query::{Groups, InstanceId, Scene, SceneShape};
+use std::ffi::c_char;
+
+/// Makes a scene, and hands it out.
+///
+/// # Safety
+/// As for `One::new`.
+unsafe fn make(scene: *mut SceneHandle, make: impl FnOnce() -> Result<Scene, Failure>) -> i32 {
+    entry(|| {
+        // SAFETY: the caller vouches for it.
+        let mut out = unsafe { One::new("scene", scene) }?;
+        out.set(SceneHandle { id: 0 });
+        out.set(SceneHandle { id: SCENES.insert(Box::new(make()?))? });
+        Ok(())
+    })
+}
+
+/// Does something with a scene that nobody uses.
+pub(crate) fn with(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
+    entry(|| act(SCENES.hold("scene", scene.id)?.value()?))
+}
+
+/// `cbvh_scene_new`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_new(backend_number: i32, scene: *mut SceneHandle) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { make(scene, || Ok(Scene::with_backend(backend("backend", backend_number)?))) }
+}
+
+/// `cbvh_scene_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_open(file: *const c_char, scene: *mut SceneHandle) -> i32 {
+    // SAFETY: the header asks for it.
+    let made = || Ok(Scene::open(unsafe { path("path", file) }?)?);
+    // SAFETY: the header asks for it.
+    unsafe { make(scene, made) }
+}
+
+/// `cbvh_scene_of_mesh`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneHandle) -> i32 {
+    let made = || {
+        let bvh = MESHES.share("mesh", mesh.id)?.bvh().clone();
+        Scene::of_file(bvh).map_err(|error| Failure::from(error).at("mesh"))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { make(scene, made) }
+}
+
+/// `cbvh_scene_clone`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_clone(scene: SceneHandle, other: *mut SceneHandle) -> i32 {
+    let made = || Ok((**SCENES.hold("scene", scene.id)?.value()?).clone());
+    // SAFETY: the header asks for it.
+    unsafe { make(other, made) }
+}
+
+/// `cbvh_scene_free`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_free(scene: SceneHandle) -> i32 {
+    entry(|| if scene.id == 0 { Ok(()) } else { SCENES.remove("scene", scene.id).map(drop) })
+}
+
+/// `cbvh_scene_set_parallel`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> i32 {
+    with(scene, |scene| {
+        scene.set_parallel(flag("parallel", parallel)?);
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_set_tracking`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_tracking(scene: SceneHandle, tracking: i32) -> i32 {
+    with(scene, |scene| {
+        scene.set_tracking(flag("tracking", tracking)?);
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_set_budget`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_budget(scene: SceneHandle, visits: u64) -> i32 {
+    with(scene, |scene| {
+        scene.set_budget(visits);
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_add`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_add(
+    scene: SceneHandle,
+    mesh: MeshHandle,
+    world: *const PoseRows,
+    name: *const c_char,
+    instance: *mut Instance,
+) -> i32 {
+    with(scene, |scene| {
+        let shape = MESHES.share("mesh", mesh.id)?;
+        // SAFETY: the header asks for it.
+        let (world, name) = unsafe { (pose("world", world)?, optional_text("name", name)?) };
+        let out = if instance.is_null() {
+            None
+        } else {
+            // SAFETY: as above.
+            Some(unsafe { One::new("instance", instance) }?)
+        };
+        let id = match name {
+            Some(name) => scene.add_named(name, shape, world)?,
+            None => scene.add(shape, world)?,
+        };
+        if let Some(mut out) = out {
+            out.set(id.into());
+        }
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_remove`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_remove(scene: SceneHandle, instance: Instance) -> i32 {
+    with(scene, |scene| Ok(scene.remove(instance.into())?))
+}
+
+/// `cbvh_scene_set_poses`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_set_poses(
+    scene: SceneHandle,
+    instances: *const Instance,
+    worlds: *const PoseRows,
+    count: usize,
+) -> i32 {
+    with(scene, |scene| {
+        let mut to = Vec::new();
+        // SAFETY: the header asks for it.
+        let instances = unsafe {
+            let instances = array("instances", instances, count)?;
+            poses("worlds", worlds, count, &mut to)?;
+            instances
+        };
+        let moves = instances.iter().map(|&instance| InstanceId::from(instance)).zip(to);
+        Ok(scene.set_poses(moves)?)
+    })
+}
+
+/// `cbvh_scene_set_groups`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_groups(
+    scene: SceneHandle,
+    instance: Instance,
+    member: u32,
+    meets: u32,
+) -> i32 {
+    with(scene, |scene| Ok(scene.set_groups(instance.into(), Groups { member, meets })?))
+}
+
+/// `cbvh_scene_allow`.
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_allow(scene: SceneHandle, a: Instance, b: Instance, may_touch: i32) -> i32 {
+    with(scene, |scene| Ok(scene.allow(a.into(), b.into(), flag("may_touch", may_touch)?)?))
+}
+
+/// `cbvh_scene_find`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_find(
+    scene: SceneHandle,
+    name: *const c_char,
+    instance: *mut Instance,
+) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the header asks for it.
+        let (name, mut out) = unsafe { (text("name", name)?, One::new("instance", instance)?) };
+        let id = scene.find(name).ok_or_else(|| {
+            Failure::new(Status::NotFound, format!("name: expected the name of an instance, found {name:?}"))
+        })?;
+        out.set(id.into());
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_instances`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_instances(
+    scene: SceneHandle,
+    instances: *mut Instance,
+    capacity: usize,
+    count: *mut usize,
+) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the header asks for it.
+        let mut list = unsafe { List::new("instances", instances, capacity, count) }?;
+        scene.instances().for_each(|id| list.push(id.into()));
+        list.finish()
+    })
+}
+
+/// `cbvh_scene_instance_name`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_instance_name(
+    scene: SceneHandle,
+    instance: Instance,
+    buffer: *mut c_char,
+    capacity: usize,
+    length: *mut usize,
+) -> i32 {
+    with(scene, |scene| {
+        let name = scene.name(instance.into())?.unwrap_or_default();
+        // SAFETY: the header asks for it.
+        unsafe { output::text("buffer", name, buffer, capacity, length) }
+    })
+}
+
+/// `cbvh_scene_instance_pose`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_instance_pose(
+    scene: SceneHandle,
+    instance: Instance,
+    world: *mut PoseRows,
+) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the header asks for it.
+        unsafe { One::new("world", world) }?.set(PoseRows::from(scene.pose(instance.into())?));
+        Ok(())
+    })
+}
+
+/// `cbvh_scene_instance_mesh`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_instance_mesh(
+    scene: SceneHandle,
+    instance: Instance,
+    mesh: *mut MeshHandle,
+) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the header asks for it.
+        let out = unsafe { new_mesh(mesh) }?;
+        match scene.shape(instance.into())? {
+            SceneShape::Open(shape) => hand_out(out, shape.clone()),
+            SceneShape::Stored(shape) => hand_out(out, shape.opened()?),
+            _ => Err(Failure::new(Status::Internal, "a shape of an unknown kind")),
+        }
+    })
+}
+
+/// `cbvh_scene_stats`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_stats(scene: SceneHandle, stats: *mut StatsRow) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the header asks for it.
+        unsafe { One::new("stats", stats) }?.set(StatsRow::new(scene.stats(), scene.pairs_asked()));
+        Ok(())
+    })
+}
