@@ -1,4 +1,5 @@
-// What a planner asks: is the way between two poses free, at every moment? A wall with a door, and a box that goes through.
+// What a planner asks: is the way between two poses free, at every moment? A wall with a door, and a box that goes
+// through.
 #include <cbvh.hpp>
 
 #include <cmath>
@@ -11,7 +12,8 @@ void add_box(std::vector<std::array<double, 3>> &vertices, std::vector<std::arra
              std::array<double, 3> low, std::array<double, 3> high) {
     const auto first = static_cast<std::uint32_t>(vertices.size());
     for (int corner = 0; corner < 8; corner++) {
-        vertices.push_back({corner & 1 ? high[0] : low[0], corner & 2 ? high[1] : low[1], corner & 4 ? high[2] : low[2]});
+        const auto pick = [&](std::size_t axis) { return corner >> axis & 1 ? high[axis] : low[axis]; };
+        vertices.push_back({pick(0), pick(1), pick(2)});
     }
     const std::uint32_t corners[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -58,7 +60,8 @@ int main() {
                 const double angle = t * std::acos(-1.0) / 2, c = std::cos(angle), s = std::sin(angle);
                 return cbvh::Pose({c, -s, 0, -10 + 20 * t, s, c, 0, 0, 0, 0, 1, 0});
             }
-            // Points turn in circles: an eighth of the greatest acceleration times the square of the time, and rounding.
+            // Points turn in circles: an eighth of the greatest acceleration times the square of the time, and
+            // rounding.
             double sagitta(double radius, double t0, double t1) const {
                 const double turned = (t1 - t0) * std::acos(-1.0) / 2;
                 return radius * turned * turned / 8 * (1 + 1e-12) + 1e-12 * (radius + 20);

@@ -26,10 +26,12 @@ int main() {
                     scene.name(nearest->pair.b).c_str(), nearest->distance.distance);
 
         // Both fall: only the first one has the floor below it.
-        const cbvh::Path fall = cbvh::Path::between(cbvh::Pose::translation(0, 0, 0.75), cbvh::Pose::translation(0, 0, 0));
-        const cbvh::Path aside = cbvh::Path::between(cbvh::Pose::translation(3, 0, 0.75), cbvh::Pose::translation(3, 0, 0));
+        using cbvh::Pose;
+        const cbvh::Path fall = cbvh::Path::between(Pose::translation(0, 0, 0.75), Pose::translation(0, 0, 0));
+        const cbvh::Path aside = cbvh::Path::between(Pose::translation(3, 0, 0.75), Pose::translation(3, 0, 0));
         const cbvh::MotionAnswer end = scene.motion({{first, fall}, {second, aside}});
-        std::printf("%s hits %s at %.6f\n", scene.name(end.instance_b).c_str(), scene.name(end.instance_a).c_str(), end.at);
+        std::printf("%s hits %s at %.6f\n", scene.name(end.instance_b).c_str(), scene.name(end.instance_a).c_str(),
+                    end.at);
         const bool is_aside_free = scene.is_free({{second, aside}});
 
         scene.set_poses({{first, cbvh::Pose::translation(0, 0, 0.5)}, {second, cbvh::Pose::translation(1, 0, 0.5)}});

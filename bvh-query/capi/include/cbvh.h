@@ -1,6 +1,7 @@
 /* cbvh: exact collision and distance queries between rigid triangle meshes. The C interface, C99.
  *
- * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file; questions are asked about meshes in poses:
+ * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file; questions are asked about meshes in
+ * poses:
  *
  *     cbvh_mesh room, robot;
  *     cbvh_querier querier;
@@ -14,34 +15,34 @@
  *
  * Errors. Every function but cbvh_last_message returns a cbvh_status. Any status but CBVH_OK leaves a message with the
  * thread, which names the argument, what was expected and what was found. Arguments are checked before any question is
- * asked. After a failure, handles that a function should have made are 0, and answers hold no particular values; nothing is
- * ever written beyond them. Nothing unwinds out of a function, and no argument makes one crash as long as pointers that are
- * neither null nor misaligned lead to as many elements as is said, and text ends with a zero byte.
+ * asked. After a failure, handles that a function should have made are 0, and answers hold no particular values;
+ * nothing is ever written beyond them. Nothing unwinds out of a function, and no argument makes one crash as long as
+ * pointers that are neither null nor misaligned lead to as many elements as is said, and text ends with a zero byte.
  *
  * Poses are "body to world". In questions about two meshes, the world is the frame of mesh A: a point x of mesh B is at
- * R x + t in A's frame. Points are columns; a pose is the rows of the 3 by 4 matrix [R | t]. R is a rotation to within 2^-20.
- * Lengths are in the unit of the meshes.
+ * R x + t in A's frame. Points are columns; a pose is the rows of the 3 by 4 matrix [R | t]. R is a rotation to within
+ * 2^-20. Lengths are in the unit of the meshes.
  *
- * Handles are numbers, not addresses: small structures that are passed by value. A handle of 0 is none, and freeing it does
- * nothing. A handle that was freed, is of another kind or was made up is refused with CBVH_INVALID_HANDLE; it is never
- * followed. A copy of the structure is the same handle, which is to be freed once. Handles that are not freed live as long
- * as the process. In a child after fork() without exec() use none.
+ * Handles are numbers, not addresses: small structures that are passed by value. A handle of 0 is none, and freeing it
+ * does nothing. A handle that was freed, is of another kind or was made up is refused with CBVH_INVALID_HANDLE; it is
+ * never followed. A copy of the structure is the same handle, which is to be freed once. Handles that are not freed
+ * live as long as the process. In a child after fork() without exec() use none.
  *
- * Threads. Functions may be called on any thread. Meshes and paths may be used by many threads at the same time; a querier,
- * a tracker and a scene by one at a time, and a second one gets CBVH_BUSY. Make one querier for each thread. Freeing a mesh or
- * a path that other threads use is allowed: it lives on until their questions end. cbvh_querier_set_parallel and
- * cbvh_scene_set_parallel let one question use all cores; the number of threads is that of the environment variable
- * RAYON_NUM_THREADS or, without it, of the cores.
+ * Threads. Functions may be called on any thread. Meshes and paths may be used by many threads at the same time; a
+ * querier, a tracker and a scene by one at a time, and a second one gets CBVH_BUSY. Make one querier for each thread.
+ * Freeing a mesh or a path that other threads use is allowed: it lives on until their questions end.
+ * cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all cores; the number of threads is that
+ * of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
  * command cbvh and of the Rust library.
  *
- * Lists. A function with a list of answers takes a buffer, the number of elements that it has room for, and a count. The
- * count always gets the number of all answers. If there are more than there is room for, those that fit are written, and
- * the status is CBVH_BUFFER_TOO_SMALL. The buffer may be NULL where there is room for none.
+ * Lists. A function with a list of answers takes a buffer, the number of elements that it has room for, and a count.
+ * The count always gets the number of all answers. If there are more than there is room for, those that fit are
+ * written, and the status is CBVH_BUFFER_TOO_SMALL. The buffer may be NULL where there is room for none.
  *
- * Options start with their size in bytes, for example `cbvh_motion_options options = {.size = sizeof options};`, so that later
- * versions can add fields. Fields that are 0 have their defaults. NULL stands for all defaults.
+ * Options start with their size in bytes, for example `cbvh_motion_options options = {.size = sizeof options};`, so
+ * that later versions can add fields. Fields that are 0 have their defaults. NULL stands for all defaults.
  *
  * Compatibility: see CBVH_ABI. */
 #ifndef CBVH_H
@@ -60,9 +61,9 @@ extern "C" {
 #define CBVH_VERSION_MINOR 1
 #define CBVH_VERSION_PATCH 0
 
-/* The version of the binary interface: the number in the name of the shared library. A library with the same number runs
- * programs that were built with an older header of that number. Functions and numbers may be added within it; what is there
- * keeps its meaning. */
+/* The version of the binary interface: the number in the name of the shared library. A library with the same number
+ * runs programs that were built with an older header of that number. Functions and numbers may be added within it; what
+ * is there keeps its meaning. */
 #define CBVH_ABI 0
 
 /* ---------------------------------------------------------------------------------------------------------- status */
@@ -95,8 +96,8 @@ enum {
     CBVH_INTERNAL = 11
 };
 
-/* Returns the message of the last failure on this thread, in UTF-8, or an empty text. It is never NULL, and stays valid until
- * the next failure on this thread or the end of the thread. A success does not clear it. */
+/* Returns the message of the last failure on this thread, in UTF-8, or an empty text. It is never NULL, and stays valid
+ * until the next failure on this thread or the end of the thread. A success does not clear it. */
 const char *cbvh_last_message(void);
 
 /* Writes the CBVH_ABI of the library that runs. */
@@ -125,14 +126,15 @@ typedef struct cbvh_pose { double rows[12]; } cbvh_pose;
 
 /* Checks a pose: finite, a translation of at most 2^120 along each axis, a rotation to within 2^-20. */
 cbvh_status cbvh_pose_check(const cbvh_pose *pose);
-/* Makes a pose from a quaternion x, y, z, w, the real part last, of length 1 to within 2^-21, and a translation x, y, z. */
+/* Makes a pose from a quaternion x, y, z, w, the real part last, of length 1 to within 2^-21, and a translation x, y,
+ * z. */
 cbvh_status cbvh_pose_from_quaternion(const double *quaternion, const double *translation, cbvh_pose *result);
 /* Makes the rigid pose nearest to one that is off by at most 2^-6: for rounded matrices. */
 cbvh_status cbvh_pose_nearest(const cbvh_pose *pose, cbvh_pose *result);
 /* Makes the pose that takes back what a pose does. */
 cbvh_status cbvh_pose_inverse(const cbvh_pose *pose, cbvh_pose *result);
-/* Makes the pose that does what `first` does and then what `next` does: a part's pose in a body, then the body's pose in the
- * world, is the part's pose in the world. */
+/* Makes the pose that does what `first` does and then what `next` does: a part's pose in a body, then the body's pose
+ * in the world, is the part's pose in the world. */
 cbvh_status cbvh_pose_then(const cbvh_pose *first, const cbvh_pose *next, cbvh_pose *result);
 /* Makes the pose of B in A's frame, which questions about two meshes take, from the poses of both in the world. */
 cbvh_status cbvh_pose_relative(const cbvh_pose *world_a, const cbvh_pose *world_b, cbvh_pose *result);
@@ -142,9 +144,9 @@ cbvh_status cbvh_pose_relative(const cbvh_pose *world_a, const cbvh_pose *world_
 /* How a file is opened. */
 typedef int32_t cbvh_open_mode;
 enum {
-    /* Maps the file. It takes microseconds, whatever its size, and pages are read when a question needs them. The bytes of the
-     * file must not change while it is open: replace a file by renaming another one over it. A file that is truncated while
-     * it is mapped ends the process with SIGBUS. */
+    /* Maps the file. It takes microseconds, whatever its size, and pages are read when a question needs them. The bytes
+     * of the file must not change while it is open: replace a file by renaming another one over it. A file that is
+     * truncated while it is mapped ends the process with SIGBUS. */
     CBVH_MAP = 0,
     /* Maps the file, and reads from the disk no more than questions need: for files larger than memory. */
     CBVH_MAP_SPARSE = 1,
@@ -154,37 +156,40 @@ enum {
     CBVH_READ = 3
 };
 
-/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it, CBVH_DAMAGED if it is no .cbvh file. Only the header and the table
- * of objects are checked; damage elsewhere is found by the question that needs it. */
+/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it, CBVH_DAMAGED if it is no .cbvh file. Only the header and
+ * the table of objects are checked; damage elsewhere is found by the question that needs it. */
 cbvh_status cbvh_mesh_open(const char *path, cbvh_open_mode mode, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file, which are copied. */
 cbvh_status cbvh_mesh_from_bytes(const void *bytes, size_t size, cbvh_mesh *mesh);
-/* Opens the bytes of a .cbvh file where they are, at any address. They must stay there unchanged until `release` is called with
- * `user`: once, on any thread, when the handle, its clones and objects are freed, scenes with them are freed, and queriers
- * asked about them are freed or have been asked about another mesh. That may be during this call, as large files are copied to
- * large memory pages. Without `release`, the bytes must stay as long as the process. After a failure `release` is not called.
+/* Opens the bytes of a .cbvh file where they are, at any address. They must stay there unchanged until `release` is
+ * called with `user`: once, on any thread, when the handle, its clones and objects are freed, scenes with them are
+ * freed, and queriers asked about them are freed or have been asked about another mesh. That may be during this call,
+ * as large files are copied to large memory pages. Without `release`, the bytes must stay as long as the process. After
+ * a failure `release` is not called.
  * `release` must not let an exception out and must not call this library. */
 cbvh_status cbvh_mesh_borrow_bytes(const void *bytes, size_t size, void (*release)(void *user), void *user,
                                    cbvh_mesh *mesh);
 /* Makes another handle of the same mesh, to be freed by itself. Nothing is copied. */
 cbvh_status cbvh_mesh_clone(cbvh_mesh mesh, cbvh_mesh *other);
-/* Frees a handle. Scenes and clones keep what they use; a querier keeps the last few meshes it was asked about until it is
- * asked about another mesh, or freed. */
+/* Frees a handle. Scenes and clones keep what they use; a querier keeps the last few meshes it was asked about until it
+ * is asked about another mesh, or freed. */
 cbvh_status cbvh_mesh_free(cbvh_mesh mesh);
 
 /* Makes a mesh of one object of the file that a mesh is in. CBVH_NOT_FOUND if it has no object of this number. */
 cbvh_status cbvh_mesh_object(cbvh_mesh mesh, size_t number, cbvh_mesh *object);
 /* Writes how many objects the file of a mesh has: at least one. */
 cbvh_status cbvh_mesh_object_count(cbvh_mesh mesh, size_t *count);
-/* Writes the name of an object, in UTF-8 with a zero byte at the end, and its length without that. A name that does not fit is
- * cut, and the status is CBVH_BUFFER_TOO_SMALL. */
+/* Writes the name of an object, in UTF-8 with a zero byte at the end, and its length without that. A name that does not
+ * fit is cut, and the status is CBVH_BUFFER_TOO_SMALL. */
 cbvh_status cbvh_mesh_object_name(cbvh_mesh mesh, size_t number, char *buffer, size_t capacity, size_t *length);
 /* Writes the number of the first object with a name. CBVH_NOT_FOUND if there is none. */
 cbvh_status cbvh_mesh_find(cbvh_mesh mesh, const char *name, size_t *number);
 /* Writes how many triangles are stored for the objects of a mesh. */
 cbvh_status cbvh_mesh_triangle_count(cbvh_mesh mesh, uint64_t *count);
-/* Lists the triangles of the input that are exact duplicates of a triangle, in ascending order. They are stored once. */
-cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *triangles, size_t capacity, size_t *count);
+/* Lists the triangles of the input that are exact duplicates of a triangle, in ascending order. Such
+ * triangles are stored once. */
+cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *triangles, size_t capacity,
+                                 size_t *count);
 /* Writes the bytes of the file that a mesh is in, and how many there are. */
 cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_t *size);
 /* Writes a mesh to a file, completely or not at all. */
@@ -222,13 +227,13 @@ typedef struct cbvh_bake_options {
     int32_t force;
 } cbvh_bake_options;
 
-/* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes about
- * 0.6 microseconds per triangle on two cores. CBVH_BAKE_FAILED for what is no mesh: a face that names no vertex, a coordinate
- * that is not finite or beyond 2^120, no faces at all. */
+/* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes
+ * about 0.6 microseconds per triangle on two cores. CBVH_BAKE_FAILED for what is no mesh: a face that names no vertex,
+ * a coordinate that is not finite or beyond 2^120, no faces at all. */
 cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_t *faces, size_t face_count,
                       const cbvh_bake_options *options, cbvh_mesh *mesh);
-/* Bakes mesh files (OBJ, STL, PLY, glTF) of any size into a .cbvh file, which is written completely or not at all. An output
- * that is up to date is left alone; `was_up_to_date` gets 1 then, else 0, and may be NULL. */
+/* Bakes mesh files (OBJ, STL, PLY, glTF) of any size into a .cbvh file, which is written completely or not at all. An
+ * output that is up to date is left alone; `was_up_to_date` gets 1 then, else 0, and may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);
 
@@ -248,11 +253,11 @@ enum {
 cbvh_status cbvh_querier_new(cbvh_backend backend, cbvh_querier *querier);
 /* Frees a querier. CBVH_BUSY while it is in use. */
 cbvh_status cbvh_querier_free(cbvh_querier querier);
-/* Lets questions about many poses, paths or probes use all cores (1), or the calling thread alone (0, the default). Answers are
- * the same. Give poses that follow a path in the order of the path: neighbours share what was found. */
+/* Lets questions about many poses, paths or probes use all cores (1), or the calling thread alone (0, the default).
+ * Answers are the same. Give poses that follow a path in the order of the path: neighbours share what was found. */
 cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
-/* Lets the question about each pose, path or probe visit at most so many pairs of nodes, of some 100 ns each; more ends with
- * CBVH_LIMIT. Without it, only the sizes of the files bound a question. */
+/* Lets the question about each pose, path or probe visit at most so many pairs of nodes, of some 100 ns each; more ends
+ * with CBVH_LIMIT. Without it, only the sizes of the files bound a question. */
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 
 /* How much work the last question was. */
@@ -272,9 +277,10 @@ cbvh_status cbvh_querier_stats(cbvh_querier querier, cbvh_stats *stats);
 
 /* --------------------------------------------------------------------------------------- questions about two meshes
  *
- * Each takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces; touching is contact, exactly.
- * They fail with CBVH_DAMAGED if a page that a question touches is damaged, and with CBVH_LIMIT if the budget of the querier
- * does not suffice. A question about small or separated meshes takes about a microsecond, a call adds some 0.1. */
+ * Each takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces; touching is contact,
+ * exactly. They fail with CBVH_DAMAGED if a page that a question touches is damaged, and with CBVH_LIMIT if the budget
+ * of the querier does not suffice. A question about small or separated meshes takes about a microsecond, a call adds
+ * some 0.1. */
 
 /* Answers whether the meshes touch. */
 cbvh_status cbvh_collide(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
@@ -308,7 +314,8 @@ cbvh_status cbvh_relate(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cb
 typedef struct cbvh_distance_answer {
     /* The distance; 0 if and only if the meshes touch. */
     double distance;
-    /* The two triangles named here are certainly at least this far apart and, if an error was allowed, no two are nearer. */
+    /* The two triangles named here are certainly at least this far apart and, if an error was allowed, no two are
+     * nearer. */
     double lower;
     /* The meshes are certainly at most this far apart. */
     double upper;
@@ -343,8 +350,8 @@ typedef struct cbvh_contact {
     uint32_t triangle_b;
 } cbvh_contact;
 
-/* Lists all pairs of triangles in contact, those of one pose after those of the one before. `counts` gets the number of pairs
- * of each pose, and may be NULL. */
+/* Lists all pairs of triangles in contact, those of one pose after those of the one before. `counts` gets the number of
+ * pairs of each pose, and may be NULL. */
 cbvh_status cbvh_contacts(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t pose_count,
                           size_t *counts, cbvh_contact *contacts, size_t capacity, size_t *count);
 /* Writes the number of the first pose in which the meshes touch, or `count` if they touch in none. */
@@ -357,8 +364,8 @@ cbvh_status cbvh_displacement(cbvh_mesh b, const cbvh_pose *from, const cbvh_pos
 cbvh_status cbvh_tracker_new(cbvh_tracker *tracker);
 /* Frees a tracker. */
 cbvh_status cbvh_tracker_free(cbvh_tracker tracker);
-/* Answer as the functions of querier do, by means of it, on one core and in less time where each pose is near the one before,
- * in this call or the last one. A tracker is about one pair of meshes; another pair makes it forget. */
+/* Answer as the functions of querier do, by means of it, on one core and in less time where each pose is near the one
+ * before, in this call or the last one. A tracker is about one pair of meshes; another pair makes it forget. */
 cbvh_status cbvh_tracker_collide(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
                                  const cbvh_pose *poses, size_t count, bool *answers);
 cbvh_status cbvh_tracker_within(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
@@ -370,27 +377,29 @@ cbvh_status cbvh_tracker_distance(cbvh_tracker tracker, cbvh_querier querier, cb
  *
  * Is the way free, at every moment from 0 to 1, and where does it end? Answers are certain between samples, too. */
 
-/* Makes the path between two poses: the origin of B moves on a line, B turns about one axis the shorter way, both at a constant
- * rate. CBVH_INVALID_ARGUMENT if the poses are half a turn apart. */
+/* Makes the path between two poses: the origin of B moves on a line, B turns about one axis the shorter way, both at a
+ * constant rate. CBVH_INVALID_ARGUMENT if the poses are half a turn apart. */
 cbvh_status cbvh_path_between(const cbvh_pose *start, const cbvh_pose *end, cbvh_path *path);
-/* Makes a screw motion from `start`: a turn by `angle` radians, any number of turns, about the axis through `point` with
+/* Makes a screw motion from `start`: a turn by `angle` radians, any number of turns, about the axis through `point`
+ * with
  * `direction`, and a shift along it. Points and directions are 3 numbers. */
 cbvh_status cbvh_path_screw(const cbvh_pose *start, const double *point, const double *direction, double angle,
                             double shift, cbvh_path *path);
 /* Makes the path through at least two poses, each part of which takes the same time. */
 cbvh_status cbvh_path_polyline(const cbvh_pose *poses, size_t count, cbvh_path *path);
 
-/* Writes where B is at a time from 0 to 1, and returns 0; any other number is a failure, which the question passes on. The same
- * time gives the same pose, to the bit. */
+/* Writes where B is at a time from 0 to 1, and returns 0; any other number is a failure, which the question passes on.
+ * The same time gives the same pose, to the bit. */
 typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
-/* Returns a bound of the sagitta: how far any point that moves with B, and is at most `radius` from B's origin, is during
- * [t0, t1] from where it would be if it went straight, at a constant rate, from where it is at t0 to where it is at t1. At most
- * an eighth of the greatest acceleration times the square of the time. It must hold with all rounding; answers are only as
- * certain as it is. NaN and negative numbers count as infinite. */
+/* Returns a bound of the sagitta: how far any point that moves with B, and is at most `radius` from B's origin, is
+ * during [t0, t1] from where it would be if it went straight, at a constant rate, from where it is at t0 to where it is
+ * at t1. At most an eighth of the greatest acceleration times the square of the time. It must hold with all rounding;
+ * answers are only as certain as it is. NaN and negative numbers count as infinite. */
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
-/* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on several
- * threads at the same time if the querier or scene is parallel. They must not let an exception or longjmp out. They may call
- * this library, but with the querier or scene in use they get CBVH_BUSY. `user` must live as long as the path is used. */
+/* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
+ * several threads at the same time if the querier or scene is parallel. They must not let an exception or longjmp out.
+ * They may call this library, but with the querier or scene in use they get CBVH_BUSY. `user` must live as long as the
+ * path is used. */
 cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta, void *user,
                                      cbvh_path *path);
 /* Frees a path. */
@@ -405,8 +414,8 @@ typedef struct cbvh_motion_options {
     size_t size;
     /* Meshes that come as near as this hit; 0 for contact. Finite, at least 0. */
     double clearance;
-    /* How near B may come to a hit, beyond the clearance, without an answer that says free or hit; 0 for a millionth of the
-     * diagonal of the larger object's box. A smaller one costs more. */
+    /* How near B may come to a hit, beyond the clearance, without an answer that says free or hit; 0 for a millionth of
+     * the diagonal of the larger object's box. A smaller one costs more. */
     double tolerance;
 } cbvh_motion_options;
 
@@ -454,8 +463,8 @@ cbvh_status cbvh_edges_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, 
 
 /* ---------------------------------------------------------------------------------------------------------- probes
  *
- * Questions about one mesh and many points, rays or segments. `pose` is where the mesh stands in the frame of the probes; NULL
- * for the mesh's own frame. Points are 3 numbers each. */
+ * Questions about one mesh and many points, rays or segments. `pose` is where the mesh stands in the frame of the
+ * probes; NULL for the mesh's own frame. Points are 3 numbers each. */
 
 /* On which side of a mesh a point is. */
 typedef int32_t cbvh_side;
@@ -527,14 +536,16 @@ typedef struct cbvh_ray_hit {
     int32_t reserved;
 } cbvh_ray_hit;
 
-/* Answers where each ray first hits. Which triangle is hit is decided exactly; edges and corners belong to triangles. */
+/* Answers where each ray first hits. Which triangle is hit is decided exactly; edges and corners belong to triangles.
+ * */
 cbvh_status cbvh_first_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                             size_t count, cbvh_ray_hit *answers);
 /* Answers whether each ray hits at all. */
-cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays, size_t count,
+cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
+    size_t count,
                           bool *answers);
-/* Lists all hits in their order along each ray, those of one ray after those of the one before. Hits at exactly the same
- * parameter are one. `counts` gets the number of hits of each ray, and may be NULL. */
+/* Lists all hits in their order along each ray, those of one ray after those of the one before. Hits at exactly the
+ * same parameter are one. `counts` gets the number of hits of each ray, and may be NULL. */
 cbvh_status cbvh_all_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t ray_count, size_t *counts, cbvh_ray_hit *hits, size_t capacity, size_t *count);
 
@@ -545,18 +556,19 @@ typedef struct cbvh_segment {
 } cbvh_segment;
 
 /* Answers whether each segment meets the mesh, exactly. */
-cbvh_status cbvh_meet_segments(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_segment *segments,
+cbvh_status cbvh_meet_segments(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose,
+    const cbvh_segment *segments,
                                size_t count, bool *answers);
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
- * Many placed meshes, and questions over all pairs that matter. Of a pair, A is the instance that was added in the lower place,
- * and answers are in A's frame. A scene is used by one thread at a time; clone it for others. */
+ * Many placed meshes, and questions over all pairs that matter. Of a pair, A is the instance that was added in the
+ * lower place, and answers are in A's frame. A scene is used by one thread at a time; clone it for others. */
 
 /* Makes an empty scene. */
 cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
-/* Opens a scene file, which `cbvh bake --scene` makes: maps it, with one instance for each of its own. CBVH_INVALID_ARGUMENT for a
- * .cbvh file without instances. */
+/* Opens a scene file, which `cbvh bake --scene` makes: maps it, with one instance for each of its own.
+ * CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
 cbvh_status cbvh_scene_open(const char *path, cbvh_scene *scene);
 /* Makes a scene of the instances in the file of a mesh. */
 cbvh_status cbvh_scene_of_mesh(cbvh_mesh mesh, cbvh_scene *scene);
@@ -571,17 +583,20 @@ cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
 /* Bounds the question about each pair and each probe, as cbvh_querier_set_budget does. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
 
-/* Adds a mesh at a pose in the world. Its rotation is rigid to within 2^-23 and its translation at most 2^118 along each axis.
- * `name` may be NULL; else no other instance has it. `instance` may be NULL. The handle of the mesh may be freed afterwards. */
+/* Adds a mesh at a pose in the world. Its rotation is rigid to within 2^-23 and its translation at most 2^118 along
+ * each axis.
+ * `name` may be NULL; else no other instance has it. `instance` may be NULL. The handle of the mesh may be freed
+ * afterwards. */
 cbvh_status cbvh_scene_add(cbvh_scene scene, cbvh_mesh mesh, const cbvh_pose *world, const char *name,
                            cbvh_instance *instance);
-/* Removes an instance. Its number is never given again by this scene. CBVH_NOT_FOUND if the scene has no such instance; an
- * instance of another scene is not recognised as such. */
+/* Removes an instance. Its number is never given again by this scene. CBVH_NOT_FOUND if the scene has no such instance;
+ * an instance of another scene is not recognised as such. */
 cbvh_status cbvh_scene_remove(cbvh_scene scene, cbvh_instance instance);
 /* Moves many instances, or none after a failure. */
-cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds, size_t count);
-/* Sets the groups that an instance is in and those it meets, a bit each. Two instances are asked about if each is in a group that
- * the other meets. By default all bits are set. */
+cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds,
+    size_t count);
+/* Sets the groups that an instance is in and those it meets, a bit each. Two instances are asked about if each is in a
+ * group that the other meets. By default all bits are set. */
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
 /* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
 cbvh_status cbvh_scene_allow(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t may_touch);
@@ -642,8 +657,9 @@ cbvh_status cbvh_scene_relations(cbvh_scene scene, cbvh_scene_relation *relation
 /* Lists all pairs of triangles in contact. */
 cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, size_t capacity, size_t *count);
 
-/* Answers where the ways of some instances end that move at the same time along paths in the world, while the rest stands still:
- * the earliest hit of all pairs of which one moves. Where those instances stand now does not matter, and they stay there. */
+/* Answers where the ways of some instances end that move at the same time along paths in the world, while the rest
+ * stands still: the earliest hit of all pairs of which one moves. Where those instances stand now does not matter, and
+ * they stay there. */
 cbvh_status cbvh_scene_motion(cbvh_scene scene, const cbvh_instance *instances, const cbvh_path *paths, size_t count,
                               const cbvh_motion_options *options, cbvh_motion_answer *answer);
 /* Answers whether all of them are certainly free, which takes less time. */

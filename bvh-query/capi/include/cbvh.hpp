@@ -1,8 +1,8 @@
-// cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. All of it is in this header, and
-// stands on cbvh.h, which documents what questions mean: shapes, units, costs, threads.
+// cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. All of it is in this
+// header, and stands on cbvh.h, which documents what questions mean: shapes, units, costs, threads.
 //
-// Meshes and paths may be shared by threads; make a Querier and a Scene for each thread. Objects that were moved from hold no
-// handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
+// Meshes and paths may be shared by threads; make a Querier and a Scene for each thread. Objects that were moved from
+// hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
 
@@ -69,8 +69,8 @@ struct Pose : cbvh_pose {
     }
     /// A translation.
     static Pose translation(double x, double y, double z) { return Pose({1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}); }
-    /// From a matrix whose entries are m(row, column): Eigen::Isometry3d, Eigen::Matrix4d, a 3 by 4 matrix. Of the fourth row
-    /// nothing is read.
+    /// From a matrix whose entries are m(row, column): Eigen::Isometry3d, Eigen::Matrix4d, a 3 by 4 matrix. Of the
+    /// fourth row nothing is read.
     template <class Matrix> static Pose from_matrix(const Matrix &m) {
         Pose pose;
         for (int row = 0; row < 3; row++) {
@@ -423,8 +423,9 @@ public:
     static Path polyline(const std::vector<Pose> &poses) {
         return made([&](cbvh_path *path) { return cbvh_path_polyline(poses.data(), poses.size(), path); });
     }
-    /// A path of one's own: an object with `Pose pose(double t) const` and `double sagitta(double radius, double t0, double t1)
-    /// const`, which cbvh_sagitta_function explains. It is copied. What it throws becomes an Error of CBVH_CALLBACK_FAILED.
+    /// A path of one's own: an object with `Pose pose(double t) const` and `double sagitta(double radius, double t0,
+    /// double t1) const`, which cbvh_sagitta_function explains. It is copied. If `pose` throws, the question throws
+    /// an Error of CBVH_CALLBACK_FAILED. A sagitta that throws counts as infinite.
     template <class Own> static Path of(Own own) {
         auto kept = std::make_shared<const Own>(std::move(own));
         Path path = made([&](cbvh_path *made) {
@@ -612,7 +613,8 @@ public:
     closest_points(const Mesh &mesh, const std::vector<Point> &points,
                    double within = std::numeric_limits<double>::infinity(), const Pose &pose = {}) {
         return optional<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
-            return cbvh_closest_points(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within, answers);
+            return cbvh_closest_points(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within,
+                answers);
         });
     }
     std::optional<ClosestPoint> closest_point(const Mesh &mesh, const Point &point,
@@ -643,7 +645,8 @@ public:
         return values;
     }
     /// Where rays first hit, whether they hit, and all hits.
-    std::vector<std::optional<RayHit>> first_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
+    std::vector<std::optional<RayHit>> first_hits(const Mesh &mesh, const std::vector<Ray> &rays,
+        const Pose &pose = {}) {
         return optional<RayHit>(rays.size(), [&](RayHit *answers) {
             return cbvh_first_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), answers);
         });
@@ -678,7 +681,8 @@ private:
     Owned handle_;
 };
 
-/// Remembers what it found from pose to pose of one pair: faster where a mesh moves little by little. One for each thread.
+/// Remembers what it found from pose to pose of one pair: faster where a mesh moves little by little. One for each
+/// thread.
 class Tracker {
 public:
     Tracker() {
@@ -820,12 +824,14 @@ public:
         });
     }
     std::vector<cbvh_scene_relation> relations() {
-        return detail::list<cbvh_scene_relation>([&](cbvh_scene_relation *found, std::size_t capacity, std::size_t *count) {
+        return detail::list<cbvh_scene_relation>([&](cbvh_scene_relation *found, std::size_t capacity,
+            std::size_t *count) {
             return cbvh_scene_relations(raw(), found, capacity, count);
         });
     }
     std::vector<cbvh_scene_contact> contacts() {
-        return detail::list<cbvh_scene_contact>([&](cbvh_scene_contact *found, std::size_t capacity, std::size_t *count) {
+        return detail::list<cbvh_scene_contact>([&](cbvh_scene_contact *found, std::size_t capacity,
+            std::size_t *count) {
             return cbvh_scene_contacts(raw(), found, capacity, count);
         });
     }
@@ -837,14 +843,16 @@ public:
     };
     MotionAnswer motion(const std::vector<Way> &ways, const MotionOptions &options = {}) {
         MotionAnswer answer{};
-        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths,
+            const cbvh_motion_options *raw_options) {
             return cbvh_scene_motion(raw(), instances, paths, ways.size(), raw_options, &answer);
         });
         return answer;
     }
     bool is_free(const std::vector<Way> &ways, const MotionOptions &options = {}) {
         bool answer = false;
-        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths,
+            const cbvh_motion_options *raw_options) {
             return cbvh_scene_is_free(raw(), instances, paths, ways.size(), raw_options, &answer);
         });
         return answer;

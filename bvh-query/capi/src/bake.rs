@@ -89,7 +89,7 @@ pub unsafe extern "C" fn cbvh_bake(
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         // SAFETY: the header asks for it.
         let (out, choices) = unsafe {
-            let out = new_mesh(mesh)?;
+            let out = new_mesh("mesh", mesh)?;
             rows_of_three("vertices", vertices, vertex_count, &mut positions)?;
             rows_of_three("faces", faces, face_count, &mut triangles)?;
             (out, choices(options)?)

@@ -84,8 +84,8 @@ fn keep(message: String) {
     let _ = MESSAGE.try_with(|last| *last.borrow_mut() = bytes);
 }
 
-/// Returns this thread's last message: text in UTF-8 that ends with a zero byte, valid until the next failure of a function
-/// of the interface on this thread.
+/// Returns this thread's last message: text in UTF-8 that ends with a zero byte, valid until the next failure of a
+/// function of the interface on this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_last_message() -> *const c_char {
     let kept = MESSAGE.try_with(|last| {

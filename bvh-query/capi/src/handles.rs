@@ -19,9 +19,9 @@ const MOST_AT_HAND: usize = 8;
 
 /// Meshes that a querier was last asked about.
 ///
-/// Threads that ask about one mesh would otherwise count its uses in the same word of memory, twice a question. A mesh at
-/// hand is compared with its place in the table by reading alone. One that was freed is let go when the querier is asked
-/// about a mesh that it does not have at hand, or is freed.
+/// Threads that ask about one mesh would otherwise count its uses in the same word of memory, twice a question. A mesh
+/// at hand is compared with its place in the table by reading alone. One that was freed is let go when the querier is
+/// asked about a mesh that it does not have at hand, or is freed.
 #[derive(Default)]
 pub(crate) struct AtHand {
     meshes: [Option<(u64, OwnedShape)>; MOST_AT_HAND],

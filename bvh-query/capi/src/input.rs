@@ -157,6 +157,11 @@ pub(crate) fn flag(name: &str, value: i32) -> Result<bool, Failure> {
     }
 }
 
+/// Checks the distance up to which a closest point counts, which may be infinite.
+pub(crate) fn check_within(within: f64) -> Result<(), Failure> {
+    if within >= 0.0 { Ok(()) } else { Err(Failure::argument("within", "a distance of at least 0", within)) }
+}
+
 fn pose_of(rows: &PoseRows) -> Result<Pose, Failure> {
     Ok(Pose::from_rows(&rows.rows)?)
 }

@@ -4,7 +4,8 @@
 //! what is here. Below the functions there are four ideas:
 //!
 //! - `entry`: nothing unwinds out of a function; it returns a status, and a message stays with the thread.
-//! - `table`: a handle is a number, looked up in a table, so that a freed or foreign one is recognised and never followed.
+//! - `table`: a handle is a number, looked up in a table, so that a freed or foreign one is recognised and never
+//!   followed.
 //! - `input`: pointers are checked for null, alignment and length before anything is read, and what they point to is
 //!   copied before anything is written.
 //! - `output`: answers are written through raw pointers, because C's memory may hold no values yet and may overlap.

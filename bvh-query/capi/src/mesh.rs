@@ -9,15 +9,15 @@ use crate::types::MeshHandle;
 use bvh_query::{Bvh, OpenError, OwnedShape, ReadAhead};
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Room for the handle of a new mesh, which holds no handle until there is one.
 ///
 /// # Safety
 /// As for `One::new`.
-pub(crate) unsafe fn new_mesh<'a>(out: *mut MeshHandle) -> Result<One<'a, MeshHandle>, Failure> {
+pub(crate) unsafe fn new_mesh<'a>(name: &str, out: *mut MeshHandle) -> Result<One<'a, MeshHandle>, Failure> {
     // SAFETY: the caller vouches for it.
-    let mut out = unsafe { One::new("mesh", out) }?;
+    let mut out = unsafe { One::new(name, out) }?;
     out.set(MeshHandle { id: 0 });
     Ok(out)
 }
@@ -36,7 +36,7 @@ fn damaged(error: bvh_query::FormatError) -> Failure {
 pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *mut MeshHandle) -> i32 {
     entry(|| {
         // SAFETY: the header asks for it.
-        let (out, file) = unsafe { (new_mesh(mesh)?, path("path", file)?) };
+        let (out, file) = unsafe { (new_mesh("mesh", mesh)?, path("path", file)?) };
         let opened: Result<Bvh, OpenError> = match mode {
             0 => Bvh::open_with(file, ReadAhead::Usual),
             1 => Bvh::open_with(file, ReadAhead::Sparse),
@@ -53,7 +53,7 @@ pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *m
 pub unsafe extern "C" fn cbvh_mesh_from_bytes(bytes: *const u8, size: usize, mesh: *mut MeshHandle) -> i32 {
     entry(|| {
         // SAFETY: the header asks for it.
-        let (out, bytes) = unsafe { (new_mesh(mesh)?, array("bytes", bytes, size)?) };
+        let (out, bytes) = unsafe { (new_mesh("mesh", mesh)?, array("bytes", bytes, size)?) };
         hand_out(out, Bvh::from_bytes(bytes.to_vec()).map_err(damaged)?.into())
     })
 }
@@ -67,11 +67,14 @@ struct Borrowed {
     size: usize,
     release: Release,
     user: *mut c_void,
-    /// Whether the bytes have been taken: until then nothing is released.
-    is_taken: Arc<AtomicBool>,
-    /// Whether they were dropped before that.
-    is_over: Arc<AtomicBool>,
+    /// `OPENING`, until the bytes are `TAKEN` by a handle or `DROPPED`. Whichever of the two comes second sees the
+    /// other one, and releases the bytes: a failure to open them releases nothing.
+    state: Arc<AtomicU8>,
 }
+
+const OPENING: u8 = 0;
+const TAKEN: u8 = 1;
+const DROPPED: u8 = 2;
 
 // SAFETY: the header asks that the bytes do not change and that `release` may be called on any thread.
 unsafe impl Send for Borrowed {}
@@ -87,8 +90,7 @@ impl AsRef<[u8]> for Borrowed {
 
 impl Drop for Borrowed {
     fn drop(&mut self) {
-        self.is_over.store(true, Ordering::Release);
-        if self.is_taken.load(Ordering::Acquire)
+        if self.state.swap(DROPPED, Ordering::AcqRel) == TAKEN
             && let Some(release) = self.release
         {
             // SAFETY: the header asks for a function that may be called here.
@@ -108,21 +110,13 @@ pub unsafe extern "C" fn cbvh_mesh_borrow_bytes(
 ) -> i32 {
     entry(|| {
         // SAFETY: the header asks for it.
-        let (out, bytes) = unsafe { (new_mesh(mesh)?, array("bytes", bytes, size)?) };
-        let (is_taken, is_over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-        let borrowed = Borrowed {
-            start: bytes.as_ptr(),
-            size,
-            release,
-            user,
-            is_taken: is_taken.clone(),
-            is_over: is_over.clone(),
-        };
+        let (out, bytes) = unsafe { (new_mesh("mesh", mesh)?, array("bytes", bytes, size)?) };
+        let state = Arc::new(AtomicU8::new(OPENING));
+        let borrowed = Borrowed { start: bytes.as_ptr(), size, release, user, state: state.clone() };
         let bvh = Bvh::from_bytes(borrowed).map_err(damaged)?;
         hand_out(out, bvh.into())?;
-        is_taken.store(true, Ordering::Release);
         // A large file has been copied to large pages by now.
-        if is_over.load(Ordering::Acquire)
+        if state.swap(TAKEN, Ordering::AcqRel) == DROPPED
             && let Some(release) = release
         {
             // SAFETY: as in `drop`.
@@ -142,7 +136,7 @@ fn ask(mesh: MeshHandle, ask: impl FnOnce(OwnedShape) -> Result<(), Failure>) ->
 pub unsafe extern "C" fn cbvh_mesh_clone(mesh: MeshHandle, other: *mut MeshHandle) -> i32 {
     entry(|| {
         // SAFETY: the header asks for it.
-        let out = unsafe { new_mesh(other) }.map_err(|failure| failure.at("other"))?;
+        let out = unsafe { new_mesh("other", other) }?;
         hand_out(out, MESHES.share("mesh", mesh.id)?)
     })
 }
@@ -158,7 +152,7 @@ pub extern "C" fn cbvh_mesh_free(mesh: MeshHandle) -> i32 {
 pub unsafe extern "C" fn cbvh_mesh_object(mesh: MeshHandle, number: usize, object: *mut MeshHandle) -> i32 {
     ask(mesh, |shape| {
         // SAFETY: the header asks for it.
-        let out = unsafe { new_mesh(object) }.map_err(|failure| failure.at("object"))?;
+        let out = unsafe { new_mesh("object", object) }?;
         let bvh = shape.bvh().clone();
         let objects = bvh.objects().len();
         let found = OwnedShape::object(bvh, number);

@@ -16,8 +16,8 @@ impl<T: Copy> Room<'_, T> {
     /// Takes room for `count` values.
     ///
     /// # Safety
-    /// If the pointer is aligned and not null, `count` values may be written there during the lifetime, and the caller does not
-    /// use the memory meanwhile.
+    /// If the pointer is aligned and not null, `count` values may be written there during the lifetime, and the caller
+    /// does not use the memory meanwhile.
     pub(crate) unsafe fn new(name: &str, start: *mut T, count: usize) -> Result<Self, Failure> {
         check_pointer(name, start, count)?;
         Ok(Self { start, count, caller: PhantomData })

@@ -2,7 +2,7 @@
 
 use crate::entry::entry;
 use crate::handles::QUERIERS;
-use crate::input::{array, pose_or_identity, rows_of_three};
+use crate::input::{array, check_within, pose_or_identity, rows_of_three};
 use crate::output::{List, Room};
 use crate::queriers::{Asker, Probes};
 use crate::status::Failure;
@@ -79,9 +79,16 @@ impl Question {
 ///
 /// # Safety
 /// As for `array`, of three numbers per point.
-unsafe fn read_points(points: *const f64, count: usize) -> impl FnOnce(&mut Probes) -> Result<(), Failure> {
-    // SAFETY: the caller vouches for it.
-    move |probes| unsafe { rows_of_three("points", points, count, &mut probes.points) }
+unsafe fn read_points(
+    points: *const f64,
+    count: usize,
+    within: f64,
+) -> impl FnOnce(&mut Probes) -> Result<(), Failure> {
+    move |probes| {
+        // SAFETY: the caller vouches for it.
+        unsafe { rows_of_three("points", points, count, &mut probes.points) }?;
+        check_within(within)
+    }
 }
 
 /// Reads rays.
@@ -135,7 +142,7 @@ pub unsafe extern "C" fn cbvh_closest_points(
     // SAFETY: the header asks for it.
     unsafe {
         Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count), |probes: &Probes| &probes.points),
+            (answers, read_points(points, count, within), |probes: &Probes| &probes.points),
             |batch, points| batch.closest_points(points, within),
             |querier, shape, point| querier.closest_point(shape, point, within),
             ClosestRow::from,
@@ -156,7 +163,7 @@ pub unsafe extern "C" fn cbvh_sides(
     // SAFETY: the header asks for it.
     unsafe {
         Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count), |probes: &Probes| &probes.points),
+            (answers, read_points(points, count, f64::INFINITY), |probes: &Probes| &probes.points),
             |batch, points| batch.sides(points),
             |querier, shape, point| querier.side(shape, point),
             side,
@@ -178,7 +185,7 @@ pub unsafe extern "C" fn cbvh_signed_distances(
     // SAFETY: the header asks for it.
     unsafe {
         Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count), |probes: &Probes| &probes.points),
+            (answers, read_points(points, count, within), |probes: &Probes| &probes.points),
             |batch, points| batch.signed_distances(points, within),
             |querier, shape, point| querier.signed_distance(shape, point, within),
             ClosestRow::from,

@@ -1,12 +1,12 @@
 //! Tables of what handles stand for.
 //!
-//! A handle is a number and never an address: 8 bits for its kind, 24 for its place in the table of that kind, and 32 for
-//! how often the place was freed before. A number that no table knows is refused, whoever made it up, and a freed handle is
-//! refused even after its place is taken again; after 2^32 uses a place is given up. Nothing is ever read through a handle,
-//! so that all of this is sound.
+//! A handle is a number and never an address: 8 bits for its kind, 24 for its place in the table of that kind, and 32
+//! for how often the place was freed before. A number that no table knows is refused, whoever made it up, and a freed
+//! handle is refused even after its place is taken again; after 2^32 uses a place is given up. Nothing is ever read
+//! through a handle, so that all of this is sound.
 //!
-//! Places never move. They are found without a lock, and each has a lock of its own: threads that use different handles do
-//! not wait for each other.
+//! Places never move. They are found without a lock, and each has a lock of its own: threads that use different handles
+//! do not wait for each other.
 
 use crate::status::{Failure, Status};
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,7 +1,7 @@
 //! The structures and numbers that the header declares, and what they are made from.
 //!
-//! Structures have no bytes that are not part of a field, so that answers can be compared as bytes. A test compares sizes,
-//! offsets and numbers with those that a C compiler sees.
+//! Structures have no bytes that are not part of a field, so that answers can be compared as bytes. A test compares
+//! sizes, offsets and numbers with those that a C compiler sees.
 
 use crate::input::{Options, Plain};
 use crate::status::Failure;

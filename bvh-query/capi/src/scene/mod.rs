@@ -17,10 +17,10 @@ use std::ffi::c_char;
 ///
 /// # Safety
 /// As for `One::new`.
-unsafe fn make(scene: *mut SceneHandle, make: impl FnOnce() -> Result<Scene, Failure>) -> i32 {
+unsafe fn make(name: &str, scene: *mut SceneHandle, make: impl FnOnce() -> Result<Scene, Failure>) -> i32 {
     entry(|| {
         // SAFETY: the caller vouches for it.
-        let mut out = unsafe { One::new("scene", scene) }?;
+        let mut out = unsafe { One::new(name, scene) }?;
         out.set(SceneHandle { id: 0 });
         out.set(SceneHandle { id: SCENES.insert(Box::new(make()?))? });
         Ok(())
@@ -36,7 +36,7 @@ pub(crate) fn with(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<()
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_new(backend_number: i32, scene: *mut SceneHandle) -> i32 {
     // SAFETY: the header asks for it.
-    unsafe { make(scene, || Ok(Scene::with_backend(backend("backend", backend_number)?))) }
+    unsafe { make("scene", scene, || Ok(Scene::with_backend(backend("backend", backend_number)?))) }
 }
 
 /// `cbvh_scene_open`.
@@ -45,7 +45,7 @@ pub unsafe extern "C" fn cbvh_scene_open(file: *const c_char, scene: *mut SceneH
     // SAFETY: the header asks for it.
     let made = || Ok(Scene::open(unsafe { path("path", file) }?)?);
     // SAFETY: the header asks for it.
-    unsafe { make(scene, made) }
+    unsafe { make("scene", scene, made) }
 }
 
 /// `cbvh_scene_of_mesh`.
@@ -56,7 +56,7 @@ pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneH
         Scene::of_file(bvh).map_err(|error| Failure::from(error).at("mesh"))
     };
     // SAFETY: the header asks for it.
-    unsafe { make(scene, made) }
+    unsafe { make("scene", scene, made) }
 }
 
 /// `cbvh_scene_clone`.
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneH
 pub unsafe extern "C" fn cbvh_scene_clone(scene: SceneHandle, other: *mut SceneHandle) -> i32 {
     let made = || Ok((**SCENES.hold("scene", scene.id)?.value()?).clone());
     // SAFETY: the header asks for it.
-    unsafe { make(other, made) }
+    unsafe { make("other", other, made) }
 }
 
 /// `cbvh_scene_free`.
@@ -247,7 +247,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
 ) -> i32 {
     with(scene, |scene| {
         // SAFETY: the header asks for it.
-        let out = unsafe { new_mesh(mesh) }?;
+        let out = unsafe { new_mesh("mesh", mesh) }?;
         match scene.shape(instance.into())? {
             SceneShape::Open(shape) => hand_out(out, shape.clone()),
             SceneShape::Stored(shape) => hand_out(out, shape.opened()?),

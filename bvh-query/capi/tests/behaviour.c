@@ -1,0 +1,528 @@
+/* What the header promises beyond answers: lists and text that do not fit, what lives on, borrowed bytes, paths of the
+ * caller, files, scenes, and cubes whose answers are known. */
+#include "support.h"
+
+static cbvh_querier querier;
+
+/* Cubes, whose answers are plain geometry. */
+static void cubes(const char *parallel) {
+    const cbvh_mesh one = cube(1), quarter = cube(0.25);
+    const cbvh_pose poses[4] = {shift(0, 0, 0), shift(1, 0, 0), shift(1.5, 0, 0), shift(2, 2, 0)};
+    const double distances[4] = {0, 0, 0.5, sqrt(2)};
+    bool touch[4], near[4];
+    cbvh_distance_answer answers[4];
+    OK(cbvh_collide(querier, one, one, poses, 4, touch));
+    OK(cbvh_within(querier, one, one, poses, 4, 0.5, near));
+    OK(cbvh_distance(querier, one, one, poses, 4, NULL, answers));
+    for (int k = 0; k < 4; k++) {
+        CHECK(touch[k] == (k < 2) && near[k] == (k < 3) && answers[k].distance == distances[k]);
+        CHECK(answers[k].lower <= answers[k].distance && answers[k].distance <= answers[k].upper);
+        double squared = 0;
+        for (int axis = 0; axis < 3; axis++) {
+            squared += pow(answers[k].point_a[axis] - answers[k].point_b[axis], 2);
+        }
+        CHECK(fabs(sqrt(squared) - answers[k].distance) < 1e-12);
+    }
+    size_t first;
+    OK(cbvh_first_collision(querier, one, one, poses + 2, 2, &first));
+    CHECK(first == 2);
+    OK(cbvh_first_collision(querier, one, one, poses, 4, &first));
+    CHECK(first == 0);
+    const cbvh_pose placed[3] = {shift(0, 0, 0), shift(3, 0, 0), shift(0.5, 0, 0)};
+    cbvh_relation relations[3];
+    OK(cbvh_relate(querier, one, quarter, placed, 3, relations));
+    CHECK(relations[0] == CBVH_B_IN_A && relations[1] == CBVH_APART && relations[2] == CBVH_TOUCHING);
+    OK(cbvh_relate(querier, quarter, one, placed, 1, relations));
+    CHECK(relations[0] == CBVH_A_IN_B);
+
+    const double points[12] = {0, 0, 0.25, 0, 0, 2, 0.5, 0, 0, 0, 5, 0};
+    const cbvh_pose world = shift(0, 0, 0);
+    cbvh_side sides[4];
+    cbvh_closest_point closest[4];
+    OK(cbvh_sides(querier, one, NULL, points, 4, sides));
+    CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_OUTSIDE && sides[2] == CBVH_ON && sides[3] == CBVH_OUTSIDE);
+    OK(cbvh_signed_distances(querier, one, &world, points, 4, 2, closest));
+    CHECK(closest[0].distance == 0.25 && closest[0].side == CBVH_INSIDE && closest[1].distance == 1.5);
+    CHECK(closest[1].point[2] == 0.5 && closest[2].distance == 0 && closest[2].side == CBVH_ON);
+    CHECK(!closest[3].found && isnan(closest[3].distance) && closest[3].side == CBVH_SIDE_NOT_ASKED);
+    OK(cbvh_closest_points(querier, one, NULL, points, 4, INFINITY, closest));
+    CHECK(closest[3].found && closest[3].distance == 4.5 && closest[3].side == CBVH_SIDE_NOT_ASKED);
+    const cbvh_pose above = shift(0, 0, 10);
+    const cbvh_ray rays[2] = {{{0.1, 0.2, 5}, {0, 0, -1}, INFINITY}, {{0.1, 0.2, 5}, {0, 0, 1}, INFINITY}};
+    cbvh_ray_hit hits[4];
+    bool any[2];
+    size_t counts[2], count;
+    OK(cbvh_first_hits(querier, one, NULL, rays, 2, hits));
+    CHECK(hits[0].found && hits[0].t == 4.5 && hits[0].point[2] == 0.5 && !hits[1].found && isnan(hits[1].t));
+    OK(cbvh_any_hits(querier, one, &above, rays, 2, any));
+    CHECK(!any[0] && any[1]);
+    OK(cbvh_all_hits(querier, one, NULL, rays, 2, counts, hits, 4, &count));
+    CHECK(count == 2 && counts[0] == 2 && counts[1] == 0 && hits[0].t == 4.5 && hits[1].t == 5.5);
+    const cbvh_segment segments[2] = {{{0, 0, 0}, {0, 0, 0.5}}, {{0, 0, 0}, {0, 0, 0.25}}};
+    OK(cbvh_meet_segments(querier, one, NULL, segments, 2, any));
+    CHECK(any[0] && !any[1]);
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(quarter));
+    printf("behaviour: cubes%s\n", parallel);
+}
+
+/* Buffers of every size: the count is always that of all, and nothing is written beyond what fits. */
+static void lists(void) {
+    const cbvh_mesh mesh = cube(1);
+    const cbvh_pose poses[3] = {shift(0.5, 0.25, 0.125), shift(3, 0, 0), shift(1, 0, 0)};
+    cbvh_contact all[200], some[200], pattern;
+    size_t count, counts[3];
+    OK(cbvh_contacts(querier, mesh, mesh, poses, 3, counts, all, 200, &count));
+    CHECK(count > 10 && count <= 200 && counts[0] + counts[1] + counts[2] == count && counts[0] > 0 && counts[1] == 0);
+    memset(&pattern, 0xA5, sizeof pattern);
+    for (size_t capacity = 0; capacity <= count; capacity++) {
+        size_t found = 999;
+        memset(some, 0xA5, sizeof some);
+        const cbvh_status status = cbvh_contacts(querier, mesh, mesh, poses, 3, NULL, capacity ? some : NULL, capacity,
+            &found);
+        CHECK(found == count && status == (capacity < count ? CBVH_BUFFER_TOO_SMALL : CBVH_OK));
+        CHECK(memcmp(some, all, capacity * sizeof *some) == 0);
+        CHECK(memcmp(&some[capacity], &pattern, sizeof pattern) == 0);
+    }
+    FAILS(cbvh_contacts(querier, mesh, mesh, poses, 1, NULL, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL,
+          "contacts: expected room for");
+    size_t size, length;
+    FAILS(cbvh_mesh_bytes(mesh, NULL, 0, &size), CBVH_BUFFER_TOO_SMALL, "buffer: expected room for");
+    unsigned char *bytes = malloc(size);
+    CHECK(bytes != NULL);
+    OK(cbvh_mesh_bytes(mesh, bytes, size, &size));
+    cbvh_mesh again;
+    OK(cbvh_mesh_from_bytes(bytes, size, &again));
+    OK(cbvh_mesh_check(again));
+    /* Damage is found by who needs it. */
+    bytes[size - 100] ^= 1;
+    bytes[4200] ^= 1;
+    cbvh_mesh damaged;
+    const cbvh_status opened = cbvh_mesh_from_bytes(bytes, size, &damaged);
+    if (opened == CBVH_OK) {
+        FAILS(cbvh_mesh_check(damaged), CBVH_DAMAGED, "R");
+        OK(cbvh_mesh_free(damaged));
+    } else {
+        CHECK(opened == CBVH_DAMAGED);
+    }
+    free(bytes);
+    char text[8];
+    OK(cbvh_mesh_object_name(mesh, 0, text, sizeof text, &length));
+    CHECK(length == 0 && text[0] == 0);
+    OK(cbvh_mesh_free(again));
+    OK(cbvh_mesh_free(mesh));
+}
+
+static int released;
+static void release(void *user) {
+    released++;
+    free(user);
+}
+
+/* Bytes of the caller are used until the last one who needs them is gone. */
+static void borrowed(void) {
+    const cbvh_mesh mesh = cube(1);
+    size_t size;
+    (void)cbvh_mesh_bytes(mesh, NULL, 0, &size);
+    unsigned char *bytes = malloc(size + 1);
+    CHECK(bytes != NULL);
+    /* At an odd address. */
+    OK(cbvh_mesh_bytes(mesh, bytes + 1, size, &size));
+    cbvh_mesh lent, copy;
+    cbvh_scene scene, second;
+    FAILS(cbvh_mesh_borrow_bytes(bytes + 2, size - 1, release, bytes, &lent), CBVH_DAMAGED, "bytes: ");
+    CHECK(released == 0);
+    OK(cbvh_mesh_borrow_bytes(bytes + 1, size, release, bytes, &lent));
+    OK(cbvh_mesh_clone(lent, &copy));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    const cbvh_pose here = CBVH_IDENTITY;
+    OK(cbvh_scene_add(scene, lent, &here, NULL, NULL));
+    OK(cbvh_scene_clone(scene, &second));
+    OK(cbvh_mesh_free(lent));
+    OK(cbvh_mesh_free(copy));
+    OK(cbvh_scene_free(scene));
+    const double point[3] = {0, 0, 2};
+    cbvh_closest_point closest;
+    OK(cbvh_scene_closest_points(second, point, 1, INFINITY, &closest));
+    CHECK(closest.distance == 1.5 && released == 0);
+    OK(cbvh_scene_free(second));
+    CHECK(released == 1);
+    /* A querier keeps what it was asked about until it is asked about something else. */
+    bytes = malloc(size);
+    CHECK(bytes != NULL);
+    OK(cbvh_mesh_bytes(mesh, bytes, size, &size));
+    OK(cbvh_mesh_borrow_bytes(bytes, size, release, bytes, &lent));
+    bool answer;
+    OK(cbvh_collide(querier, lent, lent, &here, 1, &answer));
+    OK(cbvh_mesh_free(lent));
+    CHECK(released == 1);
+    OK(cbvh_collide(querier, mesh, mesh, &here, 1, &answer));
+    CHECK(released == 2);
+    /* More meshes than a querier has at hand. */
+    cbvh_mesh many[20];
+    for (int k = 0; k < 20; k++) {
+        many[k] = cube(k + 1);
+    }
+    for (int a = 0; a < 20; a++) {
+        for (int b = 0; b < 20; b++) {
+            const cbvh_pose aside = shift(0, (a + b + 2) / 2.0 + 1, 0);
+            cbvh_distance_answer distance;
+            OK(cbvh_distance(querier, many[a], many[b], &aside, 1, NULL, &distance));
+            CHECK(distance.distance == 1);
+        }
+    }
+    for (int k = 0; k < 20; k++) {
+        OK(cbvh_mesh_free(many[k]));
+    }
+    OK(cbvh_mesh_free(mesh));
+}
+
+/* A cube that moves along x, turning about it, by functions of the caller. */
+typedef struct { double from, to; int fails_after, code, breaks; cbvh_querier querier; } course;
+
+static int32_t course_pose(void *user, double t, cbvh_pose *pose) {
+    course *of = user;
+    if (of->fails_after-- == 0) {
+        return of->code;
+    }
+    *pose = shift((1 - t) * of->from + t * of->to, 0, 0);
+    if (of->breaks) {
+        pose->rows[0] = 2;
+    }
+    if (of->querier.id != 0) {
+        bool answer;
+        const cbvh_mesh none = {0};
+        FAILS(cbvh_collide(of->querier, none, none, pose, 1, &answer), CBVH_BUSY, "querier: ");
+    }
+    return 0;
+}
+
+static double course_sagitta(void *user, double radius, double t0, double t1) {
+    (void)user, (void)radius, (void)t0, (void)t1;
+    /* A line, but for the rounding of two products and a sum of numbers up to 8. */
+    return 0x1p-48;
+}
+
+static void paths(void) {
+    const cbvh_mesh mesh = cube(1);
+    const cbvh_pose start = shift(-4, 0, 0), end = shift(4, 0, 0), aside_start = shift(-4, 2, 0), aside_end = shift(4,
+        2, 0);
+    course of = {.from = -4, .to = 4, .fails_after = -1};
+    cbvh_path own, between, screw, polyline;
+    const double origin[3] = {0, 0, 0}, x_axis[3] = {1, 0, 0};
+    const cbvh_pose knots[3] = {shift(-4, 0, 0), shift(0, 0, 0), shift(4, 0, 0)};
+    OK(cbvh_path_from_functions(course_pose, course_sagitta, &of, &own));
+    OK(cbvh_path_between(&start, &end, &between));
+    OK(cbvh_path_screw(&start, origin, x_axis, 0, 8, &screw));
+    OK(cbvh_path_polyline(knots, 3, &polyline));
+    const cbvh_path all[4] = {own, between, screw, polyline};
+    cbvh_motion_answer answers[4], edges[2];
+    bool free_ways[4];
+    for (int parallel = 0; parallel < 2; parallel++) {
+        OK(cbvh_querier_set_parallel(querier, parallel));
+        OK(cbvh_motions(querier, mesh, mesh, all, 4, NULL, answers));
+        OK(cbvh_are_free(querier, mesh, mesh, all, 4, NULL, free_ways));
+        for (int k = 0; k < 4; k++) {
+            /* The cubes touch from x = -1, three eighths of the way. */
+            CHECK(!free_ways[k] && answers[k].outcome == CBVH_HIT && answers[k].free_until <= 0.375);
+            CHECK(answers[k].at >= 0.375 && answers[k].at < 0.37501 && answers[k].distance.distance == 0);
+            cbvh_pose at;
+            OK(cbvh_path_pose(all[k], 0.25, &at));
+            CHECK(at.rows[3] == -2);
+        }
+        const cbvh_motion_options clear = {.size = sizeof clear, .clearance = 1, .tolerance = 1e-3};
+        OK(cbvh_motions(querier, mesh, mesh, all, 1, &clear, answers));
+        CHECK(answers[0].outcome == CBVH_HIT && fabs(answers[0].at - 0.25) < 1e-3 && answers[0].free_until <= 0.25);
+        const cbvh_pose starts[2] = {start, aside_start}, ends[2] = {end, aside_end};
+        OK(cbvh_edge_motions(querier, mesh, mesh, starts, ends, 2, NULL, edges));
+        OK(cbvh_edges_are_free(querier, mesh, mesh, starts, ends, 2, NULL, free_ways));
+        CHECK(edges[0].outcome == CBVH_HIT && !free_ways[0] && edges[1].outcome == CBVH_FREE && free_ways[1]);
+        CHECK(edges[1].free_until == 1 && isnan(edges[1].at) && isnan(edges[1].distance.distance));
+    }
+    OK(cbvh_querier_set_parallel(querier, 0));
+    /* A hair's breadth is neither free nor a hit within a coarse tolerance. */
+    const cbvh_pose hair_start = shift(-4, 1 + 1e-9, 0), hair_end = shift(4, 1 + 1e-9, 0);
+    const cbvh_motion_options coarse = {.size = sizeof coarse, .tolerance = 0.125};
+    OK(cbvh_edge_motions(querier, mesh, mesh, &hair_start, &hair_end, 1, &coarse, edges));
+    CHECK(edges[0].outcome == CBVH_NEAR && edges[0].distance.distance > 0 && edges[0].distance.distance <= 0.125);
+    double reach, moved;
+    OK(cbvh_path_reach(mesh, between, 0, 1, &reach));
+    CHECK(reach >= 4 && reach < 4.001);
+    OK(cbvh_displacement(mesh, &start, &end, &moved));
+    CHECK(moved >= 8 && moved < 8.001);
+
+    /* A callback may call the library, but not with the querier in use. */
+    of.querier = querier;
+    OK(cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, free_ways));
+    of.querier.id = 0;
+    /* Failures of functions take the place of an answer, whenever they come. */
+    bool answer;
+    for (int fails_after = 0; fails_after < 12; fails_after++) {
+        for (int parallel = 0; parallel < 2; parallel++) {
+            OK(cbvh_querier_set_parallel(querier, parallel));
+            of.fails_after = fails_after;
+            of.code = 7;
+            const cbvh_status status = cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, &answer);
+            if (status != CBVH_OK) {
+                FAILS(status, CBVH_CALLBACK_FAILED, "found the code 7 of its function");
+            } else {
+                CHECK(of.fails_after >= 0 && fails_after > 0);
+            }
+            of.fails_after = fails_after;
+            /* Left as it was: no pose. */
+            of.code = 0;
+            (void)cbvh_motions(querier, mesh, mesh, &own, 1, NULL, answers);
+        }
+    }
+    OK(cbvh_querier_set_parallel(querier, 0));
+    of.fails_after = -1;
+    of.breaks = 1;
+    FAILS(cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, &answer), CBVH_CALLBACK_FAILED,
+          "path: the pose at t = 0: expected a rotation");
+    cbvh_pose at;
+    FAILS(cbvh_path_pose(own, 0.5, &at), CBVH_CALLBACK_FAILED, "at t = 0.5");
+    for (int k = 0; k < 4; k++) {
+        OK(cbvh_path_free(all[k]));
+    }
+    FAILS(cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, &answer), CBVH_INVALID_HANDLE,
+          "paths[0]: expected the handle of an open path");
+    OK(cbvh_mesh_free(mesh));
+}
+
+/* A path of poses: a tracker answers as a querier does, to the bit. */
+static void trackers(void) {
+    const cbvh_mesh mesh = cube(1);
+    enum { STEPS = 200 };
+    static cbvh_pose poses[STEPS];
+    static cbvh_distance_answer one[STEPS], other[STEPS];
+    static bool touch[STEPS], near[STEPS], tracked[STEPS];
+    for (int k = 0; k < STEPS; k++) {
+        const double angle = 0.01 * k;
+        const cbvh_pose turned = {{cos(angle), -sin(angle), 0, 2 - 0.01 * k, sin(angle), cos(angle), 0, 0, 0, 0, 1, 0}};
+        poses[k] = turned;
+    }
+    cbvh_tracker tracker;
+    OK(cbvh_tracker_new(&tracker));
+    OK(cbvh_collide(querier, mesh, mesh, poses, STEPS, touch));
+    OK(cbvh_tracker_collide(tracker, querier, mesh, mesh, poses, STEPS, tracked));
+    CHECK(memcmp(touch, tracked, sizeof touch) == 0 && !touch[0] && touch[STEPS - 1]);
+    OK(cbvh_within(querier, mesh, mesh, poses, STEPS, 0.25, near));
+    OK(cbvh_tracker_within(tracker, querier, mesh, mesh, poses, STEPS, 0.25, tracked));
+    CHECK(memcmp(near, tracked, sizeof near) == 0 && memcmp(near, touch, sizeof near) != 0);
+    OK(cbvh_distance(querier, mesh, mesh, poses, STEPS, NULL, one));
+    OK(cbvh_tracker_distance(tracker, querier, mesh, mesh, poses, STEPS, other));
+    CHECK(memcmp(one, other, sizeof one) == 0);
+    OK(cbvh_tracker_free(tracker));
+    FAILS(cbvh_tracker_free(tracker), CBVH_INVALID_HANDLE, "tracker: ");
+    /* With an allowed error, the answer is between the bounds that it states. */
+    const cbvh_distance_options loose = {.size = sizeof loose, .rel_err = 0.5};
+    OK(cbvh_distance(querier, mesh, mesh, poses, 1, &loose, other));
+    CHECK(other[0].lower <= one[0].distance && one[0].distance <= other[0].upper &&
+          other[0].upper <= 1.5 * one[0].distance + 1e-9);
+    cbvh_stats stats;
+    OK(cbvh_querier_stats(querier, &stats));
+    CHECK(stats.node_tests + stats.packet_tests > 0 && stats.pairs == 1);
+    OK(cbvh_mesh_free(mesh));
+}
+
+static void scenes(int parallel, int tracking) {
+    const cbvh_mesh mesh = cube(1), small = cube(0.25);
+    cbvh_scene scene;
+    cbvh_instance a, b, c, found[4];
+    const cbvh_pose at_a = shift(0, 0, 0), at_b = shift(1.5, 0, 0), at_c = shift(0, 0, 0.1);
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_set_parallel(scene, parallel));
+    OK(cbvh_scene_set_tracking(scene, tracking));
+    OK(cbvh_scene_add(scene, mesh, &at_a, "a", &a));
+    OK(cbvh_scene_add(scene, mesh, &at_b, "b", &b));
+    OK(cbvh_scene_add(scene, small, &at_c, NULL, &c));
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_mesh_free(small));
+    bool answer;
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_within(scene, 0.5, &answer));
+    CHECK(answer);
+    cbvh_scene_distance_answer nearest;
+    OK(cbvh_scene_distance(scene, &nearest));
+    CHECK(nearest.found && nearest.pair.a.id == a.id && nearest.pair.b.id == c.id &&
+          nearest.distance.distance == 0.275);
+    size_t count;
+    cbvh_scene_relation relations[3];
+    OK(cbvh_scene_relations(scene, relations, 3, &count));
+    CHECK(count == 1 && relations[0].relation == CBVH_B_IN_A && relations[0].pair.b.id == c.id);
+    cbvh_scene_pair pairs[3];
+    OK(cbvh_scene_pairs_within(scene, 0.5, pairs, 3, &count));
+    CHECK(count == 2 && pairs[0].a.id == a.id && pairs[0].b.id == b.id && pairs[1].b.id == c.id);
+    FAILS(cbvh_scene_pairs_within(scene, 0.5, pairs, 1, &count), CBVH_BUFFER_TOO_SMALL,
+          "pairs: expected room for 2 elements, found room for 1");
+    CHECK(count == 2);
+    const cbvh_pose touching = shift(1, 0, 0);
+    OK(cbvh_scene_set_poses(scene, &b, &touching, 1));
+    OK(cbvh_scene_pairs_in_contact(scene, pairs, 3, &count));
+    CHECK(count == 1 && pairs[0].a.id == a.id && pairs[0].b.id == b.id);
+    FAILS(cbvh_scene_contacts(scene, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "contacts: ");
+    CHECK(count > 0);
+    OK(cbvh_scene_allow(scene, a, b, 1));
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_allow(scene, a, b, 0));
+    OK(cbvh_scene_set_groups(scene, b, 1, 2));
+    OK(cbvh_scene_set_groups(scene, a, 1, 2));
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_set_groups(scene, a, ~0u, ~0u));
+    OK(cbvh_scene_set_groups(scene, b, ~0u, ~0u));
+    /* The small cube comes out of the large one, through its face: from 0.1 to 1.1 along z, it touches at once it
+     * reaches 0.375. */
+    const cbvh_pose out = shift(0, 0, 1.1);
+    cbvh_path path;
+    cbvh_motion_answer way;
+    OK(cbvh_path_between(&at_c, &out, &path));
+    OK(cbvh_scene_motion(scene, &c, &path, 1, NULL, &way));
+    CHECK(way.outcome == CBVH_HIT && way.instance_a.id == a.id && way.instance_b.id == c.id);
+    CHECK(way.at >= 0.2749 && way.at < 0.2751 && way.free_until <= 0.275);
+    OK(cbvh_scene_is_free(scene, &c, &path, 1, NULL, &answer));
+    CHECK(!answer);
+    OK(cbvh_path_free(path));
+    course of = {.from = 4, .to = 3, .fails_after = 3, .code = 5};
+    OK(cbvh_path_from_functions(course_pose, course_sagitta, &of, &path));
+    FAILS(cbvh_scene_is_free(scene, &c, &path, 1, NULL, &answer), CBVH_CALLBACK_FAILED, "the code 5");
+    of.fails_after = -1;
+    OK(cbvh_scene_is_free(scene, &c, &path, 1, NULL, &answer));
+    CHECK(answer);
+    OK(cbvh_path_free(path));
+    const double points[6] = {0, 0, 0.45, 5, 0, 0};
+    cbvh_closest_point closest[2];
+    cbvh_side sides[2];
+    OK(cbvh_scene_signed_distances(scene, points, 2, INFINITY, closest));
+    CHECK(closest[0].side == CBVH_INSIDE && fabs(closest[0].distance - 0.05) < 1e-15 && closest[0].instance.id == a.id);
+    CHECK(closest[1].side == CBVH_OUTSIDE && closest[1].distance == 3.5 && closest[1].instance.id == b.id);
+    OK(cbvh_scene_sides(scene, points, 2, sides));
+    CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_OUTSIDE);
+    const cbvh_ray ray = {{0.05, 0.05, 5}, {0, 0, -1}, INFINITY};
+    cbvh_ray_hit hits[4];
+    size_t hit_count;
+    OK(cbvh_scene_all_hits(scene, &ray, 1, &hit_count, hits, 4, &count));
+    CHECK(count == 4 && hit_count == 4 && hits[0].t == 4.5 && hits[0].instance.id == a.id &&
+          hits[1].instance.id == c.id);
+    OK(cbvh_scene_first_hits(scene, &ray, 1, hits));
+    OK(cbvh_scene_any_hits(scene, &ray, 1, &answer));
+    CHECK(hits[0].t == 4.5 && answer);
+    const cbvh_segment segment = {{0, 0, 3}, {0, 0, 2}};
+    OK(cbvh_scene_meet_segments(scene, &segment, 1, &answer));
+    CHECK(!answer);
+    char name[2];
+    size_t length;
+    OK(cbvh_scene_instance_name(scene, b, name, 2, &length));
+    CHECK(length == 1 && strcmp(name, "b") == 0);
+    FAILS(cbvh_scene_instance_name(scene, b, name, 1, &length), CBVH_BUFFER_TOO_SMALL,
+          "buffer: expected room for 2 bytes, found room for 1");
+    CHECK(length == 1 && name[0] == 0);
+    OK(cbvh_scene_instance_name(scene, c, name, 2, &length));
+    CHECK(length == 0);
+    OK(cbvh_scene_remove(scene, b));
+    FAILS(cbvh_scene_remove(scene, b), CBVH_NOT_FOUND, "was it removed?");
+    cbvh_pose world;
+    OK(cbvh_scene_instance_pose(scene, c, &world));
+    CHECK(world.rows[11] == 0.1);
+    cbvh_mesh of_c;
+    uint64_t triangles;
+    OK(cbvh_scene_instance_mesh(scene, c, &of_c));
+    OK(cbvh_mesh_triangle_count(of_c, &triangles));
+    CHECK(triangles == 12);
+    OK(cbvh_scene_add(scene, of_c, &at_b, "b", &b));
+    OK(cbvh_mesh_free(of_c));
+    OK(cbvh_scene_instances(scene, found, 4, &count));
+    CHECK(count == 3 && found[0].id == a.id && found[1].id == b.id && found[2].id == c.id);
+    OK(cbvh_scene_find(scene, "b", &found[0]));
+    CHECK(found[0].id == b.id);
+    cbvh_stats stats;
+    OK(cbvh_scene_stats(scene, &stats));
+    OK(cbvh_scene_free(scene));
+}
+
+/* Files: baked, opened in all ways, and a scene file, in the folder that the program is given. */
+static void files(const char *folder, const char *testdata) {
+    char input[1000], output[1000];
+    const char *const inputs[1] = {input};
+    snprintf(input, sizeof input, "%s/fclrob.obj", testdata);
+    snprintf(output, sizeof output, "%s/fclrob.cbvh", folder);
+    int32_t up_to_date = 7;
+    const cbvh_bake_options packed = {.size = sizeof packed, .triangles = "packed"};
+    OK(cbvh_bake_files(inputs, 1, output, &packed, &up_to_date));
+    CHECK(up_to_date == 0);
+    OK(cbvh_bake_files(inputs, 1, output, &packed, &up_to_date));
+    CHECK(up_to_date == 1);
+    uint64_t triangles[4];
+    cbvh_mesh opened[4];
+    for (cbvh_open_mode mode = CBVH_MAP; mode <= CBVH_READ; mode++) {
+        OK(cbvh_mesh_open(output, mode, &opened[mode]));
+        OK(cbvh_mesh_check(opened[mode]));
+        OK(cbvh_mesh_triangle_count(opened[mode], &triangles[mode]));
+        CHECK(triangles[mode] == 216);
+    }
+    OK(cbvh_mesh_save(opened[1], output));
+    for (int mode = 0; mode < 4; mode++) {
+        OK(cbvh_mesh_free(opened[mode]));
+    }
+    snprintf(input, sizeof input, "%s/ok-scene.cbvh", testdata);
+    cbvh_scene scene, again;
+    size_t count, objects, length;
+    OK(cbvh_scene_open(input, &scene));
+    FAILS(cbvh_scene_instances(scene, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "instances: ");
+    CHECK(count > 0);
+    cbvh_mesh mesh, object;
+    OK(cbvh_mesh_open(input, CBVH_MAP, &mesh));
+    OK(cbvh_scene_of_mesh(mesh, &again));
+    OK(cbvh_mesh_object_count(mesh, &objects));
+    for (size_t number = 0; number < objects; number++) {
+        char name[100];
+        size_t same;
+        OK(cbvh_mesh_object_name(mesh, number, name, sizeof name, &length));
+        CHECK(strlen(name) == length);
+        OK(cbvh_mesh_find(mesh, name, &same));
+        CHECK(same <= number);
+        OK(cbvh_mesh_object(mesh, number, &object));
+        OK(cbvh_mesh_free(object));
+    }
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_scene_free(again));
+    OK(cbvh_scene_free(scene));
+    snprintf(input, sizeof input, "%s/bad-R05-truncated.cbvh", testdata);
+    FAILS(cbvh_mesh_open(input, CBVH_MAP, &mesh), CBVH_DAMAGED, "R05");
+    snprintf(input, sizeof input, "%s/bad-R27-flipped-bit.cbvh", testdata);
+    OK(cbvh_mesh_open(input, CBVH_MAP, &mesh));
+    FAILS(cbvh_mesh_check(mesh), CBVH_DAMAGED, "R27");
+    OK(cbvh_mesh_free(mesh));
+    /* Duplicates are stored once. */
+    const uint32_t faces[9] = {0, 1, 2, 0, 1, 3, 0, 1, 2};
+    uint32_t twins[2];
+    OK(cbvh_bake(CUBE_VERTICES, 8, faces, 3, NULL, &mesh));
+    OK(cbvh_mesh_triangle_count(mesh, &triangles[0]));
+    OK(cbvh_mesh_duplicates(mesh, 0, twins, 2, &count));
+    CHECK(triangles[0] == 2 && count == 1 && twins[0] == 2);
+    OK(cbvh_mesh_free(mesh));
+}
+
+int main(int count, char **arguments) {
+    CHECK(count == 3);
+    uint32_t abi = 7;
+    OK(cbvh_abi(&abi));
+    CHECK(abi == CBVH_ABI);
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    cubes(", one core");
+    OK(cbvh_querier_set_parallel(querier, 1));
+    cubes(", all cores");
+    OK(cbvh_querier_set_parallel(querier, 0));
+    lists();
+    borrowed();
+    paths();
+    trackers();
+    scenes(0, 0);
+    scenes(1, 1);
+    files(arguments[1], arguments[2]);
+    OK(cbvh_querier_free(querier));
+    puts("behaviour: as the header says");
+    return 0;
+}

@@ -1,0 +1,323 @@
+/* Every bad argument by itself: the status that it gives, and a message that names it. */
+#include "support.h"
+
+static cbvh_mesh mesh;
+static cbvh_querier querier;
+static cbvh_tracker tracker;
+static cbvh_path path;
+static cbvh_scene scene;
+static cbvh_instance instance;
+static cbvh_pose pose = CBVH_IDENTITY;
+/* An address that numbers cannot have, in memory that is there. */
+static double room[64];
+#define MISALIGNED(type) ((type *)(void *)((char *)room + 1))
+
+static void handles(void) {
+    const cbvh_mesh no_mesh = {0}, made_up = {0x123456789ABCDEF0u}, a_path = {path.id},
+        beyond = {mesh.id + (1ull << 40)};
+    bool answer;
+    FAILS(cbvh_collide(querier, no_mesh, mesh, &pose, 1, &answer), CBVH_INVALID_HANDLE,
+          "a: expected the handle of an open mesh, found 0");
+    FAILS(cbvh_collide(querier, mesh, made_up, &pose, 1, &answer), CBVH_INVALID_HANDLE,
+          "b: expected the handle of an open mesh, found 0x123456789abcdef0");
+    FAILS(cbvh_collide(querier, mesh, a_path, &pose, 1, &answer), CBVH_INVALID_HANDLE, "found the handle of a path");
+    FAILS(cbvh_collide(querier, mesh, beyond, &pose, 1, &answer), CBVH_INVALID_HANDLE, "never gave out");
+    FAILS(cbvh_mesh_check(no_mesh), CBVH_INVALID_HANDLE, "mesh: ");
+    cbvh_mesh freed;
+    OK(cbvh_mesh_clone(mesh, &freed));
+    OK(cbvh_collide(querier, freed, mesh, &pose, 1, &answer));
+    OK(cbvh_mesh_free(freed));
+    /* Also where the querier has the mesh at hand. */
+    FAILS(cbvh_collide(querier, freed, mesh, &pose, 1, &answer), CBVH_INVALID_HANDLE,
+          "a: expected the handle of an open mesh, found one of a mesh that was freed");
+    FAILS(cbvh_mesh_free(freed), CBVH_INVALID_HANDLE, "freed");
+    cbvh_mesh next;
+    OK(cbvh_mesh_clone(mesh, &next));
+    FAILS(cbvh_collide(querier, freed, mesh, &pose, 1, &answer), CBVH_INVALID_HANDLE, "freed");
+    OK(cbvh_mesh_free(next));
+    OK(cbvh_mesh_free(no_mesh));
+    const cbvh_querier no_querier = {0};
+    FAILS(cbvh_collide(no_querier, mesh, mesh, &pose, 1, &answer), CBVH_INVALID_HANDLE, "querier: ");
+    FAILS(cbvh_querier_set_parallel(no_querier, 1), CBVH_INVALID_HANDLE, "querier: ");
+    OK(cbvh_querier_free(no_querier));
+    cbvh_querier gone;
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &gone));
+    OK(cbvh_querier_free(gone));
+    FAILS(cbvh_querier_free(gone), CBVH_INVALID_HANDLE,
+          "querier: expected the handle of an open querier, found one of a querier that was freed");
+    const cbvh_tracker no_tracker = {0};
+    FAILS(cbvh_tracker_collide(no_tracker, querier, mesh, mesh, &pose, 1, &answer), CBVH_INVALID_HANDLE, "tracker: ");
+    const cbvh_path no_path = {0};
+    FAILS(cbvh_are_free(querier, mesh, mesh, &no_path, 1, NULL, &answer), CBVH_INVALID_HANDLE, "paths[0]: ");
+    FAILS(cbvh_path_pose(no_path, 0, &pose), CBVH_INVALID_HANDLE, "path: ");
+    const cbvh_scene no_scene = {0};
+    FAILS(cbvh_scene_collide(no_scene, &answer), CBVH_INVALID_HANDLE, "scene: ");
+    FAILS(cbvh_scene_add(scene, no_mesh, &pose, NULL, NULL), CBVH_INVALID_HANDLE, "mesh: ");
+}
+
+static void pointers(void) {
+    bool answer;
+    size_t count;
+    cbvh_mesh made = {7};
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, NULL, NULL), CBVH_INVALID_ARGUMENT,
+          "mesh: expected a pointer, found NULL");
+    FAILS(cbvh_bake(NULL, 8, CUBE_FACES, 12, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "vertices: expected a pointer, found NULL");
+    CHECK(made.id == 0);
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, NULL, 12, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "faces: expected a pointer, found NULL");
+    FAILS(cbvh_bake(MISALIGNED(double), 1, CUBE_FACES, 12, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "vertices: expected an address that is a multiple of 8");
+    FAILS(cbvh_bake(CUBE_VERTICES, SIZE_MAX / 8, CUBE_FACES, 12, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "vertices: expected at most");
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, SIZE_MAX, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "faces: expected at most");
+    FAILS(cbvh_collide(querier, mesh, mesh, NULL, 1, &answer), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_collide(querier, mesh, mesh, MISALIGNED(cbvh_pose), 1, &answer), CBVH_INVALID_ARGUMENT,
+          "poses: expected an address");
+    FAILS(cbvh_collide(querier, mesh, mesh, &pose, SIZE_MAX / 96 + 1, &answer), CBVH_INVALID_ARGUMENT,
+          "poses: expected at most");
+    FAILS(cbvh_collide(querier, mesh, mesh, &pose, 1, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
+    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, NULL, MISALIGNED(cbvh_distance_answer)), CBVH_INVALID_ARGUMENT,
+          "answers: expected an address");
+    FAILS(cbvh_contacts(querier, mesh, mesh, &pose, 1, NULL, NULL, 4, &count), CBVH_INVALID_ARGUMENT,
+          "contacts: expected a pointer, found NULL");
+    FAILS(cbvh_contacts(querier, mesh, mesh, &pose, 1, NULL, NULL, 0, NULL), CBVH_INVALID_ARGUMENT,
+          "count: expected a pointer, found NULL");
+    FAILS(cbvh_contacts(querier, mesh, mesh, &pose, 1, MISALIGNED(size_t), NULL, 0, &count), CBVH_INVALID_ARGUMENT,
+          "counts: expected an address");
+    FAILS(cbvh_first_collision(querier, mesh, mesh, &pose, 1, NULL), CBVH_INVALID_ARGUMENT, "number: ");
+    FAILS(cbvh_closest_points(querier, mesh, NULL, NULL, 1, INFINITY, NULL), CBVH_INVALID_ARGUMENT,
+          "points: expected a pointer");
+    FAILS(cbvh_first_hits(querier, mesh, NULL, NULL, 1, NULL), CBVH_INVALID_ARGUMENT, "rays: expected a pointer");
+    FAILS(cbvh_meet_segments(querier, mesh, NULL, NULL, 1, NULL), CBVH_INVALID_ARGUMENT,
+          "segments: expected a pointer");
+    FAILS(cbvh_edges_are_free(querier, mesh, mesh, NULL, &pose, 1, NULL, &answer), CBVH_INVALID_ARGUMENT, "starts: ");
+    FAILS(cbvh_edges_are_free(querier, mesh, mesh, &pose, NULL, 1, NULL, &answer), CBVH_INVALID_ARGUMENT, "ends: ");
+    FAILS(cbvh_motions(querier, mesh, mesh, NULL, 1, NULL, NULL), CBVH_INVALID_ARGUMENT, "paths: ");
+    FAILS(cbvh_motions(querier, mesh, mesh, &path, 1, NULL, NULL), CBVH_INVALID_ARGUMENT, "answers: ");
+    FAILS(cbvh_querier_new(CBVH_BACKEND_BEST, NULL), CBVH_INVALID_ARGUMENT, "querier: ");
+    FAILS(cbvh_querier_stats(querier, NULL), CBVH_INVALID_ARGUMENT, "stats: ");
+    FAILS(cbvh_tracker_new(NULL), CBVH_INVALID_ARGUMENT, "tracker: ");
+    FAILS(cbvh_scene_new(CBVH_BACKEND_BEST, NULL), CBVH_INVALID_ARGUMENT, "scene: ");
+    FAILS(cbvh_path_between(&pose, NULL, NULL), CBVH_INVALID_ARGUMENT, "path: ");
+    cbvh_path made_path;
+    FAILS(cbvh_path_between(NULL, &pose, &made_path), CBVH_INVALID_ARGUMENT, "start: ");
+    FAILS(cbvh_path_between(&pose, NULL, &made_path), CBVH_INVALID_ARGUMENT, "end: ");
+    FAILS(cbvh_path_screw(&pose, NULL, room, 1, 1, &made_path), CBVH_INVALID_ARGUMENT, "point: ");
+    FAILS(cbvh_path_from_functions(NULL, NULL, NULL, &made_path), CBVH_INVALID_ARGUMENT,
+          "pose: expected a function, found NULL");
+    FAILS(cbvh_pose_check(NULL), CBVH_INVALID_ARGUMENT, "pose: ");
+    FAILS(cbvh_pose_inverse(&pose, NULL), CBVH_INVALID_ARGUMENT, "result: ");
+    FAILS(cbvh_pose_from_quaternion(NULL, room, &pose), CBVH_INVALID_ARGUMENT, "quaternion: ");
+    FAILS(cbvh_mesh_open(NULL, CBVH_MAP, &made), CBVH_INVALID_ARGUMENT, "path: expected a pointer, found NULL");
+    FAILS(cbvh_mesh_from_bytes(NULL, 1, &made), CBVH_INVALID_ARGUMENT, "bytes: ");
+    FAILS(cbvh_mesh_find(mesh, NULL, &count), CBVH_INVALID_ARGUMENT, "name: ");
+    FAILS(cbvh_mesh_object_count(mesh, NULL), CBVH_INVALID_ARGUMENT, "count: ");
+    FAILS(cbvh_mesh_save(mesh, NULL), CBVH_INVALID_ARGUMENT, "path: ");
+    FAILS(cbvh_bake_files(NULL, 1, "x", NULL, NULL), CBVH_INVALID_ARGUMENT, "inputs: expected a pointer");
+    const char *none = NULL;
+    FAILS(cbvh_bake_files(&none, 1, "x", NULL, NULL), CBVH_INVALID_ARGUMENT, "inputs[0]: expected a pointer");
+    FAILS(cbvh_bake_files(&none, 0, "x", NULL, NULL), CBVH_INVALID_ARGUMENT, "inputs: expected at least one path");
+    FAILS(cbvh_scene_collide(scene, NULL), CBVH_INVALID_ARGUMENT, "answer: ");
+    FAILS(cbvh_scene_set_poses(scene, NULL, &pose, 1), CBVH_INVALID_ARGUMENT, "instances: ");
+    FAILS(cbvh_scene_set_poses(scene, &instance, NULL, 1), CBVH_INVALID_ARGUMENT, "worlds: ");
+    FAILS(cbvh_scene_find(scene, NULL, &instance), CBVH_INVALID_ARGUMENT, "name: ");
+    FAILS(cbvh_abi(NULL), CBVH_INVALID_ARGUMENT, "abi: ");
+    /* No elements may be anywhere. */
+    OK(cbvh_collide(querier, mesh, mesh, NULL, 0, NULL));
+    OK(cbvh_closest_points(querier, mesh, NULL, MISALIGNED(double), 0, 1, NULL));
+    OK(cbvh_contacts(querier, mesh, mesh, NULL, 0, NULL, NULL, 0, &count));
+    CHECK(count == 0);
+}
+
+static void numbers(void) {
+    bool answers[2];
+    cbvh_pose poses[2] = {CBVH_IDENTITY, CBVH_IDENTITY};
+    cbvh_distance_answer distance;
+    cbvh_closest_point closest;
+    const struct { int entry; double value; const char *text; } bad[] = {
+        {3, NAN, "poses[1]: row 1, column 4: expected a finite number, found NaN"},
+        {0, -INFINITY, "poses[1]: row 1, column 1: expected a finite number, found infinity"},
+        {0, 2, "poses[1]: expected a rotation, found a matrix"},
+        {0, -1, "poses[1]: expected a rotation, found a reflection"},
+        {11, 1e300, "poses[1]: expected a translation of at most 2^120"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        poses[1] = poses[0];
+        poses[1].rows[bad[k].entry] = bad[k].value;
+        FAILS(cbvh_collide(querier, mesh, mesh, poses, 2, answers), CBVH_INVALID_ARGUMENT, bad[k].text);
+    }
+    poses[1] = poses[0];
+    const double ds[] = {NAN, -1, INFINITY};
+    for (int k = 0; k < 3; k++) {
+        FAILS(cbvh_within(querier, mesh, mesh, poses, 2, ds[k], answers), CBVH_INVALID_ARGUMENT,
+              "d: expected a finite distance of at least 0");
+        FAILS(cbvh_scene_within(scene, ds[k], answers), CBVH_INVALID_ARGUMENT, "d: expected a finite distance");
+    }
+    FAILS(cbvh_closest_points(querier, mesh, NULL, room, 1, NAN, &closest), CBVH_INVALID_ARGUMENT, "within: ");
+    const double point[3] = {0, NAN, 0};
+    cbvh_side side;
+    FAILS(cbvh_sides(querier, mesh, NULL, point, 1, &side), CBVH_INVALID_ARGUMENT, "NaN");
+    cbvh_pose scaled = CBVH_IDENTITY;
+    scaled.rows[0] = scaled.rows[5] = scaled.rows[10] = 25.4;
+    FAILS(cbvh_sides(querier, mesh, &scaled, room, 1, &side), CBVH_INVALID_ARGUMENT,
+          "pose: expected a rotation, found a matrix scaled by 25.4");
+    cbvh_ray ray = {{0, 0, 0}, {0, 0, 0}, INFINITY};
+    FAILS(cbvh_any_hits(querier, mesh, NULL, &ray, 1, answers), CBVH_INVALID_ARGUMENT, "direction");
+    ray.direction[0] = 1;
+    ray.until = -1;
+    FAILS(cbvh_any_hits(querier, mesh, NULL, &ray, 1, answers), CBVH_INVALID_ARGUMENT, "until");
+    cbvh_mesh opened;
+    FAILS(cbvh_mesh_open("x", 4, &opened), CBVH_INVALID_ARGUMENT,
+          "mode: expected a number of cbvh_open_mode, 0 to 3, found 4");
+    FAILS(cbvh_querier_new(-1, &(cbvh_querier){0}), CBVH_INVALID_ARGUMENT,
+          "backend: expected a number of cbvh_backend, 0 to 3, found -1");
+    FAILS(cbvh_querier_set_parallel(querier, 2), CBVH_INVALID_ARGUMENT, "parallel: expected 0 or 1, found 2");
+    FAILS(cbvh_scene_set_tracking(scene, -1), CBVH_INVALID_ARGUMENT, "tracking: expected 0 or 1, found -1");
+    FAILS(cbvh_scene_allow(scene, instance, instance, 3), CBVH_INVALID_ARGUMENT, "may_touch: expected 0 or 1, found 3");
+    cbvh_pose result;
+    FAILS(cbvh_path_pose(path, 1.5, &result), CBVH_INVALID_ARGUMENT, "t: expected a time from 0 to 1, found 1.5");
+    FAILS(cbvh_path_pose(path, NAN, &result), CBVH_INVALID_ARGUMENT, "t: expected a time from 0 to 1, found NaN");
+    double bound;
+    FAILS(cbvh_path_reach(mesh, path, 0.5, 0.25, &bound), CBVH_INVALID_ARGUMENT, "t1: expected a time from t0 to 1");
+    const double quaternion[4] = {0, 3, 0, 4};
+    FAILS(cbvh_pose_from_quaternion(quaternion, room, &result), CBVH_INVALID_ARGUMENT,
+          "expected a quaternion of length 1, found length 5");
+    cbvh_path made;
+    FAILS(cbvh_path_polyline(poses, 1, &made), CBVH_INVALID_ARGUMENT, "poses: expected at least two poses, found 1");
+    CHECK(made.id == 0);
+    cbvh_pose half_turn = CBVH_IDENTITY;
+    half_turn.rows[0] = half_turn.rows[5] = -1;
+    FAILS(cbvh_path_between(&pose, &half_turn, &made), CBVH_INVALID_ARGUMENT,
+          "start and end: expected a turn of less than half a circle");
+    FAILS(cbvh_edges_are_free(querier, mesh, mesh, &pose, &half_turn, 1, NULL, answers), CBVH_INVALID_ARGUMENT,
+          "starts[0] and ends[0]: expected a turn");
+    const double x_axis[3] = {1, 0, 0};
+    FAILS(cbvh_path_screw(&pose, room, room, 1, 1, &made), CBVH_INVALID_ARGUMENT, "direction: ");
+    FAILS(cbvh_path_screw(&pose, room, x_axis, NAN, 1, &made), CBVH_INVALID_ARGUMENT, "angle: ");
+    /* Options: sizes first. */
+    cbvh_distance_options allowed = {.size = 0};
+    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 24");
+    allowed.size = sizeof allowed + 8;
+    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT, "found 32");
+    allowed = (cbvh_distance_options){.size = sizeof allowed, .rel_err = -1};
+    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
+          "rel_err: expected a finite fraction");
+    cbvh_motion_options motion = {.size = 1};
+    FAILS(cbvh_are_free(querier, mesh, mesh, &path, 1, &motion, answers), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 24");
+    motion = (cbvh_motion_options){.size = sizeof motion, .clearance = NAN};
+    FAILS(cbvh_are_free(querier, mesh, mesh, &path, 1, &motion, answers), CBVH_INVALID_ARGUMENT, "clearance: ");
+    motion = (cbvh_motion_options){.size = sizeof motion, .tolerance = -1};
+    FAILS(cbvh_scene_is_free(scene, &instance, &path, 1, &motion, answers), CBVH_INVALID_ARGUMENT, "tolerance: ");
+}
+
+static void bakes(void) {
+    cbvh_mesh made;
+    const uint32_t faces[3] = {0, 1, 8};
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, faces, 1, NULL, &made), CBVH_BAKE_FAILED, "8");
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, faces, 0, NULL, &made), CBVH_BAKE_FAILED, "triangle");
+    const double vertices[9] = {0, 0, NAN, 1, 0, 0, 0, 1, 0};
+    const uint32_t first[3] = {0, 1, 2};
+    FAILS(cbvh_bake(vertices, 3, first, 1, NULL, &made), CBVH_BAKE_FAILED, "NaN");
+#define OPTION(field, value, text)                                                                                     \
+    do {                                                                                                               \
+        const cbvh_bake_options wrong = {.size = sizeof wrong, .field = value};                                        \
+        FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &wrong, &made), CBVH_INVALID_ARGUMENT, text);                \
+    } while (0)
+    OPTION(profile, "dop7", "options.profile: expected NULL or one of dop14-u8");
+    OPTION(triangles, "small", "options.triangles: expected NULL or one of f32, packed, quantized, found \"small\"");
+    OPTION(effort, "low", "options.effort: expected NULL or one of fast, default, high");
+    OPTION(effort, "\xFF", "options.effort: expected text in UTF-8");
+    OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");
+    OPTION(no_ids, 2, "options.no_ids: expected 0 or 1, found 2");
+    OPTION(scene, 1, "options.scene: expected nothing");
+    OPTION(max_memory, 1, "options.max_memory: expected nothing");
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &(cbvh_bake_options){.size = 8}, &made), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 80");
+    const char *missing = "/no such folder/x.obj";
+    FAILS(cbvh_bake_files(&missing, 1, "/no such folder/x.cbvh", NULL, NULL), CBVH_SYSTEM, "x.obj");
+    FAILS(cbvh_mesh_open("/no such folder/x.cbvh", CBVH_READ, &made), CBVH_SYSTEM, "x.cbvh");
+    CHECK(made.id == 0);
+    FAILS(cbvh_mesh_from_bytes("nothing of the kind", 19, &made), CBVH_DAMAGED, "bytes: ");
+    FAILS(cbvh_mesh_from_bytes(NULL, 0, &made), CBVH_DAMAGED, "bytes: ");
+    FAILS(cbvh_mesh_save(mesh, "/no such folder/x.cbvh"), CBVH_SYSTEM, "x.cbvh");
+    FAILS(cbvh_mesh_object(mesh, 1, &made), CBVH_NOT_FOUND, "number: expected a number below 1, found 1");
+    size_t number;
+    FAILS(cbvh_mesh_find(mesh, "x", &number), CBVH_NOT_FOUND, "name: expected the name of an object, found \"x\"");
+    FAILS(cbvh_mesh_object_name(mesh, 7, NULL, 0, &number), CBVH_NOT_FOUND,
+          "number: expected a number below 1, found 7");
+}
+
+static void scenes(void) {
+    cbvh_instance none = {0}, found, foreign = {1ull << 40};
+    cbvh_pose rounded = CBVH_IDENTITY;
+    rounded.rows[1] = 0x1p-21;
+    OK(cbvh_pose_check(&rounded));
+    FAILS(cbvh_scene_add(scene, mesh, &rounded, "rounded", &found), CBVH_INVALID_ARGUMENT,
+          "instance rounded: expected");
+    FAILS(cbvh_scene_add(scene, mesh, NULL, NULL, &found), CBVH_INVALID_ARGUMENT, "world: ");
+    FAILS(cbvh_scene_add(scene, mesh, &pose, "one", &found), CBVH_INVALID_ARGUMENT,
+          "instance \"one\": expected a name of its own");
+    FAILS(cbvh_scene_remove(scene, none), CBVH_NOT_FOUND, "expected an instance of the scene, found none");
+    FAILS(cbvh_scene_set_poses(scene, &foreign, &pose, 1), CBVH_NOT_FOUND, "expected an instance of the scene");
+    FAILS(cbvh_scene_set_groups(scene, foreign, 1, 1), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_instance_pose(scene, none, &rounded), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_find(scene, "two", &found), CBVH_NOT_FOUND,
+          "name: expected the name of an instance, found \"two\"");
+    cbvh_motion_answer answer;
+    FAILS(cbvh_scene_motion(scene, &none, &path, 1, NULL, &answer), CBVH_NOT_FOUND, "instance");
+    cbvh_scene made;
+    FAILS(cbvh_scene_of_mesh(mesh, &made), CBVH_INVALID_ARGUMENT,
+          "mesh: expected a scene, a file with instances, found none");
+    FAILS(cbvh_scene_open("/no such folder/x.cbvh", &made), CBVH_SYSTEM, "x.cbvh");
+}
+
+static void limits(void) {
+    bool answer;
+    OK(cbvh_querier_set_budget(querier, 0));
+    FAILS(cbvh_collide(querier, mesh, mesh, &pose, 1, &answer), CBVH_LIMIT, "budget");
+    OK(cbvh_querier_set_parallel(querier, 1));
+    FAILS(cbvh_collide(querier, mesh, mesh, &pose, 1, &answer), CBVH_LIMIT, "budget");
+    OK(cbvh_querier_set_parallel(querier, 0));
+    OK(cbvh_querier_set_budget(querier, UINT64_MAX));
+    OK(cbvh_collide(querier, mesh, mesh, &pose, 1, &answer));
+    CHECK(answer);
+    cbvh_mesh open;
+    cbvh_relation relation;
+    const cbvh_bake_options options = {.size = sizeof options, .no_topology = 1};
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &options, &open));
+    cbvh_mesh small = cube(0.25);
+    FAILS(cbvh_relate(querier, open, small, &pose, 1, &relation), CBVH_INVALID_ARGUMENT,
+          "states which objects are closed");
+    OK(cbvh_mesh_free(small));
+    OK(cbvh_mesh_free(open));
+}
+
+int main(void) {
+    CHECK(strcmp(cbvh_last_message(), "") == 0);
+    mesh = cube(1);
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    OK(cbvh_tracker_new(&tracker));
+    const cbvh_pose end = shift(3, 0, 0);
+    OK(cbvh_path_between(&pose, &end, &path));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, mesh, &pose, "one", &instance));
+    handles();
+    pointers();
+    numbers();
+    bakes();
+    scenes();
+    limits();
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_path_free(path));
+    OK(cbvh_tracker_free(tracker));
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(mesh));
+    puts("misuse: every bad argument has its status and its message");
+    return 0;
+}

@@ -1,0 +1,244 @@
+/* Ten thousand calls with arguments at random: right ones, and each kind of wrong one. None crashes, reads or writes
+ * where it must not (the address sanitizer looks on), or leaks; handles that calls made are freed, some of them twice.
+ * */
+#include "support.h"
+
+#define CALLS 10000
+#define KEPT 32
+
+static random_source source = {5};
+static size_t below(size_t limit) { return random_below(&source, limit); }
+
+/* Handles of all kinds, open and freed. */
+static uint64_t kept[KEPT];
+
+static uint64_t any_handle(uint64_t likely) {
+    switch (below(8)) {
+    case 0: return kept[below(KEPT)];
+    case 1: return below(4) ? 0 : random_bits(&source);
+    case 2: return below(2) ? likely + 1 : likely ^ 1ull << below(64);
+    default: return likely;
+    }
+}
+
+/* Frees a handle of whatever kind. */
+static bool free_any(uint64_t handle) {
+    return cbvh_mesh_free((cbvh_mesh){handle}) == CBVH_OK || cbvh_querier_free((cbvh_querier){handle}) == CBVH_OK ||
+           cbvh_tracker_free((cbvh_tracker){handle}) == CBVH_OK || cbvh_path_free((cbvh_path){handle}) == CBVH_OK ||
+           cbvh_scene_free((cbvh_scene){handle}) == CBVH_OK;
+}
+
+/* What calls may be given: arrays that hold `ELEMENTS` of anything, and numbers that are not plain. */
+#define ELEMENTS 4
+static struct { double numbers[14 * ELEMENTS]; } input;
+static struct { double numbers[24 * ELEMENTS]; } output;
+
+static double any_number(void) {
+    const double odd[] = {0, -1, 1, NAN, INFINITY, -INFINITY, 1e308, -1e-320, 0x1p-500, 2, 0.5};
+    return below(3) ? random_signed(&source) : odd[below(sizeof odd / sizeof *odd)];
+}
+
+/* Poses that are right more often than not, as numbers; other functions see points, rays and segments in them. */
+static void *any_input(void) {
+    for (int element = 0; element < ELEMENTS; element++) {
+        const cbvh_pose pose = random_pose(&source, 1);
+        memcpy(input.numbers + 12 * element, pose.rows, sizeof pose.rows);
+    }
+    if (below(3) == 0) {
+        input.numbers[below(12 * ELEMENTS)] = any_number();
+    }
+    const size_t kind = below(12);
+    return kind == 0 ? NULL : kind == 1 ? (char *)&input + 1 + below(7) : (char *)&input;
+}
+
+/* Room that is filled with a pattern, so that what is not written shows. */
+static void *any_output(void) {
+    const size_t kind = below(12);
+    memset(&output, 0xA5, sizeof output);
+    return kind == 0 ? NULL : kind == 1 ? (char *)&output + 1 + below(7) : (char *)&output;
+}
+
+/* At most as many as there is room for, or so many that no memory has them. */
+static size_t any_count(void) {
+    const size_t far[] = {SIZE_MAX, SIZE_MAX / 2, SIZE_MAX / 8, (size_t)1 << 62};
+    return below(12) ? below(ELEMENTS) : far[below(4)];
+}
+
+static int32_t any_flag(void) { return below(4) ? (int32_t)below(2) : (int32_t)random_bits(&source); }
+
+static const void *any_options(void) {
+    static cbvh_bake_options bake;
+    static cbvh_motion_options motion;
+    static cbvh_distance_options distance;
+    const char *const names[] = {NULL, "", "f32", "dop6-u8", "fast", "\xC3(", "packed"};
+    memset(&bake, 0, sizeof bake);
+    bake.size = below(4) ? sizeof bake : below(200);
+    bake.profile = names[below(7)];
+    bake.triangles = names[below(7)];
+    bake.effort = below(2) ? NULL : names[below(7)];
+    bake.max_error = below(2) ? 0 : any_number();
+    bake.no_ids = any_flag();
+    bake.force = below(8) == 0;
+    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(100), fabs(any_number()),
+        below(2) ? 0 : any_number()};
+    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(100), any_number(),
+        below(2) ? 0 : any_number()};
+    switch (below(4)) {
+    case 0: return &bake;
+    case 1: return &motion;
+    case 2: return &distance;
+    default: return NULL;
+    }
+}
+
+static int32_t any_pose(void *user, double t, cbvh_pose *pose) {
+    (void)user;
+    if (below(16) == 0) {
+        return (int32_t)below(3);
+    }
+    *pose = shift(3 - 6 * t, 0, 0);
+    if (below(32) == 0) {
+        pose->rows[below(12)] = any_number();
+    }
+    return 0;
+}
+
+static double any_sagitta(void *user, double radius, double t0, double t1) {
+    (void)user, (void)radius, (void)t0, (void)t1;
+    return below(8) ? 1e-9 : any_number();
+}
+
+int main(void) {
+    const cbvh_mesh mesh = cube(1), other = cube(0.5);
+    const cbvh_pose here = CBVH_IDENTITY, there = shift(3, 0, 0);
+    cbvh_querier querier;
+    cbvh_tracker tracker;
+    cbvh_path path;
+    cbvh_scene scene;
+    cbvh_instance instance;
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    OK(cbvh_tracker_new(&tracker));
+    OK(cbvh_path_between(&here, &there, &path));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, mesh, &here, "here", &instance));
+    OK(cbvh_scene_add(scene, other, &there, NULL, NULL));
+    /* A way that is decided slowly is not what is looked for. */
+    OK(cbvh_querier_set_budget(querier, 20000));
+    OK(cbvh_scene_set_budget(scene, 20000));
+    size_t statuses[12] = {0};
+    for (int call = 0; call < CALLS; call++) {
+        const cbvh_mesh a = {any_handle(mesh.id)}, b = {any_handle(other.id)};
+        const cbvh_querier q = {any_handle(querier.id)};
+        const cbvh_tracker r = {any_handle(tracker.id)};
+        const cbvh_path p = {any_handle(path.id)};
+        const cbvh_scene s = {any_handle(scene.id)};
+        const cbvh_instance i = {any_handle(instance.id)};
+        const cbvh_path paths[2] = {p, path};
+        const cbvh_instance instances[2] = {i, instance};
+        void *in = any_input(), *out = any_output();
+        void *const more = below(8) ? &input : NULL;
+        const void *const options = any_options();
+        const size_t n = any_count(), capacity = below(ELEMENTS);
+        const double x = any_number(), y = any_number();
+        size_t count = 0, counts[ELEMENTS];
+        uint64_t made = 0;
+        char name[3] = {(char)('a' + below(26)), 0, 0};
+        cbvh_status status = CBVH_OK;
+        switch (below(58)) {
+        case 0: status = cbvh_collide(q, a, b, in, n, out); break;
+        case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
+        case 2: status = cbvh_relate(q, a, b, in, n, out); break;
+        case 3: status = cbvh_distance(q, a, b, in, n, options, out); break;
+        case 4: status = cbvh_contacts(q, a, b, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
+        case 5: status = cbvh_first_collision(q, a, b, in, n, out); break;
+        case 6: status = cbvh_displacement(a, in, more, out); break;
+        case 7: status = cbvh_tracker_collide(r, q, a, b, in, n, out); break;
+        case 8: status = cbvh_tracker_within(r, q, a, b, in, n, x, out); break;
+        case 9: status = cbvh_tracker_distance(r, q, a, b, in, n, out); break;
+        case 10: status = cbvh_motions(q, a, b, paths, below(3), options, out); break;
+        case 11: status = cbvh_are_free(q, a, b, paths, below(3), options, out); break;
+        case 12: status = cbvh_edge_motions(q, a, b, in, more, n, options, out); break;
+        case 13: status = cbvh_edges_are_free(q, a, b, in, more, n, options, out); break;
+        case 14: status = cbvh_closest_points(q, a, more, in, n, x, out); break;
+        case 15: status = cbvh_sides(q, a, more, in, n, out); break;
+        case 16: status = cbvh_signed_distances(q, a, more, in, n, x, out); break;
+        case 17: status = cbvh_first_hits(q, a, more, in, n, out); break;
+        case 18: status = cbvh_any_hits(q, a, more, in, n, out); break;
+        case 19: status = cbvh_all_hits(q, a, more, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
+        case 20: status = cbvh_meet_segments(q, a, more, in, n, out); break;
+        case 21: status = cbvh_mesh_clone(a, (cbvh_mesh *)&made); break;
+        case 22: status = cbvh_mesh_object(a, below(3), (cbvh_mesh *)&made); break;
+        case 23: status = cbvh_mesh_object_name(a, below(3), out, capacity, &count); break;
+        case 24: status = cbvh_mesh_find(a, below(4) ? name : NULL, out); break;
+        case 25: status = cbvh_mesh_triangle_count(a, out); break;
+        case 26: status = cbvh_mesh_bytes(a, out, below(sizeof output - 8), &count); break;
+        case 27: status = cbvh_mesh_duplicates(a, (uint32_t)below(20), out, capacity, &count); break;
+        case 28: status = cbvh_mesh_from_bytes(in, below(sizeof input - 8), (cbvh_mesh *)&made); break;
+        case 29: status = cbvh_mesh_check(a); break;
+        case 30: status = cbvh_bake(in, n, (uint32_t *)more, below(ELEMENTS), options, (cbvh_mesh *)&made); break;
+        case 31: status = cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, below(13), options, (cbvh_mesh *)&made); break;
+        case 32: status = cbvh_querier_new(any_flag(), (cbvh_querier *)&made); break;
+        case 33: status = cbvh_querier_set_parallel(q, any_flag()); break;
+        case 34: status = cbvh_querier_stats(q, out); break;
+        case 35: status = cbvh_tracker_new((cbvh_tracker *)&made); break;
+        case 36: status = cbvh_path_between(in, more, (cbvh_path *)&made); break;
+        case 37: status = cbvh_path_screw(in, more, &x, y, y, (cbvh_path *)(n == 0 ? &made : NULL)); break;
+        case 38: status = cbvh_path_polyline(in, n, (cbvh_path *)&made); break;
+        case 39: status = cbvh_path_from_functions(below(4) ? any_pose : NULL, any_sagitta, NULL,
+            (cbvh_path *)&made); break;
+        case 40: status = cbvh_path_pose(p, x, out); break;
+        case 41: status = cbvh_path_reach(a, p, x, y, out); break;
+        case 42: status = cbvh_scene_new(any_flag(), (cbvh_scene *)&made); break;
+        case 43: status = cbvh_scene_clone(s, (cbvh_scene *)&made); break;
+        case 44: status = cbvh_scene_add(s, a, in, below(2) ? NULL : name, (cbvh_instance *)&count); break;
+        case 45: status = cbvh_scene_remove(s, i.id == instance.id ? (cbvh_instance){below(40)} : i); break;
+        case 46: status = cbvh_scene_set_poses(s, instances, in, below(3)); break;
+        case 47: status = cbvh_scene_set_groups(s, i, (uint32_t)below(4), ~0u); break;
+        case 48: status = cbvh_scene_allow(s, i, instance, any_flag()); break;
+        case 49: status = cbvh_scene_instances(s, out, capacity, &count); break;
+        case 50: status = cbvh_scene_pairs_within(s, x, out, capacity, &count); break;
+        case 51: status = cbvh_scene_contacts(s, out, capacity, &count); break;
+        case 52: status = cbvh_scene_distance(s, out); break;
+        case 53: status = cbvh_scene_motion(s, instances, paths, below(3), options, out); break;
+        case 54: status = cbvh_scene_first_hits(s, in, n, out); break;
+        case 55: status = cbvh_scene_signed_distances(s, in, n, x, out); break;
+        case 56: status = cbvh_pose_then(in, more, out); break;
+        default:
+            /* Frees one, as every kind. */
+            status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;
+        }
+        CHECK(status >= CBVH_OK && status < CBVH_INTERNAL);
+        CHECK(status == CBVH_OK || *cbvh_last_message() != 0);
+        CHECK(status == CBVH_OK || made == 0);
+        statuses[status]++;
+        if (made != 0) {
+            /* The handle that was there is freed, unless it has been. */
+            const size_t place = below(KEPT);
+            free_any(kept[place]);
+            kept[place] = made;
+        }
+    }
+    /* The first ones still answer. */
+    bool answer;
+    OK(cbvh_querier_set_parallel(querier, 0));
+    OK(cbvh_collide(querier, mesh, other, &here, 1, &answer));
+    CHECK(!answer);
+    printf("random misuse: %d calls:", CALLS);
+    for (int status = 0; status < 12; status++) {
+        printf(" %zu", statuses[status]);
+    }
+    puts(" by status");
+    /* Both what is right and what is wrong was called often. */
+    CHECK(statuses[CBVH_OK] > CALLS / 10 && statuses[CBVH_INVALID_ARGUMENT] > CALLS / 10);
+    CHECK(statuses[CBVH_INVALID_HANDLE] > CALLS / 20 && statuses[CBVH_BUFFER_TOO_SMALL] > 0);
+    for (size_t place = 0; place < KEPT; place++) {
+        free_any(kept[place]);
+    }
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_path_free(path));
+    OK(cbvh_tracker_free(tracker));
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(other));
+    OK(cbvh_mesh_free(mesh));
+    return 0;
+}

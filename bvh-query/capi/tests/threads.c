@@ -1,0 +1,134 @@
+/* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh and a
+ * path may be freed while others use them. */
+#include "support.h"
+#include <pthread.h>
+
+#define THREADS 4
+#define POSES 400
+#define ROUNDS 20
+
+static cbvh_mesh mesh;
+static cbvh_pose poses[POSES];
+static cbvh_distance_answer expected[POSES];
+
+static void *ask(void *unused) {
+    cbvh_querier querier;
+    cbvh_distance_answer answers[POSES];
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    for (int round = 0; round < ROUNDS; round++) {
+        memset(answers, 0, sizeof answers);
+        OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, answers));
+        CHECK(memcmp(answers, expected, sizeof expected) == 0);
+        /* One after the other, and with handles that come and go. */
+        cbvh_mesh own;
+        OK(cbvh_mesh_clone(mesh, &own));
+        for (int k = 0; k < POSES; k++) {
+            OK(cbvh_distance(querier, own, mesh, &poses[k], 1, NULL, &answers[k]));
+        }
+        OK(cbvh_mesh_free(own));
+        CHECK(memcmp(answers, expected, sizeof expected) == 0);
+        FAILS(cbvh_distance(querier, own, mesh, poses, 1, NULL, answers), CBVH_INVALID_HANDLE, "a: ");
+    }
+    OK(cbvh_querier_free(querier));
+    return unused;
+}
+
+/* Waits inside a question until the other thread has tried what it must not. */
+static pthread_barrier_t barrier;
+static cbvh_querier shared;
+static cbvh_scene scene;
+static int calls;
+
+static int32_t waiting_pose(void *user, double t, cbvh_pose *pose) {
+    (void)user;
+    *pose = shift(3 + t, 0, 0);
+    if (calls++ == 0) {
+        pthread_barrier_wait(&barrier);
+        pthread_barrier_wait(&barrier);
+    }
+    return 0;
+}
+
+static double no_sagitta(void *user, double radius, double t0, double t1) {
+    (void)user, (void)radius, (void)t0, (void)t1;
+    return 1e-12;
+}
+
+static cbvh_path path;
+static cbvh_mesh temporary;
+
+static void *hold(void *unused) {
+    bool answer;
+    OK(cbvh_are_free(shared, temporary, mesh, &path, 1, NULL, &answer));
+    CHECK(answer);
+    return unused;
+}
+
+static void *hold_scene(void *instance) {
+    bool answer;
+    OK(cbvh_scene_is_free(scene, instance, &path, 1, NULL, &answer));
+    CHECK(answer);
+    return NULL;
+}
+
+int main(void) {
+    random_source source = {3};
+    mesh = cube(1);
+    cbvh_querier querier;
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    for (int k = 0; k < POSES; k++) {
+        poses[k] = random_pose(&source, 1.5);
+    }
+    OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, expected));
+    cbvh_distance_answer answers[POSES];
+    OK(cbvh_querier_set_parallel(querier, 1));
+    OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, answers));
+    CHECK(memcmp(answers, expected, sizeof expected) == 0);
+
+    pthread_t threads[THREADS];
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_create(&threads[k], NULL, ask, NULL) == 0);
+    }
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_join(threads[k], NULL) == 0);
+    }
+
+    CHECK(pthread_barrier_init(&barrier, NULL, 2) == 0);
+    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, &path));
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &shared));
+    OK(cbvh_mesh_clone(mesh, &temporary));
+    CHECK(pthread_create(&threads[0], NULL, hold, NULL) == 0);
+    pthread_barrier_wait(&barrier);
+    bool answer;
+    FAILS(cbvh_collide(shared, mesh, mesh, poses, 1, &answer), CBVH_BUSY,
+          "querier: expected a querier that nobody uses, found it in use");
+    FAILS(cbvh_querier_free(shared), CBVH_BUSY, "querier: ");
+    FAILS(cbvh_querier_set_budget(shared, 1), CBVH_BUSY, "querier: ");
+    /* The question goes on with what is freed meanwhile. */
+    OK(cbvh_mesh_free(temporary));
+    OK(cbvh_path_free(path));
+    pthread_barrier_wait(&barrier);
+    CHECK(pthread_join(threads[0], NULL) == 0);
+    OK(cbvh_collide(shared, mesh, mesh, poses, 1, &answer));
+    OK(cbvh_querier_free(shared));
+
+    calls = 0;
+    cbvh_instance instances[2];
+    const cbvh_pose here = CBVH_IDENTITY, there = shift(3, 0, 0);
+    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, &path));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, mesh, &here, NULL, &instances[0]));
+    OK(cbvh_scene_add(scene, mesh, &there, NULL, &instances[1]));
+    CHECK(pthread_create(&threads[0], NULL, hold_scene, &instances[1]) == 0);
+    pthread_barrier_wait(&barrier);
+    FAILS(cbvh_scene_collide(scene, &answer), CBVH_BUSY, "scene: ");
+    FAILS(cbvh_scene_free(scene), CBVH_BUSY, "scene: ");
+    pthread_barrier_wait(&barrier);
+    CHECK(pthread_join(threads[0], NULL) == 0);
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_path_free(path));
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(mesh));
+    puts("threads: the same bits, and no querier or scene for two");
+    return 0;
+}
