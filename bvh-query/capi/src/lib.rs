@@ -1,7 +1,7 @@
 //! The C interface of cbvh: what `include/cbvh.h` declares, function by function.
 //!
-//! The header documents every function for its users, and is written by hand; `tests/check_header.sh` compares it with
-//! what is here. Below the functions there are four ideas:
+//! The header documents every function for its users, and is written by hand; `tests/header.py` compares it with what
+//! is here. Below the functions there are four ideas:
 //!
 //! - `entry`: nothing unwinds out of a function; it returns a status, and a message stays with the thread.
 //! - `table`: a handle is a number, looked up in a table, so that a freed or foreign one is recognised and never
@@ -14,6 +14,8 @@ mod bake;
 mod entry;
 mod handles;
 mod input;
+#[cfg(test)]
+mod layout;
 mod mesh;
 mod motions;
 mod output;

@@ -5,7 +5,7 @@ use crate::handles::MESHES;
 use crate::input::{array, path, text};
 use crate::output::{self, List, One, Room};
 use crate::status::{Failure, Status};
-use crate::types::MeshHandle;
+use crate::types::{MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, READ};
 use bvh_query::{Bvh, OpenError, OwnedShape, ReadAhead};
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
@@ -38,10 +38,10 @@ pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *m
         // SAFETY: the header asks for it.
         let (out, file) = unsafe { (new_mesh("mesh", mesh)?, path("path", file)?) };
         let opened: Result<Bvh, OpenError> = match mode {
-            0 => Bvh::open_with(file, ReadAhead::Usual),
-            1 => Bvh::open_with(file, ReadAhead::Sparse),
-            2 => Bvh::open_with(file, ReadAhead::Whole),
-            3 => Bvh::read(file),
+            MAP => Bvh::open_with(file, ReadAhead::Usual),
+            MAP_SPARSE => Bvh::open_with(file, ReadAhead::Sparse),
+            MAP_WHOLE => Bvh::open_with(file, ReadAhead::Whole),
+            READ => Bvh::read(file),
             _ => return Err(Failure::argument("mode", "a number of cbvh_open_mode, 0 to 3", mode)),
         };
         hand_out(out, opened?.into())

@@ -1,7 +1,7 @@
 //! The structures and numbers that the header declares, and what they are made from.
 //!
-//! Structures have no bytes that are not part of a field, so that answers can be compared as bytes. A test compares
-//! sizes, offsets and numbers with those that a C compiler sees.
+//! Structures have no bytes that are not part of a field, so that answers can be compared as bytes.
+//! `tests/header.py` compares sizes, offsets and numbers with those that a C compiler sees.
 
 use crate::input::{Options, Plain};
 use crate::status::Failure;
@@ -209,7 +209,7 @@ pub struct ClosestRow {
 /// No instance: the answer is about one mesh, or there is none.
 const NO_INSTANCE: Instance = Instance { id: 0 };
 /// `CBVH_SIDE_NOT_ASKED`.
-const SIDE_NOT_ASKED: i32 = -1;
+pub(crate) const SIDE_NOT_ASKED: i32 = -1;
 
 impl ClosestRow {
     const NONE: Self = Self {
@@ -439,13 +439,25 @@ pub(crate) fn side(of: Side) -> i32 {
     }
 }
 
+/// The numbers of `cbvh_open_mode`.
+pub(crate) const MAP: i32 = 0;
+pub(crate) const MAP_SPARSE: i32 = 1;
+pub(crate) const MAP_WHOLE: i32 = 2;
+pub(crate) const READ: i32 = 3;
+
+/// The numbers of `cbvh_backend`.
+pub(crate) const BACKEND_BEST: i32 = 0;
+pub(crate) const BACKEND_SCALAR: i32 = 1;
+pub(crate) const BACKEND_AVX2: i32 = 2;
+pub(crate) const BACKEND_AVX512: i32 = 3;
+
 /// Reads `cbvh_backend`.
 pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
     let backend = match number {
-        0 => return Ok(Backend::detect().map_err(bvh_query::QueryError::from)?),
-        1 => Backend::Scalar,
-        2 => Backend::Avx2,
-        3 => Backend::Avx512,
+        BACKEND_BEST => return Ok(Backend::detect().map_err(bvh_query::QueryError::from)?),
+        BACKEND_SCALAR => Backend::Scalar,
+        BACKEND_AVX2 => Backend::Avx2,
+        BACKEND_AVX512 => Backend::Avx512,
         _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 3", number)),
     };
     Ok(Backend::from_name(backend.name()).map_err(bvh_query::QueryError::from)?)
