@@ -178,11 +178,13 @@ static void borrowed(void) {
 }
 
 /* A cube that moves along x, turning about it, by functions of the caller. */
-typedef struct { double from, to; int fails_after, code, breaks; cbvh_querier querier; } course;
+typedef struct { double from, to; int fails_after, code, breaks, has_failed, late_calls; cbvh_querier querier; } course;
 
 static int32_t course_pose(void *user, double t, cbvh_pose *pose) {
     course *of = user;
+    of->late_calls += of->has_failed;
     if (of->fails_after-- == 0) {
+        of->has_failed = 1;
         return of->code;
     }
     *pose = shift((1 - t) * of->from + t * of->to, 0, 0);
@@ -262,19 +264,24 @@ static void paths(void) {
             OK(cbvh_querier_set_parallel(querier, parallel));
             of.fails_after = fails_after;
             of.code = 7;
+            of.has_failed = 0;
             const cbvh_status status = cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, &answer);
             if (status != CBVH_OK) {
                 FAILS(status, CBVH_CALLBACK_FAILED, "found the code 7 of its function");
             } else {
                 CHECK(of.fails_after >= 0 && fails_after > 0);
             }
+            of.has_failed = 0;
             of.fails_after = fails_after;
             /* Left as it was: no pose. */
             of.code = 0;
             (void)cbvh_motions(querier, mesh, mesh, &own, 1, NULL, answers);
+            of.has_failed = 0;
         }
     }
     OK(cbvh_querier_set_parallel(querier, 0));
+    /* After its first failure a function is not called again: the question ends. */
+    CHECK(of.late_calls == 0);
     of.fails_after = -1;
     of.breaks = 1;
     FAILS(cbvh_are_free(querier, mesh, mesh, &own, 1, NULL, &answer), CBVH_CALLBACK_FAILED,

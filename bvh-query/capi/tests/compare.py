@@ -55,7 +55,7 @@ class Comparison:
         self.folder, self.questions, self.values = folder, 0, {}
 
     def bake(self, mesh, *options):
-        baked = self.folder / f"{mesh.stem}{'-'.join(options)}.cbvh"
+        baked = self.folder / f"{mesh.parent.name}-{mesh.stem}{'-'.join(options)}.cbvh"
         if not baked.exists():
             run(COMMAND, "bake", mesh, "-o", baked, "-q", *options)
         return baked
