@@ -193,12 +193,11 @@ def bundled(comparison):
 
 
 def shared(comparison):
-    """A few questions about each open pair, and about motions, probes and a scene."""
+    """All poses of each open pair in all modes, and questions about motions, probes and a scene."""
     for line in (SHARED / "poses" / "pairs.txt").read_text().splitlines():
         pair, *meshes = line.split()
-        for kind in ("d0pen", "d0.5", "d5", "overlap"):
-            poses = SHARED / "poses" / f"{pair}_{kind}.txt"
-            comparison.pairs([SHARED / "meshes" / mesh for mesh in meshes], poses, 3, 0.05)
+        for poses in sorted((SHARED / "poses").glob(f"{pair}_*.txt")):
+            comparison.pairs([SHARED / "meshes" / mesh for mesh in meshes], poses, 100, 0.05)
     for pair, *meshes in (("fcl", "fclenv", "fclrob"), ("bunny", "bunny", "bunny")):
         for kind in ("short", "slide", "spin", "long"):
             files = [SHARED / "meshes" / f"{mesh}.obj" for mesh in meshes]

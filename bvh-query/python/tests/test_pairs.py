@@ -122,7 +122,7 @@ class SameBits(unittest.TestCase):
             for pair, *meshes in pairs:
                 for poses in sorted((SHARED / "poses").glob(f"{pair}_*.txt")):
                     files = [SHARED / "meshes" / mesh for mesh in meshes]
-                    varied |= self.check(pathlib.Path(folder), files, poses, 3, 0.05)
+                    varied |= self.check(pathlib.Path(folder), files, poses, 100, 0.05)
         self.assertIn("distance", varied)
 
 
