@@ -1,50 +1,124 @@
-//! Answers as tuples of arrays, one element or row per question.
+//! Answers as Python has them: plain values after one question alone, arrays of one element or row each after N.
 //!
-//! Answers that may be missing have an array of bool in front; the other arrays hold NaN and 0 where there is none.
+//! An answer of several parts is a tuple. Answers that may be missing have a bool in front; the other parts are NaN and 0
+//! where there is none.
 
-use crate::arrays::{array, table};
-use bvh_query::{ClosestPoint, Contact, Distance, MotionAnswer, RayHit};
-use numpy::{PyArray1, PyArray2};
+use bvh_query::{ClosestPoint, Contact, Distance, MotionAnswer, Pose, RayHit};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 
-type Numbers<'py> = Bound<'py, PyArray1<f64>>;
-type Points<'py> = Bound<'py, PyArray2<f64>>;
-type Ids<'py> = Bound<'py, PyArray1<u32>>;
+/// Makes answers to one question alone, or to N.
+#[derive(Clone, Copy)]
+pub(crate) struct Answers<'py> {
+    pub(crate) py: Python<'py>,
+    pub(crate) one: bool,
+}
+
+impl<'py> Answers<'py> {
+    /// A value, or an array of shape (N,).
+    pub(crate) fn values<T: Element + IntoPyObject<'py>>(
+        self,
+        mut of: impl Iterator<Item = T>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if self.one
+            && let Some(value) = of.next()
+        {
+            return value.into_bound_py_any(self.py);
+        }
+        Ok(array(self.py, of).into_any())
+    }
+
+    /// An array of shape (K,) or (N, K).
+    pub(crate) fn rows<T: Element, const K: usize>(
+        self,
+        mut of: impl Iterator<Item = [T; K]>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if self.one
+            && let Some(row) = of.next()
+        {
+            return Ok(PyArray1::from_slice(self.py, &row).into_any());
+        }
+        Ok(table(self.py, of)?.into_any())
+    }
+
+    /// Poses of shape (4, 4) or (N, 4, 4).
+    pub(crate) fn poses(self, of: &[Pose]) -> PyResult<Bound<'py, PyAny>> {
+        let flat: Vec<f64> = of.iter().flat_map(matrix).collect();
+        let flat = PyArray1::from_vec(self.py, flat);
+        let shaped = if self.one {
+            flat.reshape([4, 4])?.into_any()
+        } else {
+            flat.reshape([of.len(), 4, 4])?.into_any()
+        };
+        Ok(shaped)
+    }
+
+    /// What `make` makes of the rows that each question found, or a list of that.
+    pub(crate) fn lists<T>(
+        self,
+        of: &[Vec<T>],
+        make: impl Fn(&[T]) -> PyResult<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if self.one
+            && let Some(rows) = of.first()
+        {
+            return make(rows);
+        }
+        let lists = of.iter().map(|rows| make(rows)).collect::<PyResult<Vec<_>>>()?;
+        Ok(PyList::new(self.py, lists)?.into_any())
+    }
+}
+
+/// An array of shape (N,).
+pub(crate) fn array<T: Element>(py: Python<'_>, of: impl Iterator<Item = T>) -> Bound<'_, PyArray1<T>> {
+    PyArray1::from_vec(py, of.collect())
+}
+
+/// An array of shape (N, K).
+pub(crate) fn table<T: Element, const K: usize>(
+    py: Python<'_>,
+    of: impl Iterator<Item = [T; K]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let flat: Vec<T> = of.flatten().collect();
+    let rows = flat.len() / K;
+    PyArray1::from_vec(py, flat).reshape([rows, K])
+}
+
+fn matrix(pose: &Pose) -> [f64; 16] {
+    let (r, t) = (pose.rotation(), pose.translation());
+    let row = |k: usize| [r[k][0], r[k][1], r[k][2], t[k]];
+    let mut matrix = [0.0; 16];
+    for k in 0..3 {
+        matrix[4 * k..4 * k + 4].copy_from_slice(&row(k));
+    }
+    matrix[15] = 1.0;
+    matrix
+}
 
 /// Distance, lower and upper bound, points of A and B, object and triangle of A, and of B.
-pub(crate) type Distances<'py> = (
-    Numbers<'py>,
-    Numbers<'py>,
-    Numbers<'py>,
-    Points<'py>,
-    Points<'py>,
-    Ids<'py>,
-    Ids<'py>,
-    Ids<'py>,
-    Ids<'py>,
-);
-
 pub(crate) fn distances<'py>(
-    py: Python<'py>,
+    to: Answers<'py>,
     of: impl Iterator<Item = Option<Distance>> + Clone,
-) -> PyResult<Distances<'py>> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let numbers =
-        |of_one: fn(Distance) -> f64| array(py, of.clone().map(|answer| answer.map_or(f64::NAN, of_one)));
-    let points = |of_one: fn(Distance) -> [f64; 3]| {
-        table(py, of.clone().map(|answer| answer.map_or([f64::NAN; 3], of_one)))
-    };
-    let ids = |of_one: fn(Distance) -> u32| array(py, of.clone().map(|answer| answer.map_or(0, of_one)));
-    Ok((
-        numbers(|answer| answer.distance),
-        numbers(|answer| answer.lower),
-        numbers(|answer| answer.upper),
+        |part: fn(Distance) -> f64| to.values(of.clone().map(|answer| answer.map_or(f64::NAN, part)));
+    let points =
+        |part: fn(Distance) -> [f64; 3]| to.rows(of.clone().map(|answer| answer.map_or([f64::NAN; 3], part)));
+    let ids = |part: fn(Distance) -> u32| to.values(of.clone().map(|answer| answer.map_or(0, part)));
+    (
+        numbers(|answer| answer.distance)?,
+        numbers(|answer| answer.lower)?,
+        numbers(|answer| answer.upper)?,
         points(|answer| answer.point_a)?,
         points(|answer| answer.point_b)?,
-        ids(|answer| answer.object_a),
-        ids(|answer| answer.triangle_a),
-        ids(|answer| answer.object_b),
-        ids(|answer| answer.triangle_b),
-    ))
+        ids(|answer| answer.object_a)?,
+        ids(|answer| answer.triangle_a)?,
+        ids(|answer| answer.object_b)?,
+        ids(|answer| answer.triangle_b)?,
+    )
+        .into_pyobject(to.py)
 }
 
 /// The numbers of the kinds of answers about motions.
@@ -53,9 +127,7 @@ pub(crate) const HIT: u8 = 1;
 pub(crate) const NEAR: u8 = 2;
 
 /// Kind, time until which the way is free, time of the contact or of the first undecided pose, and the distance there.
-pub(crate) type Motions<'py> = (Bound<'py, PyArray1<u8>>, Numbers<'py>, Numbers<'py>, Distances<'py>);
-
-pub(crate) fn motions<'py>(py: Python<'py>, of: &[MotionAnswer]) -> PyResult<Motions<'py>> {
+pub(crate) fn motions<'py>(to: Answers<'py>, of: &[MotionAnswer]) -> PyResult<Bound<'py, PyTuple>> {
     let rows: Vec<_> = of
         .iter()
         .map(|answer| match *answer {
@@ -66,37 +138,13 @@ pub(crate) fn motions<'py>(py: Python<'py>, of: &[MotionAnswer]) -> PyResult<Mot
             MotionAnswer::Near { free_until, at, distance } => (NEAR, free_until, at, Some(distance)),
         })
         .collect();
-    Ok((
-        array(py, rows.iter().map(|row| row.0)),
-        array(py, rows.iter().map(|row| row.1)),
-        array(py, rows.iter().map(|row| row.2)),
-        distances(py, rows.iter().map(|row| row.3))?,
-    ))
-}
-
-/// Where the rows of each question start, and the rows of all.
-pub(crate) type Lists<'py, T> = (Bound<'py, PyArray1<i64>>, T);
-
-pub(crate) fn starts<'py>(
-    py: Python<'py>,
-    lengths: impl Iterator<Item = usize>,
-) -> Bound<'py, PyArray1<i64>> {
-    let mut end = 0;
-    array(
-        py,
-        std::iter::once(0).chain(lengths.map(|length| {
-            end += length as i64;
-            end
-        })),
+    (
+        to.values(rows.iter().map(|row| row.0))?,
+        to.values(rows.iter().map(|row| row.1))?,
+        to.values(rows.iter().map(|row| row.2))?,
+        distances(to, rows.iter().map(|row| row.3))?,
     )
-}
-
-/// Rows of object and triangle of A, and of B.
-pub(crate) fn contacts<'py>(
-    py: Python<'py>,
-    of: &[Vec<Contact>],
-) -> PyResult<Lists<'py, Bound<'py, PyArray2<u32>>>> {
-    Ok((starts(py, of.iter().map(Vec::len)), table(py, of.iter().flatten().map(triangles))?))
+        .into_pyobject(to.py)
 }
 
 /// Object and triangle of A, and of B.
@@ -104,35 +152,37 @@ pub(crate) fn triangles(contact: &Contact) -> [u32; 4] {
     [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b]
 }
 
-/// Whether there is an answer; distance or parameter, its lower and upper bound, point, object and triangle.
-pub(crate) type Found<'py> =
-    (Bound<'py, PyArray1<bool>>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Points<'py>, Ids<'py>, Ids<'py>);
-
 /// Distance or parameter with its bounds, point, object and triangle of one answer.
 type Row = ([f64; 3], [f64; 3], u32, u32);
 
+/// Whether there is one, distance, its lower and upper bound, point, object and triangle.
 pub(crate) fn closest<'py>(
-    py: Python<'py>,
+    to: Answers<'py>,
     of: impl Iterator<Item = Option<ClosestPoint>>,
-) -> PyResult<Found<'py>> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let row = |c: ClosestPoint| ([c.distance, c.lower, c.upper], c.point, c.object, c.triangle);
-    found(py, of.map(|answer| answer.map(row)).collect())
+    found(to, of.map(|answer| answer.map(row)).collect())
 }
 
-pub(crate) fn hits<'py>(py: Python<'py>, of: impl Iterator<Item = Option<RayHit>>) -> PyResult<Found<'py>> {
+/// Whether there is one, parameter, its lower and upper bound, point, object and triangle.
+pub(crate) fn hits<'py>(
+    to: Answers<'py>,
+    of: impl Iterator<Item = Option<RayHit>>,
+) -> PyResult<Bound<'py, PyTuple>> {
     let row = |hit: RayHit| ([hit.t, hit.lower, hit.upper], hit.point, hit.object, hit.triangle);
-    found(py, of.map(|answer| answer.map(row)).collect())
+    found(to, of.map(|answer| answer.map(row)).collect())
 }
 
-fn found(py: Python<'_>, of: Vec<Option<Row>>) -> PyResult<Found<'_>> {
+fn found<'py>(to: Answers<'py>, of: Vec<Option<Row>>) -> PyResult<Bound<'py, PyTuple>> {
     let rows = || of.iter().map(|row| row.unwrap_or(([f64::NAN; 3], [f64::NAN; 3], 0, 0)));
-    Ok((
-        array(py, of.iter().map(Option::is_some)),
-        array(py, rows().map(|row| row.0[0])),
-        array(py, rows().map(|row| row.0[1])),
-        array(py, rows().map(|row| row.0[2])),
-        table(py, rows().map(|row| row.1))?,
-        array(py, rows().map(|row| row.2)),
-        array(py, rows().map(|row| row.3)),
-    ))
+    (
+        to.values(of.iter().map(Option::is_some))?,
+        to.values(rows().map(|row| row.0[0]))?,
+        to.values(rows().map(|row| row.0[1]))?,
+        to.values(rows().map(|row| row.0[2]))?,
+        to.rows(rows().map(|row| row.1))?,
+        to.values(rows().map(|row| row.2))?,
+        to.values(rows().map(|row| row.3))?,
+    )
+        .into_pyobject(to.py)
 }

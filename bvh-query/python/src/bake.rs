@@ -1,11 +1,11 @@
 //! Bakes meshes: arrays into memory, and files into files of any size.
 
-use crate::arrays::rows;
+use crate::arrays::{rows, shape_error};
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
 use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
 use bvh_query::Bvh;
-use numpy::PyReadonlyArray2;
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -52,12 +52,14 @@ impl BakeOptions {
 #[pyfunction]
 pub(crate) fn bake(
     py: Python<'_>,
-    vertices: PyReadonlyArray2<'_, f64>,
+    vertices: &Bound<'_, PyAny>,
     faces: PyReadonlyArray2<'_, u32>,
     options: BakeOptions,
 ) -> PyResult<Mesh> {
     let options = options.read()?;
-    let mesh = bvh_bake::mesh::Mesh::from_triangles(rows(&vertices, "vertices")?, rows(&faces, "faces")?);
+    let [_, 3] = *faces.shape() else { return Err(shape_error("faces", "(F, 3)", faces.shape())) };
+    let faces = faces.as_slice()?.as_chunks::<3>().0.to_vec();
+    let mesh = bvh_bake::mesh::Mesh::from_triangles(rows(vertices, "vertices")?.rows, faces);
     let (bytes, _) = py.detach(|| to_bytes(&mesh, &options)).map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))

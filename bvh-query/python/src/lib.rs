@@ -1,7 +1,7 @@
 //! The compiled part of the Python module `cbvh`: meshes, and questions about them, with arrays in and arrays out.
 //!
-//! What users see is in `python/cbvh/__init__.py`: it checks shapes, names results and documents them. This module takes
-//! arrays of exactly the shapes stated here, and lets other threads of Python run while it works.
+//! What users see is in `python/cbvh/__init__.py`: it names results and documents questions. This module reads what callers
+//! give, and lets other threads of Python run while it works.
 
 mod answers;
 mod arrays;
@@ -28,14 +28,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
     }
     functions![bake::bake, bake::bake_files];
-    functions![
-        pairs::collide,
-        pairs::within,
-        pairs::relation,
-        pairs::distance,
-        pairs::distance_with,
-        pairs::contacts
-    ];
+    functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
     functions![poses::poses_of, poses::relative_poses];
     functions![

@@ -1,6 +1,6 @@
 //! A mesh in a `.cbvh` file, mapped or in memory: what Python code holds.
 
-use crate::arrays::table;
+use crate::answers::table;
 use crate::errors::{FormatError, open_error};
 use bvh_query::{Bvh, Object, OwnedShape};
 use numpy::PyArray2;

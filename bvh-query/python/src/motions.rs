@@ -1,14 +1,13 @@
 //! Questions about the way of one mesh past another.
 
-use crate::answers::{self, Motions};
-use crate::arrays::array;
+use crate::answers::{self, Answers};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
 use crate::pairs::with_querier;
 use crate::paths::{AnyPath, until_raised};
 use bvh_query::{Batch, MotionOptions, Querier, QueryError};
-use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 /// Why a question about paths has no answer.
 enum Ended {
@@ -52,36 +51,38 @@ fn ask<T: Send>(
     asked.map_err(|ended: Ended| ended.into())
 }
 
+/// `paths` is a list, and whether it is one path alone.
 #[pyfunction]
 pub(crate) fn motion<'py>(
     py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    paths: Vec<Bound<'py, PyAny>>,
+    paths: (Vec<Bound<'py, PyAny>>, bool),
     clearance: f64,
     tolerance: Option<f64>,
     parallel: bool,
-) -> PyResult<Motions<'py>> {
-    let (a, b, paths) = (a.shape().shape(), b.shape().shape(), AnyPath::read(paths));
+) -> PyResult<Bound<'py, PyTuple>> {
+    let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
     let batch = || Batch::new(a, b)?.motion(&paths, &options);
     let found = ask(py, &paths, parallel, batch, |querier, path| querier.motion(a, b, path, &options))?;
-    answers::motions(py, &found)
+    answers::motions(Answers { py, one }, &found)
 }
 
+/// `paths` is a list, and whether it is one path alone.
 #[pyfunction]
 pub(crate) fn is_free<'py>(
     py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    paths: Vec<Bound<'py, PyAny>>,
+    paths: (Vec<Bound<'py, PyAny>>, bool),
     clearance: f64,
     tolerance: Option<f64>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let (a, b, paths) = (a.shape().shape(), b.shape().shape(), AnyPath::read(paths));
+) -> PyResult<Bound<'py, PyAny>> {
+    let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
     let batch = || Batch::new(a, b)?.is_free(&paths, &options);
     let found = ask(py, &paths, parallel, batch, |querier, path| querier.is_free(a, b, path, &options))?;
-    Ok(array(py, found.into_iter()))
+    Answers { py, one }.values(found.into_iter())
 }

@@ -1,23 +1,25 @@
 //! Questions about two meshes in many poses.
 
-use crate::answers::{self, Distances, Lists};
-use crate::arrays::{array, poses};
+use crate::answers::{self, Answers, table};
+use crate::arrays::{self, Rows};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
-use bvh_query::{Batch, DistanceOptions, Pose, Querier, QueryError, Shape};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray3};
+use bvh_query::{Batch, Contact, DistanceOptions, Pose, Querier, QueryError, Shape};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::sync::Mutex;
 
-/// Queriers that are not in use. Their memory is that of the largest questions so far.
-static QUERIERS: Mutex<Vec<Querier>> = Mutex::new(Vec::new());
+/// Queriers that are not in use. Their memory is that of the largest questions so far. To move one takes longer than a short
+/// question, so they stay where they are.
+static QUERIERS: Mutex<Vec<Box<Querier>>> = Mutex::new(Vec::new());
 
 /// Calls `ask` with a querier that no other thread has.
 pub(crate) fn with_querier<T, E: From<QueryError>>(
     ask: impl FnOnce(&mut Querier) -> Result<T, E>,
 ) -> Result<T, E> {
     let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
-    let mut querier = kept.map_or_else(Querier::new, Ok)?;
+    let mut querier = kept.map_or_else(|| Querier::new().map(Box::new), Ok)?;
     let answer = ask(&mut querier);
     // After an error, which is rare, a querier may be in the middle of a question.
     if answer.is_ok()
@@ -29,119 +31,115 @@ pub(crate) fn with_querier<T, E: From<QueryError>>(
 }
 
 /// A pair of meshes, and the poses of the second in the frame of the first.
-struct Question<'a> {
+struct Question<'py, 'a> {
+    py: Python<'py>,
     a: Shape<'a>,
     b: Shape<'a>,
-    poses: Vec<Pose>,
+    poses: Rows<Pose>,
     parallel: bool,
 }
 
-impl<'a> Question<'a> {
-    fn new(a: &'a Mesh, b: &'a Mesh, array: &PyReadonlyArray3<'_, f64>, parallel: bool) -> PyResult<Self> {
-        Ok(Self { a: a.shape().shape(), b: b.shape().shape(), poses: poses(array, "poses")?, parallel })
+impl<'py, 'a> Question<'py, 'a> {
+    fn new(a: &'a Mesh, b: &'a Mesh, poses: &Bound<'py, PyAny>, parallel: bool) -> PyResult<Self> {
+        let (a, b) = (a.shape().shape(), b.shape().shape());
+        Ok(Self { py: poses.py(), a, b, poses: arrays::poses(poses, "poses")?, parallel })
     }
 
     /// Asks about all poses, on all cores or one after the other, without Python's lock.
     fn ask<T: Send>(
         &self,
-        py: Python<'_>,
         batch: impl Fn(&Batch<'_>, &[Pose]) -> Result<Vec<T>, QueryError> + Send + Sync,
         one: impl Fn(&mut Querier, Shape<'_>, Shape<'_>, &Pose) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
-        let Self { a, b, ref poses, parallel } = *self;
-        py.detach(|| {
+        let (a, b, poses, parallel) = (self.a, self.b, &self.poses.rows, self.parallel);
+        let ask = || {
             if parallel {
                 return batch(&Batch::new(a, b)?, poses);
             }
             with_querier(|querier| poses.iter().map(|pose| one(querier, a, b, pose)).collect())
-        })
-        .map_err(query_error)
+        };
+        self.py.detach(ask).map_err(query_error)
+    }
+
+    fn answers(&self) -> Answers<'py> {
+        Answers { py: self.py, one: self.poses.one }
     }
 }
 
 #[pyfunction]
 pub(crate) fn collide<'py>(
-    py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
+    poses: &Bound<'py, PyAny>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let question = Question::new(a, b, &poses, parallel)?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.collide(a, b, pose);
-    Ok(array(py, question.ask(py, |batch, poses| batch.collide(poses), one)?.into_iter()))
+    let found = question.ask(|batch, poses| batch.collide(poses), one)?;
+    question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
 pub(crate) fn within<'py>(
-    py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
+    poses: &Bound<'py, PyAny>,
     d: f64,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let question = Question::new(a, b, &poses, parallel)?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.within(a, b, pose, d);
-    Ok(array(py, question.ask(py, |batch, poses| batch.within(poses, d), one)?.into_iter()))
+    let found = question.ask(|batch, poses| batch.within(poses, d), one)?;
+    question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
 pub(crate) fn relation<'py>(
-    py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
+    poses: &Bound<'py, PyAny>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<u8>>> {
-    let question = Question::new(a, b, &poses, parallel)?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.relation(a, b, pose);
-    let answers = question.ask(py, |batch, poses| batch.relation(poses), one)?;
-    Ok(array(py, answers.into_iter().map(|relation| relation as u8)))
+    let found = question.ask(|batch, poses| batch.relation(poses), one)?;
+    question.answers().values(found.into_iter().map(|relation| relation as u8))
 }
 
+/// Allowed errors cannot be combined with all cores.
 #[pyfunction]
 pub(crate) fn distance<'py>(
-    py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
-    parallel: bool,
-) -> PyResult<Distances<'py>> {
-    let question = Question::new(a, b, &poses, parallel)?;
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.distance(a, b, pose);
-    let found = question.ask(py, |batch, poses| batch.distance(poses), one)?;
-    answers::distances(py, found.iter().copied().map(Some))
-}
-
-#[pyfunction]
-pub(crate) fn distance_with<'py>(
-    py: Python<'py>,
-    a: &Mesh,
-    b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
+    poses: &Bound<'py, PyAny>,
     rel_err: f64,
     abs_err: f64,
-) -> PyResult<Distances<'py>> {
-    let question = Question::new(a, b, &poses, false)?;
+    parallel: bool,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(a, b, poses, parallel)?;
     let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
+    let exact = rel_err == 0.0 && abs_err == 0.0;
+    if parallel && !exact {
+        return Err(PyValueError::new_err("parallel: expected False with rel_err or abs_err, found True"));
+    }
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| {
-        querier.distance_with(a, b, pose, &options)
+        if exact { querier.distance(a, b, pose) } else { querier.distance_with(a, b, pose, &options) }
     };
-    // Only a querier takes allowed errors.
-    let found = question.ask(py, |_, _| Ok(Vec::new()), one)?;
-    answers::distances(py, found.iter().copied().map(Some))
+    let found = question.ask(|batch, poses| batch.distance(poses), one)?;
+    answers::distances(question.answers(), found.iter().copied().map(Some))
 }
 
 #[pyfunction]
 pub(crate) fn contacts<'py>(
-    py: Python<'py>,
     a: &Mesh,
     b: &Mesh,
-    poses: PyReadonlyArray3<'py, f64>,
+    poses: &Bound<'py, PyAny>,
     parallel: bool,
-) -> PyResult<Lists<'py, Bound<'py, PyArray2<u32>>>> {
-    let question = Question::new(a, b, &poses, parallel)?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.contacts(a, b, pose);
-    answers::contacts(py, &question.ask(py, |batch, poses| batch.contacts(poses), one)?)
+    let found = question.ask(|batch, poses| batch.contacts(poses), one)?;
+    let py = question.py;
+    let triangles = |rows: &[Contact]| Ok(table(py, rows.iter().map(answers::triangles))?.into_any());
+    question.answers().lists(&found, triangles)
 }

@@ -1,10 +1,11 @@
 //! Paths: the library's own motions and polylines, and paths that Python code answers for.
 
-use crate::arrays::{array, one_pose, pose_rows, poses};
+use crate::answers::Answers;
+use crate::arrays::{many_poses, numbers, pose, poses, shape_error};
 use crate::errors::path_error;
 use bvh_query::{Motion, Path, Polyline, Pose};
-use numpy::{PyArray1, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use numpy::PyUntypedArrayMethods;
+use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -27,76 +28,95 @@ impl Own {
     }
 }
 
-/// Many paths of the library.
+/// Paths of the library: one alone, or many.
 #[pyclass(frozen, module = "cbvh._cbvh")]
-pub(crate) struct Paths(Vec<Own>);
+pub(crate) struct Paths {
+    paths: Vec<Own>,
+    one: bool,
+}
+
+impl Paths {
+    fn of(path: Own) -> Self {
+        Self { paths: vec![path], one: true }
+    }
+}
 
 #[pymethods]
 impl Paths {
-    /// Motions between as many starts as ends.
+    /// Motions between starts and ends of shape (4, 4) or (N, 4, 4).
     #[staticmethod]
-    fn between(starts: PyReadonlyArray3<'_, f64>, ends: PyReadonlyArray3<'_, f64>) -> PyResult<Self> {
-        let (starts, ends) = (poses(&starts, "start")?, poses(&ends, "end")?);
-        if starts.len() != ends.len() {
-            let found = format!("end: expected {} poses as for start, found {}", starts.len(), ends.len());
-            return Err(PyValueError::new_err(found));
-        }
-        let numbered = starts.iter().zip(&ends).enumerate();
-        let motion = |(number, (start, end)): (usize, (&Pose, &Pose))| {
-            let place = || format!("start[{number}] and end[{number}]");
-            Motion::between(start, end).map(Own::Motion).map_err(|error| path_error(&place(), &error))
-        };
-        Ok(Self(numbered.map(motion).collect::<PyResult<_>>()?))
+    fn between(start: &Bound<'_, PyAny>, end: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let made =
+            poses(start, "start")?.with("start", (&poses(end, "end")?, "end"), |start, end, place| {
+                Motion::between(start, end).map(Own::Motion).map_err(|error| path_error(&place(), &error))
+            })?;
+        Ok(Self { paths: made.rows, one: made.one })
     }
 
     /// A screw motion.
     #[staticmethod]
     fn screw(
-        start: PyReadonlyArray2<'_, f64>,
-        point: [f64; 3],
-        direction: [f64; 3],
+        start: &Bound<'_, PyAny>,
+        point: &Bound<'_, PyAny>,
+        direction: &Bound<'_, PyAny>,
         angle: f64,
         shift: f64,
     ) -> PyResult<Self> {
-        let start = one_pose(&start, "start")?;
+        let start = pose(start, "start")?;
+        let (point, direction) = (vector(point, "point")?, vector(direction, "direction")?);
         let motion = Motion::screw(&start, point, direction, angle, shift);
-        motion.map(|motion| Self(vec![Own::Motion(motion)])).map_err(|error| path_error("screw", &error))
+        motion.map(|motion| Self::of(Own::Motion(motion))).map_err(|error| path_error("screw", &error))
     }
 
     /// A path through poses.
     #[staticmethod]
-    fn through(knots: PyReadonlyArray3<'_, f64>) -> PyResult<Self> {
-        let polyline =
-            Polyline::new(&poses(&knots, "poses")?).map_err(|error| path_error("poses", &error))?;
-        Ok(Self(vec![Own::Polyline(Arc::new(polyline))]))
+    fn through(knots: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let knots = many_poses(knots, "poses", " with N of at least 2")?;
+        let polyline = Polyline::new(&knots).map_err(|error| path_error("poses", &error))?;
+        Ok(Self::of(Own::Polyline(Arc::new(polyline))))
+    }
+
+    /// Whether this is one path alone.
+    fn is_one(&self) -> bool {
+        self.one
     }
 
     /// How many paths there are.
     fn count(&self) -> usize {
-        self.0.len()
+        self.paths.len()
     }
 
     /// One of the paths.
-    fn one(&self, number: usize) -> PyResult<Self> {
-        let found = || format!("motion: expected a number below {}, found {number}", self.0.len());
-        Ok(Self(vec![self.0.get(number).ok_or_else(|| PyIndexError::new_err(found()))?.clone()]))
+    fn path(&self, number: usize) -> PyResult<Self> {
+        let found = || format!("motion: expected a number below {}, found {number}", self.paths.len());
+        let path = self.paths.get(number).ok_or_else(|| PyIndexError::new_err(found()))?;
+        Ok(Self::of(path.clone()))
     }
 
-    /// The poses of each path at each time: a row for each path and time.
-    fn poses<'py>(
-        &self,
-        py: Python<'py>,
-        times: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    /// The poses of each path at each time, of shape () or (T,): shape (N * T, 4, 4).
+    fn poses<'py>(&self, t: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let times = numbers(t, "t")?;
+        if times.ndim() > 1 {
+            return Err(shape_error("t", "() or (T,)", times.shape()));
+        }
         let times = times.as_slice()?;
         let of = |path: &Own| times.iter().map(|&t| path.path().pose(t)).collect::<Vec<_>>();
-        pose_rows(py, self.0.iter().flat_map(of))
+        let found: Vec<Pose> = self.paths.iter().flat_map(of).collect();
+        Answers { py: t.py(), one: false }.poses(&found)
     }
 
     /// The sagitta of each path.
-    fn sagittas<'py>(&self, py: Python<'py>, radius: f64, t0: f64, t1: f64) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.0.iter().map(|path| path.path().sagitta(radius, t0, t1)))
+    fn sagittas<'py>(&self, py: Python<'py>, radius: f64, t0: f64, t1: f64) -> PyResult<Bound<'py, PyAny>> {
+        let of = |path: &Own| path.path().sagitta(radius, t0, t1);
+        Answers { py, one: self.one }.values(self.paths.iter().map(of))
     }
+}
+
+/// Reads an array of shape (3,).
+fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
+    let array = numbers(value, name)?;
+    let vector = array.as_slice()?.first_chunk().filter(|_| array.shape() == [3]);
+    vector.copied().ok_or_else(|| shape_error(name, "(3,)", array.shape()))
 }
 
 /// How many poses of a path of Python code are kept, since questions ask for the ends of an interval again and again.
@@ -133,14 +153,27 @@ impl Called {
 
     fn ask_pose(&self, t: f64) -> PyResult<Pose> {
         Python::attach(|py| {
-            let found = self.object.bind(py).call_method1("pose", (t,))?;
-            let found: PyReadonlyArray2<'_, f64> = found.extract()?;
-            one_pose(&found, &format!("path.pose({t:?})"))
+            pose(&self.object.bind(py).call_method1("pose", (t,))?, &format!("path.pose({t:?})"))
         })
     }
 
     fn ask_sagitta(&self, radius: f64, t0: f64, t1: f64) -> PyResult<f64> {
-        Python::attach(|py| self.object.bind(py).call_method1("sagitta", (radius, t0, t1))?.extract())
+        Python::attach(|py| {
+            let found = self.object.bind(py).call_method1("sagitta", (radius, t0, t1))?;
+            let place = || format!("path.sagitta({radius:?}, {t0:?}, {t1:?})");
+            let length: f64 = match found.extract() {
+                Ok(length) => length,
+                Err(_) => {
+                    let message = format!("{}: expected a number, found {}", place(), found.repr()?);
+                    return Err(PyTypeError::new_err(message));
+                }
+            };
+            if length >= 0.0 {
+                return Ok(length);
+            }
+            let message = format!("{}: expected a length of at least 0, found {length:?}", place());
+            Err(PyValueError::new_err(message))
+        })
     }
 
     /// Ends the question.
@@ -188,7 +221,7 @@ impl AnyPath {
         let mut paths = Vec::new();
         for item in list {
             match item.cast::<Paths>() {
-                Ok(own) => paths.extend(own.get().0.iter().cloned().map(Self::Own)),
+                Ok(own) => paths.extend(own.get().paths.iter().cloned().map(Self::Own)),
                 Err(_) => paths.push(Self::Called(Called::new(item.unbind()))),
             }
         }

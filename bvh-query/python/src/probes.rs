@@ -1,192 +1,180 @@
 //! Questions about one mesh and many points, rays or segments.
 
-use crate::answers::{self, Found, Lists, starts};
-use crate::arrays::{array, one_pose, rows};
+use crate::answers::{self, Answers};
+use crate::arrays::{Rows, numbers, pose_or_identity, rows, shape_error};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
 use crate::pairs::with_querier;
-use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray};
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, RayHit};
+use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-/// A mesh, where it stands in the frame of the probes, and whether all cores work.
-struct Place {
+/// A mesh, where it stands in the frame of the probes, and the probes.
+struct Question<'py, 'a, P> {
+    py: Python<'py>,
+    mesh: &'a Mesh,
     pose: Pose,
+    probes: Rows<P>,
     parallel: bool,
 }
 
-impl Place {
-    fn new(pose: &PyReadonlyArray2<'_, f64>, parallel: bool) -> PyResult<Self> {
-        Ok(Self { pose: one_pose(pose, "pose")?, parallel })
+impl<'py, 'a, P: Sync> Question<'py, 'a, P> {
+    fn new(
+        py: Python<'py>,
+        mesh: &'a Mesh,
+        probes: Rows<P>,
+        pose: Option<&Bound<'py, PyAny>>,
+        parallel: bool,
+    ) -> PyResult<Self> {
+        Ok(Self { py, mesh, pose: pose_or_identity(pose, "pose")?, probes, parallel })
     }
 
     /// Asks about all probes, on all cores or one after the other, without Python's lock.
-    fn ask<P: Sync, T: Send>(
+    fn ask<T: Send>(
         &self,
-        py: Python<'_>,
-        (mesh, probes): (&Mesh, &[P]),
-        batch: impl Fn(&ProbeBatch<'_>) -> Result<Vec<T>, QueryError> + Send + Sync,
+        batch: impl Fn(&ProbeBatch<'_>, &[P]) -> Result<Vec<T>, QueryError> + Send + Sync,
         one: impl Fn(&mut Querier, PlacedShape<'_>, &P) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
-        let placed = mesh.shape().shape().at(&self.pose);
-        let parallel = self.parallel;
-        py.detach(|| {
+        let placed = self.mesh.shape().shape().at(&self.pose);
+        let (probes, parallel) = (&self.probes.rows, self.parallel);
+        let ask = || {
             if parallel {
-                return batch(&ProbeBatch::new(placed)?);
+                return batch(&ProbeBatch::new(placed)?, probes);
             }
             with_querier(|querier| probes.iter().map(|probe| one(querier, placed, probe)).collect())
-        })
-        .map_err(query_error)
+        };
+        self.py.detach(ask).map_err(query_error)
+    }
+
+    fn answers(&self) -> Answers<'py> {
+        Answers { py: self.py, one: self.probes.one }
     }
 }
 
 #[pyfunction]
 pub(crate) fn closest_points<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    points: PyReadonlyArray2<'py, f64>,
+    points: &Bound<'py, PyAny>,
     within: f64,
-    pose: PyReadonlyArray2<'py, f64>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Found<'py>> {
-    let points = rows(&points, "points")?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &points),
-        |batch| batch.closest_points(&points, within),
+) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(points.py(), mesh, rows(points, "points")?, pose, parallel)?;
+    let found = question.ask(
+        |batch, points| batch.closest_points(points, within),
         |querier, shape, &point| querier.closest_point(shape, point, within),
     )?;
-    answers::closest(py, found.iter().copied())
+    answers::closest(question.answers(), found.into_iter())
 }
 
 #[pyfunction]
 pub(crate) fn sides<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    points: PyReadonlyArray2<'py, f64>,
-    pose: PyReadonlyArray2<'py, f64>,
+    points: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<u8>>> {
-    let points = rows(&points, "points")?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &points),
-        |batch| batch.sides(&points),
-        |querier, shape, &point| querier.side(shape, point),
-    )?;
-    Ok(array(py, found.into_iter().map(|side| side as u8)))
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(points.py(), mesh, rows(points, "points")?, pose, parallel)?;
+    let found = question
+        .ask(|batch, points| batch.sides(points), |querier, shape, &point| querier.side(shape, point))?;
+    question.answers().values(found.into_iter().map(|side| side as u8))
 }
 
-/// Reads rays: origins and directions of shape (N, 3), and the greatest parameter of each of shape (N,).
+/// Reads rays: origins and directions of shape (3,) or (N, 3), and their greatest parameters of shape () or (N,).
 pub(crate) fn rays(
-    origins: &PyReadonlyArray2<'_, f64>,
-    directions: &PyReadonlyArray2<'_, f64>,
-    until: &PyReadonlyArray1<'_, f64>,
-) -> PyResult<Vec<Ray>> {
-    let (origins, directions) = (rows(origins, "origins")?, rows(directions, "directions")?);
-    let until = until.as_slice()?;
-    if origins.len() != directions.len() || origins.len() != until.len() {
-        return Err(PyValueError::new_err(format!(
-            "expected as many directions and ends as origins, found {} origins, {} directions and {} ends",
-            origins.len(),
-            directions.len(),
-            until.len()
-        )));
+    origins: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    until: &Bound<'_, PyAny>,
+) -> PyResult<Rows<Ray>> {
+    let (origins, directions) = (rows(origins, "origins")?, rows::<3>(directions, "directions")?);
+    let (count, found) = (origins.rows.len(), directions.rows.len());
+    if found != count {
+        let message = format!("directions: expected as many directions as origins, {count}, found {found}");
+        return Err(PyValueError::new_err(message));
     }
-    let both = origins.into_iter().zip(directions).zip(until);
-    Ok(both.map(|((origin, direction), &until)| Ray::new(origin, direction).until(until)).collect())
+    let until = numbers(until, "until")?;
+    if !until.shape().is_empty() && until.shape() != [count] {
+        return Err(shape_error("until", &format!("() or ({count},)"), until.shape()));
+    }
+    let lines = origins.rows.into_iter().zip(directions.rows);
+    let rays = lines.zip(until.as_slice()?.iter().cycle());
+    let rays = rays.map(|((origin, direction), &until)| Ray::new(origin, direction).until(until)).collect();
+    Ok(Rows { rows: rays, one: origins.one })
 }
 
 #[pyfunction]
 pub(crate) fn first_hits<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    origins: PyReadonlyArray2<'py, f64>,
-    directions: PyReadonlyArray2<'py, f64>,
-    until: PyReadonlyArray1<'py, f64>,
-    pose: PyReadonlyArray2<'py, f64>,
+    origins: &Bound<'py, PyAny>,
+    directions: &Bound<'py, PyAny>,
+    until: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Found<'py>> {
-    let rays = rays(&origins, &directions, &until)?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &rays),
-        |batch| batch.first_hits(&rays),
-        |querier, shape, ray| querier.first_hit(shape, ray),
-    )?;
-    answers::hits(py, found.iter().copied())
+) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
+    let found = question
+        .ask(|batch, rays| batch.first_hits(rays), |querier, shape, ray| querier.first_hit(shape, ray))?;
+    answers::hits(question.answers(), found.into_iter())
 }
 
 #[pyfunction]
 pub(crate) fn any_hits<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    origins: PyReadonlyArray2<'py, f64>,
-    directions: PyReadonlyArray2<'py, f64>,
-    until: PyReadonlyArray1<'py, f64>,
-    pose: PyReadonlyArray2<'py, f64>,
+    origins: &Bound<'py, PyAny>,
+    directions: &Bound<'py, PyAny>,
+    until: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let rays = rays(&origins, &directions, &until)?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &rays),
-        |batch| batch.any_hits(&rays),
-        |querier, shape, ray| querier.any_hit(shape, ray),
-    )?;
-    Ok(array(py, found.into_iter()))
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
+    let found = question
+        .ask(|batch, rays| batch.any_hits(rays), |querier, shape, ray| querier.any_hit(shape, ray))?;
+    question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
 pub(crate) fn all_hits<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    origins: PyReadonlyArray2<'py, f64>,
-    directions: PyReadonlyArray2<'py, f64>,
-    until: PyReadonlyArray1<'py, f64>,
-    pose: PyReadonlyArray2<'py, f64>,
+    origins: &Bound<'py, PyAny>,
+    directions: &Bound<'py, PyAny>,
+    until: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Lists<'py, Found<'py>>> {
-    let rays = rays(&origins, &directions, &until)?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &rays),
-        |batch| batch.all_hits(&rays),
-        |querier, shape, ray| querier.all_hits(shape, ray),
-    )?;
-    let hits = answers::hits(py, found.iter().flatten().copied().map(Some))?;
-    Ok((starts(py, found.iter().map(Vec::len)), hits))
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
+    let found = question
+        .ask(|batch, rays| batch.all_hits(rays), |querier, shape, ray| querier.all_hits(shape, ray))?;
+    let along_one = Answers { py: question.py, one: false };
+    let hits = |hits: &[RayHit]| Ok(answers::hits(along_one, hits.iter().copied().map(Some))?.into_any());
+    question.answers().lists(&found, hits)
 }
 
-/// Reads segments: starts and ends of shape (N, 3).
-pub(crate) fn segments(
-    starts: &PyReadonlyArray2<'_, f64>,
-    ends: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<Vec<[[f64; 3]; 2]>> {
+/// Reads segments: starts and ends of shape (3,) or (N, 3).
+pub(crate) fn segments(starts: &Bound<'_, PyAny>, ends: &Bound<'_, PyAny>) -> PyResult<Rows<[[f64; 3]; 2]>> {
     let (starts, ends) = (rows(starts, "starts")?, rows(ends, "ends")?);
-    if starts.len() != ends.len() {
-        let found = format!("expected as many ends as starts, found {} and {}", ends.len(), starts.len());
-        return Err(PyValueError::new_err(found));
+    let (count, found) = (starts.rows.len(), ends.rows.len());
+    if found != count {
+        let message = format!("ends: expected as many ends as starts, {count}, found {found}");
+        return Err(PyValueError::new_err(message));
     }
-    Ok(starts.into_iter().zip(ends).map(|(start, end)| [start, end]).collect())
+    let both = starts.rows.into_iter().zip(ends.rows);
+    Ok(Rows { rows: both.map(|(start, end)| [start, end]).collect(), one: starts.one })
 }
 
 #[pyfunction]
 pub(crate) fn meet_segments<'py>(
-    py: Python<'py>,
     mesh: &Mesh,
-    starts: PyReadonlyArray2<'py, f64>,
-    ends: PyReadonlyArray2<'py, f64>,
-    pose: PyReadonlyArray2<'py, f64>,
+    starts: &Bound<'py, PyAny>,
+    ends: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
     parallel: bool,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let segments = segments(&starts, &ends)?;
-    let found = Place::new(&pose, parallel)?.ask(
-        py,
-        (mesh, &segments),
-        |batch| batch.meet_segments(&segments),
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(starts.py(), mesh, segments(starts, ends)?, pose, parallel)?;
+    let found = question.ask(
+        |batch, segments| batch.meet_segments(segments),
         |querier, shape, &[start, end]| querier.meets_segment(shape, start, end),
     )?;
-    Ok(array(py, found.into_iter()))
+    question.answers().values(found.into_iter())
 }

@@ -4,12 +4,13 @@
 //! threads wait for each other there and nowhere else. Paths of Python code are asked about with a copy of the scene:
 //! they may then ask the scene themselves.
 
-use crate::arrays::{array, one_pose, pose_rows, poses, table};
+use crate::answers::{Answers, array, table};
+use crate::arrays::{self, pose_or_identity};
 use crate::errors::{FormatError, open_error, query_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
 use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, SceneError, ScenePair, SceneShape};
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use std::collections::HashMap;
@@ -198,12 +199,12 @@ impl Scene {
         py: Python<'_>,
         mesh: &Mesh,
         known: Py<PyAny>,
-        pose: PyReadonlyArray2<'_, f64>,
+        pose: Option<Bound<'_, PyAny>>,
         name: Option<String>,
         groups: [u32; 2],
         number: Option<i64>,
     ) -> PyResult<i64> {
-        let pose = one_pose(&pose, "pose")?;
+        let pose = pose_or_identity(pose.as_ref(), "pose")?;
         let shape = SceneShape::from(mesh.shape().clone());
         let groups = Groups { member: groups[0], meets: groups[1] };
         let added = self.with(py, |state| {
@@ -235,14 +236,23 @@ impl Scene {
         })
     }
 
-    /// Moves as many instances as there are poses.
+    /// Moves an instance to a pose of shape (4, 4).
+    fn set_pose(&self, number: i64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (py, pose) = (pose.py(), arrays::pose(pose, "pose")?);
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            state.scene.set_pose(id, pose).map_err(|error| scene_error(state.refused(error)))
+        })
+    }
+
+    /// Moves as many instances as there are poses, of shape (N, 4, 4).
     fn set_poses(
         &self,
         py: Python<'_>,
         numbers: PyReadonlyArray1<'_, i64>,
-        array: PyReadonlyArray3<'_, f64>,
+        poses: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let (numbers, poses) = (numbers.as_slice()?.to_vec(), poses(&array, "poses")?);
+        let (numbers, poses) = (numbers.as_slice()?.to_vec(), arrays::many_poses(poses, "poses", "")?);
         if numbers.len() != poses.len() {
             let found = format!("poses: expected as many as ids, {}, found {}", numbers.len(), poses.len());
             return Err(PyValueError::new_err(found));
@@ -329,11 +339,21 @@ impl Scene {
         self.with(py, |state| state.next = state.next.max(next));
     }
 
+    /// The pose of an instance, shape (4, 4).
+    fn pose<'py>(&self, py: Python<'py>, number: i64) -> PyResult<Bound<'py, PyAny>> {
+        let found = self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            state.scene.pose(id).copied().map_err(|_| no_instance("id", number))
+        })?;
+        Answers { py, one: true }.poses(&[found])
+    }
+
+    /// The poses of instances, shape (N, 4, 4).
     fn poses<'py>(
         &self,
         py: Python<'py>,
         numbers: PyReadonlyArray1<'py, i64>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let numbers = numbers.as_slice()?.to_vec();
         let found = self.with(py, |state| {
             let pose = |&number: &i64| -> PyResult<Pose> {
@@ -342,7 +362,7 @@ impl Scene {
             };
             numbers.iter().map(pose).collect::<PyResult<Vec<_>>>()
         })?;
-        pose_rows(py, found.into_iter())
+        Answers { py, one: false }.poses(&found)
     }
 
     /// Whether questions use all cores, and whether the scene remembers what it found of each pair.

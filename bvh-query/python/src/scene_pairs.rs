@@ -1,21 +1,22 @@
 //! Questions about all pairs of a scene, standing still and moving.
 
-use crate::answers::{self, Distances, FREE, HIT, NEAR};
-use crate::arrays::{array, table};
+use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
 use bvh_query::{InstanceId, MotionOptions, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 type Pairs<'py> = Bound<'py, PyArray2<i64>>;
 
-/// The pairs and the distance; none where there is no pair.
-type Nearest<'py> = (Pairs<'py>, Distances<'py>);
+/// A pair and its distance, or `None` where there is no pair.
+type Nearest<'py> = Option<(i64, i64, Bound<'py, PyTuple>)>;
 
 fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], SceneDistance)>) -> PyResult<Nearest<'py>> {
-    let distances = answers::distances(py, found.iter().map(|(_, found)| Some(found.distance)))?;
-    Ok((table(py, found.iter().map(|(pair, _)| *pair))?, distances))
+    let Some(([a, b], found)) = found else { return Ok(None) };
+    let distance = answers::distances(Answers { py, one: true }, std::iter::once(Some(found.distance)))?;
+    Ok(Some((a, b, distance)))
 }
 
 fn numbered(state: &State, pairs: Vec<ScenePair>) -> Vec<[i64; 2]> {

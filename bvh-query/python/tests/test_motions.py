@@ -93,6 +93,17 @@ class Paths(unittest.TestCase):
             nearest = max(nearest, ratio)
         self.assertGreater(nearest, 0.3)
 
+    def test_arrays_may_change_afterwards(self):
+        poses, point = random_poses(10, 4, 1.0), np.array([0.0, 0, 1])
+        every = [cbvh.Motion.between(*poses[:2]), cbvh.Motion.between(poses, poses[::-1]), cbvh.Polyline(poses)]
+        every += [cbvh.Motion.screw(poses[0], point, [1, 0, 0], 9.0, 2.0), cbvh.Motion.between(poses, poses[0])[1]]
+        before = [path.pose([0, 0.3, 1]) for path in every]
+        poses[:] = random_poses(11, 4, 1.0)
+        point[:] = 5
+        for path, expected in zip(every, before):
+            np.testing.assert_array_equal(path.pose([0, 0.3, 1]), expected)
+            np.testing.assert_array_equal(pickle.loads(pickle.dumps(path)).pose([0, 0.3, 1]), expected)
+
     def test_pickles_lead_the_same_way(self):
         poses = random_poses(9, 3, 1.0)
         every = [cbvh.Motion.between(*poses[:2]), cbvh.Motion.between(poses, poses[::-1]), cbvh.Polyline(poses)]
@@ -169,8 +180,8 @@ class Ways(unittest.TestCase):
         several = cbvh.Motion.between([one, one], one)
         cases = [
             (ValueError, "start: expected shape (4, 4) or (N, 4, 4), found (3, 4)", cbvh.Motion.between, one[:3], one),
-            (ValueError, "end[0]: row 4: expected 0 0 0 1, found NaN", cbvh.Motion.between, one, one * np.nan),
-            (ValueError, "end: expected 2 poses as for start, found 3", cbvh.Motion.between, [one] * 2, [one] * 3),
+            (ValueError, "end: row 4: expected 0 0 0 1, found NaN", cbvh.Motion.between, one, one * np.nan),
+            (ValueError, "end: expected as many as of start, 2, found 3", cbvh.Motion.between, [one] * 2, [one] * 3),
             (ValueError, "start[1] and end[1]: expected a turn of less than half", cbvh.Motion.between, one, [one, flip]),
             (ValueError, "start: expected shape (4, 4)", cbvh.Motion.screw, [one], [0, 0, 0], [0, 0, 1], 1.0),
             (ValueError, "point: expected shape (3,), found (2,)", cbvh.Motion.screw, one, [0, 0], [0, 0, 1], 1.0),
@@ -245,7 +256,7 @@ class OwnPaths(unittest.TestCase):
             (ValueError, "path.pose(1.0): row 4: expected 0 0 0 1, found NaN", path(lambda t: far if t < 1 else far * np.nan)),
             (ValueError, "path.pose(0.0): expected a rotation", path(lambda t: np.diag([2.0, 2, 2, 1]))),
             (TypeError, "path.pose(0.0): expected numbers, found dtype object", path(lambda t: None)),
-            (ValueError, ": expected a length of at least 0, found nan", path(lambda t: far + 0, lambda *_: np.nan)),
+            (ValueError, ": expected a length of at least 0, found NaN", path(lambda t: far + 0, lambda *_: np.nan)),
             (ValueError, ": expected a length of at least 0, found -1.0", path(lambda t: far + 0, lambda *_: -1)),
             (TypeError, "path.sagitta(", path(lambda t: far + 0, lambda *_: "x")),
             (TypeError, "positional argument", path(lambda t: far, lambda: 0.0)),

@@ -11,6 +11,16 @@ from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
 from common import ask_command, bottom_row, cube, numbers_of, random_poses, shifts, write_rows
 
 
+class Convertible:
+    """Another library's array."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __array__(self, dtype=None, copy=None):
+        return np.array(self.array, dtype)
+
+
 class Geometry(unittest.TestCase):
     """Cubes, whose answers are known."""
 
@@ -67,7 +77,11 @@ class Geometry(unittest.TestCase):
 
     def test_arrays_of_any_layout_are_read(self):
         poses = shifts((0, 0, 0), (3, 0, 0), (0, 0, 0))
-        every = np.asfortranarray(poses), poses.astype(np.float32), np.repeat(poses, 2, axis=0)[::2], poses.tolist()
+        read_only = poses.copy()
+        read_only.flags.writeable = False
+        every = [np.asfortranarray(poses), np.repeat(poses, 2, axis=0)[::2], poses[::-1], poses.tolist(), list(poses)]
+        every += [poses.astype(dtype) for dtype in (">f8", "<f4", np.float16, np.longdouble, np.int8, np.uint64)]
+        every += [read_only, Convertible(poses), memoryview(poses)]
         for array in every:
             self.assertEqual(self.cube.collide(self.cube, array).tolist(), [True, False, True])
         vertices, faces = cube()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import enum
-from typing import Any, NamedTuple, Sequence, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import Floats
+Floats = NDArray[np.float64]
 
 
 class Relation(enum.IntEnum):
@@ -184,35 +184,17 @@ class SceneRayHit(NamedTuple):
     """The answer of `Mesh.first_hits`, in the world."""
 
 
-Answer = TypeVar("Answer", bound=tuple[Any, ...])
+Number = TypeVar("Number", bound=enum.IntEnum)
 
 
-def as_answer(kind: type[Answer], fields: Sequence[NDArray[Any]], one: bool) -> Answer:
-    """A named tuple of arrays or, for one question, of its elements."""
-    return kind(*[field.item() if field.ndim == 1 else field[0] for field in fields] if one else fields)
+def named(kind: type[Number], found: Any) -> Any:
+    """The name of a number, or the numbers of N answers as they are."""
+    return kind(found) if type(found) is int else found
 
 
-def split_rows(starts: NDArray[np.int64], rows: NDArray[Any]) -> list[NDArray[Any]]:
-    """The rows of each question, given where those of each start."""
-    return np.split(rows, starts[1:-1]) if len(starts) > 1 else []
+_SIGNS = np.array([1.0, -1.0, 1.0, np.nan])
 
 
-def split_hits(starts: NDArray[np.int64], hits: Sequence[NDArray[Any]]) -> list[RayHit]:
-    """The hits of each ray, given where those of each start."""
-    return [RayHit(*fields) for fields in zip(*(split_rows(starts, field) for field in hits))]
-
-
-def signed(distances: Floats, sides: NDArray[np.uint8]) -> Floats:
+def signed(distances: Any, sides: Any) -> Any:
     """Distances, negative inside and NaN where there is no inside."""
-    found: Floats = distances * np.array([1.0, -1.0, 1.0, np.nan])[sides]
-    return found
-
-
-def as_motion(
-    kinds: NDArray[np.uint8], until: Floats, at: Floats, distance: Sequence[NDArray[Any]], one: bool
-) -> MotionAnswer:
-    """Answers about ways: of plain values for one question."""
-    placed = as_answer(Distance, distance, one)
-    if one:
-        return MotionAnswer(MotionKind(int(kinds[0])), until[0].item(), at[0].item(), placed)
-    return MotionAnswer(kinds, until, at, placed)
+    return distances * (_SIGNS[sides].item() if type(sides) is int else _SIGNS[sides])

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _cbvh
-from ._arrays import read_numbers
 from ._mesh import Mesh, open
 
 
@@ -49,8 +48,7 @@ def bake(
     Without ``ids`` triangles are numbered in an order of the baker's; without ``topology`` there are no answers about
     insides. Baking takes about a microsecond a triangle. `Mesh.save` writes the result.
     """
-    points = read_numbers(vertices, "vertices", np.float64)
-    numbers = np.asarray(faces)
+    points, numbers = np.asarray(vertices), np.asarray(faces)
     for array, name, per in ((points, "vertices", "V"), (numbers, "faces", "F")):
         if array.ndim != 2 or array.shape[1] != 3:
             raise ValueError(f"{name}: expected shape ({per}, 3), found {array.shape}")

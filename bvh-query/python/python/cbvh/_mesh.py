@@ -12,17 +12,15 @@ from . import _cbvh
 from ._answers import (
     ClosestPoint,
     Distance,
+    Floats,
     MotionAnswer,
+    MotionKind,
     RayHit,
     Relation,
     Side,
-    as_answer,
-    as_motion,
+    named,
     signed,
-    split_hits,
-    split_rows,
 )
-from ._arrays import Floats, read_pose, read_poses, read_rays, read_rows
 from ._motion import Path, read_paths
 
 
@@ -116,18 +114,14 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        rows, one = read_poses(poses)
-        found = _cbvh.collide(self._mesh, _other(other), rows, parallel)
-        return bool(found[0]) if one else found
+        return _cbvh.collide(self._mesh, _other(other), poses, parallel)
 
     def within(self, other: Mesh, poses: ArrayLike, d: float, *, parallel: bool = False) -> Any:
         """Are they at most ``d`` mesh units apart? Exact: bool, or an array of bool of shape (N,).
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        rows, one = read_poses(poses)
-        found = _cbvh.within(self._mesh, _other(other), rows, d, parallel)
-        return bool(found[0]) if one else found
+        return _cbvh.within(self._mesh, _other(other), poses, d, parallel)
 
     def distance(
         self,
@@ -144,21 +138,14 @@ class Mesh:
         ``abs_err`` let the answer exceed the least distance by a fraction of it or by a length, which saves time;
         ``lower`` is what is certain. They cannot be combined with ``parallel``.
         """
-        rows, one = read_poses(poses)
-        if rel_err == 0 and abs_err == 0:
-            return as_answer(Distance, _cbvh.distance(self._mesh, _other(other), rows, parallel), one)
-        if parallel:
-            raise ValueError("parallel: expected False with rel_err or abs_err, found True")
-        return as_answer(Distance, _cbvh.distance_with(self._mesh, _other(other), rows, rel_err, abs_err), one)
+        return Distance(*_cbvh.distance(self._mesh, _other(other), poses, rel_err, abs_err, parallel))
 
     def relation(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers, shape (N,).
 
         ``poses``: of ``other``, mesh B, in the frame of this mesh, A (body to world), shape (4, 4) or (N, 4, 4).
         """
-        rows, one = read_poses(poses)
-        found = _cbvh.relation(self._mesh, _other(other), rows, parallel)
-        return Relation(int(found[0])) if one else found
+        return named(Relation, _cbvh.relation(self._mesh, _other(other), poses, parallel))
 
     def contacts(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """All pairs of triangles that touch, exactly, in ascending order.
@@ -168,9 +155,7 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        rows, one = read_poses(poses)
-        starts, pairs = _cbvh.contacts(self._mesh, _other(other), rows, parallel)
-        return pairs if one else split_rows(starts, pairs)
+        return _cbvh.contacts(self._mesh, _other(other), poses, parallel)
 
     def motion(
         self,
@@ -189,9 +174,10 @@ class Mesh:
         hit, beyond the clearance, without an answer that says free or hit, in mesh units; None: a millionth of the
         diagonal of the larger object's box. ``parallel`` does nothing where a path is your own.
         """
-        paths, one = read_paths(motion)
+        paths = read_paths(motion)
         found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)
-        return as_motion(*found, one)
+        kind, free_until, at, distance = found
+        return MotionAnswer(named(MotionKind, kind), free_until, at, Distance(*distance))
 
     def is_free(
         self,
@@ -206,9 +192,7 @@ class Mesh:
 
         This is what planners ask. Arguments are those of `motion`.
         """
-        paths, one = read_paths(motion)
-        found = _cbvh.is_free(self._mesh, _other(other), paths, clearance, tolerance, parallel)
-        return bool(found[0]) if one else found
+        return _cbvh.is_free(self._mesh, _other(other), read_paths(motion), clearance, tolerance, parallel)
 
     def closest_points(
         self,
@@ -223,17 +207,14 @@ class Mesh:
         ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
         shape (4, 4); None: they are in the frame of the mesh.
         """
-        rows, one = read_rows(points, "points", 3)
-        return as_answer(ClosestPoint, _cbvh.closest_points(self._mesh, rows, within, read_pose(pose), parallel), one)
+        return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel))
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
         """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers, shape (N,).
 
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        rows, one = read_rows(points, "points", 3)
-        found = _cbvh.sides(self._mesh, rows, read_pose(pose), parallel)
-        return Side(int(found[0])) if one else found
+        return named(Side, _cbvh.sides(self._mesh, points, pose, parallel))
 
     def signed_distances(
         self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
@@ -243,12 +224,8 @@ class Mesh:
         NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of
         this mesh in the frame of the points (body to world).
         """
-        rows, one = read_rows(points, "points", 3)
-        placed = read_pose(pose)
-        distances = _cbvh.closest_points(self._mesh, rows, np.inf, placed, parallel)[1]
-        sides = _cbvh.sides(self._mesh, rows, placed, parallel)
-        found = signed(distances, sides)
-        return found[0].item() if one else found
+        sides = _cbvh.sides(self._mesh, points, pose, parallel)
+        return signed(self.closest_points(points, pose=pose, parallel=parallel).distance, sides)
 
     def first_hits(
         self,
@@ -265,8 +242,7 @@ class Mesh:
         ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
         world).
         """
-        rays, one = read_rays(origins, directions, until)
-        return as_answer(RayHit, _cbvh.first_hits(self._mesh, *rays, read_pose(pose), parallel), one)
+        return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel))
 
     def any_hits(
         self,
@@ -279,9 +255,7 @@ class Mesh:
     ) -> Any:
         """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of
         `first_hits`."""
-        rays, one = read_rays(origins, directions, until)
-        found = _cbvh.any_hits(self._mesh, *rays, read_pose(pose), parallel)
-        return bool(found[0]) if one else found
+        return _cbvh.any_hits(self._mesh, origins, directions, until, pose, parallel)
 
     def all_hits(
         self,
@@ -297,9 +271,8 @@ class Mesh:
 
         Arguments are those of `first_hits`.
         """
-        rays, one = read_rays(origins, directions, until)
-        starts, hits = _cbvh.all_hits(self._mesh, *rays, read_pose(pose), parallel)
-        return RayHit(*hits) if one else split_hits(starts, hits)
+        found = _cbvh.all_hits(self._mesh, origins, directions, until, pose, parallel)
+        return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)
 
     def meet_segments(
         self, starts: ArrayLike, ends: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
@@ -308,10 +281,7 @@ class Mesh:
 
         ``starts`` and ``ends`` have shape (3,) or (N, 3). ``pose``: of this mesh in their frame (body to world).
         """
-        first, one = read_rows(starts, "starts", 3)
-        last, _ = read_rows(ends, "ends", 3)
-        found = _cbvh.meet_segments(self._mesh, first, last, read_pose(pose), parallel)
-        return bool(found[0]) if one else found
+        return _cbvh.meet_segments(self._mesh, starts, ends, pose, parallel)
 
 
 _open_file = open

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _cbvh
-from ._arrays import Floats, broadcast_rows, read_numbers, read_pose, read_poses
+from ._answers import Floats
 
 
 class Path(Protocol):
@@ -36,11 +36,9 @@ class Path(Protocol):
 class _Own:
     """Paths of the library: what `Motion` and `Polyline` have in common."""
 
-    __slots__ = ("_paths", "_one", "_made")
+    __slots__ = ("_paths",)
 
     _paths: _cbvh.Paths
-    _one: bool
-    _made: tuple[Any, ...]
 
     def pose(self, t: ArrayLike) -> Floats:
         """Where the body is at ``t``, from 0 to 1, of shape () or (T,): poses (body to world) of shape (4, 4) or (T, 4,
@@ -48,19 +46,12 @@ class _Own:
 
         Times before 0 and NaN count as 0, times after 1 as 1. Of N motions, the poses have N in front of their shape.
         """
-        times = read_numbers(t, "t", np.float64)
-        if times.ndim > 1:
-            raise ValueError(f"t: expected shape () or (T,), found {times.shape}")
-        rows = self._paths.poses(times.reshape(-1))
-        return rows.reshape((() if self._one else (self._paths.count(),)) + times.shape + (4, 4))
+        rows = self._paths.poses(t)
+        return rows.reshape((() if self._paths.is_one() else (self._paths.count(),)) + np.shape(t) + (4, 4))
 
     def sagitta(self, radius: float, t0: float, t1: float) -> Any:
         """The bound that `Path.sagitta` states, in mesh units: a float or, of N motions, an array of shape (N,)."""
-        found = self._paths.sagittas(radius, t0, t1)
-        return found[0].item() if self._one else found
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return self._made
+        return self._paths.sagittas(radius, t0, t1)
 
 
 class Motion(_Own):
@@ -69,10 +60,11 @@ class Motion(_Own):
     N motions have a length, and ``motions[i]`` is one of them.
     """
 
-    __slots__ = ()
+    __slots__ = ("_screw",)
 
-    def __init__(self, paths: _cbvh.Paths, one: bool, made: tuple[Any, ...]) -> None:
-        self._paths, self._one, self._made = paths, one, made
+    def __init__(self, paths: _cbvh.Paths, screw: tuple[Any, ...] | None = None) -> None:
+        # What makes a screw is kept for pickling; all else is told by the first and the last poses.
+        self._paths, self._screw = paths, screw
 
     @staticmethod
     def between(start: ArrayLike, end: ArrayLike) -> Motion:
@@ -82,12 +74,7 @@ class Motion(_Own):
         ``start`` and ``end`` are poses (body to world) of shape (4, 4) or (N, 4, 4); one start or end serves N of the
         other. Raises ValueError for poses that are half a turn apart, to within 2e-9 radians.
         """
-        starts, one_start = read_poses(start, "start")
-        ends, one_end = read_poses(end, "end")
-        starts, ends = broadcast_rows((starts, one_start), (ends, one_end))
-        one = one_start and one_end
-        made = (Motion.between, (start, end) if one else (starts, ends))
-        return Motion(_cbvh.Paths.between(starts, ends), one, made)
+        return Motion(_cbvh.Paths.between(start, end))
 
     @staticmethod
     def screw(
@@ -98,18 +85,18 @@ class Motion(_Own):
 
         ``start`` (body to world) has shape (4, 4); ``point`` and ``direction``, in the world, have shape (3,).
         """
-        placed = read_pose(start, "start")
-        vectors = []
-        for value, name in ((point, "point"), (direction, "direction")):
-            vector = read_numbers(value, name, np.float64)
-            if vector.shape != (3,):
-                raise ValueError(f"{name}: expected shape (3,), found {vector.shape}")
-            vectors.append(vector)
-        paths = _cbvh.Paths.screw(placed, vectors[0].tolist(), vectors[1].tolist(), angle, shift)
-        return Motion(paths, True, (Motion.screw, (placed, *vectors, angle, shift)))
+        paths = _cbvh.Paths.screw(start, point, direction, angle, shift)
+        # Callers may change their arrays.
+        copies = [np.array(array, np.float64) for array in (start, point, direction)]
+        return Motion(paths, (*copies, angle, shift))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._screw is not None:
+            return (Motion.screw, self._screw)
+        return (Motion.between, (self.pose(0.0), self.pose(1.0)))
 
     def __len__(self) -> int:
-        if self._one:
+        if self._paths.is_one():
             raise TypeError("this is one motion, which has no length")
         return self._paths.count()
 
@@ -120,73 +107,47 @@ class Motion(_Own):
         length = len(self)
         if not -length <= number < length:
             raise IndexError(f"motion: expected a number from {-length} to {length - 1}, found {number}")
-        make, (starts, ends) = self._made
-        number %= length
-        return Motion(self._paths.one(number), True, (make, (starts[number], ends[number])))
+        return Motion(self._paths.path(number % length))
 
     def __repr__(self) -> str:
-        return "<cbvh.Motion>" if self._one else f"<cbvh.Motion: {self._paths.count()} motions>"
+        return "<cbvh.Motion>" if self._paths.is_one() else f"<cbvh.Motion: {self._paths.count()} motions>"
 
 
 class Polyline(_Own):
     """A path through poses, with `Motion.between` from each to the next, all of which take the same time."""
 
-    __slots__ = ()
+    __slots__ = ("_knots",)
 
     def __init__(self, poses: ArrayLike) -> None:
         """``poses`` (body to world) have shape (N, 4, 4), with N of at least 2."""
-        rows, one = read_poses(poses)
-        if one:
-            raise ValueError("poses: expected shape (N, 4, 4) with N of at least 2, found (4, 4)")
-        self._paths, self._one, self._made = _cbvh.Paths.through(rows), True, (Polyline, (rows,))
+        self._paths = _cbvh.Paths.through(poses)
+        # Callers may change their array.
+        self._knots = np.array(poses, np.float64)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Polyline, (self._knots,))
 
     def __repr__(self) -> str:
-        return f"<cbvh.Polyline: {len(self._made[1][0])} poses>"
-
-
-class _Called:
-    """A caller's own path, as the compiled module calls it: checks shapes and numbers, and names the path."""
-
-    __slots__ = ("_path",)
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def pose(self, t: float) -> Floats:
-        found = read_numbers(self._path.pose(t), f"path.pose({t})", np.float64)
-        if found.shape != (4, 4):
-            raise ValueError(f"path.pose({t}): expected shape (4, 4), found {found.shape}")
-        return found
-
-    def sagitta(self, radius: float, t0: float, t1: float) -> float:
-        found = self._path.sagitta(radius, t0, t1)
-        place = f"path.sagitta({radius}, {t0}, {t1})"
-        try:
-            length = float(found)
-        except (TypeError, ValueError):
-            raise TypeError(f"{place}: expected a number, found {found!r}") from None
-        if not length >= 0.0:
-            raise ValueError(f"{place}: expected a length of at least 0, found {length}")
-        return length
+        return f"<cbvh.Polyline: {len(self._knots)} poses>"
 
 
 def read_path(path: Any, name: str) -> Any:
     """One path, as the compiled module takes it."""
     if isinstance(path, _Own):
-        if not path._one:
+        if not path._paths.is_one():
             raise ValueError(f"{name}: expected one path, found {path._paths.count()} motions")
         return path._paths
     missing = [method for method in ("pose", "sagitta") if not callable(getattr(path, method, None))]
     if missing or isinstance(path, type):
         expected = "expected a cbvh.Motion, a cbvh.Polyline or an object with methods pose and sagitta"
         raise TypeError(f"{name}: {expected}, found {type(path).__name__}")
-    return _Called(path)
+    return path
 
 
 def read_paths(motion: Any) -> tuple[list[Any], bool]:
     """One path or many, as the compiled module takes them, and whether it is one."""
     if isinstance(motion, _Own):
-        return [motion._paths], motion._one
+        return [motion._paths], motion._paths.is_one()
     if isinstance(motion, (list, tuple)):
         return [read_path(path, f"motion[{number}]") for number, path in enumerate(motion)], False
     return [read_path(motion, "motion")], True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import os
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from . import _cbvh
 from ._answers import (
     ClosestPoint,
     Distance,
+    Floats,
     MotionKind,
     RayHit,
     SceneClosestPoint,
@@ -22,11 +23,8 @@ from ._answers import (
     SceneRayHit,
     SceneRelations,
     Side,
-    as_answer,
-    split_hits,
-    split_rows,
+    named,
 )
-from ._arrays import Floats, read_pose, read_poses, read_rays, read_rows
 from ._mesh import Mesh
 from ._motion import Path, read_path
 
@@ -143,7 +141,7 @@ class Scene:
         if name is not None and not isinstance(name, str):
             raise TypeError(f"name: expected a str or None, found {type(name).__name__}")
         groups = [_groups(member, "member"), _groups(meets, "meets")]
-        return self._scene.add(mesh._mesh, mesh, read_pose(pose), name, groups, None)
+        return self._scene.add(mesh._mesh, mesh, pose, name, groups, None)
 
     def remove(self, id: int) -> None:
         """Removes an instance, and its permissions to touch others."""
@@ -151,15 +149,12 @@ class Scene:
 
     def set_pose(self, id: int, pose: ArrayLike) -> None:
         """Moves an instance. ``pose`` (body to world) has shape (4, 4)."""
-        self._scene.set_poses(np.array([_number(id, "id")]), read_pose(pose)[None])
+        self._scene.set_pose(_number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
         """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). If an argument is
         wrong, none has moved."""
-        rows, one = read_poses(poses)
-        if one:
-            raise ValueError("poses: expected shape (N, 4, 4), found (4, 4)")
-        self._scene.set_poses(self._ids(ids), rows)
+        self._scene.set_poses(self._ids(ids), poses)
 
     def set_groups(self, id: int, *, member: int = ALL_GROUPS, meets: int = ALL_GROUPS) -> None:
         """Puts an instance into groups: see `add`."""
@@ -193,8 +188,7 @@ class Scene:
 
     def pose(self, id: int) -> Floats:
         """The pose of an instance (body to world), shape (4, 4)."""
-        found: Floats = self._scene.poses(np.array([_number(id, "id")]))[0]
-        return found
+        return self._scene.pose(_number(id, "id"))
 
     def poses(self, ids: ArrayLike | None = None) -> Floats:
         """The poses (body to world) of instances, shape (N, 4, 4); of all, in their order, if ``ids`` is None."""
@@ -263,19 +257,15 @@ class Scene:
 
     def distance(self) -> SceneDistance | None:
         """The nearest pair and its distance, or None if there are no pairs. Points are in A's frame."""
-        pairs, fields = _cbvh.scene_distance(self._scene)
-        if len(pairs) == 0:
-            return None
-        return _placed(pairs, fields)
+        return _nearest(_cbvh.scene_distance(self._scene))
 
     def closest_points(self, points: ArrayLike, *, within: float = np.inf) -> SceneClosestPoint:
         """The points of all instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
 
         ``within``: look no farther, in mesh units.
         """
-        rows, one = read_rows(points, "points", 3)
-        instances, fields = _cbvh.scene_closest_points(self._scene, rows, within)
-        return SceneClosestPoint(_one(instances, one), as_answer(ClosestPoint, fields, one))
+        instances, found = _cbvh.scene_closest_points(self._scene, points, within)
+        return SceneClosestPoint(instances, ClosestPoint(*found))
 
     def sides(self, points: ArrayLike) -> Any:
         """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers,
@@ -284,9 +274,7 @@ class Scene:
         INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no
         inside.
         """
-        rows, one = read_rows(points, "points", 3)
-        found = _cbvh.scene_sides(self._scene, rows)
-        return Side(int(found[0])) if one else found
+        return named(Side, _cbvh.scene_sides(self._scene, points))
 
     def signed_distances(self, points: ArrayLike) -> Any:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
@@ -294,36 +282,27 @@ class Scene:
 
         NaN where the side is UNDEFINED, and without instances.
         """
-        rows, one = read_rows(points, "points", 3)
-        return _one(_cbvh.scene_signed_distances(self._scene, rows), one)
+        return _cbvh.scene_signed_distances(self._scene, points)
 
     def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
         """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""
-        rays, one = read_rays(origins, directions, until)
-        instances, fields = _cbvh.scene_first_hits(self._scene, *rays)
-        return SceneRayHit(_one(instances, one), as_answer(RayHit, fields, one))
+        return _hits(_cbvh.scene_first_hits(self._scene, origins, directions, until))
 
     def any_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """Whether rays in the world hit any instance, exactly: bool, or an array of shape (N,)."""
-        rays, one = read_rays(origins, directions, until)
-        return _one(_cbvh.scene_any_hits(self._scene, *rays), one)
+        return _cbvh.scene_any_hits(self._scene, origins, directions, until)
 
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
 
         Each parameter occurs once, however many instances are hit at exactly that.
         """
-        rays, one = read_rays(origins, directions, until)
-        starts, (instances, fields) = _cbvh.scene_all_hits(self._scene, *rays)
-        if one:
-            return SceneRayHit(instances, RayHit(*fields))
-        return [SceneRayHit(*both) for both in zip(split_rows(starts, instances), split_hits(starts, fields))]
+        found = _cbvh.scene_all_hits(self._scene, origins, directions, until)
+        return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)
 
     def meet_segments(self, starts: ArrayLike, ends: ArrayLike) -> Any:
         """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
-        first, one = read_rows(starts, "starts", 3)
-        last, _ = read_rows(ends, "ends", 3)
-        return _one(_cbvh.scene_meet_segments(self._scene, first, last), one)
+        return _cbvh.scene_meet_segments(self._scene, starts, ends)
 
     def motion(
         self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
@@ -335,10 +314,8 @@ class Scene:
         a moving instance stands now does not matter, and it stays there.
         """
         numbers, ways = _ways(paths)
-        kind, until, at, (pairs, fields) = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
-        if len(pairs) == 0:
-            return SceneMotion(MotionKind(kind), until, at, None)
-        return SceneMotion(MotionKind(kind), until, at, _placed(pairs, fields))
+        kind, until, at, nearest = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
+        return SceneMotion(MotionKind(kind), until, at, _nearest(nearest))
 
     def is_free(
         self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
@@ -348,14 +325,17 @@ class Scene:
         return _cbvh.scene_is_free(self._scene, numbers, ways, clearance, tolerance)
 
 
-def _one(found: NDArray[Any], one: bool) -> Any:
-    return found[0].item() if one else found
+def _hits(found: tuple[Any, tuple[Any, ...]]) -> SceneRayHit:
+    instances, hits = found
+    return SceneRayHit(instances, RayHit(*hits))
 
 
-def _placed(pairs: NDArray[np.int64], fields: Sequence[NDArray[Any]]) -> SceneDistance:
-    """The pair of the only row, and its distance."""
-    a, b = pairs[0].tolist()
-    return SceneDistance(a, b, as_answer(Distance, fields, True))
+def _nearest(found: tuple[int, int, tuple[Any, ...]] | None) -> SceneDistance | None:
+    """A pair and its distance, if there is a pair."""
+    if found is None:
+        return None
+    a, b, distance = found
+    return SceneDistance(a, b, Distance(*distance))
 
 
 def _ways(paths: Mapping[int, Path]) -> tuple[list[int], list[Any]]:

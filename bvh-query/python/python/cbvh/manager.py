@@ -22,7 +22,7 @@ from typing import Any, Hashable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import Floats, read_pose
+from ._answers import Floats
 from ._baking import bake
 from ._mesh import Mesh
 from ._scene import Scene
@@ -84,7 +84,14 @@ def _geometry(mesh: Any) -> _Geometry:
 
 def _transform(transform: ArrayLike | None) -> Floats:
     """A pose. A rotation that is rounded, as of float32, is replaced by the nearest one."""
-    pose = read_pose(transform, "transform").copy()
+    if transform is None:
+        return np.eye(4)
+    numbers = np.asarray(transform)
+    if numbers.dtype.kind not in "fiu":
+        raise TypeError(f"transform: expected numbers, found dtype {numbers.dtype}")
+    if numbers.shape != (4, 4):
+        raise ValueError(f"transform: expected shape (4, 4), found {numbers.shape}")
+    pose: Floats = np.array(numbers, np.float64)
     error = np.max(np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)))
     # Half of what a scene takes; and what is off by more than 2^-16 is no rounded rotation, which the scene says.
     if 2.0**-24 < error < 2.0**-16:
