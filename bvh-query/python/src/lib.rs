@@ -5,6 +5,7 @@
 
 mod answers;
 mod arrays;
+mod asking;
 mod bake;
 mod errors;
 mod mesh;

@@ -2,33 +2,13 @@
 
 use crate::answers::{self, Answers, table};
 use crate::arrays::{self, Rows};
+use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
 use bvh_query::{Batch, Contact, DistanceOptions, Pose, Querier, QueryError, Shape};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use std::sync::Mutex;
-
-/// Queriers that are not in use. Their memory is that of the largest questions so far. To move one takes longer than a short
-/// question, so they stay where they are.
-static QUERIERS: Mutex<Vec<Box<Querier>>> = Mutex::new(Vec::new());
-
-/// Calls `ask` with a querier that no other thread has.
-pub(crate) fn with_querier<T, E: From<QueryError>>(
-    ask: impl FnOnce(&mut Querier) -> Result<T, E>,
-) -> Result<T, E> {
-    let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
-    let mut querier = kept.map_or_else(|| Querier::new().map(Box::new), Ok)?;
-    let answer = ask(&mut querier);
-    // After an error, which is rare, a querier may be in the middle of a question.
-    if answer.is_ok()
-        && let Ok(mut queriers) = QUERIERS.lock()
-    {
-        queriers.push(querier);
-    }
-    answer
-}
 
 /// A pair of meshes, and the poses of the second in the frame of the first.
 struct Question<'py, 'a> {
@@ -51,14 +31,12 @@ impl<'py, 'a> Question<'py, 'a> {
         batch: impl Fn(&Batch<'_>, &[Pose]) -> Result<Vec<T>, QueryError> + Send + Sync,
         one: impl Fn(&mut Querier, Shape<'_>, Shape<'_>, &Pose) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
-        let (a, b, poses, parallel) = (self.a, self.b, &self.poses.rows, self.parallel);
-        let ask = || {
-            if parallel {
-                return batch(&Batch::new(a, b)?, poses);
-            }
-            with_querier(|querier| poses.iter().map(|pose| one(querier, a, b, pose)).collect())
-        };
-        self.py.detach(ask).map_err(query_error)
+        let (a, b, poses) = (self.a, self.b, &self.poses.rows);
+        if self.parallel {
+            let all = Batch::new(a, b).map_err(query_error)?;
+            return on_all_cores(self.py, poses, |poses| batch(&all, poses).map_err(query_error));
+        }
+        one_by_one(self.py, poses, |querier, pose| one(querier, a, b, pose).map_err(query_error))
     }
 
     fn answers(&self) -> Answers<'py> {

@@ -2,9 +2,9 @@
 
 use crate::answers::{self, Answers};
 use crate::arrays::{Rows, numbers, pose_or_identity, rows, shape_error};
+use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
-use crate::pairs::with_querier;
 use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, RayHit};
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
@@ -38,14 +38,12 @@ impl<'py, 'a, P: Sync> Question<'py, 'a, P> {
         one: impl Fn(&mut Querier, PlacedShape<'_>, &P) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
         let placed = self.mesh.shape().shape().at(&self.pose);
-        let (probes, parallel) = (&self.probes.rows, self.parallel);
-        let ask = || {
-            if parallel {
-                return batch(&ProbeBatch::new(placed)?, probes);
-            }
-            with_querier(|querier| probes.iter().map(|probe| one(querier, placed, probe)).collect())
-        };
-        self.py.detach(ask).map_err(query_error)
+        let probes = &self.probes.rows;
+        if self.parallel {
+            let all = ProbeBatch::new(placed).map_err(query_error)?;
+            return on_all_cores(self.py, probes, |probes| batch(&all, probes).map_err(query_error));
+        }
+        one_by_one(self.py, probes, |querier, probe| one(querier, placed, probe).map_err(query_error))
     }
 
     fn answers(&self) -> Answers<'py> {

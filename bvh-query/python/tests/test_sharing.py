@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import pathlib
 import pickle
+import signal
 import tempfile
 import unittest
 
@@ -58,6 +59,28 @@ class Sharing(unittest.TestCase):
             for found in pool.map(lambda _: mesh.distance(mesh, poses), range(8)):
                 for one, other in zip(found, expected):
                     np.testing.assert_array_equal(one, other)
+
+    @unittest.skipUnless(hasattr(signal, "setitimer"), "this system has no timers that signal")
+    def test_signals_end_questions(self):
+        class Rang(Exception):
+            pass
+
+        def ring(*_):
+            raise Rang
+
+        mesh, poses = cbvh.bake(*cube()), np.tile(shifts((1.5, 0, 0)), (1 << 20, 1, 1))
+        before = signal.signal(signal.SIGALRM, ring)
+        try:
+            for parallel in (False, True):
+                signal.setitimer(signal.ITIMER_REAL, 0.3)
+                with self.assertRaises(Rang):
+                    # Takes seconds.
+                    mesh.distance(mesh, poses, parallel=parallel)
+                    mesh.distance(mesh, poses, parallel=parallel)
+                self.assertEqual(mesh.distance(mesh, poses[0]).distance, 0.5)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
 
 
 class Stubs(unittest.TestCase):

@@ -1,0 +1,77 @@
+//! Asks questions one after the other or on all cores, without Python's lock and so that Ctrl-C ends them.
+
+use crate::errors::query_error;
+use bvh_query::Querier;
+use pyo3::prelude::*;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Queriers that are not in use. Their memory is that of the largest questions so far. To move one takes longer than a short
+/// question, so they stay where they are.
+static QUERIERS: Mutex<Vec<Box<Querier>>> = Mutex::new(Vec::new());
+
+/// Calls `ask` with a querier that no other thread has.
+fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> PyResult<T>) -> PyResult<T> {
+    let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
+    let mut querier = match kept {
+        Some(querier) => querier,
+        None => Box::new(Querier::new().map_err(query_error)?),
+    };
+    let answer = ask(&mut querier);
+    // After an error, which is rare, a querier may be in the middle of a question.
+    if answer.is_ok()
+        && let Ok(mut queriers) = QUERIERS.lock()
+    {
+        queriers.push(querier);
+    }
+    answer
+}
+
+/// How many questions are asked before the time is looked at.
+const QUESTIONS: usize = 64;
+const QUESTIONS_ON_ALL_CORES: usize = 1024;
+
+/// How long questions may run before Python handles signals, such as that of Ctrl-C.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Asks about all items, one after the other.
+pub(crate) fn one_by_one<P: Sync, T: Send>(
+    py: Python<'_>,
+    items: &[P],
+    ask: impl Fn(&mut Querier, &P) -> PyResult<T> + Sync,
+) -> PyResult<Vec<T>> {
+    py.detach(|| {
+        with_querier(|querier| {
+            in_turns(items, QUESTIONS, |items| items.iter().map(|item| ask(querier, item)).collect())
+        })
+    })
+}
+
+/// Asks about all items by questions about many, which use all cores.
+pub(crate) fn on_all_cores<P: Sync, T: Send>(
+    py: Python<'_>,
+    items: &[P],
+    ask: impl Fn(&[P]) -> PyResult<Vec<T>> + Sync,
+) -> PyResult<Vec<T>> {
+    py.detach(|| in_turns(items, QUESTIONS_ON_ALL_CORES, &ask))
+}
+
+fn in_turns<P, T>(
+    items: &[P],
+    size: usize,
+    mut ask: impl FnMut(&[P]) -> PyResult<Vec<T>>,
+) -> PyResult<Vec<T>> {
+    if items.len() <= size {
+        return ask(items);
+    }
+    let mut answers = Vec::with_capacity(items.len());
+    let mut handled = Instant::now();
+    for turn in items.chunks(size) {
+        answers.extend(ask(turn)?);
+        if handled.elapsed() > PATIENCE {
+            Python::attach(|py| py.check_signals())?;
+            handled = Instant::now();
+        }
+    }
+    Ok(answers)
+}
