@@ -9,7 +9,7 @@ use super::provenance::{self, Provenance};
 use super::report::BakeReport;
 use super::summary::FileSummary;
 use crate::bake;
-use crate::error::BakeError;
+use crate::error::{BakeError, InputError};
 use crate::input::gather::Gatherer;
 use crate::input::{Checksums, GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
 use crate::options::Options;
@@ -124,13 +124,16 @@ impl<'a> FileBake<'a> {
     /// Runs the bake.
     ///
     /// # Errors
-    /// [`BakeError::Read`] if an input cannot be read or is malformed; [`BakeError::OutputIsInput`] if the output is
-    /// one of the inputs; [`BakeError::Memory`] if the memory budget is too small; [`BakeError::Room`] if there is too
-    /// little room for scratch files and the output; [`BakeError::Scratch`] if the system refuses scratch files;
-    /// [`BakeError::Write`] if it refuses the output; and the errors of [`crate::to_bytes`]. After any of them, the
-    /// output is unchanged, and no other file is left.
+    /// [`BakeError::Read`] if an input cannot be read or is malformed; [`BakeError::Input`] if there are no inputs or no
+    /// triangles; [`BakeError::OutputIsInput`] if the output is one of the inputs; [`BakeError::Memory`] if the memory
+    /// budget is too small; [`BakeError::Room`] if there is too little room for scratch files and the output;
+    /// [`BakeError::Scratch`] if the system refuses scratch files; [`BakeError::Write`] if it refuses the output; and the
+    /// errors of [`crate::to_bytes`]. After any of them, the output is unchanged, and no other file is left.
     pub fn run(mut self) -> Result<Outcome, BakeError> {
         (self.on_step)(Step::Read);
+        if self.inputs.is_empty() {
+            return Err(InputError::Empty.into());
+        }
         refuse_output(&self.inputs, &self.output)?;
         self.progress.expect_bytes(file_lengths(&self.inputs));
         storage::remove_stale(self.scratch_directory());

@@ -64,10 +64,10 @@ pub enum BakeError {
         /// The bytes that it may use.
         budget: u64,
     },
-    /// The allowed error of quantisation is too large for an object: most of its triangles would collapse.
+    /// The allowed error of quantisation is no length, or too large for an object: most of its triangles would collapse.
     #[error(
-        "{object}expected a max error of at most {limit:.2e}, a hundredth of the diagonal {diagonal:.2e} of the object's box, \
-         found {allowed:e}, which would collapse most triangles"
+        "{object}expected a max error from 0 to {limit:.2e}, a hundredth of the diagonal {diagonal:.2e} of the object's box, \
+         found {allowed:e}; a larger one would collapse most triangles"
     )]
     MaxError {
         /// The object's name as the message shows it; empty if the object has no name.

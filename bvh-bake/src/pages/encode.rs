@@ -4,31 +4,13 @@
 //! known only when all pages have been planned.
 
 use crate::pages::plan::{PagePlan, Place};
+use crate::pages::style::Style;
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;
-use bvh_format::leaf::{PACKET, TriangleEncoding};
+use bvh_format::leaf::PACKET;
 use bvh_format::page::{PAGE, PagePatcher, PagePlace, PageShape, PageWriter, RootRef, WrittenPage};
-use bvh_format::profile::Profile;
 use rayon::prelude::*;
-
-/// How the pages of an object are written.
-#[derive(Clone, Copy)]
-pub(crate) struct Style {
-    pub(crate) profile: Profile,
-    pub(crate) encoding: TriangleEncoding,
-    pub(crate) f16_scale: f32,
-    pub(crate) ids: bool,
-    pub(crate) turning_slabs: bool,
-}
-
-impl Style {
-    /// Whether treelets of nothing but packets are short: where the size of triangles counts more than time, that of
-    /// treelets does as well.
-    pub(crate) fn has_short_treelets(&self) -> bool {
-        self.profile.has_short_treelets() && self.encoding != TriangleEncoding::F32
-    }
-}
 
 /// Pages that are encoded together.
 pub(crate) struct Encoder<'a> {

@@ -4,6 +4,7 @@ pub(crate) mod assemble;
 pub(crate) mod brick;
 mod encode;
 mod plan;
+mod style;
 pub(crate) mod unnumbered;
 
-pub(crate) use encode::Style;
+pub(crate) use style::Style;

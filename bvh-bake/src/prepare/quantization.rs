@@ -24,15 +24,17 @@ const COARSE_ERROR_PER_SPACING: f64 = 0.1;
 /// they are.
 ///
 /// # Errors
-/// [`BakeError::MaxError`] if the allowed error exceeds a hundredth of the diagonal. An object of diagonal 0 is a point and
-/// cannot collapse.
+/// [`BakeError::MaxError`] if the allowed error is negative, NaN, or exceeds a hundredth of the diagonal. An object of diagonal
+/// 0 is a point and cannot collapse.
 pub(crate) fn grid_error(options: &Options, object: &str, diagonal: f64) -> Result<Option<f64>, BakeError> {
     if options.triangles != Some(TriangleEncoding::Quantized) {
         return Ok(None);
     }
     let allowed = options.max_error.unwrap_or(DEFAULT_ERROR_PER_DIAGONAL * diagonal);
     let limit = MAX_ERROR_PER_DIAGONAL * diagonal;
-    if allowed > limit && diagonal > 0.0 {
+    // NaN is no length either.
+    let is_length = allowed >= 0.0;
+    if !is_length || allowed > limit && diagonal > 0.0 {
         let object = if object.is_empty() {
             String::new()
         } else {
@@ -63,6 +65,10 @@ mod tests {
         assert!(matches!(error(None, 200.0), Ok(Some(error)) if error == 200.0 * 1e-5));
         assert!(matches!(error(Some(2.0), 200.0), Ok(Some(2.0))));
         assert!(matches!(error(Some(2.001), 200.0), Err(BakeError::MaxError { limit: 2.0, .. })));
+        for wrong in [-1e-300, f64::NAN] {
+            assert!(matches!(error(Some(wrong), 200.0), Err(BakeError::MaxError { .. })));
+            assert!(matches!(error(Some(wrong), 0.0), Err(BakeError::MaxError { .. })));
+        }
         // A point cannot collapse.
         assert!(matches!((error(None, 0.0), error(Some(1.0), 0.0)), (Ok(None), Ok(Some(1.0)))));
         assert!(matches!(grid_error(&Options::default(), "", 200.0), Ok(None)));

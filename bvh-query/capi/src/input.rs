@@ -1,8 +1,6 @@
 //! Reads arguments: pointers, lengths, text, numbers and structures with a size.
 
 use crate::status::Failure;
-use crate::types::PoseRows;
-use bvh_query::Pose;
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
@@ -160,49 +158,6 @@ pub(crate) fn flag(name: &str, value: i32) -> Result<bool, Failure> {
 /// Checks the distance up to which a closest point counts, which may be infinite.
 pub(crate) fn check_within(within: f64) -> Result<(), Failure> {
     if within >= 0.0 { Ok(()) } else { Err(Failure::argument("within", "a distance of at least 0", within)) }
-}
-
-fn pose_of(rows: &PoseRows) -> Result<Pose, Failure> {
-    Ok(Pose::from_rows(&rows.rows)?)
-}
-
-/// Reads one pose.
-///
-/// # Safety
-/// As for `value`.
-pub(crate) unsafe fn pose(name: &str, pointer: *const PoseRows) -> Result<Pose, Failure> {
-    // SAFETY: the caller vouches for it.
-    let rows = unsafe { value(name, pointer) }?;
-    pose_of(&rows).map_err(|failure| failure.at(name))
-}
-
-/// Reads one pose, or takes none for the identity.
-///
-/// # Safety
-/// As for `value`.
-pub(crate) unsafe fn pose_or_identity(name: &str, pointer: *const PoseRows) -> Result<Pose, Failure> {
-    // SAFETY: the caller vouches for it.
-    if pointer.is_null() { Ok(Pose::IDENTITY) } else { unsafe { pose(name, pointer) } }
-}
-
-/// Reads poses into memory that is used again and again.
-///
-/// # Safety
-/// As for `array`.
-pub(crate) unsafe fn poses(
-    name: &str,
-    pointer: *const PoseRows,
-    count: usize,
-    into: &mut Vec<Pose>,
-) -> Result<(), Failure> {
-    // SAFETY: the caller vouches for it.
-    let rows = unsafe { array(name, pointer, count) }?;
-    into.clear();
-    into.reserve(count);
-    for (number, rows) in rows.iter().enumerate() {
-        into.push(pose_of(rows).map_err(|failure| failure.at(format_args!("{name}[{number}]")))?);
-    }
-    Ok(())
 }
 
 /// Reads three numbers.

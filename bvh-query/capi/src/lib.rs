@@ -10,9 +10,9 @@
 //!   copied before anything is written.
 //! - `output`: answers are written through raw pointers, because C's memory may hold no values yet and may overlap.
 
+mod at_hand;
 mod bake;
 mod entry;
-mod handles;
 mod input;
 #[cfg(test)]
 mod layout;

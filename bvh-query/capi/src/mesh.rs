@@ -1,7 +1,7 @@
 //! Meshes: opened files, whole or object by object.
 
+use crate::at_hand::MESHES;
 use crate::entry::entry;
-use crate::handles::MESHES;
 use crate::input::{array, path, text};
 use crate::output::{self, List, One, Room};
 use crate::status::{Failure, Status};

@@ -1,11 +1,11 @@
 //! Questions about the ways of one mesh in the frame of another.
 
 use crate::entry::entry;
-use crate::handles::QUERIERS;
-use crate::input::{array, options, poses};
+use crate::input::{array, options};
 use crate::output::Room;
 use crate::paths::AskedPath;
-use crate::queriers::Asker;
+use crate::poses::poses;
+use crate::queriers::{Asker, QUERIERS};
 use crate::status::Failure;
 use crate::types::{MeshHandle, MotionChoices, MotionRow, PathHandle, PoseRows, QuerierHandle};
 use bvh_query::{Batch, Motion, MotionOptions, Path, Querier, QueryError, Shape};

@@ -1,10 +1,11 @@
 //! Questions about two meshes in many poses.
 
+use crate::at_hand::MESHES;
 use crate::entry::entry;
-use crate::handles::QUERIERS;
-use crate::input::{options, poses};
+use crate::input::options;
 use crate::output::{List, One, Room};
-use crate::queriers::Asker;
+use crate::poses::{pose, poses};
+use crate::queriers::{Asker, QUERIERS};
 use crate::status::Failure;
 use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle, relation};
 use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
@@ -236,10 +237,10 @@ pub unsafe extern "C" fn cbvh_displacement(
     bound: *mut f64,
 ) -> i32 {
     entry(|| {
-        let shape = crate::handles::MESHES.share("b", b.id)?;
+        let shape = MESHES.share("b", b.id)?;
         // SAFETY: the header asks for it.
         unsafe {
-            let (from, to) = (crate::input::pose("from", from)?, crate::input::pose("to", to)?);
+            let (from, to) = (pose("from", from)?, pose("to", to)?);
             One::new("bound", bound)?.set(displacement(&shape, &from, &to));
         }
         Ok(())

@@ -1,14 +1,19 @@
 //! Paths: motions between poses, screws, polylines, and functions of the caller.
 
+use crate::at_hand::MESHES;
 use crate::entry::entry;
-use crate::handles::{MESHES, PATHS};
-use crate::input::{pose, poses, triple};
+use crate::input::triple;
 use crate::output::One;
+use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
+use crate::table::{Kind, Table};
 use crate::types::{MeshHandle, PathHandle, PoseRows};
 use bvh_query::{Motion, Path, Polyline, Pose, motion_reach};
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// All paths that are open.
+pub(crate) static PATHS: Table<Arc<PathValue>> = Table::new(Kind::Path);
 
 /// `cbvh_pose_function`.
 type PoseFunction = unsafe extern "C" fn(user: *mut c_void, t: f64, pose: *mut PoseRows) -> i32;

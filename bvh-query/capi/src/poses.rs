@@ -1,7 +1,7 @@
-//! Poses: checks, and what composes them.
+//! Poses: reads, checks and composes them.
 
 use crate::entry::entry;
-use crate::input::{array, pose, triple, value};
+use crate::input::{array, triple, value};
 use crate::output::One;
 use crate::status::Failure;
 use crate::types::PoseRows;
@@ -99,4 +99,47 @@ pub unsafe extern "C" fn cbvh_pose_relative(
     };
     // SAFETY: the header asks for it.
     unsafe { make(result, made) }
+}
+
+fn pose_of(rows: &PoseRows) -> Result<Pose, Failure> {
+    Ok(Pose::from_rows(&rows.rows)?)
+}
+
+/// Reads one pose.
+///
+/// # Safety
+/// As for `value`.
+pub(crate) unsafe fn pose(name: &str, pointer: *const PoseRows) -> Result<Pose, Failure> {
+    // SAFETY: the caller vouches for it.
+    let rows = unsafe { value(name, pointer) }?;
+    pose_of(&rows).map_err(|failure| failure.at(name))
+}
+
+/// Reads one pose, or takes none for the identity.
+///
+/// # Safety
+/// As for `value`.
+pub(crate) unsafe fn pose_or_identity(name: &str, pointer: *const PoseRows) -> Result<Pose, Failure> {
+    // SAFETY: the caller vouches for it.
+    if pointer.is_null() { Ok(Pose::IDENTITY) } else { unsafe { pose(name, pointer) } }
+}
+
+/// Reads poses into memory that is used again and again.
+///
+/// # Safety
+/// As for `array`.
+pub(crate) unsafe fn poses(
+    name: &str,
+    pointer: *const PoseRows,
+    count: usize,
+    into: &mut Vec<Pose>,
+) -> Result<(), Failure> {
+    // SAFETY: the caller vouches for it.
+    let rows = unsafe { array(name, pointer, count) }?;
+    into.clear();
+    into.reserve(count);
+    for (number, rows) in rows.iter().enumerate() {
+        into.push(pose_of(rows).map_err(|failure| failure.at(format_args!("{name}[{number}]")))?);
+    }
+    Ok(())
 }

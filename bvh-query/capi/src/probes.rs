@@ -1,10 +1,10 @@
 //! Questions about one mesh and many points, rays or segments.
 
 use crate::entry::entry;
-use crate::handles::QUERIERS;
-use crate::input::{array, check_within, pose_or_identity, rows_of_three};
+use crate::input::{array, check_within, rows_of_three};
 use crate::output::{List, Room};
-use crate::queriers::{Asker, Probes};
+use crate::poses::pose_or_identity;
+use crate::queriers::{Asker, Probes, QUERIERS};
 use crate::status::Failure;
 use crate::types::{ClosestRow, HitRow, MeshHandle, PoseRows, QuerierHandle, RayRow, SegmentRow, side};
 use bvh_query::{PlacedShape, ProbeBatch, Querier, QueryError, Ray};

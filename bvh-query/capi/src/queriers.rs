@@ -1,12 +1,16 @@
 //! Queriers: the memory of questions, and how they are asked.
 
+use crate::at_hand::AtHand;
 use crate::entry::entry;
-use crate::handles::{AtHand, QUERIERS};
 use crate::input::flag;
 use crate::output::One;
 use crate::status::Failure;
+use crate::table::{Kind, Table};
 use crate::types::{QuerierHandle, StatsRow, backend};
 use bvh_query::{Pose, Querier, Ray};
+
+/// All queriers that are open.
+pub(crate) static QUERIERS: Table<Box<Asker>> = Table::new(Kind::Querier);
 
 /// What the handle of a querier stands for.
 pub(crate) struct Asker {

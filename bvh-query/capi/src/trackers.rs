@@ -1,13 +1,16 @@
 //! Trackers: questions about poses that follow a path.
 
 use crate::entry::entry;
-use crate::handles::{QUERIERS, TRACKERS};
-use crate::input::poses;
 use crate::output::{One, Room};
-use crate::queriers::Asker;
+use crate::poses::poses;
+use crate::queriers::{Asker, QUERIERS};
 use crate::status::Failure;
+use crate::table::{Kind, Table};
 use crate::types::{DistanceRow, MeshHandle, PoseRows, QuerierHandle, TrackerHandle};
 use bvh_query::{Pose, Querier, QueryError, Shape, Tracker};
+
+/// All trackers that are open.
+static TRACKERS: Table<Box<Tracker>> = Table::new(Kind::Tracker);
 
 /// `cbvh_tracker_new`.
 #[unsafe(no_mangle)]

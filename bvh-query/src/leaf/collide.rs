@@ -21,8 +21,8 @@
 
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{Local, U, repeat, tile, valid_lanes};
-use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest_of, max3, min3, project};
+use crate::leaf::local::{Local, repeat, tile, valid_lanes};
+use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest_of, max3, min3, project};
 use crate::leaf::placed_packet::{PlacedPacket, load4};
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 

@@ -15,8 +15,8 @@
 //! `r` is not far below.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{Local, U, repeat, splat4, tile};
-use crate::leaf::math::{Corners, Vec3, add, along, dot, edges, max3, min3, project, sub};
+use crate::leaf::local::{Local, repeat, tile};
+use crate::leaf::math::{Corners, U, Vec3, add, along, dot, edges, max3, min3, project, splat4, sub};
 use crate::leaf::placed_packet::load4;
 use crate::leaf::queue::TriangleQueue;
 

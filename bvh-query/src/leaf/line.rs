@@ -9,8 +9,7 @@
 //! their sums add 24u m^2. Together that is at most 12 m d + 6 d^2 + 36u m^2, and less than (m + d) (18 d + 48u m).
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::U;
-use crate::leaf::math::{cross, dot, largest_of};
+use crate::leaf::math::{U, cross, dot, largest_of};
 use crate::leaf::point::LocalPoint;
 use bvh_format::leaf::Packet;
 

@@ -1,9 +1,8 @@
 //! Brings a packet of A and a packet of B into one local frame, with a bound on the error.
 //!
-//! The frame has A's directions, the first corner of A's packet as its origin, and a unit that makes
-//! the larger object about 1 in size, so that squares and products stay within f32's range whatever
-//! the mesh's unit. The packets' offset from each other is computed in f64: what remains for f32 is
-//! as small as the packets and their distance, and so is its rounding.
+//! It has the directions and the unit of [`LocalFrame`], and the first corner of A's packet as its origin. The packets'
+//! offset from each other is computed in f64: what remains for f32 is as small as the packets and their distance, and so
+//! is its rounding.
 //!
 //! With u = 2^-24, w the corners of B relative to its packet's first corner, |w| <= m_b, c the offset,
 //! |c| <= m_c, |a| <= m_a: a corner of A is off by u m_a (one rounded difference); a corner R w + c of B
@@ -14,56 +13,9 @@
 //! of 2^-150 and less is within 2^-140 more, which `e_pose` includes.
 
 use crate::isa::Isa;
-use crate::leaf::math::{Corners, Vec3, add, dot};
+use crate::leaf::frame::LocalFrame;
+use crate::leaf::math::{Corners, U, Vec3, add, dot, splat4};
 use crate::leaf::placed_packet::{PlacedPacket, larger};
-use crate::traverse::placement::Placement;
-use bvh_format::object::Object;
-
-/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
-pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
-
-/// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
-const UNDERFLOW: f32 = f32::from_bits(1 << 9);
-
-/// The frame that all pairs of packets of a query share.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LocalFrame {
-    pub(crate) rotation: [[f64; 3]; 3],
-    pub(crate) translation: [f64; 3],
-    /// Rotation in units of the frame.
-    pub(crate) rotation32: [[f32; 3]; 3],
-    /// Units of the frame in a mesh unit, a power of two.
-    pub(crate) scale: f32,
-    /// Bound on the f64 error, units of the frame.
-    pub(super) error: f32,
-}
-
-impl LocalFrame {
-    pub(crate) fn new(placement: &Placement, a: &Object, b: &Object) -> Self {
-        let size = |object: &Object| {
-            let record = object.record();
-            (0..3).fold(0.0f64, |m, i| {
-                m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
-            })
-        };
-        let scale = scale_of(size(a).max(size(b)));
-        let rotation32 = placement.rotation.map(|row| row.map(|r| (r * scale) as f32));
-        Self {
-            rotation: placement.rotation,
-            translation: placement.translation,
-            rotation32,
-            scale: scale as f32,
-            error: ((placement.error * scale) as f32).next_up() + UNDERFLOW,
-        }
-    }
-}
-
-/// Returns a power of two near 1 / size, by its exponent, from 2^-120 to 2^120; what has no size takes any unit.
-#[inline(always)]
-pub(crate) fn scale_of(size: f64) -> f64 {
-    let exponent = (size.to_bits() >> 52) as i64 - 1023;
-    f64::from_bits(((1023 - exponent.clamp(-120, 120)) as u64) << 52)
-}
 
 /// A packet of A and one of B in one frame, whose origin is the first corner of A's.
 pub(crate) struct Local<'a> {
@@ -117,11 +69,6 @@ pub(crate) fn repeat<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
 #[inline(always)]
 pub(crate) fn tile<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
     [isa.tile(&v[0]), isa.tile(&v[1]), isa.tile(&v[2])]
-}
-
-#[inline(always)]
-pub(crate) fn splat4<I: Isa>(isa: I, v: [f32; 3]) -> Vec3<I::H> {
-    [isa.splat4(v[0]), isa.splat4(v[1]), isa.splat4(v[2])]
 }
 
 /// The lanes of a packet pair that hold pairs of triangles.

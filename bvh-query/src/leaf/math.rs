@@ -3,13 +3,22 @@
 //! Functions, not closures, take registers here and elsewhere: a closure may not be inlined, and what
 //! is not inlined into a backend's function lacks its features.
 
-use crate::isa::Lanes;
+use crate::isa::{Isa, Lanes};
+
+/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
+pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
 
 /// x, y, z of several lanes.
 pub(crate) type Vec3<T> = [T; 3];
 
 /// Three points, or three edges.
 pub(crate) type Corners<T> = [Vec3<T>; 3];
+
+/// Three numbers, each in all of four lanes.
+#[inline(always)]
+pub(crate) fn splat4<I: Isa>(isa: I, v: [f32; 3]) -> Vec3<I::H> {
+    [isa.splat4(v[0]), isa.splat4(v[1]), isa.splat4(v[2])]
+}
 
 #[inline(always)]
 pub(crate) fn sub<T: Lanes>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {

@@ -5,6 +5,7 @@
 
 pub(crate) mod collide;
 pub(crate) mod distance;
+pub(crate) mod frame;
 pub(crate) mod line;
 pub(crate) mod local;
 pub(crate) mod math;

@@ -4,8 +4,8 @@
 //! not depend on the packet that it meets. See `Local` for both together, and for the error.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::local::{LocalFrame, splat4};
-use crate::leaf::math::{Corners, Vec3, add, cross, dot, largest, max3, min3, project, sub};
+use crate::leaf::frame::LocalFrame;
+use crate::leaf::math::{Corners, Vec3, add, cross, dot, largest, max3, min3, project, splat4, sub};
 use bvh_format::leaf::Packet;
 
 /// Packets kept for each side: 24 KiB, so that they stay in the second-level cache beside the memory of the walk.

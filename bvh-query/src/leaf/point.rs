@@ -14,8 +14,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::distance::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
-use crate::leaf::local::U;
-use crate::leaf::math::{Corners, Vec3, along, dot, edges, largest_of, min3, project};
+use crate::leaf::math::{Corners, U, Vec3, along, dot, edges, largest_of, min3, project};
 use bvh_format::leaf::Packet;
 
 /// The error that underflow adds to each coordinate: 2^-140, in units of the frame.

@@ -18,6 +18,10 @@ pub trait Path {
     /// It must hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as
     /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work a question
     /// takes.
+    ///
+    /// Questions ask with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library answer for any numbers,
+    /// so that others can stand on them: times in any order, as of a way back; times before 0 and after 1, when they stand
+    /// still; and NaN, for which nothing is known.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
 
@@ -244,11 +248,34 @@ impl Path for Motion {
     }
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
-        let turned = (t1 - t0) * self.angle;
-        let arc = self.arm(radius) * (turned * turned) / 8.0;
-        // Thrice: of the point, and of both ends of the segment.
-        arc * (1.0 + 1.0 / (1 << 17) as f64) + 3.0 * self.rounding(radius)
+        sagitta_of(self, radius, [t0, t1], |radius, [t0, t1]| {
+            let turned = (t1 - t0) * self.angle;
+            let arc = self.arm(radius) * (turned * turned) / 8.0;
+            // Thrice: of the point, and of both ends of the segment.
+            arc * (1.0 + 1.0 / (1 << 17) as f64) + 3.0 * self.rounding(radius)
+        })
     }
+}
+
+/// Returns the sagitta of a path for any numbers, given what it is for radii of at least 0 and times in their order from 0
+/// to 1.
+fn sagitta_of(path: &impl Path, radius: f64, times: [f64; 2], within: impl Fn(f64, [f64; 2]) -> f64) -> f64 {
+    let [t0, t1] = times;
+    if !radius.is_finite() || t0.is_nan() || t1.is_nan() {
+        return f64::INFINITY;
+    }
+    let (radius, [t0, t1]) = (radius.abs(), [t0.min(t1), t0.max(t1)]);
+    let [from, to] = [t0, t1].map(|t| t.clamp(0.0, 1.0));
+    let inside = within(radius, [from, to]);
+    let outside = (from - t0) + (t1 - to);
+    if outside == 0.0 {
+        return inside;
+    }
+    // Outside it stands still, where one that goes straight at a constant rate is on its way.
+    let (start, end) = (path.pose(from), path.pose(to));
+    let turned = norm(&difference(end.rotation(), start.rotation()));
+    let moved = length([0, 1, 2].map(|k| end.translation()[k] - start.translation()[k])) + turned * radius;
+    inside + moved * (outside / (t1 - t0)).min(1.0) * (1.0 + 1.0 / (1u64 << 40) as f64)
 }
 
 /// Motions between one pose after another, each of which takes the same time.
@@ -294,17 +321,10 @@ impl Polyline {
         }
         moved.sqrt() + turned.sqrt() * radius
     }
-}
-
-impl Path for Polyline {
-    fn pose(&self, t: f64) -> Pose {
-        let (number, t) = self.at(t);
-        self.motions[number].pose(t)
-    }
 
     /// The way is within the largest sagitta of its motions of the polygon through the knots, and that is farthest from the
     /// straight way at a knot.
-    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+    fn sagitta_within(&self, radius: f64, [t0, t1]: [f64; 2]) -> f64 {
         let ((first, from), (mut last, mut to)) = (self.at(t0), self.at(t1));
         if to == 0.0 && last > first {
             // The end of one motion is the start of the next, to the bit.
@@ -326,6 +346,17 @@ impl Path for Polyline {
         let knot = |number: usize| self.bend(number, radius, [t0, t1], &ends);
         let knots = (first + 1..=last).map(knot).fold(0.0, f64::max);
         bent + knots * (1.0 + 1.0 / (1u64 << 40) as f64)
+    }
+}
+
+impl Path for Polyline {
+    fn pose(&self, t: f64) -> Pose {
+        let (number, t) = self.at(t);
+        self.motions[number].pose(t)
+    }
+
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        sagitta_of(self, radius, [t0, t1], |radius, times| self.sagitta_within(radius, times))
     }
 }
 
@@ -467,7 +498,10 @@ pub(super) mod tests {
     pub(in crate::motion) fn departure(path: &dyn Path, level: i32, state: &mut u64) -> f64 {
         let size = 0.5f64.powi(level);
         let t0 = (signed(state).abs() / size).floor() * size;
-        let t1 = (t0 + size).min(1.0);
+        departure_between(path, [t0, (t0 + size).min(1.0)], state)
+    }
+
+    fn departure_between(path: &dyn Path, [t0, t1]: [f64; 2], state: &mut u64) -> f64 {
         let radius = 2.0 * signed(state).abs() + 1e-6;
         let bound = path.sagitta(radius, t0, t1);
         let p = vector(state);
@@ -498,5 +532,22 @@ pub(super) mod tests {
             }
         }
         assert!(largest > 0.5, "{largest}");
+    }
+
+    #[test]
+    fn sagittas_hold_for_ways_back_and_beyond_the_ends() {
+        let state = &mut 12;
+        for path in paths(state) {
+            for _ in 0..60 {
+                let [t0, t1] = [(); 2].map(|()| 0.5 + signed(state));
+                let ratio = departure_between(&*path, [t0, t1], state);
+                assert!(ratio <= 1.0, "{ratio} from {t0} to {t1}");
+            }
+            assert_eq!(path.sagitta(1.0, 0.25, 0.75), path.sagitta(-1.0, 0.75, 0.25));
+            for [radius, t0, t1] in [[f64::NAN, 0.0, 1.0], [1.0, f64::NAN, 1.0], [1.0, 0.0, f64::NAN]] {
+                assert_eq!(path.sagitta(radius, t0, t1), f64::INFINITY);
+            }
+            assert!(path.sagitta(1.0, f64::NEG_INFINITY, f64::INFINITY).is_finite());
+        }
     }
 }

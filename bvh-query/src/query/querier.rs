@@ -5,8 +5,7 @@ use crate::isa::Backend;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
-use crate::query::motion::sweep::Ends;
-use crate::query::probe::closest::BoundedTriangle;
+use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::search::BoundedPair;
 use crate::traverse::walk_memory::WalkMemory;
 
@@ -43,6 +42,13 @@ pub struct Querier {
     budget: u64,
     pub(super) stats: QueryStats,
     questions: u64,
+}
+
+/// The memory of B at the end of an interval; at its start, B is where other queries have it.
+#[derive(Default)]
+pub(super) struct Ends {
+    pub(super) packets: PlacedPackets,
+    pub(super) queue: TriangleQueue,
 }
 
 impl Querier {

@@ -8,7 +8,7 @@
 //! A tree is split at the median along the longest side. Each node also has the union of the groups below it, so that parts
 //! of the scene that are not asked about each other are left out at once.
 
-use crate::scene::instance::Groups;
+use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -8,6 +8,7 @@
 
 mod broad_phase;
 mod error;
+mod groups;
 mod instance;
 mod motion;
 mod probe;
@@ -17,7 +18,8 @@ mod workers;
 mod world_box;
 
 pub use error::{OpenSceneError, SceneError};
-pub use instance::{Groups, InstanceId, SceneShape};
+pub use groups::Groups;
+pub use instance::{InstanceId, SceneShape};
 pub use motion::SceneMotion;
 pub use probe::{SceneClosestPoint, SceneRayHit};
 pub use question::{SceneContact, SceneDistance, ScenePair};

@@ -3,15 +3,20 @@
 mod probes;
 mod questions;
 
+use crate::at_hand::MESHES;
 use crate::entry::entry;
-use crate::handles::{MESHES, SCENES};
-use crate::input::{array, flag, optional_text, path, pose, poses, text};
+use crate::input::{array, flag, optional_text, path, text};
 use crate::mesh::{hand_out, new_mesh};
 use crate::output::{self, List, One};
+use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
+use crate::table::{Kind, Table};
 use crate::types::{Instance, MeshHandle, PoseRows, SceneHandle, StatsRow, backend};
 use bvh_query::{Groups, InstanceId, Scene, SceneShape};
 use std::ffi::c_char;
+
+/// All scenes that are open.
+static SCENES: Table<Box<Scene>> = Table::new(Kind::Scene);
 
 /// Makes a scene, and hands it out.
 ///

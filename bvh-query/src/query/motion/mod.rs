@@ -17,7 +17,7 @@
 mod pairs;
 mod question;
 mod search;
-pub(super) mod sweep;
+mod sweep;
 
 pub(crate) use question::{radius, tolerance};
 pub(crate) use search::Earliest;

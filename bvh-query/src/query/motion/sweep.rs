@@ -25,13 +25,6 @@ use crate::traverse::placement::{ObjectPair, Placement};
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
-/// The memory of B at the end of an interval; at its start, B is where other queries have it.
-#[derive(Default)]
-pub(in crate::query) struct Ends {
-    packets: PlacedPackets,
-    queue: TriangleQueue,
-}
-
 impl Querier {
     /// Adds the pairs of triangles of two objects that the interval does not set apart. Returns false if there are more of
     /// them, or more work, than there is room for; then some are missing.

@@ -9,13 +9,14 @@ use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
-use crate::leaf::local::scale_of;
+use crate::leaf::frame::scale_of;
 use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_within};
 use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
 use crate::query::options::check_distance;
+use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
@@ -36,14 +37,6 @@ const LIMIT_WIDENING: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
 /// A pose may be 2^-20 from rigid, entry by entry, so that lengths in an object's frame may differ from those in the frame of a
 /// question by 2^-19 of themselves. A bound may come from one triangle and decide about another: that counts twice.
 const MAX_STRETCH: f64 = 1.0 + 1.0 / (1 << 17) as f64;
-
-/// A triangle that may be the closest, with a lower bound of its distance.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::query) struct BoundedTriangle {
-    lower: f32,
-    leaf: LeafPacket,
-    lane: u8,
-}
 
 /// The closest triangle so far.
 #[derive(Clone, Copy)]

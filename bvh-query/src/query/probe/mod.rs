@@ -2,6 +2,7 @@
 
 #[cfg(feature = "parallel")]
 pub(crate) mod batch;
+pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
 pub(crate) mod placed;

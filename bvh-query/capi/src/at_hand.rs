@@ -1,18 +1,12 @@
-//! The tables of all handles, and the meshes that a querier keeps at hand.
+//! The table of meshes, and those that a querier keeps at hand.
 
-use crate::paths::PathValue;
-use crate::queriers::Asker;
 use crate::status::Failure;
 use crate::table::{Kind, Table};
 use crate::types::MeshHandle;
-use bvh_query::{OwnedShape, Scene, Shape, Tracker};
-use std::sync::Arc;
+use bvh_query::{OwnedShape, Shape};
 
+/// All meshes that are open.
 pub(crate) static MESHES: Table<OwnedShape> = Table::new(Kind::Mesh);
-pub(crate) static QUERIERS: Table<Box<Asker>> = Table::new(Kind::Querier);
-pub(crate) static TRACKERS: Table<Box<Tracker>> = Table::new(Kind::Tracker);
-pub(crate) static PATHS: Table<Arc<PathValue>> = Table::new(Kind::Path);
-pub(crate) static SCENES: Table<Box<Scene>> = Table::new(Kind::Scene);
 
 /// How many meshes a querier keeps at hand.
 const MOST_AT_HAND: usize = 8;
