@@ -6,7 +6,7 @@
 | Coal | cbvh |
 |---|---|
 | a `BVHModelOBBRSS`, filled and built at each start | `bake` or, once for all starts, `bake_files` and `open` |
-| two transforms | the pose of b in the frame of a (body to world): `inv(pose_a) @ pose_b`, or N at once |
+| two transforms | the pose of b in the frame of a (body to world): `cbvh.relative(pose_a, pose_b)`, or N at once |
 | `collide` | `a.collide(b, poses)` |
 | `collide` with a `security_margin` | `a.within(b, poses, margin)` |
 | `collide` with many contacts | `a.contacts(b, poses)`: all pairs of triangles that touch |

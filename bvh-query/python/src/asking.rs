@@ -1,9 +1,15 @@
 //! Asks questions one after the other or on all cores, without Python's lock and so that Ctrl-C ends them.
+//!
+//! What uses all cores runs in a pool of threads of this module. A process that was forked has none of the threads of the
+//! one it comes from, so that it starts its own.
 
+use crate::arguments::reserved;
 use crate::errors::query_error;
 use bvh_query::Querier;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use std::sync::Mutex;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Queriers that are not in use. Their memory is that of the largest questions so far. To move one takes longer than a short
@@ -53,7 +59,30 @@ pub(crate) fn on_all_cores<P: Sync, T: Send>(
     items: &[P],
     ask: impl Fn(&[P]) -> PyResult<Vec<T>> + Sync,
 ) -> PyResult<Vec<T>> {
-    py.detach(|| in_turns(items, QUESTIONS_ON_ALL_CORES, &ask))
+    py.detach(|| in_turns(items, QUESTIONS_ON_ALL_CORES, |items| on_pool(|| ask(items))?))
+}
+
+/// The pool of a process.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+/// Runs something that uses all cores, or as many as the environment variable `RAYON_NUM_THREADS` says.
+pub(crate) fn on_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let own = std::process::id();
+    let pool = {
+        let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some((process, pool)) if *process == own => Arc::clone(pool),
+            _ => {
+                let made = ThreadPoolBuilder::new().build();
+                let made = made.map_err(|error| PyRuntimeError::new_err(format!("threads: {error}")))?;
+                let pool = Arc::new(made);
+                // To end the pool of another process would wait for threads that are not here.
+                std::mem::forget(kept.replace((own, Arc::clone(&pool))));
+                pool
+            }
+        }
+    };
+    Ok(pool.install(work))
 }
 
 fn in_turns<P, T>(
@@ -64,7 +93,7 @@ fn in_turns<P, T>(
     if items.len() <= size {
         return ask(items);
     }
-    let mut answers = Vec::with_capacity(items.len());
+    let mut answers = reserved(items.len())?;
     let mut handled = Instant::now();
     for turn in items.chunks(size) {
         answers.extend(ask(turn)?);

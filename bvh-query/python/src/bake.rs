@@ -1,8 +1,10 @@
 //! Bakes meshes: arrays into memory, and files into files of any size.
 
-use crate::arrays::{rows, shape_error};
+use crate::arguments::{rows, shape_error};
+use crate::asking::on_pool;
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
+use bvh_bake::mesh::Mesh as Triangles;
 use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
 use bvh_query::Bvh;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -59,8 +61,9 @@ pub(crate) fn bake(
     let options = options.read()?;
     let [_, 3] = *faces.shape() else { return Err(shape_error("faces", "(F, 3)", faces.shape())) };
     let faces = faces.as_slice()?.as_chunks::<3>().0.to_vec();
-    let mesh = bvh_bake::mesh::Mesh::from_triangles(rows(vertices, "vertices")?.rows, faces);
-    let (bytes, _) = py.detach(|| to_bytes(&mesh, &options)).map_err(bake_error)?;
+    let vertices = rows(vertices, "vertices")?.rows;
+    let bake = || to_bytes(&Triangles::from_triangles(vertices, faces), &options);
+    let (bytes, _) = py.detach(|| on_pool(bake))?.map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }
@@ -77,6 +80,6 @@ pub(crate) fn bake_files(
 ) -> PyResult<bool> {
     let options = options.read()?;
     let bake = || FileBake::new(inputs, output).options(options).max_memory(max_memory).force(force).run();
-    let outcome = py.detach(bake).map_err(bake_error)?;
+    let outcome = py.detach(|| on_pool(bake))?.map_err(bake_error)?;
     Ok(matches!(outcome, Outcome::UpToDate(_)))
 }

@@ -26,7 +26,7 @@ fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr 
         Some(number) => {
             let text = source.to_string();
             let text = text.split(" (os error").next().unwrap_or_default().to_owned();
-            PyOSError::new_err((number, text, path.to_owned()))
+            PyOSError::new_err((number, text, path.as_os_str().to_owned()))
         }
         None => PyOSError::new_err(message),
     }

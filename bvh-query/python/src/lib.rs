@@ -4,7 +4,7 @@
 //! give, and lets other threads of Python run while it works.
 
 mod answers;
-mod arrays;
+mod arguments;
 mod asking;
 mod bake;
 mod errors;
@@ -31,10 +31,11 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![bake::bake, bake::bake_files];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
-    functions![poses::poses_of, poses::relative_poses];
+    functions![arguments::copied_numbers, poses::poses_of, poses::relative_poses];
     functions![
         probes::closest_points,
         probes::sides,
+        probes::signed_distances,
         probes::first_hits,
         probes::any_hits,
         probes::all_hits,

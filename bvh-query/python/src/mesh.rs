@@ -46,10 +46,11 @@ impl Mesh {
     }
 
     /// One object of the file.
-    fn object(&self, number: usize) -> PyResult<Self> {
+    fn object(&self, number: i64) -> PyResult<Self> {
         let bvh = Arc::clone(self.shape.bvh());
         let objects = bvh.objects().len();
-        let shape = OwnedShape::object(bvh, number).ok_or_else(|| {
+        let shape = usize::try_from(number).ok().and_then(|number| OwnedShape::object(bvh, number));
+        let shape = shape.ok_or_else(|| {
             PyIndexError::new_err(format!("object: expected a number below {objects}, found {number}"))
         })?;
         Ok(Self { shape })

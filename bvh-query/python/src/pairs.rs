@@ -1,7 +1,7 @@
 //! Questions about two meshes in many poses.
 
 use crate::answers::{self, Answers, table};
-use crate::arrays::{self, Rows};
+use crate::arguments::{self, Rows, flag, number};
 use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
@@ -20,9 +20,14 @@ struct Question<'py, 'a> {
 }
 
 impl<'py, 'a> Question<'py, 'a> {
-    fn new(a: &'a Mesh, b: &'a Mesh, poses: &Bound<'py, PyAny>, parallel: bool) -> PyResult<Self> {
-        let (a, b) = (a.shape().shape(), b.shape().shape());
-        Ok(Self { py: poses.py(), a, b, poses: arrays::poses(poses, "poses")?, parallel })
+    fn new(
+        a: &'a Mesh,
+        b: &'a Mesh,
+        poses: &Bound<'py, PyAny>,
+        parallel: &Bound<'py, PyAny>,
+    ) -> PyResult<Self> {
+        let (a, b, parallel) = (a.shape().shape(), b.shape().shape(), flag(parallel, "parallel")?);
+        Ok(Self { py: poses.py(), a, b, poses: arguments::poses(poses, "poses")?, parallel })
     }
 
     /// Asks about all poses, on all cores or one after the other, without Python's lock.
@@ -32,7 +37,8 @@ impl<'py, 'a> Question<'py, 'a> {
         one: impl Fn(&mut Querier, Shape<'_>, Shape<'_>, &Pose) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
         let (a, b, poses) = (self.a, self.b, &self.poses.rows);
-        if self.parallel {
+        // Without poses, too, the other arguments are checked.
+        if self.parallel || poses.is_empty() {
             let all = Batch::new(a, b).map_err(query_error)?;
             return on_all_cores(self.py, poses, |poses| batch(&all, poses).map_err(query_error));
         }
@@ -49,7 +55,7 @@ pub(crate) fn collide<'py>(
     a: &Mesh,
     b: &Mesh,
     poses: &Bound<'py, PyAny>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.collide(a, b, pose);
@@ -62,10 +68,10 @@ pub(crate) fn within<'py>(
     a: &Mesh,
     b: &Mesh,
     poses: &Bound<'py, PyAny>,
-    d: f64,
-    parallel: bool,
+    d: &Bound<'py, PyAny>,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(a, b, poses, parallel)?;
+    let (question, d) = (Question::new(a, b, poses, parallel)?, number(d, "d")?);
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.within(a, b, pose, d);
     let found = question.ask(|batch, poses| batch.within(poses, d), one)?;
     question.answers().values(found.into_iter())
@@ -76,7 +82,7 @@ pub(crate) fn relation<'py>(
     a: &Mesh,
     b: &Mesh,
     poses: &Bound<'py, PyAny>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.relation(a, b, pose);
@@ -90,14 +96,15 @@ pub(crate) fn distance<'py>(
     a: &Mesh,
     b: &Mesh,
     poses: &Bound<'py, PyAny>,
-    rel_err: f64,
-    abs_err: f64,
-    parallel: bool,
+    rel_err: &Bound<'py, PyAny>,
+    abs_err: &Bound<'py, PyAny>,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let question = Question::new(a, b, poses, parallel)?;
+    let (rel_err, abs_err) = (number(rel_err, "rel_err")?, number(abs_err, "abs_err")?);
     let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
     let exact = rel_err == 0.0 && abs_err == 0.0;
-    if parallel && !exact {
+    if question.parallel && !exact {
         return Err(PyValueError::new_err("parallel: expected False with rel_err or abs_err, found True"));
     }
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| {
@@ -112,7 +119,7 @@ pub(crate) fn contacts<'py>(
     a: &Mesh,
     b: &Mesh,
     poses: &Bound<'py, PyAny>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.contacts(a, b, pose);

@@ -1,12 +1,13 @@
 //! Paths: the library's own motions and polylines, and paths that Python code answers for.
 
 use crate::answers::Answers;
-use crate::arrays::{many_poses, numbers, pose, poses, shape_error};
+use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
 use crate::errors::path_error;
 use bvh_query::{Motion, Path, Polyline, Pose};
 use numpy::PyUntypedArrayMethods;
-use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyRecursionError, PyValueError};
 use pyo3::prelude::*;
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -59,9 +60,10 @@ impl Paths {
         start: &Bound<'_, PyAny>,
         point: &Bound<'_, PyAny>,
         direction: &Bound<'_, PyAny>,
-        angle: f64,
-        shift: f64,
+        angle: &Bound<'_, PyAny>,
+        shift: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
+        let (angle, shift) = (number(angle, "angle")?, number(shift, "shift")?);
         let start = pose(start, "start")?;
         let (point, direction) = (vector(point, "point")?, vector(direction, "direction")?);
         let motion = Motion::screw(&start, point, direction, angle, shift);
@@ -71,7 +73,7 @@ impl Paths {
     /// A path through poses.
     #[staticmethod]
     fn through(knots: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let knots = many_poses(knots, "poses", " with N of at least 2")?;
+        let knots = many_poses(knots, "poses")?;
         let polyline = Polyline::new(&knots).map_err(|error| path_error("poses", &error))?;
         Ok(Self::of(Own::Polyline(Arc::new(polyline))))
     }
@@ -99,14 +101,21 @@ impl Paths {
         if times.ndim() > 1 {
             return Err(shape_error("t", "() or (T,)", times.shape()));
         }
-        let times = times.as_slice()?;
+        let times = times.as_slice()?.to_vec();
         let of = |path: &Own| times.iter().map(|&t| path.path().pose(t)).collect::<Vec<_>>();
-        let found: Vec<Pose> = self.paths.iter().flat_map(of).collect();
+        let found: Vec<Pose> = t.py().detach(|| self.paths.iter().flat_map(of).collect());
         Answers { py: t.py(), one: false }.poses(&found)
     }
 
     /// The sagitta of each path.
-    fn sagittas<'py>(&self, py: Python<'py>, radius: f64, t0: f64, t1: f64) -> PyResult<Bound<'py, PyAny>> {
+    fn sagittas<'py>(
+        &self,
+        radius: &Bound<'py, PyAny>,
+        t0: &Bound<'py, PyAny>,
+        t1: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = radius.py();
+        let (radius, t0, t1) = (number(radius, "radius")?, number(t0, "t0")?, number(t1, "t1")?);
         let of = |path: &Own| path.path().sagitta(radius, t0, t1);
         Answers { py, one: self.one }.values(self.paths.iter().map(of))
     }
@@ -131,6 +140,35 @@ pub(crate) struct Called {
     raised: Mutex<Option<PyErr>>,
 }
 
+/// How many questions may ask a path that asks a question that asks a path, and so on. Each takes some kilobytes of the
+/// stack, which Python does not count.
+const MOST_NESTED: u32 = 64;
+
+thread_local! {
+    static NESTED: Cell<u32> = const { Cell::new(0) };
+}
+
+/// A call of Python code by a question, as long as it runs.
+struct Nested;
+
+impl Nested {
+    fn new() -> PyResult<Self> {
+        let depth = NESTED.get();
+        if depth >= MOST_NESTED {
+            let found = "path: expected questions in paths that questions ask at most 64 deep, found more";
+            return Err(PyRecursionError::new_err(found));
+        }
+        NESTED.set(depth + 1);
+        Ok(Self)
+    }
+}
+
+impl Drop for Nested {
+    fn drop(&mut self) {
+        NESTED.set(NESTED.get() - 1);
+    }
+}
+
 /// What unwinds a question when a path raises an exception.
 struct Raised;
 
@@ -152,22 +190,18 @@ impl Called {
     }
 
     fn ask_pose(&self, t: f64) -> PyResult<Pose> {
+        let _nested = Nested::new()?;
         Python::attach(|py| {
             pose(&self.object.bind(py).call_method1("pose", (t,))?, &format!("path.pose({t:?})"))
         })
     }
 
     fn ask_sagitta(&self, radius: f64, t0: f64, t1: f64) -> PyResult<f64> {
+        let _nested = Nested::new()?;
         Python::attach(|py| {
             let found = self.object.bind(py).call_method1("sagitta", (radius, t0, t1))?;
             let place = || format!("path.sagitta({radius:?}, {t0:?}, {t1:?})");
-            let length: f64 = match found.extract() {
-                Ok(length) => length,
-                Err(_) => {
-                    let message = format!("{}: expected a number, found {}", place(), found.repr()?);
-                    return Err(PyTypeError::new_err(message));
-                }
-            };
+            let length = number(&found, &place())?;
             if length >= 0.0 {
                 return Ok(length);
             }

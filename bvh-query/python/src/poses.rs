@@ -1,7 +1,7 @@
 //! Makes poses: from quaternions, and of one body in the frame of another.
 
 use crate::answers::Answers;
-use crate::arrays::{poses, rows};
+use crate::arguments::{poses, rows};
 use crate::errors::pose_error;
 use bvh_query::Pose;
 use pyo3::prelude::*;

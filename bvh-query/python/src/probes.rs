@@ -1,13 +1,12 @@
 //! Questions about one mesh and many points, rays or segments.
 
 use crate::answers::{self, Answers};
-use crate::arrays::{Rows, numbers, pose_or_identity, rows, shape_error};
+use crate::arguments::{Rows, flag, number, numbers, points as read_points, pose_or_identity, shape_error};
 use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::query_error;
 use crate::mesh::Mesh;
 use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, RayHit};
 use numpy::PyUntypedArrayMethods;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -26,9 +25,10 @@ impl<'py, 'a, P: Sync> Question<'py, 'a, P> {
         mesh: &'a Mesh,
         probes: Rows<P>,
         pose: Option<&Bound<'py, PyAny>>,
-        parallel: bool,
+        parallel: &Bound<'py, PyAny>,
     ) -> PyResult<Self> {
-        Ok(Self { py, mesh, pose: pose_or_identity(pose, "pose")?, probes, parallel })
+        let (pose, parallel) = (pose_or_identity(pose, "pose")?, flag(parallel, "parallel")?);
+        Ok(Self { py, mesh, pose, probes, parallel })
     }
 
     /// Asks about all probes, on all cores or one after the other, without Python's lock.
@@ -39,7 +39,8 @@ impl<'py, 'a, P: Sync> Question<'py, 'a, P> {
     ) -> PyResult<Vec<T>> {
         let placed = self.mesh.shape().shape().at(&self.pose);
         let probes = &self.probes.rows;
-        if self.parallel {
+        // Without probes, too, the other arguments are checked.
+        if self.parallel || probes.is_empty() {
             let all = ProbeBatch::new(placed).map_err(query_error)?;
             return on_all_cores(self.py, probes, |probes| batch(&all, probes).map_err(query_error));
         }
@@ -55,11 +56,12 @@ impl<'py, 'a, P: Sync> Question<'py, 'a, P> {
 pub(crate) fn closest_points<'py>(
     mesh: &Mesh,
     points: &Bound<'py, PyAny>,
-    within: f64,
+    within: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let question = Question::new(points.py(), mesh, rows(points, "points")?, pose, parallel)?;
+    let question = Question::new(points.py(), mesh, read_points(points, "points")?, pose, parallel)?;
+    let within = number(within, "within")?;
     let found = question.ask(
         |batch, points| batch.closest_points(points, within),
         |querier, shape, &point| querier.closest_point(shape, point, within),
@@ -72,34 +74,52 @@ pub(crate) fn sides<'py>(
     mesh: &Mesh,
     points: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(points.py(), mesh, rows(points, "points")?, pose, parallel)?;
+    let question = Question::new(points.py(), mesh, read_points(points, "points")?, pose, parallel)?;
     let found = question
         .ask(|batch, points| batch.sides(points), |querier, shape, &point| querier.side(shape, point))?;
     question.answers().values(found.into_iter().map(|side| side as u8))
 }
 
-/// Reads rays: origins and directions of shape (3,) or (N, 3), and their greatest parameters of shape () or (N,).
+/// NaN where the mesh has no inside.
+#[pyfunction]
+pub(crate) fn signed_distances<'py>(
+    mesh: &Mesh,
+    points: &Bound<'py, PyAny>,
+    pose: Option<&Bound<'py, PyAny>>,
+    parallel: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(points.py(), mesh, read_points(points, "points")?, pose, parallel)?;
+    let found = question.ask(
+        |batch, points| batch.signed_distances(points, f64::INFINITY),
+        |querier, shape, &point| querier.signed_distance(shape, point, f64::INFINITY),
+    )?;
+    let distances = found.into_iter().map(|found| found.and_then(|found| found.value()).unwrap_or(f64::NAN));
+    question.answers().values(distances)
+}
+
+/// Reads rays: origins and directions of shape (3,) or (N, 3), and their greatest parameters of shape () or (N,). One origin
+/// serves N directions, and one direction N origins.
 pub(crate) fn rays(
     origins: &Bound<'_, PyAny>,
     directions: &Bound<'_, PyAny>,
     until: &Bound<'_, PyAny>,
 ) -> PyResult<Rows<Ray>> {
-    let (origins, directions) = (rows(origins, "origins")?, rows::<3>(directions, "directions")?);
-    let (count, found) = (origins.rows.len(), directions.rows.len());
-    if found != count {
-        let message = format!("directions: expected as many directions as origins, {count}, found {found}");
-        return Err(PyValueError::new_err(message));
-    }
+    let (origins, directions) = (read_points(origins, "origins")?, read_points(directions, "directions")?);
+    let mut rays = origins.with("origins", (&directions, "directions"), |&origin, &direction, _| {
+        Ok(Ray::new(origin, direction))
+    })?;
     let until = numbers(until, "until")?;
-    if !until.shape().is_empty() && until.shape() != [count] {
-        return Err(shape_error("until", &format!("() or ({count},)"), until.shape()));
+    let count = rays.rows.len();
+    if !until.shape().is_empty() && (rays.one || until.shape() != [count]) {
+        let expected = if rays.one { "()".to_owned() } else { format!("() or ({count},)") };
+        return Err(shape_error("until", &expected, until.shape()));
     }
-    let lines = origins.rows.into_iter().zip(directions.rows);
-    let rays = lines.zip(until.as_slice()?.iter().cycle());
-    let rays = rays.map(|((origin, direction), &until)| Ray::new(origin, direction).until(until)).collect();
-    Ok(Rows { rows: rays, one: origins.one })
+    for (ray, &until) in rays.rows.iter_mut().zip(until.as_slice()?.iter().cycle()) {
+        *ray = ray.until(until);
+    }
+    Ok(rays)
 }
 
 #[pyfunction]
@@ -109,7 +129,7 @@ pub(crate) fn first_hits<'py>(
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
     let found = question
@@ -124,7 +144,7 @@ pub(crate) fn any_hits<'py>(
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
     let found = question
@@ -139,7 +159,7 @@ pub(crate) fn all_hits<'py>(
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(origins.py(), mesh, rays(origins, directions, until)?, pose, parallel)?;
     let found = question
@@ -149,16 +169,10 @@ pub(crate) fn all_hits<'py>(
     question.answers().lists(&found, hits)
 }
 
-/// Reads segments: starts and ends of shape (3,) or (N, 3).
+/// Reads segments: starts and ends of shape (3,) or (N, 3). One start serves N ends, and one end N starts.
 pub(crate) fn segments(starts: &Bound<'_, PyAny>, ends: &Bound<'_, PyAny>) -> PyResult<Rows<[[f64; 3]; 2]>> {
-    let (starts, ends) = (rows(starts, "starts")?, rows(ends, "ends")?);
-    let (count, found) = (starts.rows.len(), ends.rows.len());
-    if found != count {
-        let message = format!("ends: expected as many ends as starts, {count}, found {found}");
-        return Err(PyValueError::new_err(message));
-    }
-    let both = starts.rows.into_iter().zip(ends.rows);
-    Ok(Rows { rows: both.map(|(start, end)| [start, end]).collect(), one: starts.one })
+    let ends = read_points(ends, "ends")?;
+    read_points(starts, "starts")?.with("starts", (&ends, "ends"), |&start, &end, _| Ok([start, end]))
 }
 
 #[pyfunction]
@@ -167,7 +181,7 @@ pub(crate) fn meet_segments<'py>(
     starts: &Bound<'py, PyAny>,
     ends: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
-    parallel: bool,
+    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(starts.py(), mesh, segments(starts, ends)?, pose, parallel)?;
     let found = question.ask(

@@ -5,7 +5,8 @@
 //! they may then ask the scene themselves.
 
 use crate::answers::{Answers, array, table};
-use crate::arrays::{self, pose_or_identity};
+use crate::arguments::{self, pose_or_identity};
+use crate::asking::on_pool;
 use crate::errors::{FormatError, open_error, query_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
@@ -32,7 +33,7 @@ pub(crate) struct State {
     entries: HashMap<i64, Entry>,
     numbers: HashMap<InstanceId, i64>,
     next: i64,
-    parallel: bool,
+    pub(crate) parallel: bool,
     tracking: bool,
 }
 
@@ -55,7 +56,7 @@ impl State {
     }
 
     fn enter(&mut self, number: Option<i64>, id: InstanceId, mesh: Py<PyAny>) -> i64 {
-        let number = number.filter(|number| !self.entries.contains_key(number)).unwrap_or(self.next);
+        let number = number.unwrap_or(self.next);
         self.entries.insert(number, Entry { id, mesh: Arc::new(mesh) });
         self.numbers.insert(id, number);
         self.next = self.next.max(number.saturating_add(1));
@@ -134,17 +135,20 @@ impl Scene {
     }
 
     /// Asks a question, and reads the answer while the scene is still as it was.
-    pub(crate) fn ask<A, T: Send>(
+    pub(crate) fn ask<A: Send, T: Send>(
         &self,
         py: Python<'_>,
         ask: impl FnOnce(&mut bvh_query::Scene) -> Result<A, SceneError> + Send,
         read: impl FnOnce(&State, A) -> T + Send,
     ) -> PyResult<T> {
-        let asked = self.with(py, |state| match ask(&mut state.scene) {
-            Ok(answer) => Ok(read(state, answer)),
-            Err(error) => Err(state.refused(error)),
-        });
-        asked.map_err(scene_error)
+        self.with(py, |state| {
+            let answer =
+                if state.parallel { on_pool(|| ask(&mut state.scene))? } else { ask(&mut state.scene) };
+            match answer {
+                Ok(answer) => Ok(read(state, answer)),
+                Err(error) => Err(scene_error(state.refused(error))),
+            }
+        })
     }
 }
 
@@ -238,7 +242,7 @@ impl Scene {
 
     /// Moves an instance to a pose of shape (4, 4).
     fn set_pose(&self, number: i64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (py, pose) = (pose.py(), arrays::pose(pose, "pose")?);
+        let (py, pose) = (pose.py(), arguments::pose(pose, "pose")?);
         self.with(py, |state| {
             let id = state.id(number, "id")?;
             state.scene.set_pose(id, pose).map_err(|error| scene_error(state.refused(error)))
@@ -252,7 +256,7 @@ impl Scene {
         numbers: PyReadonlyArray1<'_, i64>,
         poses: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let (numbers, poses) = (numbers.as_slice()?.to_vec(), arrays::many_poses(poses, "poses", "")?);
+        let (numbers, poses) = (numbers.as_slice()?.to_vec(), arguments::many_poses(poses, "poses")?);
         if numbers.len() != poses.len() {
             let found = format!("poses: expected as many as ids, {}, found {}", numbers.len(), poses.len());
             return Err(PyValueError::new_err(found));

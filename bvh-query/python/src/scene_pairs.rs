@@ -1,9 +1,12 @@
 //! Questions about all pairs of a scene, standing still and moving.
 
 use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
+use crate::arguments::number;
+use crate::asking::on_pool;
+use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
-use bvh_query::{InstanceId, MotionOptions, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
+use bvh_query::{InstanceId, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -29,7 +32,8 @@ pub(crate) fn scene_collide(py: Python<'_>, scene: &Scene) -> PyResult<bool> {
 }
 
 #[pyfunction]
-pub(crate) fn scene_within(py: Python<'_>, scene: &Scene, d: f64) -> PyResult<bool> {
+pub(crate) fn scene_within(py: Python<'_>, scene: &Scene, d: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let d = number(d, "d")?;
     scene.ask(py, |scene| scene.within(d), |_, found| found)
 }
 
@@ -39,7 +43,12 @@ pub(crate) fn scene_pairs_in_contact<'py>(py: Python<'py>, scene: &Scene) -> PyR
 }
 
 #[pyfunction]
-pub(crate) fn scene_pairs_within<'py>(py: Python<'py>, scene: &Scene, d: f64) -> PyResult<Pairs<'py>> {
+pub(crate) fn scene_pairs_within<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    d: &Bound<'py, PyAny>,
+) -> PyResult<Pairs<'py>> {
+    let d = number(d, "d")?;
     table(py, scene.ask(py, |scene| scene.pairs_within(d), numbered)?.into_iter())
 }
 
@@ -85,7 +94,7 @@ struct Ways {
 
 impl Ways {
     /// Asks a question about them. A path of Python code is called without the lock of the scene, on this thread alone.
-    fn ask<A, T: Send>(
+    fn ask<A: Send, T: Send>(
         &self,
         py: Python<'_>,
         scene: &Scene,
@@ -96,7 +105,13 @@ impl Ways {
             let ids = self.numbers.iter().map(|&number| state.id(number, "paths"));
             let ids = ids.collect::<PyResult<Vec<_>>>()?;
             let ways: Vec<_> = ids.into_iter().zip(self.paths.iter().map(AnyPath::path)).collect();
-            let answer = until_raised(self.paths.iter(), || ask(&mut state.scene, &ways))?;
+            let parallel = state.parallel;
+            let scene = &mut state.scene;
+            let answer = if parallel {
+                on_pool(|| ask(scene, &ways))?
+            } else {
+                until_raised(self.paths.iter(), || ask(scene, &ways))?
+            };
             match answer {
                 Ok(answer) => Ok(read(state, answer)),
                 Err(error) => Err(scene_error(state.refused(error))),
@@ -106,6 +121,7 @@ impl Ways {
             return scene.with(py, run);
         }
         let mut own = scene.with(py, |state| state.clone());
+        own.parallel = false;
         own.scene.set_parallel(false);
         py.detach(|| run(&mut own))
     }
@@ -117,11 +133,11 @@ pub(crate) fn scene_motion<'py>(
     scene: &Scene,
     numbers: Vec<i64>,
     paths: Vec<Bound<'py, PyAny>>,
-    clearance: f64,
-    tolerance: Option<f64>,
+    clearance: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(u8, f64, f64, Nearest<'py>)> {
     let ways = Ways { numbers, paths: AnyPath::read(paths) };
-    let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
+    let options = options(clearance, tolerance)?;
     let read = |state: &State, answer: SceneMotion| {
         let of = |found: SceneDistance| Some((state.pair(found.pair), found));
         match answer {
@@ -143,10 +159,10 @@ pub(crate) fn scene_is_free<'py>(
     scene: &Scene,
     numbers: Vec<i64>,
     paths: Vec<Bound<'py, PyAny>>,
-    clearance: f64,
-    tolerance: Option<f64>,
+    clearance: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<bool> {
     let ways = Ways { numbers, paths: AnyPath::read(paths) };
-    let options = MotionOptions::new().clearance(clearance).tolerance(tolerance);
+    let options = options(clearance, tolerance)?;
     ways.ask(py, scene, |scene, ways| scene.is_free(ways, &options), |_, found| found)
 }

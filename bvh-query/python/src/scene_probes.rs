@@ -1,7 +1,7 @@
 //! Questions about many points, rays or segments in the world, over all instances of a scene.
 
 use crate::answers::{self, Answers};
-use crate::arrays::rows;
+use crate::arguments::{number, points as read_points};
 use crate::probes::{rays, segments};
 use crate::scene::{Scene, State};
 use bvh_query::{ClosestPoint, InstanceId, RayHit, SceneClosestPoint, SceneRayHit};
@@ -20,10 +20,10 @@ fn instance(state: &State, id: Option<InstanceId>) -> i64 {
 pub(crate) fn scene_closest_points<'py>(
     scene: &Scene,
     points: &Bound<'py, PyAny>,
-    within: f64,
+    within: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-    let (py, points) = (points.py(), rows(points, "points")?);
-    let to = Answers { py, one: points.one };
+    let (py, points) = (points.py(), read_points(points, "points")?);
+    let (to, within) = (Answers { py, one: points.one }, number(within, "within")?);
     let found: Vec<OfInstance<ClosestPoint>> = scene.ask(
         py,
         |scene| scene.closest_points(&points.rows, within),
@@ -39,7 +39,7 @@ pub(crate) fn scene_closest_points<'py>(
 
 #[pyfunction]
 pub(crate) fn scene_sides<'py>(scene: &Scene, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let (py, points) = (points.py(), rows(points, "points")?);
+    let (py, points) = (points.py(), read_points(points, "points")?);
     let found = scene.ask(py, |scene| scene.sides(&points.rows), |_, found| found)?;
     Answers { py, one: points.one }.values(found.into_iter().map(|side| side as u8))
 }
@@ -50,7 +50,7 @@ pub(crate) fn scene_signed_distances<'py>(
     scene: &Scene,
     points: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (py, points) = (points.py(), rows(points, "points")?);
+    let (py, points) = (points.py(), read_points(points, "points")?);
     let found =
         scene.ask(py, |scene| scene.signed_distances(&points.rows, f64::INFINITY), |_, found| found)?;
     let distances = found.into_iter().map(|found| found.and_then(|(_, of)| of.value()).unwrap_or(f64::NAN));

@@ -156,6 +156,7 @@ class Manager(unittest.TestCase):
         manager.add_object("a", solid())
         flat, add = types.SimpleNamespace(vertices=[1], faces=[[0]]), manager.add_object
         cases = [
+            (TypeError, "unhashable", add, ["b"], solid()),
             (ValueError, "name: expected that of an object of the manager, found 'b'", manager.remove_object, "b"),
             (ValueError, "name: expected that of an object", manager.set_transform, "b", np.eye(4)),
             (ValueError, "name: expected that of an object", manager.min_distance_internal, "b"),
@@ -169,6 +170,8 @@ class Manager(unittest.TestCase):
             with self.subTest(message), self.assertRaises(kind) as caught:
                 call(*arguments)
             self.assertIn(message, str(caught.exception))
+        # Nothing was added.
+        self.assertEqual(manager.in_collision_internal(return_names=True), (False, set()))
         self.assertEqual(manager.min_distance_internal(), np.inf)
 
     def test_threads_share_a_manager(self):

@@ -187,11 +187,15 @@ class Ways(unittest.TestCase):
             (ValueError, "point: expected shape (3,), found (2,)", cbvh.Motion.screw, one, [0, 0], [0, 0, 1], 1.0),
             (ValueError, "direction", cbvh.Motion.screw, one, [0, 0, 0], [0, 0, 0], 1.0),
             (ValueError, "angle", cbvh.Motion.screw, one, [0, 0, 0], [0, 0, 1], np.nan),
-            (ValueError, "poses: expected shape (N, 4, 4) with N of at least 2", cbvh.Polyline, one),
+            (ValueError, "poses: expected shape (N, 4, 4), found (4, 4)", cbvh.Polyline, one),
             (ValueError, "poses: expected at least two poses, found 1", cbvh.Polyline, [one]),
             (ValueError, "t: expected shape () or (T,), found (1, 1)", motion.pose, [[0.5]]),
             (TypeError, "one motion, which has no length", len, motion),
             (IndexError, "motion: expected a number from -2 to 1, found 2", several.__getitem__, 2),
+            (TypeError, "motion: expected a number, found slice", several.__getitem__, slice(2)),
+            (TypeError, "angle: expected a number, found str", cbvh.Motion.screw, one, [0, 0, 0], [0, 0, 1], "x"),
+            (TypeError, "radius: expected a number, found str", motion.sagitta, "x", 0, 1),
+            (TypeError, "clearance: expected a number", lambda: self.cube.motion(self.cube, motion, clearance="x")),
             (TypeError, "motion: expected a cbvh.Motion", self.cube.motion, self.cube, one),
             (TypeError, "motion: expected a cbvh.Motion", self.cube.is_free, self.cube, Line),
             (TypeError, "motion[1]: expected a cbvh.Motion", self.cube.is_free, self.cube, [motion, 3]),
@@ -265,6 +269,52 @@ class OwnPaths(unittest.TestCase):
             with self.subTest(message), self.assertRaises(kind) as caught:
                 self.cube.motion(self.cube, own)
             self.assertIn(message, str(caught.exception))
+
+    def test_a_way_back_is_answered_as_the_way_there(self):
+        class Back:
+            def __init__(self, path):
+                self.path = path
+
+            def pose(self, t):
+                return self.path.pose(1 - t)
+
+            def sagitta(self, radius, t0, t1):
+                return self.path.sagitta(radius, 1 - t0, 1 - t1)
+
+        over, through = (cbvh.Polyline(shifts((-5, 3, 0), (0, y, 0), (5, 3, 0))) for y in (2, 0))
+        for path, free in ((over, True), (through, False)):
+            self.assertIs(self.cube.is_free(self.cube, path), free)
+            self.assertIs(self.cube.is_free(self.cube, Back(path)), free)
+            scene = cbvh.Scene()
+            scene.add(self.cube)
+            self.assertIs(scene.is_free({scene.add(self.cube): Back(path)}), free)
+
+    def test_a_path_that_asks_about_itself_is_an_error(self):
+        cube = self.cube
+
+        class Itself(Line):
+            def pose(self, t):
+                cube.is_free(cube, self)
+                return super().pose(t)
+
+        with self.assertRaises(RecursionError):
+            cube.is_free(cube, Itself(-5, 10))
+        # The depth is counted anew.
+        self.assertIs(cube.is_free(cube, Line(-5, 10, 12)), True)
+
+    def test_what_a_sagitta_raises_is_raised(self):
+        class Odd:
+            def __float__(self):
+                raise KeyboardInterrupt
+
+        path = type("Path", (Line,), {"sagitta": lambda *_: Odd()})(-5, 10, 12)
+        with self.assertRaises(KeyboardInterrupt):
+            self.cube.is_free(self.cube, path)
+
+    def test_any_iterable_of_paths_is_many(self):
+        lines = [Line(-5, 10, 12), Line(-5, 10)]
+        for many in (lines, tuple(lines), iter(lines), dict.fromkeys(lines)):
+            self.assertEqual(self.cube.is_free(self.cube, many).tolist(), [True, False])
 
     def test_a_path_may_ask_questions_itself(self):
         outer = self

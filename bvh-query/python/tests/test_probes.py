@@ -18,6 +18,21 @@ class Geometry(unittest.TestCase):
     def setUpClass(cls):
         cls.cube = cbvh.bake(*cube())
 
+    def test_one_end_serves_many(self):
+        ways = np.array([[0.0, 0, -1], [0, 0, 1], [0, 1, 0.5]])
+        origin, many = [0, 0, 5], np.tile([0.0, 0, 5], (3, 1))
+        for ask in (self.cube.first_hits, self.cube.any_hits, self.cube.all_hits):
+            np.testing.assert_equal(ask(origin, ways), ask(many, ways))
+            np.testing.assert_equal(ask(many, ways[0]), ask(many, np.tile(ways[0], (3, 1))))
+        self.assertEqual(self.cube.any_hits([origin], ways[0]).tolist(), [True])
+        self.assertEqual(self.cube.any_hits(origin, ways[:1]).tolist(), [True])
+        self.assertEqual(self.cube.meet_segments(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
+        self.assertEqual(self.cube.meet_segments([[0, 0, 0], [0, 0, 4]], origin).tolist(), [True, False])
+        scene = cbvh.Scene()
+        scene.add(self.cube)
+        self.assertEqual(scene.any_hits(origin, ways).tolist(), self.cube.any_hits(origin, ways).tolist())
+        self.assertEqual(scene.meet_segments(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
+
     def test_probes(self):
         points = np.random.default_rng(1).uniform(-1, 1, (200, 3))
         outside = np.maximum(np.abs(points) - 0.5, 0)

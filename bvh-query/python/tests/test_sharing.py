@@ -2,6 +2,7 @@
 
 import ast
 import concurrent.futures
+import copy
 import doctest
 import inspect
 import multiprocessing
@@ -11,12 +12,23 @@ import pickle
 import signal
 import tempfile
 import unittest
+import warnings
 
 import numpy as np
 
 import cbvh
 from cbvh import _cbvh
 from common import TESTDATA, cube, random_poses, shifts
+
+
+def _asks_and_bakes(mesh, poses, expected):
+    scene = cbvh.Scene()
+    scene.parallel = True
+    for pose in poses:
+        scene.add(mesh, pose)
+    scene.pairs_in_contact()
+    assert cbvh.bake(*cube()).tobytes() == mesh.tobytes()
+    assert mesh.collide(mesh, poses, parallel=True).tolist() == expected
 
 
 class Sharing(unittest.TestCase):
@@ -30,9 +42,9 @@ class Sharing(unittest.TestCase):
             changed = output.stat().st_mtime_ns
             cbvh.bake_files([TESTDATA / "fclenv.obj"], output, triangles="packed")
             self.assertEqual(output.stat().st_mtime_ns, changed)
-            copy = pathlib.Path(folder) / "copy.cbvh"
-            mesh.save(copy)
-            self.assertEqual(copy.read_bytes(), output.read_bytes())
+            saved = pathlib.Path(folder) / "copy.cbvh"
+            mesh.save(saved)
+            self.assertEqual(saved.read_bytes(), output.read_bytes())
             self.assertEqual(sorted(os.listdir(folder)), ["copy.cbvh", "environment.cbvh"])
             mesh.check()
 
@@ -59,6 +71,37 @@ class Sharing(unittest.TestCase):
             for found in pool.map(lambda _: mesh.distance(mesh, poses), range(8)):
                 for one, other in zip(found, expected):
                     np.testing.assert_array_equal(one, other)
+
+    def test_threads_may_save_one_file(self):
+        mesh = cbvh.bake(*cube())
+        with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(4) as pool:
+            path = os.path.join(folder, "cube.cbvh")
+            for _ in pool.map(lambda _: mesh.save(path), range(200)):
+                pass
+            mesh.save(os.fsencode(path))
+            self.assertEqual(os.listdir(folder), ["cube.cbvh"])
+            self.assertEqual(cbvh.open(os.fsencode(path)).tobytes(), mesh.tobytes())
+
+    @unittest.skipUnless("fork" in multiprocessing.get_all_start_methods(), "this system has no fork")
+    def test_forked_processes_use_all_cores(self):
+        mesh, poses = cbvh.bake(*cube()), random_poses(3, 100, 1.5)
+        expected = mesh.collide(mesh, poses, parallel=True).tolist()
+        with warnings.catch_warnings():
+            # Threads may hold locks that a forked process waits for; those of this module do not.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = multiprocessing.get_context("fork").Process(target=_asks_and_bakes, args=(mesh, poses, expected))
+            child.start()
+        child.join(60)
+        if child.exitcode is None:
+            child.kill()
+        self.assertEqual(child.exitcode, 0)
+
+    def test_meshes_are_shared_by_copies(self):
+        mesh = cbvh.bake(*cube())
+        self.assertIs(copy.copy(mesh), mesh)
+        self.assertIs(copy.deepcopy({"mesh": [mesh]})["mesh"][0], mesh)
+        for held in (bytearray(mesh.tobytes()), memoryview(mesh.tobytes())):
+            self.assertEqual(cbvh.Mesh.from_bytes(held).triangles, 12)
 
     @unittest.skipUnless(hasattr(signal, "setitimer"), "this system has no timers that signal")
     def test_signals_end_questions(self):

@@ -159,7 +159,7 @@ fn ties_go_to_the_lowest_numbers_and_a_limit_is_exact() {
         }
         for wrong in [f64::NAN, -1.0] {
             let error = querier.closest_point(&bvh, [0.0; 3], wrong);
-            assert!(matches!(error, Err(QueryError::Number { name: "d", .. })), "{error:?}");
+            assert!(matches!(error, Err(QueryError::Number { name: "within", .. })), "{error:?}");
         }
         querier.set_budget(2);
         assert_eq!(querier.closest_point(&bvh, [0.0; 3], 9.0), Err(QueryError::Budget { visits: 2 }));

@@ -13,14 +13,15 @@ False
 
 **Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a
 point ``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the
-frame of the first one. Rotations must be rigid to within 2^-20.
+frame of the first one. Rotations must be rigid to within 2^-20, those of scenes and of `relative` to within 2^-23, as
+matrices with eight digits after the point are.
 
 **Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are ways of a body.
 `Mesh.motion` and `Mesh.is_free` tell whether a way is free, certainly at every moment. **Scenes** are many placed
 meshes (`Scene`), and `CollisionManager` asks about them as trimesh does.
 
-**Answers** to one question are plain values; answers to N questions are arrays of N elements or rows. Lengths are in
-mesh units. Contact and insides are decided exactly: touching is contact, and the surface of a mesh is what collides.
+**Answers** to one question are plain values; answers to N questions are arrays of N elements or rows, or lists of N
+arrays where each question finds as many as there are. Lengths are in mesh units. Contact and insides are decided exactly: touching is contact, and the surface of a mesh is what collides.
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
 ``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 import os
-from typing import Any, Sequence
+from typing import Any, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,14 +21,33 @@ def _options(
     ids: bool,
     topology: bool,
 ) -> dict[str, Any]:
+    for name, text in (("profile", profile), ("triangles", triangles), ("effort", effort)):
+        if text is not None and not isinstance(text, str):
+            raise TypeError(f"{name}: expected a str or None, found {type(text).__name__}")
+    for name, choice in (("ids", ids), ("topology", topology)):
+        _bool(choice, name)
+    if max_error is not None:
+        if isinstance(max_error, (str, bytes)) or not hasattr(max_error, "__float__"):
+            raise TypeError(f"max_error: expected a number, found {type(max_error).__name__}")
+        max_error = float(max_error)
+        if triangles != "quantized":
+            raise ValueError(f'max_error: expected triangles="quantized" beside it, found {triangles!r}')
+        if not 0 < max_error < np.inf:
+            raise ValueError(f"max_error: expected a finite length above 0, found {max_error}")
     return {
         "profile": profile,
         "triangles": triangles,
         "max_error": max_error,
         "effort": effort,
-        "ids": ids,
-        "topology": topology,
+        "ids": bool(ids),
+        "topology": bool(topology),
     }
+
+
+def _bool(value: Any, name: str) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name}: expected a bool, found {type(value).__name__}")
+    return bool(value)
 
 
 def bake(
@@ -47,8 +67,16 @@ def bake(
     ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
     Without ``ids`` triangles are numbered in an order of the baker's; without ``topology`` there are no answers about
     insides. Baking takes about a microsecond a triangle. `Mesh.save` writes the result.
+
+    Vertices are stored as float32 offsets from an origin of each object. That moves no vertex whose coordinates are float32
+    numbers, and others by at most 2^-23 of the diagonal of the object's box; ``triangles="quantized"`` moves them by up to
+    ``max_error``. Answers are exact about the mesh that is stored.
     """
-    points, numbers = np.asarray(vertices), np.asarray(faces)
+    points = _cbvh.copied_numbers(vertices, "vertices")
+    try:
+        numbers = np.asarray(faces)
+    except ValueError as error:
+        raise ValueError(f"faces: expected shape (F, 3), found what numpy refuses: {error}") from error
     for array, name, per in ((points, "vertices", "V"), (numbers, "faces", "F")):
         if array.ndim != 2 or array.shape[1] != 3:
             raise ValueError(f"{name}: expected shape ({per}, 3), found {array.shape}")
@@ -78,10 +106,25 @@ def bake_files(
 
     Nothing is done if the file is up to date, unless ``force``. ``max_memory``: stay within so many bytes; the rest
     goes to scratch files, so that a mesh may be larger than memory. The other options are those of `bake`. The
-    environment variable ``RAYON_NUM_THREADS`` tells how many threads bake; without it, as many as there are cores.
+    environment variable ``RAYON_NUM_THREADS`` tells how many threads the module uses, to bake as for ``parallel=True``;
+    without it, as many as there are cores.
     Raises OSError if the system refuses a file, and BakeError if a mesh cannot be baked.
     """
-    files = [inputs] if isinstance(inputs, (str, os.PathLike)) else list(inputs)
+    if isinstance(inputs, (str, bytes, os.PathLike)):
+        inputs = [inputs]
+    elif not isinstance(inputs, Iterable):
+        raise TypeError(f"inputs: expected a path or paths, found {type(inputs).__name__}")
+    files = [os.fsdecode(file) for file in inputs]
+    if not files:
+        raise ValueError("inputs: expected at least one file, found none")
     options = _options(profile, triangles, max_error, effort, ids, topology)
-    _cbvh.bake_files([os.fspath(file) for file in files], os.fspath(output), options, max_memory, force)
+    if max_memory is not None:
+        try:
+            max_memory = operator.index(max_memory)
+        except TypeError:
+            raise TypeError(f"max_memory: expected bytes as an int, found {type(max_memory).__name__}") from None
+        if max_memory < 0:
+            raise ValueError(f"max_memory: expected bytes of at least 0, found {max_memory}")
+        max_memory = min(max_memory, 2**64 - 1)
+    _cbvh.bake_files(files, os.fsdecode(output), options, max_memory, _bool(force, "force"))
     return open(output)

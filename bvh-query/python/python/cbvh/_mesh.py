@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import os
-from typing import Any, Sequence
+import secrets
+from typing import Any, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +21,6 @@ from ._answers import (
     Relation,
     Side,
     named,
-    signed,
 )
 from ._motion import Path, read_paths
 
@@ -40,17 +41,25 @@ class Mesh:
     __slots__ = ("_mesh", "_path", "_object")
 
     def __init__(self, mesh: _cbvh.Mesh, path: str | None = None, object: int | None = None) -> None:
+        if not isinstance(mesh, _cbvh.Mesh):
+            raise TypeError(f"expected cbvh.open or cbvh.bake to make a mesh, found {type(mesh).__name__}")
         self._mesh, self._path, self._object = mesh, path, object
 
     @staticmethod
-    def from_bytes(data: bytes) -> Mesh:
-        """Opens the bytes of a ``.cbvh`` file."""
-        return Mesh(_cbvh.Mesh.from_bytes(data))
+    def from_bytes(data: bytes | bytearray | memoryview) -> Mesh:
+        """Opens the bytes of a ``.cbvh`` file, which are copied."""
+        return Mesh(_cbvh.Mesh.from_bytes(bytes(memoryview(data))))
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._path is not None:
             return (open, (self._path, self._object))
         return (_unpickle, (self._mesh.bytes(), self._object))
+
+    def __copy__(self) -> Mesh:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Mesh:
+        return self
 
     def __repr__(self) -> str:
         place = "in memory" if self._path is None else repr(self._path)
@@ -84,7 +93,13 @@ class Mesh:
             if names.count(object) != 1:
                 raise ValueError(f"object: expected one name of {names}, found {object!r}")
             object = names.index(object)
-        return Mesh(self._mesh.object(object), self._path, object)
+        try:
+            number = operator.index(object)
+        except TypeError:
+            raise TypeError(f"object: expected a number or a name, found {type(object).__name__}") from None
+        # A number that is too large for the compiled module names no object either.
+        found = self._mesh.object(number if 0 <= number < 2**63 else -1)
+        return Mesh(found, self._path, number)
 
     def check(self) -> None:
         """Checks all checksums and rules of the whole file, which questions check only where they go.
@@ -99,15 +114,15 @@ class Mesh:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file. A file of that name is replaced when all is written."""
-        temporary = f"{os.fspath(path)}.{os.getpid()}.tmp"
-        try:
-            with _open_file(temporary, "xb") as file:
+        temporary = f"{os.fsdecode(path)}.{secrets.token_hex(8)}.tmp"
+        with _open_file(temporary, "xb") as file:
+            try:
                 file.write(self.tobytes())
-            os.replace(temporary, path)
-        except BaseException:
-            if os.path.exists(temporary):
+                file.close()
+                os.replace(temporary, path)
+            except BaseException:
                 os.remove(temporary)
-            raise
+                raise
 
     def collide(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do the surfaces touch? Exact: bool, or an array of bool of shape (N,).
@@ -141,7 +156,8 @@ class Mesh:
         return Distance(*_cbvh.distance(self._mesh, _other(other), poses, rel_err, abs_err, parallel))
 
     def relation(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
-        """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers, shape (N,).
+        """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers as uint8, shape
+        (N,).
 
         ``poses``: of ``other``, mesh B, in the frame of this mesh, A (body to world), shape (4, 4) or (N, 4, 4).
         """
@@ -160,7 +176,7 @@ class Mesh:
     def motion(
         self,
         other: Mesh,
-        motion: Path | Sequence[Path],
+        motion: Path | Iterable[Path],
         *,
         clearance: float = 0.0,
         tolerance: float | None = None,
@@ -168,8 +184,8 @@ class Mesh:
     ) -> MotionAnswer:
         """Is the way of ``other`` free, with it moving in the frame of this mesh, and where does it end if it is not?
 
-        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or a list of N
-        paths, the answer has arrays of N elements. The answer is certain at every moment, not at samples.
+        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or of N paths in a
+        list or another iterable, the answer has arrays of N elements. The answer is certain at every moment, not at samples.
         ``clearance``: meshes that come as near as this, in mesh units, hit. ``tolerance``: how near they may come to a
         hit, beyond the clearance, without an answer that says free or hit, in mesh units; None: a millionth of the
         diagonal of the larger object's box. ``parallel`` does nothing where a path is your own.
@@ -182,7 +198,7 @@ class Mesh:
     def is_free(
         self,
         other: Mesh,
-        motion: Path | Sequence[Path],
+        motion: Path | Iterable[Path],
         *,
         clearance: float = 0.0,
         tolerance: float | None = None,
@@ -210,7 +226,7 @@ class Mesh:
         return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel))
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
-        """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers, shape (N,).
+        """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as uint8, shape (N,).
 
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
@@ -224,8 +240,7 @@ class Mesh:
         NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of
         this mesh in the frame of the points (body to world).
         """
-        sides = _cbvh.sides(self._mesh, points, pose, parallel)
-        return signed(self.closest_points(points, pose=pose, parallel=parallel).distance, sides)
+        return _cbvh.signed_distances(self._mesh, points, pose, parallel)
 
     def first_hits(
         self,
@@ -238,8 +253,8 @@ class Mesh:
     ) -> RayHit:
         """Where rays first hit the surface: which triangle, and at which parameter.
 
-        ``origins`` and ``directions`` have shape (3,) or (N, 3); directions of any length are the unit of ``t``.
-        ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
+        ``origins`` and ``directions`` have shape (3,) or (N, 3), and one of either serves N of the other; directions of
+        any length are the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
         world).
         """
         return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel))
@@ -279,7 +294,7 @@ class Mesh:
     ) -> Any:
         """Whether closed segments meet the surface, exactly: bool, or an array of shape (N,).
 
-        ``starts`` and ``ends`` have shape (3,) or (N, 3). ``pose``: of this mesh in their frame (body to world).
+        ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
         """
         return _cbvh.meet_segments(self._mesh, starts, ends, pose, parallel)
 
@@ -288,8 +303,13 @@ _open_file = open
 
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
-    """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size."""
-    mesh = Mesh(_cbvh.Mesh.open(os.fspath(path)), os.path.abspath(path))
+    """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size.
+
+    Bytes of the file may change meanwhile: what is damaged is a FormatError. But if the file is cut short, the system ends
+    the process as soon as a question needs what is missing. `Mesh.from_bytes` copies instead.
+    """
+    name = os.fsdecode(path)
+    mesh = Mesh(_cbvh.Mesh.open(name), os.path.abspath(name))
     return mesh if object is None else mesh.object(object)
 
 

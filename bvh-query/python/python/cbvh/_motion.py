@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+import operator
+from typing import Any, Iterable, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,6 +64,9 @@ class Motion(_Own):
     __slots__ = ("_screw",)
 
     def __init__(self, paths: _cbvh.Paths, screw: tuple[Any, ...] | None = None) -> None:
+        if not isinstance(paths, _cbvh.Paths):
+            found = type(paths).__name__
+            raise TypeError(f"expected cbvh.Motion.between or cbvh.Motion.screw to make a motion, found {found}")
         # What makes a screw is kept for pickling; all else is told by the first and the last poses.
         self._paths, self._screw = paths, screw
 
@@ -85,10 +89,9 @@ class Motion(_Own):
 
         ``start`` (body to world) has shape (4, 4); ``point`` and ``direction``, in the world, have shape (3,).
         """
-        paths = _cbvh.Paths.screw(start, point, direction, angle, shift)
-        # Callers may change their arrays.
-        copies = [np.array(array, np.float64) for array in (start, point, direction)]
-        return Motion(paths, (*copies, angle, shift))
+        copied = _cbvh.copied_numbers
+        arrays = copied(start, "start"), copied(point, "point"), copied(direction, "direction")
+        return Motion(_cbvh.Paths.screw(*arrays, angle, shift), (*arrays, angle, shift))
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._screw is not None:
@@ -105,6 +108,10 @@ class Motion(_Own):
 
     def __getitem__(self, number: int) -> Motion:
         length = len(self)
+        try:
+            number = operator.index(number)
+        except TypeError:
+            raise TypeError(f"motion: expected a number, found {type(number).__name__}") from None
         if not -length <= number < length:
             raise IndexError(f"motion: expected a number from {-length} to {length - 1}, found {number}")
         return Motion(self._paths.path(number % length))
@@ -120,9 +127,8 @@ class Polyline(_Own):
 
     def __init__(self, poses: ArrayLike) -> None:
         """``poses`` (body to world) have shape (N, 4, 4), with N of at least 2."""
-        self._paths = _cbvh.Paths.through(poses)
-        # Callers may change their array.
-        self._knots = np.array(poses, np.float64)
+        self._knots = _cbvh.copied_numbers(poses, "poses")
+        self._paths = _cbvh.Paths.through(self._knots)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (Polyline, (self._knots,))
@@ -148,6 +154,7 @@ def read_paths(motion: Any) -> tuple[list[Any], bool]:
     """One path or many, as the compiled module takes them, and whether it is one."""
     if isinstance(motion, _Own):
         return [motion._paths], motion._paths.is_one()
-    if isinstance(motion, (list, tuple)):
+    is_path = callable(getattr(motion, "pose", None))
+    if isinstance(motion, Iterable) and not is_path and not isinstance(motion, (str, bytes, np.ndarray)):
         return [read_path(path, f"motion[{number}]") for number, path in enumerate(motion)], False
     return [read_path(motion, "motion")], True

@@ -13,7 +13,7 @@ def pose(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> F
     4).
 
     ``position`` has shape (3,) or (N, 3), in mesh units; ``quaternion`` has shape (4,) or (N, 4), the real part last,
-    as in SciPy, ROS and OMPL, and length 1 to within 2^-21. One of either serves N of the other.
+    as in SciPy, ROS and OMPL (python-fcl, trimesh and Eigen's constructor have it first), and length 1 to within 2^-21. One of either serves N of the other.
     """
     return _cbvh.poses_of(position, quaternion)
 

@@ -37,8 +37,9 @@ def _number(value: Any, name: str) -> int:
         number = operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: expected the number of an instance, found {type(value).__name__}") from None
-    # A number that is too large for the compiled module names no instance either.
-    return number if 0 <= number < 2**63 else -1
+    if not 0 <= number < 2**63:
+        raise KeyError(f"{name}: expected an instance of the scene, found {number}")
+    return number
 
 
 def _groups(value: Any, name: str) -> int:
@@ -64,7 +65,7 @@ class Scene:
     **Threads** may share a scene: a question waits until the one before is answered, and other threads of Python run
     meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers.
     Pickling keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone,
-    each once.
+    each once. What is added later may have another place in the order than in the scene that was pickled.
 
     >>> import cbvh, numpy as np
     >>> vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -90,9 +91,10 @@ class Scene:
     def open(path: str | os.PathLike[str]) -> Scene:
         """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the
         size."""
-        whole = os.path.abspath(path)
+        name = os.fsdecode(path)
+        whole = os.path.abspath(name)
         scene = Scene.__new__(Scene)
-        scene._scene = _cbvh.Scene.open(os.fspath(path), lambda mesh, object: Mesh(mesh, whole, object))
+        scene._scene = _cbvh.Scene.open(name, lambda mesh, object: Mesh(mesh, whole, object))
         return scene
 
     def copy(self) -> Scene:
@@ -148,17 +150,21 @@ class Scene:
         self._scene.remove(_number(id, "id"))
 
     def set_pose(self, id: int, pose: ArrayLike) -> None:
-        """Moves an instance. ``pose`` (body to world) has shape (4, 4)."""
+        """Moves an instance. ``pose`` (body to world) has shape (4, 4), and must be rigid to within 2^-23."""
         self._scene.set_pose(_number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
-        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). If an argument is
-        wrong, none has moved."""
+        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). Of an instance that is
+        given twice, the last pose counts. If an argument is wrong, none has moved."""
         self._scene.set_poses(self._ids(ids), poses)
 
-    def set_groups(self, id: int, *, member: int = ALL_GROUPS, meets: int = ALL_GROUPS) -> None:
-        """Puts an instance into groups: see `add`."""
-        self._scene.set_groups(_number(id, "id"), [_groups(member, "member"), _groups(meets, "meets")])
+    def set_groups(self, id: int, *, member: int | None = None, meets: int | None = None) -> None:
+        """Puts an instance into groups: see `add`. None leaves them as they are."""
+        number = _number(id, "id")
+        known = self._scene.groups(number)
+        groups = [_groups(known[0] if member is None else member, "member")]
+        groups.append(_groups(known[1] if meets is None else meets, "meets"))
+        self._scene.set_groups(number, groups)
 
     def groups(self, id: int) -> tuple[int, int]:
         """The groups that an instance is in, and those that it meets."""
@@ -175,6 +181,8 @@ class Scene:
 
     def find(self, name: str) -> int | None:
         """The number of the instance with a name, or None."""
+        if not isinstance(name, str):
+            raise TypeError(f"name: expected a str, found {type(name).__name__}")
         return self._scene.find(name)
 
     def name(self, id: int) -> str | None:
@@ -207,14 +215,15 @@ class Scene:
         return iter(self._scene.ids().tolist())
 
     def __contains__(self, id: object) -> bool:
-        return isinstance(id, (int, np.integer)) and self._scene.has(_number(id, "id"))
+        return isinstance(id, (int, np.integer)) and 0 <= int(id) < 2**63 and self._scene.has(int(id))
 
     def __bool__(self) -> bool:
         return True
 
     @property
     def parallel(self) -> bool:
-        """Whether a question uses all cores. Answers are the same bits. False at first."""
+        """Whether a question uses all cores, or as many as the environment variable ``RAYON_NUM_THREADS`` says. Answers
+        are the same bits. False at first."""
         return self._scene.switches()[0]
 
     @parallel.setter
@@ -342,8 +351,9 @@ def _ways(paths: Mapping[int, Path]) -> tuple[list[int], list[Any]]:
     """The numbers of instances, and their paths as the compiled module takes them."""
     if not isinstance(paths, Mapping):
         raise TypeError(f"paths: expected a mapping of numbers of instances to paths, found {type(paths).__name__}")
-    numbers = [_number(number, "paths") for number in paths]
-    return numbers, [read_path(path, f"paths[{number!r}]") for number, path in paths.items()]
+    items = list(paths.items())
+    numbers = [_number(number, "paths") for number, _ in items]
+    return numbers, [read_path(path, f"paths[{number!r}]") for number, path in items]
 
 
 def _scene_of(

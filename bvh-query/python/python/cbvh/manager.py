@@ -9,6 +9,7 @@ It stands on `Scene` and needs neither trimesh nor FCL. What differs:
 - Contacts are all pairs of triangles that touch, each once.
 - `add_object` returns None, not an object of FCL.
 - Without any pair of objects, a distance is infinite, and the names and the data are None.
+- A manager is neither pickled nor copied; a `Scene` is.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ from typing import Any, Hashable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _cbvh
 from ._answers import Floats
 from ._baking import bake
 from ._mesh import Mesh
+from ._poses import relative
 from ._scene import Scene
 
 EXTERNAL = "__external"
@@ -86,12 +89,9 @@ def _transform(transform: ArrayLike | None) -> Floats:
     """A pose. A rotation that is rounded, as of float32, is replaced by the nearest one."""
     if transform is None:
         return np.eye(4)
-    numbers = np.asarray(transform)
-    if numbers.dtype.kind not in "fiu":
-        raise TypeError(f"transform: expected numbers, found dtype {numbers.dtype}")
-    if numbers.shape != (4, 4):
-        raise ValueError(f"transform: expected shape (4, 4), found {numbers.shape}")
-    pose: Floats = np.array(numbers, np.float64)
+    pose = _cbvh.copied_numbers(transform, "transform")
+    if pose.shape != (4, 4):
+        raise ValueError(f"transform: expected shape (4, 4), found {pose.shape}")
     error = np.max(np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)))
     # Half of what a scene takes; and what is off by more than 2^-16 is no rounded rotation, which the scene says.
     if 2.0**-24 < error < 2.0**-16:
@@ -131,9 +131,7 @@ class ContactData:
                     raise AttributeError("point: expected objects with vertices and faces, found a cbvh.Mesh")
                 meshes.append(bake(geometry.vertices[geometry.faces[triangle]], [[0, 1, 2]]))
                 poses.append(pose)
-            relative = np.linalg.inv(poses[0]) @ poses[1]
-            relative[3] = [0, 0, 0, 1]
-            found = meshes[0].distance(meshes[1], relative).point_a
+            found = meshes[0].distance(meshes[1], relative(*poses)).point_a
             self._point = poses[0][:3, :3] @ found + poses[0][:3, 3]
         return self._point
 
@@ -179,6 +177,7 @@ class CollisionManager:
     def add_object(self, name: Hashable, mesh: Any, transform: ArrayLike | None = None) -> None:
         """Adds an object. It replaces one of the same name. ``transform`` (body to world): None is the identity."""
         geometry, pose = _geometry(mesh), _transform(transform)
+        hash(name)  # Raises TypeError where it cannot be a name.
         with self._lock:
             among = self._among.add(geometry.mesh, pose)
             against = self._against.add(geometry.mesh, pose, member=_OWN, meets=_OTHERS)

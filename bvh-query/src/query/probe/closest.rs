@@ -15,7 +15,6 @@ use crate::narrow::{Closest, Point, point_distance, triangles_within};
 use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
-use crate::query::options::check_distance;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
@@ -99,7 +98,11 @@ impl Querier {
 
 /// Refuses a limit that means nothing. Infinity is none.
 pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
-    if within == f64::INFINITY { Ok(()) } else { check_distance(within) }
+    if within >= 0.0 {
+        return Ok(());
+    }
+    let expected = "a distance of at least 0, or infinity";
+    Err(QueryError::Number { name: "within", expected, found: within })
 }
 
 /// What is known of a point, over all objects.

@@ -1,14 +1,16 @@
-//! Reads arrays of numbers as callers give them: one row alone, such as a pose of shape (4, 4), or N rows.
+//! Reads what callers give: numbers, and arrays of one row alone, such as a pose of shape (4, 4), or of N rows.
 //!
-//! Everything is copied while Python's lock is held: another thread may change an array while a question runs.
+//! Messages begin with the name of the argument. Everything is copied while Python's lock is held: another thread may
+//! change an array while a question runs.
 
 use crate::errors::pose_error;
 use bvh_query::Pose;
+use numpy::npyffi::NPY_ORDER;
 use numpy::{
-    PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods, dtype, get_array_module,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -29,7 +31,11 @@ impl<T> Rows<T> {
         let row = |(number, row): (usize, &S)| {
             read(row, &|| if one { name.to_owned() } else { format!("{name}[{number}]") })
         };
-        Ok(Self { rows: rows.iter().enumerate().map(row).collect::<PyResult<_>>()?, one })
+        let mut read = reserved(rows.len())?;
+        for numbered in rows.iter().enumerate() {
+            read.push(row(numbered)?);
+        }
+        Ok(Self { rows: read, one })
     }
 
     /// Makes something of each row of one list and the same row of another. One row alone serves all rows of the other
@@ -72,7 +78,8 @@ pub(crate) fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<Py
     }
     let py = value.py();
     let numpy = get_array_module(py)?;
-    let array = numpy.call_method1("asarray", (value,))?.cast_into::<PyUntypedArray>()?;
+    let array = numpy.call_method1("asarray", (value,)).map_err(|error| no_array(py, name, error))?;
+    let array = array.cast_into::<PyUntypedArray>()?;
     let found = array.dtype();
     if array.len() > 0 && !b"fiu".contains(&found.kind()) {
         return Err(PyTypeError::new_err(format!("{name}: expected numbers, found dtype {}", found.str()?)));
@@ -88,6 +95,30 @@ pub(crate) fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<Py
     Ok(array.try_readonly()?)
 }
 
+/// Copies numbers of any shape into an array that nobody else has.
+#[pyfunction]
+pub(crate) fn copied_numbers<'py>(
+    value: &Bound<'py, PyAny>,
+    name: &str,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let array = numbers(value, name)?;
+    PyArray1::from_slice(value.py(), array.as_slice()?)
+        .reshape_with_order(array.shape(), NPY_ORDER::NPY_CORDER)
+}
+
+/// Names the argument that numpy makes no array of, such as a list of rows of several lengths.
+fn no_array(py: Python<'_>, name: &str, error: PyErr) -> PyErr {
+    let message =
+        format!("{name}: expected numbers in an array, found what numpy refuses: {}", error.value(py));
+    let named = match &error {
+        _ if error.is_instance_of::<PyValueError>(py) => PyValueError::new_err(message),
+        _ if error.is_instance_of::<PyTypeError>(py) => PyTypeError::new_err(message),
+        _ => return error,
+    };
+    named.set_cause(py, Some(error));
+    named
+}
+
 /// Returns whether numbers lie one after the other, and can be read where they are.
 fn is_plain(array: &Bound<'_, PyArrayDyn<f64>>) -> bool {
     array.is_c_contiguous() && array.data().is_aligned()
@@ -97,7 +128,59 @@ fn is_plain(array: &Bound<'_, PyArrayDyn<f64>>) -> bool {
 pub(crate) fn rows<const K: usize>(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Rows<[f64; K]>> {
     let array = numbers(value, name)?;
     let one = expect_rows(&array, name, &[K])?;
-    Ok(Rows { rows: array.as_slice()?.as_chunks::<K>().0.to_vec(), one })
+    let found = array.as_slice()?.as_chunks::<K>().0;
+    let mut rows = reserved(found.len())?;
+    rows.extend_from_slice(found);
+    Ok(Rows { rows, one })
+}
+
+/// Reads points, which are finite: an array of shape (3,) or (N, 3).
+pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Rows<[f64; 3]>> {
+    let read = rows(value, name)?;
+    for (number, point) in read.rows.iter().enumerate() {
+        if let Some(found) = point.iter().find(|x| !x.is_finite()) {
+            let place = if read.one { String::new() } else { format!("[{number}]") };
+            let message = format!("{name}{place}: expected finite coordinates, found {found}");
+            return Err(PyValueError::new_err(message));
+        }
+    }
+    Ok(read)
+}
+
+/// An empty list with room for `count` elements.
+pub(crate) fn reserved<T>(count: usize) -> PyResult<Vec<T>> {
+    let mut list = Vec::new();
+    let refused =
+        |_| PyMemoryError::new_err(format!("expected room for {count} rows, found too little memory"));
+    list.try_reserve_exact(count).map_err(refused)?;
+    Ok(list)
+}
+
+/// Reads a number.
+pub(crate) fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    value.extract().map_err(|error: PyErr| {
+        let py = value.py();
+        if error.is_instance_of::<PyTypeError>(py) {
+            PyTypeError::new_err(format!("{name}: expected a number, found {}", kind(value)))
+        } else if error.is_instance_of::<PyOverflowError>(py) {
+            PyValueError::new_err(format!(
+                "{name}: expected a number that a float can hold, found one beyond"
+            ))
+        } else {
+            error
+        }
+    })
+}
+
+/// Reads a choice.
+pub(crate) fn flag(value: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
+    let wrong = |_| PyTypeError::new_err(format!("{name}: expected a bool, found {}", kind(value)));
+    value.extract().map_err(wrong)
+}
+
+/// The name of a value's type.
+fn kind(value: &Bound<'_, PyAny>) -> String {
+    value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string())
 }
 
 /// Reads poses: an array of shape (4, 4) or (N, 4, 4).
@@ -110,13 +193,9 @@ pub(crate) fn poses(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Rows<Pose>
 }
 
 /// Reads poses of shape (N, 4, 4).
-pub(crate) fn many_poses(value: &Bound<'_, PyAny>, name: &str, least: &str) -> PyResult<Vec<Pose>> {
+pub(crate) fn many_poses(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Pose>> {
     let Rows { rows, one } = poses(value, name)?;
-    if one {
-        let message = format!("{name}: expected shape (N, 4, 4){least}, found (4, 4)");
-        return Err(PyValueError::new_err(message));
-    }
-    Ok(rows)
+    if one { Err(shape_error(name, "(N, 4, 4)", &[4, 4])) } else { Ok(rows) }
 }
 
 /// Reads a pose of shape (4, 4).
