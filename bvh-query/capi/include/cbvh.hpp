@@ -8,9 +8,12 @@
 
 #include "cbvh.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -20,9 +23,14 @@
 #include <utility>
 #include <vector>
 
+// Beside the type, where C++ looks for them.
 inline bool operator==(cbvh_instance a, cbvh_instance b) { return a.id == b.id; }
 inline bool operator!=(cbvh_instance a, cbvh_instance b) { return a.id != b.id; }
 inline bool operator<(cbvh_instance a, cbvh_instance b) { return a.id < b.id; }
+
+template <> struct std::hash<cbvh_instance> {
+    std::size_t operator()(cbvh_instance instance) const noexcept { return std::hash<std::uint64_t>()(instance.id); }
+};
 
 namespace cbvh {
 
@@ -43,6 +51,20 @@ inline void check(cbvh_status status) {
         throw Error(status, cbvh_last_message());
     }
 }
+
+namespace detail {
+
+/// Text for C, which ends at a zero byte: there must be none before.
+inline const char *c_text(const char *name, const std::string &text) {
+    const std::size_t zero = text.find('\0');
+    if (zero != std::string::npos) {
+        const std::string message = std::string(name) + ": expected text without zero bytes, found one at byte ";
+        throw Error(CBVH_INVALID_ARGUMENT, (message + std::to_string(zero)).c_str());
+    }
+    return text.c_str();
+}
+
+} // namespace detail
 
 using Point = std::array<double, 3>;
 using Contact = cbvh_contact;
@@ -94,6 +116,8 @@ struct Pose : cbvh_pose {
         check(cbvh_pose_from_quaternion(quaternion.data(), translation.data(), &pose));
         return pose;
     }
+    /// Throws unless it is rigid, as questions do: see cbvh_pose_check.
+    void check_rigid() const { check(cbvh_pose_check(this)); }
     /// The rigid pose nearest to this one, which is off by at most 2^-6.
     Pose nearest() const { return made([&](cbvh_pose *pose) { return cbvh_pose_nearest(this, pose); }); }
     /// The pose that takes back what this one does.
@@ -128,15 +152,12 @@ private:
     }
 };
 
-/// A ray from an origin; without an end unless `until` is given.
+/// A ray from an origin, in units of its direction; without an end unless `until` is given. See cbvh_ray.
 struct Ray : cbvh_ray {
-    Ray(const Point &from, const Point &to, double end = std::numeric_limits<double>::infinity()) : cbvh_ray{} {
-        for (std::size_t k = 0; k < 3; k++) {
-            origin[k] = from[k];
-            direction[k] = to[k];
-        }
-        until = end;
-    }
+    Ray(const Point &at_origin, const Point &in_direction, double until_t = std::numeric_limits<double>::infinity())
+        : cbvh_ray{{at_origin[0], at_origin[1], at_origin[2]},
+                   {in_direction[0], in_direction[1], in_direction[2]},
+                   until_t} {}
 };
 
 // Arrays of these are given to functions that take arrays of what they derive from.
@@ -176,13 +197,15 @@ struct BakeOptions {
 
     /// The texts stay those of this object.
     cbvh_bake_options raw() const {
-        const auto text = [](const std::string &of) { return of.empty() ? nullptr : of.c_str(); };
+        const auto text = [](const char *name, const std::string &of) {
+            return of.empty() ? nullptr : detail::c_text(name, of);
+        };
         cbvh_bake_options options{};
         options.size = sizeof options;
-        options.profile = text(profile);
-        options.triangles = text(triangles);
-        options.effort = text(effort);
-        options.scratch = text(scratch);
+        options.profile = text("options.profile", profile);
+        options.triangles = text("options.triangles", triangles);
+        options.effort = text("options.effort", effort);
+        options.scratch = text("options.scratch", scratch);
         options.max_error = max_error;
         options.max_memory = max_memory;
         options.split_objects = split_objects;
@@ -234,9 +257,13 @@ template <class Ask> std::vector<bool> choices(std::size_t count, Ask ask) {
     return std::vector<bool>(found.get(), found.get() + count);
 }
 
-/// Asks for a list, and once more where it was longer than expected.
-template <class Element, class Ask> std::vector<Element> list(Ask ask) {
-    std::vector<Element> found(64);
+/// The room for a list of which nothing is known.
+inline constexpr std::size_t few = 64;
+
+/// Asks for a list, and once more where it is longer than there is room for. That takes twice the time, so that there
+/// is room for as many elements as the last list had.
+template <class Element, class Ask> std::vector<Element> list(std::size_t &room, Ask ask) {
+    std::vector<Element> found(room);
     std::size_t count = 0;
     cbvh_status status = ask(found.data(), found.size(), &count);
     if (status == CBVH_BUFFER_TOO_SMALL) {
@@ -245,7 +272,14 @@ template <class Element, class Ask> std::vector<Element> list(Ask ask) {
     }
     check(status);
     found.resize(count);
+    room = std::max(count, few);
     return found;
+}
+
+/// The same of a list that takes no time.
+template <class Element, class Ask> std::vector<Element> list(Ask ask) {
+    std::size_t room = few;
+    return list<Element>(room, ask);
 }
 
 /// Asks for text.
@@ -277,9 +311,10 @@ std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const
 }
 
 /// Lists of many questions.
-template <class Element, class Ask> std::vector<std::vector<Element>> lists(std::size_t questions, Ask ask) {
+template <class Element, class Ask>
+std::vector<std::vector<Element>> lists(std::size_t &room, std::size_t questions, Ask ask) {
     std::vector<std::size_t> counts(questions);
-    const auto all = list<Element>([&](Element *elements, std::size_t capacity, std::size_t *count) {
+    const auto all = list<Element>(room, [&](Element *elements, std::size_t capacity, std::size_t *count) {
         return ask(counts.data(), elements, capacity, count);
     });
     return divided(all, counts);
@@ -298,14 +333,31 @@ template <class Answer> std::optional<Answer> found(const Answer &answer) {
     return answer.found ? std::optional<Answer>(answer) : std::nullopt;
 }
 
+/// Asks for `count` answers, not all of which there need to be.
+template <class Answer, class Ask> std::vector<std::optional<Answer>> found(std::size_t count, Ask ask) {
+    std::vector<std::optional<Answer>> all;
+    all.reserve(count);
+    for (const Answer &answer : answers<Answer>(count, ask)) {
+        all.push_back(found(answer));
+    }
+    return all;
+}
+
 } // namespace detail
+
+/// The distance of an answer of signed_distances: negative inside, NaN where the mesh has no inside.
+inline double signed_distance(const ClosestPoint &closest) {
+    return closest.side == CBVH_INSIDE           ? -closest.distance
+           : closest.side == CBVH_SIDE_UNDEFINED ? std::numeric_limits<double>::quiet_NaN()
+                                                 : closest.distance;
+}
 
 /// A baked mesh. Copies share it.
 class Mesh {
 public:
     /// Opens a .cbvh file.
     static Mesh open(const std::string &path, cbvh_open_mode mode = CBVH_MAP) {
-        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_open(path.c_str(), mode, mesh); });
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_open(detail::c_text("path", path), mode, mesh); });
     }
     /// Opens the bytes of a .cbvh file, which are copied.
     static Mesh from_bytes(const void *bytes, std::size_t size) {
@@ -329,10 +381,11 @@ public:
                            const BakeOptions &options = {}) {
         std::vector<const char *> paths;
         for (const std::string &input : inputs) {
-            paths.push_back(input.c_str());
+            paths.push_back(detail::c_text("inputs", input));
         }
         const cbvh_bake_options raw = options.raw();
-        check(cbvh_bake_files(paths.data(), paths.size(), output.c_str(), &raw, nullptr));
+        const char *raw_output = detail::c_text("output", output);
+        check(cbvh_bake_files(paths.data(), paths.size(), raw_output, &raw, nullptr));
         return open(output);
     }
 
@@ -366,7 +419,7 @@ public:
     /// The number of the first object with a name.
     std::optional<std::size_t> find(const std::string &name) const {
         std::size_t number = 0;
-        const cbvh_status status = cbvh_mesh_find(raw(), name.c_str(), &number);
+        const cbvh_status status = cbvh_mesh_find(raw(), detail::c_text("name", name), &number);
         if (status == CBVH_NOT_FOUND) {
             return std::nullopt;
         }
@@ -389,7 +442,7 @@ public:
             return cbvh_mesh_bytes(raw(), buffer, capacity, size);
         });
     }
-    void save(const std::string &path) const { check(cbvh_mesh_save(raw(), path.c_str())); }
+    void save(const std::string &path) const { check(cbvh_mesh_save(raw(), detail::c_text("path", path))); }
     /// Throws with the first rule that the file breaks.
     void check_all() const { check(cbvh_mesh_check(raw())); }
     /// A bound of how far any point moves from one pose to another.
@@ -474,7 +527,8 @@ private:
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 
-/// Answers questions about meshes: one for each thread.
+/// Answers questions about meshes: one for each thread. Lists of contacts and hits that are longer than 64 and than the
+/// last list are asked for twice, as the first time only counts them.
 class Querier {
 public:
     explicit Querier(cbvh_backend backend = CBVH_BACKEND_BEST) {
@@ -541,13 +595,13 @@ public:
     }
     /// Which triangles touch?
     std::vector<Contact> contacts(const Mesh &a, const Mesh &b, const Pose &pose) {
-        return detail::list<Contact>([&](Contact *contacts, std::size_t capacity, std::size_t *count) {
+        return detail::list<Contact>(room_, [&](Contact *contacts, std::size_t capacity, std::size_t *count) {
             return cbvh_contacts(raw(), a.raw(), b.raw(), &pose, 1, nullptr, contacts, capacity, count);
         });
     }
     std::vector<std::vector<Contact>> contacts(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
         return detail::lists<Contact>(
-            poses.size(), [&](std::size_t *counts, Contact *contacts, std::size_t capacity, std::size_t *count) {
+            room_, poses.size(), [&](std::size_t *counts, Contact *contacts, std::size_t capacity, std::size_t *count) {
                 return cbvh_contacts(raw(), a.raw(), b.raw(), poses.data(), poses.size(), counts, contacts, capacity,
                                      count);
             });
@@ -574,6 +628,23 @@ public:
         bool answer = false;
         check(cbvh_are_free(raw(), a.raw(), b.raw(), &raw_path, 1, &raw_options, &answer));
         return answer;
+    }
+    /// The same about many ways.
+    std::vector<MotionAnswer> motions(const Mesh &a, const Mesh &b, const std::vector<Path> &paths,
+                                      const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        const std::vector<cbvh_path> raw_paths = handles(paths);
+        return detail::answers<MotionAnswer>(paths.size(), [&](MotionAnswer *answers) {
+            return cbvh_motions(raw(), a.raw(), b.raw(), raw_paths.data(), raw_paths.size(), &raw_options, answers);
+        });
+    }
+    std::vector<bool> are_free(const Mesh &a, const Mesh &b, const std::vector<Path> &paths,
+                               const MotionOptions &options = {}) {
+        const cbvh_motion_options raw_options = options.raw();
+        const std::vector<cbvh_path> raw_paths = handles(paths);
+        return detail::choices(paths.size(), [&](bool *answers) {
+            return cbvh_are_free(raw(), a.raw(), b.raw(), raw_paths.data(), raw_paths.size(), &raw_options, answers);
+        });
     }
     /// The same about the ways between poses.
     MotionAnswer motion(const Mesh &a, const Mesh &b, const Pose &start, const Pose &end,
@@ -610,16 +681,15 @@ public:
 
     /// The closest surface to each point, if it is at most `within` away; `pose` places the mesh among the points.
     std::vector<std::optional<ClosestPoint>>
-    closest_points(const Mesh &mesh, const std::vector<Point> &points,
-                   double within = std::numeric_limits<double>::infinity(), const Pose &pose = {}) {
-        return optional<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+    closest_points(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {},
+                   double within = std::numeric_limits<double>::infinity()) {
+        return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
             return cbvh_closest_points(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within,
-                answers);
+                                       answers);
         });
     }
-    std::optional<ClosestPoint> closest_point(const Mesh &mesh, const Point &point,
-                                              double within = std::numeric_limits<double>::infinity(),
-                                              const Pose &pose = {}) {
+    std::optional<ClosestPoint> closest_point(const Mesh &mesh, const Point &point, const Pose &pose = {},
+                                              double within = std::numeric_limits<double>::infinity()) {
         ClosestPoint answer{};
         check(cbvh_closest_points(raw(), mesh.raw(), &pose, point.data(), 1, within, &answer));
         return detail::found(answer);
@@ -630,26 +700,42 @@ public:
             return cbvh_sides(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), answers);
         });
     }
-    /// Distances that are negative inside; NaN where the mesh has no inside.
-    std::vector<double> signed_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {}) {
-        const auto found = detail::answers<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
-            return cbvh_signed_distances(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(),
-                                         std::numeric_limits<double>::infinity(), answers);
+    cbvh_side side(const Mesh &mesh, const Point &point, const Pose &pose = {}) {
+        cbvh_side answer = CBVH_SIDE_NOT_ASKED;
+        check(cbvh_sides(raw(), mesh.raw(), &pose, point.data(), 1, &answer));
+        return answer;
+    }
+    /// Both: cbvh::signed_distance makes one number of an answer.
+    std::vector<std::optional<ClosestPoint>>
+    signed_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {},
+                     double within = std::numeric_limits<double>::infinity()) {
+        return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+            return cbvh_signed_distances(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within,
+                                         answers);
         });
-        std::vector<double> values;
-        for (const ClosestPoint &closest : found) {
-            values.push_back(closest.side == CBVH_INSIDE           ? -closest.distance
-                             : closest.side == CBVH_SIDE_UNDEFINED ? std::numeric_limits<double>::quiet_NaN()
-                                                                   : closest.distance);
-        }
-        return values;
+    }
+    std::optional<ClosestPoint> signed_distance(const Mesh &mesh, const Point &point, const Pose &pose = {},
+                                                double within = std::numeric_limits<double>::infinity()) {
+        ClosestPoint answer{};
+        check(cbvh_signed_distances(raw(), mesh.raw(), &pose, point.data(), 1, within, &answer));
+        return detail::found(answer);
     }
     /// Where rays first hit, whether they hit, and all hits.
     std::vector<std::optional<RayHit>> first_hits(const Mesh &mesh, const std::vector<Ray> &rays,
-        const Pose &pose = {}) {
-        return optional<RayHit>(rays.size(), [&](RayHit *answers) {
+                                                  const Pose &pose = {}) {
+        return detail::found<RayHit>(rays.size(), [&](RayHit *answers) {
             return cbvh_first_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), answers);
         });
+    }
+    std::optional<RayHit> first_hit(const Mesh &mesh, const Ray &ray, const Pose &pose = {}) {
+        RayHit answer{};
+        check(cbvh_first_hits(raw(), mesh.raw(), &pose, &ray, 1, &answer));
+        return detail::found(answer);
+    }
+    bool any_hit(const Mesh &mesh, const Ray &ray, const Pose &pose = {}) {
+        bool answer = false;
+        check(cbvh_any_hits(raw(), mesh.raw(), &pose, &ray, 1, &answer));
+        return answer;
     }
     std::vector<bool> any_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
         return detail::choices(rays.size(), [&](bool *answers) {
@@ -658,7 +744,7 @@ public:
     }
     std::vector<std::vector<RayHit>> all_hits(const Mesh &mesh, const std::vector<Ray> &rays, const Pose &pose = {}) {
         return detail::lists<RayHit>(
-            rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
+            room_, rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
                 return cbvh_all_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), counts, hits, capacity, count);
             });
     }
@@ -671,13 +757,15 @@ public:
 private:
     using Owned = detail::Handle<cbvh_querier, cbvh_querier_free>;
 
-    template <class Answer, class Ask> static std::vector<std::optional<Answer>> optional(std::size_t count, Ask ask) {
-        std::vector<std::optional<Answer>> found;
-        for (const Answer &answer : detail::answers<Answer>(count, ask)) {
-            found.push_back(detail::found(answer));
+    static std::vector<cbvh_path> handles(const std::vector<Path> &paths) {
+        std::vector<cbvh_path> handles;
+        handles.reserve(paths.size());
+        for (const Path &path : paths) {
+            handles.push_back(path.raw());
         }
-        return found;
+        return handles;
     }
+    std::size_t room_ = detail::few;
     Owned handle_;
 };
 
@@ -696,15 +784,31 @@ public:
         check(cbvh_tracker_collide(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, &answer));
         return answer;
     }
+    std::vector<bool> collide(Querier &querier, const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        return detail::choices(poses.size(), [&](bool *answers) {
+            return cbvh_tracker_collide(raw(), querier.raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+        });
+    }
     bool within(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose, double d) {
         bool answer = false;
         check(cbvh_tracker_within(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, d, &answer));
         return answer;
     }
+    std::vector<bool> within(Querier &querier, const Mesh &a, const Mesh &b, const std::vector<Pose> &poses, double d) {
+        return detail::choices(poses.size(), [&](bool *answers) {
+            return cbvh_tracker_within(raw(), querier.raw(), a.raw(), b.raw(), poses.data(), poses.size(), d, answers);
+        });
+    }
     DistanceAnswer distance(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose) {
         DistanceAnswer answer{};
         check(cbvh_tracker_distance(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, &answer));
         return answer;
+    }
+    std::vector<DistanceAnswer> distance(Querier &querier, const Mesh &a, const Mesh &b,
+                                         const std::vector<Pose> &poses) {
+        return detail::answers<DistanceAnswer>(poses.size(), [&](DistanceAnswer *answers) {
+            return cbvh_tracker_distance(raw(), querier.raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+        });
     }
 
 private:
@@ -712,14 +816,15 @@ private:
     Owned handle_;
 };
 
-/// Many placed meshes. One for each thread; copies share the meshes.
+/// Many placed meshes. One for each thread; copies share the meshes. Lists of pairs, contacts and hits that are longer
+/// than 64 and than the last list are asked for twice, as the first time only counts them.
 class Scene {
 public:
     explicit Scene(cbvh_backend backend = CBVH_BACKEND_BEST)
         : Scene(made([&](cbvh_scene *scene) { return cbvh_scene_new(backend, scene); })) {}
     /// Opens a scene file.
     static Scene open(const std::string &path) {
-        return made([&](cbvh_scene *scene) { return cbvh_scene_open(path.c_str(), scene); });
+        return made([&](cbvh_scene *scene) { return cbvh_scene_open(detail::c_text("path", path), scene); });
     }
     /// Makes a scene of the instances in the file of a mesh.
     static Scene of_mesh(const Mesh &mesh) {
@@ -727,8 +832,7 @@ public:
     }
     Scene(Scene &&) noexcept = default;
     Scene &operator=(Scene &&) noexcept = default;
-    Scene(const Scene &other)
-        : Scene(made([&](cbvh_scene *scene) { return cbvh_scene_clone(other.raw(), scene); })) {}
+    Scene(const Scene &other) : Scene(made([&](cbvh_scene *scene) { return cbvh_scene_clone(other.raw(), scene); })) {}
     Scene &operator=(const Scene &other) {
         *this = Scene(other);
         return *this;
@@ -748,7 +852,8 @@ public:
     /// Places a mesh in the world; a name that is empty is none.
     Instance add(const Mesh &mesh, const Pose &world, const std::string &name = {}) {
         Instance instance{0};
-        check(cbvh_scene_add(raw(), mesh.raw(), &world, name.empty() ? nullptr : name.c_str(), &instance));
+        const char *raw_name = name.empty() ? nullptr : detail::c_text("name", name);
+        check(cbvh_scene_add(raw(), mesh.raw(), &world, raw_name, &instance));
         return instance;
     }
     void remove(Instance instance) { check(cbvh_scene_remove(raw(), instance)); }
@@ -769,7 +874,7 @@ public:
     void allow(Instance a, Instance b, bool may_touch) { check(cbvh_scene_allow(raw(), a, b, may_touch)); }
     std::optional<Instance> find(const std::string &name) const {
         Instance instance{0};
-        const cbvh_status status = cbvh_scene_find(raw(), name.c_str(), &instance);
+        const cbvh_status status = cbvh_scene_find(raw(), detail::c_text("name", name), &instance);
         if (status == CBVH_NOT_FOUND) {
             return std::nullopt;
         }
@@ -814,50 +919,62 @@ public:
         return detail::found(answer);
     }
     std::vector<cbvh_scene_pair> pairs_in_contact() {
-        return detail::list<cbvh_scene_pair>([&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
-            return cbvh_scene_pairs_in_contact(raw(), pairs, capacity, count);
-        });
+        return detail::list<cbvh_scene_pair>(
+            room_, [&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_pairs_in_contact(raw(), pairs, capacity, count);
+            });
     }
     std::vector<cbvh_scene_pair> pairs_within(double d) {
-        return detail::list<cbvh_scene_pair>([&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
-            return cbvh_scene_pairs_within(raw(), d, pairs, capacity, count);
-        });
+        return detail::list<cbvh_scene_pair>(
+            room_, [&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_pairs_within(raw(), d, pairs, capacity, count);
+            });
     }
     std::vector<cbvh_scene_relation> relations() {
-        return detail::list<cbvh_scene_relation>([&](cbvh_scene_relation *found, std::size_t capacity,
-            std::size_t *count) {
-            return cbvh_scene_relations(raw(), found, capacity, count);
-        });
+        return detail::list<cbvh_scene_relation>(
+            room_, [&](cbvh_scene_relation *found, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_relations(raw(), found, capacity, count);
+            });
     }
     std::vector<cbvh_scene_contact> contacts() {
-        return detail::list<cbvh_scene_contact>([&](cbvh_scene_contact *found, std::size_t capacity,
-            std::size_t *count) {
-            return cbvh_scene_contacts(raw(), found, capacity, count);
-        });
+        return detail::list<cbvh_scene_contact>(
+            room_, [&](cbvh_scene_contact *found, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_contacts(raw(), found, capacity, count);
+            });
     }
 
-    /// An instance, and the path in the world that it moves along.
+    /// An instance, and the path in the world that it moves along, which must be there when the question is asked.
     struct Way {
+        Way(Instance moved, const Path &along) : instance(moved), path(along.raw()) {}
+        /// This path would be gone by then: give it a name.
+        Way(Instance, const Path &&) = delete;
         Instance instance;
-        const Path &path;
+        cbvh_path path;
     };
     MotionAnswer motion(const std::vector<Way> &ways, const MotionOptions &options = {}) {
         MotionAnswer answer{};
-        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths,
-            const cbvh_motion_options *raw_options) {
-            return cbvh_scene_motion(raw(), instances, paths, ways.size(), raw_options, &answer);
-        });
+        ask(ways, options,
+            [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+                return cbvh_scene_motion(raw(), instances, paths, ways.size(), raw_options, &answer);
+            });
         return answer;
     }
     bool is_free(const std::vector<Way> &ways, const MotionOptions &options = {}) {
         bool answer = false;
-        ask(ways, options, [&](const Instance *instances, const cbvh_path *paths,
-            const cbvh_motion_options *raw_options) {
-            return cbvh_scene_is_free(raw(), instances, paths, ways.size(), raw_options, &answer);
-        });
+        ask(ways, options,
+            [&](const Instance *instances, const cbvh_path *paths, const cbvh_motion_options *raw_options) {
+                return cbvh_scene_is_free(raw(), instances, paths, ways.size(), raw_options, &answer);
+            });
         return answer;
     }
 
+    /// These answer as those of Querier do, over all instances, for probes in the world.
+    std::vector<std::optional<ClosestPoint>>
+    closest_points(const std::vector<Point> &points, double within = std::numeric_limits<double>::infinity()) {
+        return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+            return cbvh_scene_closest_points(raw(), detail::numbers(points), points.size(), within, answers);
+        });
+    }
     std::optional<ClosestPoint> closest_point(const Point &point,
                                               double within = std::numeric_limits<double>::infinity()) {
         ClosestPoint answer{};
@@ -869,16 +986,37 @@ public:
             return cbvh_scene_sides(raw(), detail::numbers(points), points.size(), answers);
         });
     }
+    cbvh_side side(const Point &point) {
+        cbvh_side answer = CBVH_SIDE_NOT_ASKED;
+        check(cbvh_scene_sides(raw(), point.data(), 1, &answer));
+        return answer;
+    }
+    std::vector<std::optional<ClosestPoint>>
+    signed_distances(const std::vector<Point> &points, double within = std::numeric_limits<double>::infinity()) {
+        return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
+            return cbvh_scene_signed_distances(raw(), detail::numbers(points), points.size(), within, answers);
+        });
+    }
     std::optional<ClosestPoint> signed_distance(const Point &point,
                                                 double within = std::numeric_limits<double>::infinity()) {
         ClosestPoint answer{};
         check(cbvh_scene_signed_distances(raw(), point.data(), 1, within, &answer));
         return detail::found(answer);
     }
+    std::vector<std::optional<RayHit>> first_hits(const std::vector<Ray> &rays) {
+        return detail::found<RayHit>(rays.size(), [&](RayHit *answers) {
+            return cbvh_scene_first_hits(raw(), rays.data(), rays.size(), answers);
+        });
+    }
     std::optional<RayHit> first_hit(const Ray &ray) {
         RayHit answer{};
         check(cbvh_scene_first_hits(raw(), &ray, 1, &answer));
         return detail::found(answer);
+    }
+    bool any_hit(const Ray &ray) {
+        bool answer = false;
+        check(cbvh_scene_any_hits(raw(), &ray, 1, &answer));
+        return answer;
     }
     std::vector<bool> any_hits(const std::vector<Ray> &rays) {
         return detail::choices(rays.size(), [&](bool *answers) {
@@ -887,7 +1025,7 @@ public:
     }
     std::vector<std::vector<RayHit>> all_hits(const std::vector<Ray> &rays) {
         return detail::lists<RayHit>(
-            rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
+            room_, rays.size(), [&](std::size_t *counts, RayHit *hits, std::size_t capacity, std::size_t *count) {
                 return cbvh_scene_all_hits(raw(), rays.data(), rays.size(), counts, hits, capacity, count);
             });
     }
@@ -912,10 +1050,11 @@ private:
         std::vector<cbvh_path> paths;
         for (const Way &way : ways) {
             instances.push_back(way.instance);
-            paths.push_back(way.path.raw());
+            paths.push_back(way.path);
         }
         check(ask(instances.data(), paths.data(), &raw_options));
     }
+    std::size_t room_ = detail::few;
     Owned handle_;
 };
 

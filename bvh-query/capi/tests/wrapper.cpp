@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <string>
 #include <thread>
+#include <unordered_set>
 
 #define CHECK(is_true)                                                                                                 \
     do {                                                                                                               \
@@ -75,6 +77,8 @@ void poses() {
     const cbvh::Pose part = cbvh::Pose::translation(1, 0, 0).then(expected);
     CHECK(part.rows[3] == 5 && part.rows[7] == 7 && part.rows[11] == 7);
     FAILS(cbvh::Pose::from_rows({0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1}), CBVH_INVALID_ARGUMENT, "row 4: expected 0 0 0 1");
+    expected.check_rigid();
+    FAILS(cbvh::Pose({2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}).check_rigid(), CBVH_INVALID_ARGUMENT, "pose");
     FAILS(cbvh::Pose::from_quaternion({0, 0, 3, 4}, {0, 0, 0}), CBVH_INVALID_ARGUMENT, "length 1");
 }
 
@@ -94,6 +98,20 @@ void handles() {
     cbvh::BakeOptions options;
     options.profile = "dop7";
     FAILS(cbvh::Mesh::bake({}, {}, options), CBVH_INVALID_ARGUMENT, "options.profile");
+    // Text is not cut at a zero byte.
+    const std::string cut("a\0b", 3);
+    options.profile = cut;
+    const char *const expected = "expected text without zero bytes, found one at byte 1";
+    FAILS(cbvh::Mesh::bake({}, {}, options), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(cbvh::Mesh::open(cut), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(cbvh::Scene::open(cut), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(cbvh::Mesh::bake_files({cut}, "b"), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(cbvh::Mesh::bake_files({"a"}, cut), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(mesh.save(cut), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(mesh.find(cut), CBVH_INVALID_ARGUMENT, expected);
+    cbvh::Scene scene;
+    FAILS(scene.add(mesh, cbvh::Pose(), cut), CBVH_INVALID_ARGUMENT, expected);
+    FAILS(scene.find(cut), CBVH_INVALID_ARGUMENT, expected);
     cbvh::Querier one, other = std::move(one);
     one = std::move(other);
     CHECK(one.collide(mesh, moved, cbvh::Pose()));
@@ -116,13 +134,24 @@ void answers(bool parallel) {
     CHECK(querier.first_collision(one, one, poses) == std::size_t{0} && !querier.first_collision(one, one, {poses[2]}));
     CHECK(querier.collide(one, one, std::vector<cbvh::Pose>()).empty());
     const std::vector<cbvh::Point> points{{0, 0, 0.25}, {0, 0, 2}};
-    CHECK(querier.signed_distances(one, points) == std::vector<double>({-0.25, 1.5}));
+    const auto signs = querier.signed_distances(one, points);
+    CHECK(cbvh::signed_distance(*signs[0]) == -0.25 && cbvh::signed_distance(*signs[1]) == 1.5);
+    const auto placed = querier.signed_distances(one, points, cbvh::Pose::translation(0, 0, 2), 1.5);
+    CHECK(cbvh::signed_distance(*placed[0]) == 1.25 && cbvh::signed_distance(*placed[1]) == -0.5);
+    CHECK(!querier.signed_distances(one, points, {}, 1)[1] && querier.signed_distance(one, points[0])->side == CBVH_INSIDE);
+    CHECK(querier.side(one, points[0]) == CBVH_INSIDE && querier.side(one, {0.5, 0, 0}) == CBVH_ON);
+    const auto triangle = cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+    CHECK(std::isnan(cbvh::signed_distance(*querier.signed_distance(triangle, {0.2, 0.2, 0.1}))));
     CHECK(querier.sides(one, points) == std::vector<cbvh_side>({CBVH_INSIDE, CBVH_OUTSIDE}));
-    const auto near = querier.closest_points(one, points, 1);
+    const auto near = querier.closest_points(one, points, {}, 1);
     CHECK(near[0] && near[0]->distance == 0.25 && !near[1]);
-    CHECK(querier.closest_point(one, points[1], 10, cbvh::Pose::translation(0, 0, 1))->distance == 0.5);
+    CHECK(querier.closest_point(one, points[1], cbvh::Pose::translation(0, 0, 1), 10)->distance == 0.5);
+    // Braces are the pose that moves nothing, not a distance.
+    CHECK(querier.closest_points(one, points, {})[1]->distance == 1.5 && querier.closest_point(one, points[1], {}));
     const std::vector<cbvh::Ray> rays{{{0.1, 0.2, 5}, {0, 0, -1}}, {{0.1, 0.2, 5}, {0, 0, -1}, 4}};
     CHECK(querier.first_hits(one, rays)[0]->t == 4.5 && !querier.first_hits(one, rays)[1]);
+    CHECK(querier.first_hit(one, rays[0])->t == 4.5 && !querier.first_hit(one, rays[1]));
+    CHECK(querier.any_hit(one, rays[0]) && !querier.any_hit(one, rays[0], cbvh::Pose::translation(3, 0, 0)));
     CHECK(querier.all_hits(one, rays)[0].size() == 2 && querier.any_hits(one, rays) == std::vector<bool>({true, false}));
     CHECK(querier.meet_segments(one, {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 0}, {0, 0, 0.1}}}) == std::vector<bool>({true, false}));
     cbvh::Tracker tracker;
@@ -131,9 +160,52 @@ void answers(bool parallel) {
         CHECK(tracker.distance(querier, one, one, pose).distance == querier.distance(one, one, pose).distance);
         CHECK(tracker.within(querier, one, one, pose, 0.5));
     }
+    CHECK(tracker.collide(querier, one, one, poses) == querier.collide(one, one, poses));
+    CHECK(tracker.within(querier, one, one, poses, 0.4) == querier.within(one, one, poses, 0.4));
+    CHECK(tracker.distance(querier, one, one, poses)[2].distance == 0.5);
     const std::vector<cbvh::Pose> fewer{poses[0]};
     FAILS(querier.edges_are_free(one, one, poses, fewer), CBVH_INVALID_ARGUMENT, "as many ends as starts");
     FAILS(querier.within(one, one, poses, -1), CBVH_INVALID_ARGUMENT, "d: ");
+}
+
+// Lists that are longer than there is room for, and shorter again.
+void lists() {
+    std::vector<cbvh::Point> vertices;
+    std::vector<std::array<std::uint32_t, 3>> faces;
+    for (std::uint32_t k = 0; k < 100; k++) {
+        vertices.insert(vertices.end(), {{0, 0, 0.01 * k}, {1, 0, 0.01 * k}, {0, 1, 0.01 * k}});
+        faces.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    const cbvh::Mesh sheets = cbvh::Mesh::bake(vertices, faces);
+    const cbvh::Mesh needle = cbvh::Mesh::bake({{0.2, 0.2, -1}, {0.3, 0.2, -1}, {0.2, 0.2, 2}}, {{0, 1, 2}});
+    cbvh::Querier querier;
+    const cbvh::Pose below = cbvh::Pose::translation(0, 0, -1.5);
+    for (const unsigned most : {100U, 51U, 100U}) {
+        CHECK(querier.contacts(sheets, needle, most == 100 ? cbvh::Pose() : below).size() == most);
+        const auto contacts = querier.contacts(sheets, needle, {cbvh::Pose(), below, cbvh::Pose::translation(5, 0, 0)});
+        CHECK(contacts[0].size() == 100 && contacts[1].size() == 51 && contacts[2].empty());
+        const auto hits = querier.all_hits(sheets, {{{0.2, 0.2, 5}, {0, 0, -1}}, {{5, 5, 5}, {0, 0, -1}}});
+        CHECK(hits[0].size() == 100 && hits[1].empty());
+    }
+    // A question that was asked twice is asked once the next time.
+    std::size_t room = cbvh::detail::few;
+    int asked = 0;
+    for (const std::size_t length : {100U, 100U, 3U, 100U}) {
+        const auto list = cbvh::detail::list<int>(room, [&](int *, std::size_t capacity, std::size_t *count) {
+            asked++;
+            *count = length;
+            return length > capacity ? CBVH_BUFFER_TOO_SMALL : CBVH_OK;
+        });
+        CHECK(list.size() == length);
+    }
+    CHECK(asked == 6);
+    cbvh::Scene scene;
+    const cbvh::Instance still = scene.add(sheets, cbvh::Pose());
+    for (int k = 0; k < 3; k++) {
+        scene.add(needle, cbvh::Pose());
+    }
+    CHECK(scene.contacts().size() >= 300 && scene.pairs_in_contact().size() == 6 && scene.contacts()[0].pair.a == still);
+    CHECK(scene.all_hits({{{0.2, 0.2, 5}, {0, 0, -1}}})[0].size() >= 100);
 }
 
 struct Line {
@@ -153,6 +225,11 @@ void motions() {
     cbvh::Querier querier;
     const cbvh::Path through = cbvh::Path::of(Line{0, false}), beside = cbvh::Path::of(Line{2, false});
     CHECK(querier.motion(mesh, mesh, through).outcome == CBVH_HIT && querier.is_free(mesh, mesh, beside));
+    std::vector<cbvh::Path> both;
+    both.push_back(cbvh::Path::of(Line{2, false}));
+    both.push_back(cbvh::Path::between(cbvh::Pose::translation(-4, 0, 0), cbvh::Pose::translation(4, 0, 0)));
+    CHECK(querier.are_free(mesh, mesh, both) == std::vector<bool>({true, false}));
+    CHECK(querier.motions(mesh, mesh, both)[1].outcome == CBVH_HIT && querier.motions(mesh, mesh, {}).empty());
     // Exceptions do not cross the library.
     FAILS(querier.is_free(mesh, mesh, cbvh::Path::of(Line{2, true})), CBVH_CALLBACK_FAILED, "found the code 1");
     const cbvh::Pose start = cbvh::Pose::translation(-4, 0, 0), end = cbvh::Pose::translation(4, 0, 0);
@@ -175,8 +252,26 @@ void scenes() {
     CHECK(scene.instances() == std::vector<cbvh::Instance>({a, b}) && scene.name(a) == "a" && scene.find("a") == a);
     CHECK(scene.pose(b).rows[3] == 1.5 && scene.mesh(b).triangle_count() == 12);
     CHECK(scene.closest_point({0, 0, 2})->instance == a && scene.signed_distance({0, 0, 0})->side == CBVH_INSIDE);
+    CHECK(scene.closest_points({{0, 0, 2}, {0, 0, 9}}, 3)[0]->instance == a && !scene.closest_points({{0, 0, 9}}, 3)[0]);
+    CHECK(scene.signed_distances({{0, 0, 0}, {9, 9, 9}}, 3)[0]->side == CBVH_INSIDE && !scene.signed_distances({{9, 9, 9}}, 3)[0]);
+    CHECK(scene.side({0, 0, 0}) == CBVH_INSIDE && scene.side({9, 9, 9}) == CBVH_OUTSIDE);
+    const cbvh::Ray down({0, 0.1, 5}, {0, 0, -1}), up({0, 0.1, 5}, {0, 0, 1});
+    CHECK(scene.first_hits({down, up})[0]->t == 4.5 && !scene.first_hits({down, up})[1] && scene.any_hit(down) && !scene.any_hit(up));
     CHECK(scene.all_hits({{{0, 0.1, 5}, {0, 0, -1}}})[0].size() == 2 && scene.any_hits({{{9, 9, 5}, {0, 0, -1}}})[0] == false);
     CHECK(scene.sides({{9, 9, 9}})[0] == CBVH_OUTSIDE && scene.meet_segments({{{0, 0, 0}, {0, 0, 3}}})[0]);
+    // Ways are values. One whose path is gone is refused, and a path that has no name is no path for one.
+    std::vector<cbvh::Scene::Way> ways;
+    {
+        const cbvh::Path away = cbvh::Path::between(cbvh::Pose::translation(1.5, 0, 0), cbvh::Pose::translation(9, 0, 0));
+        ways.push_back({b, away});
+        ways[0] = cbvh::Scene::Way(b, away);
+        CHECK(scene.is_free(ways) && scene.motion(ways).outcome == CBVH_FREE && !scene.is_free(ways, {0.6, 0}));
+    }
+    FAILS(scene.is_free(ways), CBVH_INVALID_HANDLE, "paths[0]");
+    static_assert(!std::is_constructible<cbvh::Scene::Way, cbvh::Instance, cbvh::Path>::value, "a path without a name");
+    static_assert(!std::is_constructible<cbvh::Scene::Way, cbvh::Instance, const cbvh::Path>::value, "the same");
+    const std::unordered_set<cbvh::Instance> both{a, b, a};
+    CHECK(both.size() == 2 && both.count(b) == 1);
     scene.set_groups(b, 0, 0);
     CHECK(!scene.distance());
     scene.remove(b);
@@ -191,6 +286,7 @@ int main() {
     handles();
     answers(false);
     answers(true);
+    lists();
     motions();
     scenes();
     // A thread of its own has messages of its own.
