@@ -48,7 +48,7 @@ struct Robot {
     // result.min_distance, result.nearest_points, result.b1, result.b2
     cbvh::DistanceAnswer distance(const cbvh::Pose &pose) { return querier.distance(walls, robot, pose); }
 
-    // coal::continuousCollide, but certain at every moment, for meshes of any shape.
+    // fcl::continuousCollide, but certain at every moment, for meshes of any shape.
     bool may_go(const cbvh::Pose &from, const cbvh::Pose &to, double margin) {
         cbvh::MotionOptions options;
         options.clearance = margin;
