@@ -76,6 +76,7 @@ pub use file::files::{Files, StoredShape};
 pub use file::mapped::ReadAhead;
 pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
+pub use isa::floats::{FloatState, with_default_floats};
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
 pub use pose::{Pose, PoseError};
