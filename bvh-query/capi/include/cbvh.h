@@ -18,6 +18,8 @@
  * asked. After a failure, handles that a function should have made are 0, and answers hold no particular values;
  * nothing is ever written beyond them. Nothing unwinds out of a function, and no argument makes one crash as long as
  * pointers that are neither null nor misaligned lead to as many elements as is said, and text ends with a zero byte.
+ * Where memory for arrays of the caller or for a list of contacts runs out, the status is CBVH_LIMIT; where it runs out
+ * elsewhere, the process ends. Functions need 128 KiB of stack.
  *
  * Poses are "body to world". In questions about two meshes, the world is the frame of mesh A: a point x of mesh B is at
  * R x + t in A's frame. Points are columns; a pose is the rows of the 3 by 4 matrix [R | t]. R is a rotation to within
@@ -30,12 +32,17 @@
  *
  * Threads. Functions may be called on any thread. Meshes and paths may be used by many threads at the same time; a
  * querier, a tracker and a scene by one at a time, and a second one gets CBVH_BUSY. Make one querier for each thread.
+ * Many threads may look at a scene together, which is to say clone it or call cbvh_scene_find, _instances,
+ * _instance_name, _instance_pose, _instance_mesh or _stats, while none uses or changes it.
  * Freeing a mesh or a path that other threads use is allowed: it lives on until their questions end.
  * cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all cores; the number of threads is that
  * of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
- * command cbvh and of the Rust library.
+ * command cbvh and of the Rust library. How the calling thread rounds (fesetround), whether it flushes subnormal
+ * numbers (-ffast-math) and which exceptions trap (feenableexcept) does not matter: functions change it where they have
+ * to, and change it back. Functions of the caller run as the caller of the question computes; on threads of the
+ * library, long double on x86-64 is an exception.
  *
  * Lists. A function with a list of answers takes a buffer, the number of elements that it has room for, and a count.
  * The count always gets the number of all answers. If there are more than there is room for, those that fit are
@@ -86,18 +93,20 @@ enum {
     CBVH_SYSTEM = 6,
     /* A file is not a .cbvh file, or is damaged. The message names the rule it breaks and where. */
     CBVH_DAMAGED = 7,
-    /* A budget of visits or of memory does not suffice, or a limit of the format is exceeded. */
+    /* A budget of visits or of memory or the memory there is does not suffice, a limit of the format is exceeded, or
+     * 2^24 - 1 handles of a kind are open. */
     CBVH_LIMIT = 8,
     /* A mesh cannot be baked. */
     CBVH_BAKE_FAILED = 9,
-    /* A function of the caller gave no pose. */
+    /* A function of the caller gave no pose or no sagitta. */
     CBVH_CALLBACK_FAILED = 10,
     /* A defect of this library. The handle that was in use can only be freed. Please report it. */
     CBVH_INTERNAL = 11
 };
 
 /* Returns the message of the last failure on this thread, in UTF-8, or an empty text. It is never NULL, and stays valid
- * until the next failure on this thread or the end of the thread. A success does not clear it. */
+ * until the next failure on this thread or the end of the thread. A success does not clear it. Call it after a function
+ * has failed, not in the same list of arguments, which may be computed in any order. */
 const char *cbvh_last_message(void);
 
 /* Writes the CBVH_ABI of the library that runs. */
@@ -156,14 +165,15 @@ enum {
     CBVH_READ = 3
 };
 
-/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it, CBVH_DAMAGED if it is no .cbvh file. Only the header and
- * the table of objects are checked; damage elsewhere is found by the question that needs it. */
+/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it or it is no regular file, CBVH_DAMAGED if it is no .cbvh
+ * file. Only the header and the table of objects are checked; damage elsewhere is found by the question that needs
+ * it. */
 cbvh_status cbvh_mesh_open(const char *path, cbvh_open_mode mode, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file, which are copied. */
 cbvh_status cbvh_mesh_from_bytes(const void *bytes, size_t size, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file where they are, at any address. They must stay there unchanged until `release` is
  * called with `user`: once, on any thread, when the handle, its clones and objects are freed, scenes with them are
- * freed, and queriers asked about them are freed or have been asked about another mesh. That may be during this call,
+ * freed, and queriers asked about them are freed or have been asked about something else. That may be during this call,
  * as large files are copied to large memory pages. Without `release`, the bytes must stay as long as the process. After
  * a failure `release` is not called.
  * `release` must not let an exception out and must not call this library. */
@@ -171,8 +181,8 @@ cbvh_status cbvh_mesh_borrow_bytes(const void *bytes, size_t size, void (*releas
                                    cbvh_mesh *mesh);
 /* Makes another handle of the same mesh, to be freed by itself. Nothing is copied. */
 cbvh_status cbvh_mesh_clone(cbvh_mesh mesh, cbvh_mesh *other);
-/* Frees a handle. Scenes and clones keep what they use; a querier keeps the last few meshes it was asked about until it
- * is asked about another mesh, or freed. */
+/* Frees a handle. Scenes and clones keep what they use; a querier keeps a mesh that it was asked about, of the last
+ * eight, until it is next asked about any mesh that is open, or freed. */
 cbvh_status cbvh_mesh_free(cbvh_mesh mesh);
 
 /* Makes a mesh of one object of the file that a mesh is in. CBVH_NOT_FOUND if it has no object of this number. */
@@ -192,7 +202,8 @@ cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *tr
                                  size_t *count);
 /* Writes the bytes of the file that a mesh is in, and how many there are. */
 cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_t *size);
-/* Writes a mesh to a file, completely or not at all. */
+/* Writes a mesh to a file, completely or not at all: to another one, which then takes its place. What is there is
+ * replaced, also if it is a symbolic link. */
 cbvh_status cbvh_mesh_save(cbvh_mesh mesh, const char *path);
 /* Checks the whole file that a mesh is in: CBVH_DAMAGED with the first rule that it breaks. It is read once. */
 cbvh_status cbvh_mesh_check(cbvh_mesh mesh);
@@ -249,7 +260,8 @@ enum {
     CBVH_BACKEND_AVX512 = 3
 };
 
-/* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. */
+/* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. It keeps the memory of the largest question
+ * it was asked, of 100 bytes for each pose and each probe, until it is freed. */
 cbvh_status cbvh_querier_new(cbvh_backend backend, cbvh_querier *querier);
 /* Frees a querier. CBVH_BUSY while it is in use. */
 cbvh_status cbvh_querier_free(cbvh_querier querier);
@@ -350,8 +362,9 @@ typedef struct cbvh_contact {
     uint32_t triangle_b;
 } cbvh_contact;
 
-/* Lists all pairs of triangles in contact, those of one pose after those of the one before. `counts` gets the number of
- * pairs of each pose, and may be NULL. */
+/* Lists all pairs of triangles in contact in ascending order, those of one pose after those of the one before. `counts`
+ * gets the number of pairs of each pose, and may be NULL. On one core it takes at most four times the memory of the
+ * buffer, however many pairs there are; about many poses on all cores, that of all pairs. */
 cbvh_status cbvh_contacts(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t pose_count,
                           size_t *counts, cbvh_contact *contacts, size_t capacity, size_t *count);
 /* Writes the number of the first pose in which the meshes touch, or `count` if they touch in none. */
@@ -381,8 +394,7 @@ cbvh_status cbvh_tracker_distance(cbvh_tracker tracker, cbvh_querier querier, cb
  * constant rate. CBVH_INVALID_ARGUMENT if the poses are half a turn apart. */
 cbvh_status cbvh_path_between(const cbvh_pose *start, const cbvh_pose *end, cbvh_path *path);
 /* Makes a screw motion from `start`: a turn by `angle` radians, any number of turns, about the axis through `point`
- * with
- * `direction`, and a shift along it. Points and directions are 3 numbers. */
+ * with `direction`, and a shift along it. Points and directions are 3 numbers. */
 cbvh_status cbvh_path_screw(const cbvh_pose *start, const double *point, const double *direction, double angle,
                             double shift, cbvh_path *path);
 /* Makes the path through at least two poses, each part of which takes the same time. */
@@ -394,14 +406,19 @@ typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
 /* Returns a bound of the sagitta: how far any point that moves with B, and is at most `radius` from B's origin, is
  * during [t0, t1] from where it would be if it went straight, at a constant rate, from where it is at t0 to where it is
  * at t1. At most an eighth of the greatest acceleration times the square of the time. It must hold with all rounding;
- * answers are only as certain as it is. NaN and negative numbers count as infinite. */
+ * answers are only as certain as it is. It may be infinite; NaN and negative numbers end the question with
+ * CBVH_CALLBACK_FAILED. */
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
 /* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
  * several threads at the same time if the querier or scene is parallel. They must not let an exception or longjmp out.
- * They may call this library, but with the querier or scene in use they get CBVH_BUSY. `user` must live as long as the
- * path is used. */
-cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta, void *user,
-                                     cbvh_path *path);
+ * They may call this library, but with the querier or scene in use they get CBVH_BUSY; what they ask on a thread of the
+ * library takes that thread alone. `release` is called with `user` when the path is no longer used: once, on any
+ * thread, when the handle is freed and questions about it have ended. It may be NULL, must not let an exception out and
+ * must not call this library. After a failure it is not called. */
+cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta,
+                                     void (*release)(void *user), void *user, cbvh_path *path);
+/* Says in a function of a path, before it fails, why it does: the message of the question then ends with this text. */
+cbvh_status cbvh_callback_message(const char *message);
 /* Frees a path. */
 cbvh_status cbvh_path_free(cbvh_path path);
 /* Writes where B is at a time from 0 to 1. */
@@ -536,14 +553,13 @@ typedef struct cbvh_ray_hit {
     int32_t reserved;
 } cbvh_ray_hit;
 
-/* Answers where each ray first hits. Which triangle is hit is decided exactly; edges and corners belong to triangles.
- * */
+/* Answers where each ray first hits. Which triangle is hit is decided exactly; edges and corners belong to
+ * triangles. */
 cbvh_status cbvh_first_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                             size_t count, cbvh_ray_hit *answers);
 /* Answers whether each ray hits at all. */
 cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
-    size_t count,
-                          bool *answers);
+                          size_t count, bool *answers);
 /* Lists all hits in their order along each ray, those of one ray after those of the one before. Hits at exactly the
  * same parameter are one. `counts` gets the number of hits of each ray, and may be NULL. */
 cbvh_status cbvh_all_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
@@ -557,8 +573,7 @@ typedef struct cbvh_segment {
 
 /* Answers whether each segment meets the mesh, exactly. */
 cbvh_status cbvh_meet_segments(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose,
-    const cbvh_segment *segments,
-                               size_t count, bool *answers);
+                               const cbvh_segment *segments, size_t count, bool *answers);
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
@@ -584,17 +599,16 @@ cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
 
 /* Adds a mesh at a pose in the world. Its rotation is rigid to within 2^-23 and its translation at most 2^118 along
- * each axis.
- * `name` may be NULL; else no other instance has it. `instance` may be NULL. The handle of the mesh may be freed
- * afterwards. */
+ * each axis. `name` may be NULL; else no other instance has it. `instance` may be NULL. The handle of the mesh may be
+ * freed afterwards. */
 cbvh_status cbvh_scene_add(cbvh_scene scene, cbvh_mesh mesh, const cbvh_pose *world, const char *name,
                            cbvh_instance *instance);
 /* Removes an instance. Its number is never given again by this scene. CBVH_NOT_FOUND if the scene has no such instance;
  * an instance of another scene is not recognised as such. */
 cbvh_status cbvh_scene_remove(cbvh_scene scene, cbvh_instance instance);
-/* Moves many instances, or none after a failure. */
+/* Moves many instances, or none after a failure. Of an instance that is given twice, the last pose counts. */
 cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds,
-    size_t count);
+                                 size_t count);
 /* Sets the groups that an instance is in and those it meets, a bit each. Two instances are asked about if each is in a
  * group that the other meets. By default all bits are set. */
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
@@ -659,7 +673,7 @@ cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, 
 
 /* Answers where the ways of some instances end that move at the same time along paths in the world, while the rest
  * stands still: the earliest hit of all pairs of which one moves. Where those instances stand now does not matter, and
- * they stay there. */
+ * they stay there. CBVH_INVALID_ARGUMENT if an instance is given twice. */
 cbvh_status cbvh_scene_motion(cbvh_scene scene, const cbvh_instance *instances, const cbvh_path *paths, size_t count,
                               const cbvh_motion_options *options, cbvh_motion_answer *answer);
 /* Answers whether all of them are certainly free, which takes less time. */

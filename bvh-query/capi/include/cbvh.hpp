@@ -477,14 +477,16 @@ public:
         return made([&](cbvh_path *path) { return cbvh_path_polyline(poses.data(), poses.size(), path); });
     }
     /// A path of one's own: an object with `Pose pose(double t) const` and `double sagitta(double radius, double t0,
-    /// double t1) const`, which cbvh_sagitta_function explains. It is copied. If `pose` throws, the question throws
-    /// an Error of CBVH_CALLBACK_FAILED. A sagitta that throws counts as infinite.
+    /// double t1) const`, which cbvh_sagitta_function explains. It is copied, and lives until the last question about
+    /// the path has ended. If either throws, the question throws an Error of CBVH_CALLBACK_FAILED with the text of the
+    /// exception.
     template <class Own> static Path of(Own own) {
-        auto kept = std::make_shared<const Own>(std::move(own));
-        Path path = made([&](cbvh_path *made) {
-            return cbvh_path_from_functions(pose_of<Own>, sagitta_of<Own>, const_cast<Own *>(kept.get()), made);
+        auto kept = std::make_unique<Own>(std::move(own));
+        Path path = made([&](cbvh_path *raw) {
+            return cbvh_path_from_functions(pose_of<Own>, sagitta_of<Own>, release<Own>, kept.get(), raw);
         });
-        path.kept_ = std::move(kept);
+        // It is the path's from here on.
+        static_cast<void>(kept.release());
         return path;
     }
     cbvh_path raw() const noexcept { return handle_.raw(); }
@@ -512,6 +514,7 @@ private:
             *pose = static_cast<const Own *>(user)->pose(t);
             return 0;
         } catch (...) {
+            tell();
             return 1;
         }
     }
@@ -519,11 +522,21 @@ private:
         try {
             return static_cast<const Own *>(user)->sagitta(radius, t0, t1);
         } catch (...) {
-            return std::numeric_limits<double>::infinity();
+            tell();
+            return std::numeric_limits<double>::quiet_NaN();
         }
     }
-    // Declared before the handle, so that it is there until the handle is freed.
-    std::shared_ptr<const void> kept_;
+    template <class Own> static void release(void *user) { delete static_cast<Own *>(user); }
+    /// Gives the text of the exception that is being handled to the question.
+    static void tell() noexcept {
+        try {
+            throw;
+        } catch (const std::exception &thrown) {
+            static_cast<void>(cbvh_callback_message(thrown.what()));
+        } catch (...) {
+            static_cast<void>(cbvh_callback_message("an exception that is no std::exception"));
+        }
+    }
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 

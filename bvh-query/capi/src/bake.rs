@@ -1,7 +1,8 @@
 //! Bakes meshes: arrays into memory, and files into files of any size.
 
+use crate::cores;
 use crate::entry::entry;
-use crate::input::{array, check_pointer, flag, optional_text, options, path, rows_of_three};
+use crate::input::{array, flag, optional_text, options, path, rows_of_three};
 use crate::mesh::{hand_out, new_mesh};
 use crate::output::One;
 use crate::status::Failure;
@@ -106,7 +107,7 @@ pub unsafe extern "C" fn cbvh_bake(
             }
         }
         let source = bvh_bake::mesh::Mesh::from_triangles(positions, triangles);
-        let (bytes, _) = to_bytes(&source, &choices.options)?;
+        let (bytes, _) = cores::work(|| Ok(to_bytes(&source, &choices.options)?))?;
         drop(source);
         let opened = Bvh::from_bytes(bytes);
         hand_out(out, opened.map_err(|error| Failure::from(bvh_bake::BakeError::from(error)))?.into())
@@ -123,12 +124,11 @@ pub unsafe extern "C" fn cbvh_bake_files(
     was_up_to_date: *mut i32,
 ) -> i32 {
     entry(|| {
-        check_pointer("inputs", inputs, input_count)?;
-        if input_count == 0 {
-            return Err(Failure::argument("inputs", "at least one path", "none"));
-        }
         // SAFETY: the header asks for it; pointers are numbers until they are followed.
         let addresses = unsafe { array("inputs", inputs.cast::<Address>(), input_count) }?;
+        if addresses.is_empty() {
+            return Err(Failure::argument("inputs", "at least one path", "none"));
+        }
         // SAFETY: as above.
         let read =
             |(number, input): (usize, &Address)| unsafe { path(&format!("inputs[{number}]"), input.0) };
@@ -141,12 +141,11 @@ pub unsafe extern "C" fn cbvh_bake_files(
             // SAFETY: as above.
             Some(unsafe { One::new("was_up_to_date", was_up_to_date) }?)
         };
-        let outcome = FileBake::new(inputs, output)
-            .options(choices.options)
-            .max_memory(choices.max_memory)
-            .scratch(choices.scratch)
-            .force(choices.force)
-            .run()?;
+        let outcome = cores::work(|| {
+            let bake = FileBake::new(inputs, output).options(choices.options);
+            let bake = bake.max_memory(choices.max_memory).scratch(choices.scratch).force(choices.force);
+            Ok(bake.run()?)
+        })?;
         if let Some(mut out) = up_to_date {
             out.set(i32::from(matches!(outcome, Outcome::UpToDate(_))));
         }

@@ -1,7 +1,9 @@
-//! The boundary: runs a function, catches panics, and keeps the message of the last failure of each thread.
+//! The boundary: runs a function in the default state of floating-point arithmetic, catches panics, and keeps the message
+//! of the last failure of each thread. Functions of the caller run in the caller's state, which is kept meanwhile.
 
 use crate::output::One;
 use crate::status::{Failure, Status};
+use bvh_query::{FloatState, with_default_floats};
 use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::ffi::c_char;
@@ -11,47 +13,47 @@ use std::sync::Once;
 thread_local! {
     /// The last message of this thread, which ends with a zero byte.
     static MESSAGE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-    /// How many functions of the interface this thread is in: more than one where a callback calls the library.
-    static DEPTH: Cell<usize> = const { Cell::new(0) };
+    /// The state of floating-point arithmetic that the caller of the innermost function of this thread is in.
+    static CALLER_FLOATS: Cell<FloatState> = const { Cell::new(FloatState::DEFAULT) };
 }
 
-/// Counts a thread as inside the interface while it lives.
-struct Inside;
-
-impl Inside {
-    fn new() -> Self {
-        DEPTH.with(|depth| depth.set(depth.get() + 1));
-        Self
-    }
+/// The state that the caller of this function of the interface computes in, for its own functions to run in.
+pub(crate) fn caller_floats() -> FloatState {
+    CALLER_FLOATS.get()
 }
 
-impl Drop for Inside {
+/// Takes back the state of the caller of an outer function while it is dropped: a callback may call the library.
+struct OuterFloats(FloatState);
+
+impl Drop for OuterFloats {
     fn drop(&mut self) {
-        DEPTH.with(|depth| depth.set(depth.get() - 1));
+        CALLER_FLOATS.set(self.0);
     }
 }
 
-/// Keeps panics inside the interface off standard error: their text is in the message that the caller gets.
+/// Keeps panics off standard error: their text is in the message that the caller gets. The library has a standard library
+/// of its own, so that this is about no other panics than its own.
 fn quiet_panics() {
     static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let usual = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |panic| {
-            if DEPTH.with(Cell::get) == 0 {
-                usual(panic);
-            }
-        }));
-    });
+    // Tests of this crate say by a panic what fails.
+    if !cfg!(test) {
+        ONCE.call_once(|| std::panic::set_hook(Box::new(|_| {})));
+    }
 }
 
-/// Runs the body of a function of the interface. Nothing unwinds out of it.
+/// Runs the body of a function of the interface, in the default state of floating-point arithmetic. Nothing unwinds out of
+/// it.
 pub(crate) fn entry(body: impl FnOnce() -> Result<(), Failure>) -> i32 {
+    with_default_floats(|floats| {
+        let _outer = OuterFloats(CALLER_FLOATS.replace(floats));
+        caught(body)
+    })
+}
+
+fn caught(body: impl FnOnce() -> Result<(), Failure>) -> i32 {
     let run = || {
         quiet_panics();
-        let inside = Inside::new();
-        let result = body();
-        drop(inside);
-        result
+        body()
     };
     // What a panic leaves behind is not used again: a handle that was in use is refused from then on.
     let failure = match catch_unwind(AssertUnwindSafe(run)) {
@@ -125,7 +127,6 @@ mod tests {
         assert_eq!(last(), "a defect of cbvh, please report it: of 7");
         assert_eq!(entry(|| std::panic::panic_any(7)), Status::Internal as i32);
         assert!(last().ends_with("an unknown panic"));
-        assert_eq!(DEPTH.with(Cell::get), 0);
         assert_eq!(entry(|| Ok(())), 0);
         assert_eq!(entry(|| Err(Failure::argument("x\0y", "one", 2))), Status::InvalidArgument as i32);
         assert_eq!(last(), "xy: expected one, found 2");

@@ -1,6 +1,6 @@
 //! Reads arguments: pointers, lengths, text, numbers and structures with a size.
 
-use crate::status::Failure;
+use crate::status::{Failure, Status};
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
@@ -170,6 +170,14 @@ pub(crate) unsafe fn triple(name: &str, pointer: *const f64) -> Result<[f64; 3],
     Ok([found[0], found[1], found[2]])
 }
 
+/// Makes room for as many more elements, or fails where memory runs out.
+pub(crate) fn reserve<T>(name: &str, more: usize, of: &mut Vec<T>) -> Result<(), Failure> {
+    of.try_reserve(more).map_err(|_| {
+        let bytes = more.saturating_mul(size_of::<T>());
+        Failure::new(Status::Limit, format!("{name}: expected {bytes} bytes of memory, found less"))
+    })
+}
+
 /// Reads rows of three values each into memory that is used again and again.
 ///
 /// # Safety
@@ -186,6 +194,7 @@ where
     // SAFETY: the caller vouches for it; three values in an array are aligned as one is.
     let rows = unsafe { array(name, pointer.cast::<[T; 3]>(), count) }?;
     into.clear();
+    reserve(name, count, into)?;
     into.extend_from_slice(rows);
     Ok(())
 }

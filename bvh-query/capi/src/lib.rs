@@ -12,6 +12,7 @@
 
 mod at_hand;
 mod bake;
+mod cores;
 mod entry;
 mod input;
 #[cfg(test)]

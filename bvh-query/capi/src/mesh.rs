@@ -1,13 +1,14 @@
 //! Meshes: opened files, whole or object by object.
 
 use crate::at_hand::MESHES;
-use crate::entry::entry;
+use crate::entry::{caller_floats, entry};
 use crate::input::{array, path, text};
 use crate::output::{self, List, One, Room};
 use crate::status::{Failure, Status};
 use crate::types::{MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, READ};
 use bvh_query::{Bvh, OpenError, OwnedShape, ReadAhead};
 use std::ffi::{c_char, c_void};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -27,6 +28,18 @@ pub(crate) fn hand_out(mut out: One<'_, MeshHandle>, shape: OwnedShape) -> Resul
     Ok(())
 }
 
+/// Refuses what is there and is no regular file: the system would wait for somebody to write to a pipe.
+pub(crate) fn check_regular(file: &Path) -> Result<(), Failure> {
+    match std::fs::metadata(file) {
+        Ok(found) if !found.is_file() && !found.is_dir() => {
+            let message = format!("{}: expected a regular file, found another kind", file.display());
+            Err(Failure::new(Status::System, message))
+        }
+        // Opening it says what is wrong.
+        _ => Ok(()),
+    }
+}
+
 fn damaged(error: bvh_query::FormatError) -> Failure {
     Failure::new(Status::Damaged, format!("bytes: {error}"))
 }
@@ -37,6 +50,7 @@ pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *m
     entry(|| {
         // SAFETY: the header asks for it.
         let (out, file) = unsafe { (new_mesh("mesh", mesh)?, path("path", file)?) };
+        check_regular(&file)?;
         let opened: Result<Bvh, OpenError> = match mode {
             MAP => Bvh::open_with(file, ReadAhead::Usual),
             MAP_SPARSE => Bvh::open_with(file, ReadAhead::Sparse),
@@ -58,8 +72,8 @@ pub unsafe extern "C" fn cbvh_mesh_from_bytes(bytes: *const u8, size: usize, mes
     })
 }
 
-/// The function that tells a caller that borrowed bytes are no longer used.
-type Release = Option<unsafe extern "C" fn(user: *mut c_void)>;
+/// The function that tells a caller that something of it is no longer used.
+pub(crate) type Release = Option<unsafe extern "C" fn(user: *mut c_void)>;
 
 /// Bytes of the caller.
 struct Borrowed {
@@ -90,12 +104,21 @@ impl AsRef<[u8]> for Borrowed {
 
 impl Drop for Borrowed {
     fn drop(&mut self) {
-        if self.state.swap(DROPPED, Ordering::AcqRel) == TAKEN
-            && let Some(release) = self.release
-        {
+        if self.state.swap(DROPPED, Ordering::AcqRel) == TAKEN {
             // SAFETY: the header asks for a function that may be called here.
-            unsafe { release(self.user) };
+            unsafe { call_release(self.release, self.user) };
         }
+    }
+}
+
+/// Tells a caller that something of it is no longer used.
+///
+/// # Safety
+/// The function may be called, once, with `user`.
+pub(crate) unsafe fn call_release(release: Release, user: *mut c_void) {
+    if let Some(release) = release {
+        // SAFETY: the caller vouches for it, and it is no function of Rust.
+        unsafe { caller_floats().run(|| release(user)) };
     }
 }
 
@@ -116,14 +139,16 @@ pub unsafe extern "C" fn cbvh_mesh_borrow_bytes(
         let bvh = Bvh::from_bytes(borrowed).map_err(damaged)?;
         hand_out(out, bvh.into())?;
         // A large file has been copied to large pages by now.
-        if state.swap(TAKEN, Ordering::AcqRel) == DROPPED
-            && let Some(release) = release
-        {
+        if state.swap(TAKEN, Ordering::AcqRel) == DROPPED {
             // SAFETY: as in `drop`.
-            unsafe { release(user) };
+            unsafe { call_release(release, user) };
         }
         Ok(())
     })
+}
+
+fn no_object(objects: usize, number: usize) -> Failure {
+    Failure::new(Status::NotFound, format!("number: expected a number below {objects}, found {number}"))
 }
 
 /// Asks about a mesh.
@@ -150,19 +175,13 @@ pub extern "C" fn cbvh_mesh_free(mesh: MeshHandle) -> i32 {
 /// `cbvh_mesh_object`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_object(mesh: MeshHandle, number: usize, object: *mut MeshHandle) -> i32 {
-    ask(mesh, |shape| {
+    entry(|| {
         // SAFETY: the header asks for it.
         let out = unsafe { new_mesh("object", object) }?;
-        let bvh = shape.bvh().clone();
+        let bvh = MESHES.share("mesh", mesh.id)?.bvh().clone();
         let objects = bvh.objects().len();
-        let found = OwnedShape::object(bvh, number);
-        let object = found.ok_or_else(|| {
-            Failure::new(
-                Status::NotFound,
-                format!("number: expected a number below {objects}, found {number}"),
-            )
-        })?;
-        hand_out(out, object)
+        let object = OwnedShape::object(bvh, number);
+        hand_out(out, object.ok_or_else(|| no_object(objects, number))?)
     })
 }
 
@@ -201,13 +220,7 @@ pub unsafe extern "C" fn cbvh_mesh_object_name(
 ) -> i32 {
     ask(mesh, |shape| {
         let objects = shape.bvh().objects();
-        let object = objects.get(number).ok_or_else(|| {
-            let objects = objects.len();
-            Failure::new(
-                Status::NotFound,
-                format!("number: expected a number below {objects}, found {number}"),
-            )
-        })?;
+        let object = objects.get(number).ok_or_else(|| no_object(objects.len(), number))?;
         // SAFETY: the header asks for it.
         unsafe { output::text("buffer", object.name(), buffer, capacity, length) }
     })

@@ -1,11 +1,11 @@
 //! Questions about the ways of one mesh in the frame of another.
 
 use crate::entry::entry;
-use crate::input::{array, options};
+use crate::input::{array, options, reserve};
 use crate::output::Room;
 use crate::paths::AskedPath;
 use crate::poses::poses;
-use crate::queriers::{Asker, QUERIERS};
+use crate::queriers::{Asker, Probes, QUERIERS};
 use crate::status::Failure;
 use crate::types::{MeshHandle, MotionChoices, MotionRow, PathHandle, PoseRows, QuerierHandle};
 use bvh_query::{Batch, Motion, MotionOptions, Path, Querier, QueryError, Shape};
@@ -85,20 +85,19 @@ impl Question {
     unsafe fn ask<A: Ask<R>, R: Copy, P: Path + Sync>(
         &self,
         (answers, count): (*mut R, usize),
-        read: impl FnOnce(&mut Asker) -> Result<Vec<P>, Failure>,
+        read: impl FnOnce(&mut Probes) -> Result<Vec<P>, Failure>,
         check: impl Fn(&P) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let mut held = QUERIERS.hold("querier", self.querier.id)?;
         let asker = &mut **held.value()?;
-        // Both meshes come before the paths in the list of arguments, and so do their errors.
-        asker.at_hand.pair(self.a, self.b)?;
-        let paths = read(asker)?;
+        let parallel = asker.uses_all_cores();
+        let Asker { querier, budget, at_hand, probes, .. } = asker;
+        let (a, b) = at_hand.pair(self.a, self.b)?;
+        let paths = read(probes)?;
         // SAFETY: the caller vouches for it.
         let (options, mut room) =
             unsafe { (options("options", self.choices)?.read(), Room::new("answers", answers, count)?) };
-        let Asker { querier, parallel, budget, at_hand, .. } = asker;
-        let (a, b) = at_hand.pair(self.a, self.b)?;
-        if *parallel {
+        if parallel {
             let mut batch = Batch::with_backend(a, b, querier.backend());
             batch.set_budget(*budget);
             let found = A::all(&batch, &paths, &options);
@@ -125,7 +124,7 @@ impl Question {
         answers: *mut R,
     ) -> i32 {
         // SAFETY: the caller vouches for it.
-        let read = |_: &mut Asker| AskedPath::many("paths", unsafe { array("paths", paths, count) }?);
+        let read = |_: &mut Probes| AskedPath::many("paths", unsafe { array("paths", paths, count) }?);
         // SAFETY: as above.
         entry(|| unsafe { self.ask::<A, R, _>((answers, count), read, AskedPath::failure) })
     }
@@ -141,19 +140,19 @@ impl Question {
         count: usize,
         answers: *mut R,
     ) -> i32 {
-        let read = |asker: &mut Asker| {
-            let probes = &mut asker.probes;
+        let read = |probes: &mut Probes| {
             // SAFETY: the caller vouches for it.
             unsafe {
                 poses("starts", starts, count, &mut probes.poses)?;
                 poses("ends", ends, count, &mut probes.ends)?;
             }
-            let both = probes.poses.iter().zip(&probes.ends).enumerate();
-            let between = both.map(|(number, (start, end))| {
+            let mut motions = Vec::new();
+            reserve("starts", count, &mut motions)?;
+            for (number, (start, end)) in probes.poses.iter().zip(&probes.ends).enumerate() {
                 let place = format_args!("starts[{number}] and ends[{number}]");
-                Motion::between(start, end).map_err(|error| Failure::from(error).at(place))
-            });
-            between.collect()
+                motions.push(Motion::between(start, end).map_err(|error| Failure::from(error).at(place))?);
+            }
+            Ok(motions)
         };
         // SAFETY: as above.
         entry(|| unsafe { self.ask::<A, R, Motion>((answers, count), read, |_| Ok(())) })

@@ -99,6 +99,49 @@ impl<T: Copy> List<'_, T> {
     }
 }
 
+/// Room for the lists of many questions, one after the other, and for the length of each.
+pub(crate) struct Lists<'a, T> {
+    list: List<'a, T>,
+    counts: Room<'a, usize>,
+}
+
+impl<T: Copy> Lists<'_, T> {
+    /// Takes room for the lists of `questions`. Nobody may want their lengths: then `counts` is null.
+    ///
+    /// # Safety
+    /// As for `List::new`, and for `Room::new` unless `counts` is null.
+    pub(crate) unsafe fn new(
+        (name, start, capacity, count): (&'static str, *mut T, usize, *mut usize),
+        counts: *mut usize,
+        questions: usize,
+    ) -> Result<Self, Failure> {
+        // SAFETY: the caller vouches for it.
+        unsafe {
+            let list = List::new(name, start, capacity, count)?;
+            let counts = Room::new("counts", counts, if counts.is_null() { 0 } else { questions })?;
+            Ok(Self { list, counts })
+        }
+    }
+
+    /// Returns how many more values there is room for.
+    pub(crate) fn room(&self) -> usize {
+        self.list.room.count.saturating_sub(self.list.written)
+    }
+
+    /// Adds the list of a question, of which there are `count` values and no fewer of them here than fit.
+    pub(crate) fn add(&mut self, question: usize, values: impl IntoIterator<Item = T>, count: usize) {
+        self.counts.set(question, count);
+        let before = self.list.written;
+        values.into_iter().take(self.room()).for_each(|value| self.list.push(value));
+        self.list.written = before + count;
+    }
+
+    /// Writes how many values there are, and fails if there was too little room.
+    pub(crate) fn finish(self) -> Result<(), Failure> {
+        self.list.finish()
+    }
+}
+
 /// Writes text into a caller's buffer: its bytes, and a zero byte that is not counted.
 ///
 /// # Safety
@@ -114,8 +157,9 @@ pub(crate) unsafe fn text(
     let (mut count, mut room) =
         unsafe { (One::new("length", length)?, Room::new(name, buffer.cast::<u8>(), capacity)?) };
     count.set(of.len());
-    // What does not fit is cut, so that the text ends in the buffer whatever its size.
-    let fits = of.len().min(capacity.saturating_sub(1));
+    // What does not fit is cut between characters, so that text ends in the buffer whatever its size.
+    let most = of.len().min(capacity.saturating_sub(1));
+    let fits = (0..=most).rev().find(|&end| of.is_char_boundary(end)).unwrap_or(0);
     of.bytes().take(fits).enumerate().for_each(|(at, byte)| room.set(at, byte));
     room.set(fits, 0);
     if of.len() < capacity {

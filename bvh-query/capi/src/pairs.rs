@@ -2,13 +2,14 @@
 
 use crate::at_hand::MESHES;
 use crate::entry::entry;
-use crate::input::options;
-use crate::output::{List, One, Room};
+use crate::input::{options, reserve};
+use crate::output::{Lists, One, Room};
 use crate::poses::{pose, poses};
 use crate::queriers::{Asker, QUERIERS};
 use crate::status::Failure;
 use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle, relation};
 use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
+use std::ops::ControlFlow;
 
 /// A querier, two meshes, and poses of the second in the frame of the first.
 struct Question {
@@ -29,7 +30,9 @@ impl Question {
         ask: impl FnOnce(&mut Querier, Option<Batch<'_>>, [Shape<'_>; 2], &[Pose]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let mut held = QUERIERS.hold("querier", self.querier.id)?;
-        let Asker { querier, parallel, budget, at_hand, probes } = &mut **held.value()?;
+        let asker = &mut **held.value()?;
+        let parallel = asker.uses_all_cores();
+        let Asker { querier, budget, at_hand, probes, .. } = asker;
         let (a, b) = at_hand.pair(self.a, self.b)?;
         // SAFETY: the caller vouches for it.
         unsafe { poses("poses", self.poses, self.count, &mut probes.poses) }?;
@@ -156,6 +159,50 @@ pub unsafe extern "C" fn cbvh_distance(
     })
 }
 
+/// The least of any number of values, in ascending order, and how many there are.
+struct Least<T> {
+    most: usize,
+    /// At most twice as many: then the greater half goes.
+    kept: Vec<T>,
+    count: usize,
+    out_of_memory: Option<Failure>,
+}
+
+impl<T: Ord + Copy> Least<T> {
+    fn new(most: usize) -> Self {
+        Self { most, kept: Vec::new(), count: 0, out_of_memory: None }
+    }
+
+    /// Takes a value, and breaks where memory runs out.
+    fn add(&mut self, value: T) -> ControlFlow<()> {
+        self.count += 1;
+        if self.most == 0 {
+            return ControlFlow::Continue(());
+        }
+        if self.kept.len() == self.kept.capacity() {
+            if self.kept.len() >= self.most.saturating_mul(2) {
+                self.kept.select_nth_unstable(self.most);
+                self.kept.truncate(self.most);
+            } else if let Err(failure) = reserve("contacts", self.kept.len().max(16), &mut self.kept) {
+                self.out_of_memory = Some(failure);
+                return ControlFlow::Break(());
+            }
+        }
+        self.kept.push(value);
+        ControlFlow::Continue(())
+    }
+
+    fn check(&mut self) -> Result<(), Failure> {
+        self.out_of_memory.take().map_or(Ok(()), Err)
+    }
+
+    fn finish(mut self) -> (Vec<T>, usize) {
+        self.kept.sort_unstable();
+        self.kept.truncate(self.most);
+        (self.kept, self.count)
+    }
+}
+
 /// `cbvh_contacts`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_contacts(
@@ -174,21 +221,23 @@ pub unsafe extern "C" fn cbvh_contacts(
         // SAFETY: the header asks for it.
         unsafe {
             question.ask(|querier, batch, [a, b], poses| {
-                let mut list = List::new("contacts", contacts, capacity, count)?;
-                let mut counts = Room::new("counts", counts, if counts.is_null() { 0 } else { poses.len() })?;
-                let mut add = |number, found: Vec<bvh_query::Contact>| {
-                    counts.set(number, found.len());
-                    found.into_iter().for_each(|contact| list.push(contact.into()));
-                };
-                if let Some(batch) = batch {
-                    let found = batch.contacts(poses)?.into_iter().enumerate();
-                    found.for_each(|(number, found)| add(number, found));
-                } else {
-                    for (number, pose) in poses.iter().enumerate() {
-                        add(number, querier.contacts(a, b, pose)?);
+                let mut lists = Lists::new(("contacts", contacts, capacity, count), counts, poses.len())?;
+                if let Some(batch) = batch.filter(|_| poses.len() > 1) {
+                    for (number, found) in batch.contacts(poses)?.into_iter().enumerate() {
+                        let count = found.len();
+                        lists.add(number, found.into_iter().map(ContactRow::from), count);
                     }
+                    return lists.finish();
                 }
-                list.finish()
+                for (number, pose) in poses.iter().enumerate() {
+                    let mut least = Least::new(lists.room());
+                    let visited = querier.visit_contacts(a, b, pose, |contact| least.add(contact));
+                    least.check()?;
+                    visited?;
+                    let (found, count) = least.finish();
+                    lists.add(number, found.into_iter().map(ContactRow::from), count);
+                }
+                lists.finish()
             })
         }
     })
@@ -245,4 +294,24 @@ pub unsafe extern "C" fn cbvh_displacement(
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_values_are_kept() {
+        // All numbers below 1009, in an order that jumps about.
+        let values: Vec<u32> = (0..1009).map(|k| k * 503 % 1009).collect();
+        for most in [0, 1, 2, 15, 16, 17, 100, 504, 505, 1008, 1009, 1010, usize::MAX] {
+            let mut least = Least::new(most);
+            assert!(values.iter().all(|&value| least.add(value).is_continue()));
+            assert!(least.check().is_ok());
+            assert!(least.kept.capacity() <= most.saturating_mul(4).max(64), "{most}");
+            let (kept, count) = least.finish();
+            assert!(kept.into_iter().eq(0..1009.min(most) as u32), "{most}");
+            assert_eq!(count, 1009);
+        }
+    }
 }

@@ -1,15 +1,17 @@
 //! Paths: motions between poses, screws, polylines, and functions of the caller.
 
 use crate::at_hand::MESHES;
-use crate::entry::entry;
-use crate::input::triple;
+use crate::entry::{caller_floats, entry};
+use crate::input::{reserve, text, triple};
+use crate::mesh::{Release, call_release};
 use crate::output::One;
 use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{MeshHandle, PathHandle, PoseRows};
-use bvh_query::{Motion, Path, Polyline, Pose, motion_reach};
-use std::ffi::c_void;
+use bvh_query::{FloatState, Motion, Path, Polyline, Pose, motion_reach};
+use std::cell::RefCell;
+use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// All paths that are open.
@@ -31,6 +33,7 @@ pub(crate) enum PathValue {
 pub(crate) struct CallerPath {
     pose: PoseFunction,
     sagitta: SagittaFunction,
+    release: Release,
     user: *mut c_void,
 }
 
@@ -39,19 +42,61 @@ unsafe impl Send for CallerPath {}
 // SAFETY: as above.
 unsafe impl Sync for CallerPath {}
 
+impl Drop for CallerPath {
+    fn drop(&mut self) {
+        // SAFETY: the header asks for a function that may be called here.
+        unsafe { call_release(self.release, self.user) };
+    }
+}
+
+thread_local! {
+    /// Why the function of the caller that this thread is in is about to fail.
+    static REASON: RefCell<Option<String>> = const { RefCell::new(None) };
+}
+
+/// The failure of a function of the caller, with the reason that it gave.
+fn callback_failure(message: String) -> Failure {
+    let failure = Failure::new(Status::CallbackFailed, message);
+    match REASON.with(RefCell::take) {
+        Some(reason) => Failure { message: format!("{}: {reason}", failure.message), ..failure },
+        None => failure,
+    }
+}
+
 impl CallerPath {
-    fn pose(&self, t: f64) -> Result<Pose, Failure> {
+    /// Calls a function of the caller in the state of floating-point arithmetic that the question was asked in.
+    ///
+    /// # Safety
+    /// `call` does no more than call the function.
+    unsafe fn call<R>(floats: FloatState, call: impl FnOnce() -> R) -> R {
+        REASON.with(RefCell::take);
+        // SAFETY: the caller vouches for it.
+        unsafe { floats.run(call) }
+    }
+
+    fn pose(&self, floats: FloatState, t: f64) -> Result<Pose, Failure> {
         // What the function leaves as it is, is no pose.
         let mut found = PoseRows { rows: [f64::NAN; 12] };
+        let into = &raw mut found;
         // SAFETY: the header asks for a function that may be called so.
-        let code = unsafe { (self.pose)(self.user, t, &mut found) };
+        let code = unsafe { Self::call(floats, || (self.pose)(self.user, t, into)) };
         if code != 0 {
-            let message = format!("path: expected a pose at t = {t}, found the code {code} of its function");
-            return Err(Failure::new(Status::CallbackFailed, message));
+            let what = format!("path: expected a pose at t = {t}, found the code {code} of its function");
+            return Err(callback_failure(what));
         }
         let wrong =
             |error| Failure::new(Status::CallbackFailed, format!("path: the pose at t = {t}: {error}"));
         Pose::from_rows(&found.rows).map_err(wrong)
+    }
+
+    fn sagitta(&self, floats: FloatState, radius: f64, t0: f64, t1: f64) -> Result<f64, Failure> {
+        // SAFETY: the header asks for a function that may be called so.
+        let found = unsafe { Self::call(floats, || (self.sagitta)(self.user, radius, t0, t1)) };
+        if found >= 0.0 {
+            return Ok(found);
+        }
+        let expected = "sagitta: expected a bound of at least 0";
+        Err(callback_failure(format!("{expected} from t = {t0} to t = {t1}, found {found}")))
     }
 }
 
@@ -59,17 +104,23 @@ impl CallerPath {
 pub(crate) struct AskedPath {
     path: Arc<PathValue>,
     failure: Mutex<Option<Failure>>,
+    /// The state of who asks, in which functions of the caller are called on every thread.
+    floats: FloatState,
 }
 
 impl AskedPath {
     pub(crate) fn new(name: &str, path: PathHandle) -> Result<Self, Failure> {
-        Ok(Self { path: PATHS.share(name, path.id)?, failure: Mutex::new(None) })
+        Ok(Self { path: PATHS.share(name, path.id)?, failure: Mutex::new(None), floats: caller_floats() })
     }
 
     /// Reads the handles of many paths.
     pub(crate) fn many(name: &str, paths: &[PathHandle]) -> Result<Vec<Self>, Failure> {
-        let numbered = paths.iter().enumerate();
-        numbered.map(|(number, &path)| Self::new(&format!("{name}[{number}]"), path)).collect()
+        let mut asked = Vec::new();
+        reserve(name, paths.len(), &mut asked)?;
+        for (number, &path) in paths.iter().enumerate() {
+            asked.push(Self::new(&format!("{name}[{number}]"), path)?);
+        }
+        Ok(asked)
     }
 
     /// Returns the failure of a function of the caller, which takes the place of any answer.
@@ -81,6 +132,13 @@ impl AskedPath {
     fn has_failed(&self) -> bool {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
+
+    /// Keeps a failure, and returns what stands for the answer.
+    fn fail<R>(&self, failure: Failure, instead: R) -> R {
+        let mut kept = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.get_or_insert(failure);
+        instead
+    }
 }
 
 impl Path for AskedPath {
@@ -90,11 +148,9 @@ impl Path for AskedPath {
             PathValue::Polyline(polyline) => polyline.pose(t),
             // After a failure the answer does not matter, only that it comes soon: what stands still is soon decided.
             PathValue::Caller(_) if self.has_failed() => Pose::IDENTITY,
-            PathValue::Caller(caller) => caller.pose(t).unwrap_or_else(|failure| {
-                let mut kept = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-                kept.get_or_insert(failure);
-                Pose::IDENTITY
-            }),
+            PathValue::Caller(caller) => {
+                caller.pose(self.floats, t).unwrap_or_else(|failure| self.fail(failure, Pose::IDENTITY))
+            }
         }
     }
 
@@ -103,8 +159,10 @@ impl Path for AskedPath {
             PathValue::Motion(motion) => motion.sagitta(radius, t0, t1),
             PathValue::Polyline(polyline) => polyline.sagitta(radius, t0, t1),
             PathValue::Caller(_) if self.has_failed() => 0.0,
-            // SAFETY: the header asks for a function that may be called so.
-            PathValue::Caller(caller) => unsafe { (caller.sagitta)(caller.user, radius, t0, t1) },
+            PathValue::Caller(caller) => {
+                let found = caller.sagitta(self.floats, radius, t0, t1);
+                found.unwrap_or_else(|failure| self.fail(failure, 0.0))
+            }
         }
     }
 }
@@ -183,17 +241,34 @@ pub unsafe extern "C" fn cbvh_path_polyline(
 pub unsafe extern "C" fn cbvh_path_from_functions(
     pose_function: Option<PoseFunction>,
     sagitta_function: Option<SagittaFunction>,
+    release: Release,
     user: *mut c_void,
     path: *mut PathHandle,
 ) -> i32 {
-    let made = || {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let mut out = unsafe { One::new("path", path) }?;
+        out.set(PathHandle { id: 0 });
         let missing = |name: &str| Failure::argument(name, "a function", "NULL");
         let pose = pose_function.ok_or_else(|| missing("pose"))?;
         let sagitta = sagitta_function.ok_or_else(|| missing("sagitta"))?;
-        Ok(PathValue::Caller(CallerPath { pose, sagitta, user }))
-    };
-    // SAFETY: the header asks for it.
-    unsafe { make(path, made) }
+        // A failure releases nothing: the value is made only when there is a place for it.
+        let handle =
+            PATHS.insert_with(|| Arc::new(PathValue::Caller(CallerPath { pose, sagitta, release, user })))?;
+        out.set(PathHandle { id: handle });
+        Ok(())
+    })
+}
+
+/// `cbvh_callback_message`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_callback_message(message: *const c_char) -> i32 {
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let message = unsafe { text("message", message) }?;
+        REASON.with(|reason| *reason.borrow_mut() = Some(message.to_owned()));
+        Ok(())
+    })
 }
 
 /// `cbvh_path_free`.

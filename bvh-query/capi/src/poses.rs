@@ -1,7 +1,7 @@
 //! Poses: reads, checks and composes them.
 
 use crate::entry::entry;
-use crate::input::{array, triple, value};
+use crate::input::{array, reserve, triple, value};
 use crate::output::One;
 use crate::status::Failure;
 use crate::types::PoseRows;
@@ -137,7 +137,7 @@ pub(crate) unsafe fn poses(
     // SAFETY: the caller vouches for it.
     let rows = unsafe { array(name, pointer, count) }?;
     into.clear();
-    into.reserve(count);
+    reserve(name, count, into)?;
     for (number, rows) in rows.iter().enumerate() {
         into.push(pose_of(rows).map_err(|failure| failure.at(format_args!("{name}[{number}]")))?);
     }

@@ -1,8 +1,8 @@
 //! Questions about one mesh and many points, rays or segments.
 
 use crate::entry::entry;
-use crate::input::{array, check_within, rows_of_three};
-use crate::output::{List, Room};
+use crate::input::{array, check_within, reserve, rows_of_three};
+use crate::output::{Lists, Room};
 use crate::poses::pose_or_identity;
 use crate::queriers::{Asker, Probes, QUERIERS};
 use crate::status::Failure;
@@ -27,7 +27,9 @@ impl Question {
         ask: impl FnOnce(&mut Querier, Option<ProbeBatch<'_>>, PlacedShape<'_>, &Probes) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let mut held = QUERIERS.hold("querier", self.querier.id)?;
-        let Asker { querier, parallel, budget, at_hand, probes } = &mut **held.value()?;
+        let asker = &mut **held.value()?;
+        let parallel = asker.uses_all_cores();
+        let Asker { querier, budget, at_hand, probes, .. } = asker;
         let shape = at_hand.one("mesh", self.mesh)?;
         // SAFETY: the caller vouches for it.
         let placed = shape.at(&unsafe { pose_or_identity("pose", self.pose) }?);
@@ -99,6 +101,7 @@ pub(crate) unsafe fn rays(rays: *const RayRow, count: usize, into: &mut Vec<Ray>
     // SAFETY: the caller vouches for it.
     let rows = unsafe { array("rays", rays, count) }?;
     into.clear();
+    reserve("rays", count, into)?;
     into.extend(rows.iter().map(Ray::from));
     Ok(())
 }
@@ -124,6 +127,7 @@ pub(crate) unsafe fn segments(
     // SAFETY: the caller vouches for it.
     let rows = unsafe { array("segments", segments, count) }?;
     into.clear();
+    reserve("segments", count, into)?;
     into.extend(rows.iter().map(|row| [row.from, row.to]));
     Ok(())
 }
@@ -250,13 +254,10 @@ pub unsafe extern "C" fn cbvh_all_hits(
 ) -> i32 {
     let ask = |querier: &mut Querier, batch: Option<ProbeBatch<'_>>, placed: PlacedShape<'_>, of: &Probes| {
         // SAFETY: the header asks for it.
-        let (mut list, mut counts) = unsafe {
-            let count_room = if counts.is_null() { 0 } else { of.rays.len() };
-            (List::new("hits", hits, capacity, count)?, Room::new("counts", counts, count_room)?)
-        };
+        let mut lists = unsafe { Lists::new(("hits", hits, capacity, count), counts, of.rays.len()) }?;
         let mut add = |number, found: Vec<bvh_query::RayHit>| {
-            counts.set(number, found.len());
-            found.into_iter().for_each(|hit| list.push(HitRow::from(hit)));
+            let count = found.len();
+            lists.add(number, found.into_iter().map(HitRow::from), count);
         };
         if let Some(batch) = batch {
             let found = batch.all_hits(&of.rays)?.into_iter().enumerate();
@@ -266,7 +267,7 @@ pub unsafe extern "C" fn cbvh_all_hits(
                 add(number, querier.all_hits(placed, ray)?);
             }
         }
-        list.finish()
+        lists.finish()
     };
     // SAFETY: the header asks for it.
     entry(|| unsafe { Question { querier, mesh, pose }.ask(read_rays(rays, ray_count), ask) })

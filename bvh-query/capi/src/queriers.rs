@@ -1,6 +1,7 @@
 //! Queriers: the memory of questions, and how they are asked.
 
 use crate::at_hand::AtHand;
+use crate::cores;
 use crate::entry::entry;
 use crate::input::flag;
 use crate::output::One;
@@ -15,11 +16,19 @@ pub(crate) static QUERIERS: Table<Box<Asker>> = Table::new(Kind::Querier);
 /// What the handle of a querier stands for.
 pub(crate) struct Asker {
     pub(crate) querier: Querier,
-    pub(crate) parallel: bool,
+    /// Whether questions may use all cores, where they are not asked by a function of the caller.
+    parallel: bool,
     pub(crate) budget: u64,
     pub(crate) at_hand: AtHand,
     /// Memory for what a question is about.
     pub(crate) probes: Probes,
+}
+
+impl Asker {
+    /// Returns whether the question that is asked now uses all cores.
+    pub(crate) fn uses_all_cores(&self) -> bool {
+        self.parallel && cores::may_use_all()
+    }
 }
 
 #[derive(Default)]

@@ -9,8 +9,8 @@
 //! do not wait for each other.
 
 use crate::status::{Failure, Status};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard, TryLockError};
 
 /// What a handle stands for, by the highest byte of its number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -43,13 +43,15 @@ const CHUNKS: usize = 24;
 struct Slot<T> {
     /// How often the place was freed. It changes under the lock only; without it, it tells whether a handle is stale.
     generation: AtomicU32,
-    value: Mutex<Option<T>>,
+    value: RwLock<Option<T>>,
 }
 
 pub(crate) struct Table<T> {
     kind: Kind,
     chunks: [OnceLock<Box<[Slot<T>]>>; CHUNKS],
     free: Mutex<Free>,
+    /// How many handles were freed.
+    removals: AtomicU64,
 }
 
 /// Places that can be taken.
@@ -60,7 +62,17 @@ struct Free {
 }
 
 /// The value of a handle, while nobody else may use or free it.
-pub(crate) struct Held<'a, T>(MutexGuard<'a, Option<T>>);
+pub(crate) struct Held<'a, T>(RwLockWriteGuard<'a, Option<T>>);
+
+/// The value of a handle, while nobody may change or free it.
+pub(crate) struct Seen<'a, T>(RwLockReadGuard<'a, Option<T>>);
+
+impl<T> Seen<'_, T> {
+    /// Returns the value, as `Held` does.
+    pub(crate) fn value(&self) -> Result<&T, Failure> {
+        self.0.as_ref().ok_or_else(|| Failure::new(Status::Internal, "a handle without a value"))
+    }
+}
 
 impl<T> Held<'_, T> {
     /// Returns the value. It is there: a place without one has no handle of its generation.
@@ -72,7 +84,7 @@ impl<T> Held<'_, T> {
 impl<T> Table<T> {
     pub(crate) const fn new(kind: Kind) -> Self {
         let free = Mutex::new(Free { freed: Vec::new(), next: 0 });
-        Self { kind, chunks: [const { OnceLock::new() }; CHUNKS], free }
+        Self { kind, chunks: [const { OnceLock::new() }; CHUNKS], free, removals: AtomicU64::new(0) }
     }
 
     fn slot(&self, place: u32) -> Option<&Slot<T>> {
@@ -83,6 +95,11 @@ impl<T> Table<T> {
 
     /// Keeps a value, and returns its handle.
     pub(crate) fn insert(&self, value: T) -> Result<u64, Failure> {
+        self.insert_with(|| value)
+    }
+
+    /// Keeps a value that is made only if there is a place for it, and returns its handle.
+    pub(crate) fn insert_with(&self, value: impl FnOnce() -> T) -> Result<u64, Failure> {
         let place = {
             let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
             match free.freed.pop() {
@@ -96,7 +113,7 @@ impl<T> Table<T> {
                         let message = format!("expected at most {most} open handles of a {kind}, found more");
                         return Err(Failure::new(Status::Limit, message));
                     };
-                    let slot = || Slot { generation: AtomicU32::new(0), value: Mutex::new(None) };
+                    let slot = || Slot { generation: AtomicU32::new(0), value: RwLock::new(None) };
                     places.get_or_init(|| (0..1u32 << chunk).map(|_| slot()).collect());
                     free.next += 1;
                     place
@@ -106,8 +123,11 @@ impl<T> Table<T> {
         let Some(slot) = self.slot(place) else {
             return Err(Failure::new(Status::Internal, "a place beyond its table"));
         };
-        *slot.value.lock().unwrap_or_else(PoisonError::into_inner) = Some(value);
+        let mut room = slot.value.write().unwrap_or_else(PoisonError::into_inner);
+        *room = Some(value());
+        // It changes under the lock only.
         let generation = slot.generation.load(Ordering::Acquire);
+        drop(room);
         Ok(u64::from(self.kind as u8) << 56 | u64::from(place) << 32 | u64::from(generation))
     }
 
@@ -115,16 +135,12 @@ impl<T> Table<T> {
     fn find(&self, name: &str, handle: u64) -> Result<(u32, &Slot<T>), Failure> {
         let place = (handle >> 32) as u32 & 0xFF_FFFF;
         if (handle >> 56) as u8 == self.kind as u8
-            && let Some(slot) = self.slot_below_limit(place)
+            && let Some(slot) = self.slot(place)
             && slot.generation.load(Ordering::Acquire) == handle as u32
         {
             return Ok((place, slot));
         }
         Err(self.stale(name, handle))
-    }
-
-    fn slot_below_limit(&self, place: u32) -> Option<&Slot<T>> {
-        if place + 1 < 1 << CHUNKS { self.slot(place) } else { None }
     }
 
     #[cold]
@@ -137,7 +153,7 @@ impl<T> Table<T> {
             Some(other) if other != self.kind => format!("the handle of a {}", other.name()),
             Some(_)
                 if self
-                    .slot_below_limit(place)
+                    .slot(place)
                     .is_some_and(|slot| (handle as u32) < slot.generation.load(Ordering::Acquire)) =>
             {
                 format!("one of a {kind} that was freed")
@@ -153,25 +169,40 @@ impl<T> Table<T> {
     /// Returns whether a handle has not been freed. It is cheap, and threads that ask it do not disturb each other.
     pub(crate) fn is_open(&self, handle: u64) -> bool {
         let place = (handle >> 32) as u32 & 0xFF_FFFF;
-        let slot = self.slot_below_limit(place);
+        let slot = self.slot(place);
         slot.is_some_and(|slot| slot.generation.load(Ordering::Acquire) == handle as u32)
     }
 
     /// Returns the value of a handle for use by this thread alone.
     pub(crate) fn hold(&self, name: &str, handle: u64) -> Result<Held<'_, T>, Failure> {
         let (_, slot) = self.find(name, handle)?;
-        match slot.value.try_lock() {
+        match slot.value.try_write() {
             // It may have been freed before it was locked.
             Ok(value) if slot.generation.load(Ordering::Acquire) == handle as u32 && value.is_some() => {
                 Ok(Held(value))
             }
             Ok(_) => Err(self.stale(name, handle)),
             Err(TryLockError::WouldBlock) => Err(self.busy(name)),
-            Err(TryLockError::Poisoned(_)) => Err(Failure::new(
-                Status::Internal,
-                format!("{name}: a defect of cbvh ended its last use; free it, and make another one"),
-            )),
+            Err(TryLockError::Poisoned(_)) => Err(defect(name)),
         }
+    }
+
+    /// Returns the value of a handle for threads that only look at it, of which there may be many at the same time.
+    pub(crate) fn see(&self, name: &str, handle: u64) -> Result<Seen<'_, T>, Failure> {
+        let (_, slot) = self.find(name, handle)?;
+        match slot.value.try_read() {
+            Ok(value) if slot.generation.load(Ordering::Acquire) == handle as u32 && value.is_some() => {
+                Ok(Seen(value))
+            }
+            Ok(_) => Err(self.stale(name, handle)),
+            Err(TryLockError::WouldBlock) => Err(self.busy(name)),
+            Err(TryLockError::Poisoned(_)) => Err(defect(name)),
+        }
+    }
+
+    /// Returns how many handles were freed: a number that is the same as before says that none was meanwhile.
+    pub(crate) fn removals(&self) -> u64 {
+        self.removals.load(Ordering::Acquire)
     }
 
     #[cold]
@@ -185,11 +216,11 @@ impl<T> Table<T> {
     /// Frees a handle, and returns its value, which is to be dropped.
     pub(crate) fn remove(&self, name: &str, handle: u64) -> Result<T, Failure> {
         let (place, slot) = self.find(name, handle)?;
-        let mut value = match slot.value.try_lock() {
+        let mut value = match slot.value.try_write() {
             Ok(value) => value,
             // Values that are shared are held for moments only.
             Err(TryLockError::WouldBlock) if matches!(self.kind, Kind::Mesh | Kind::Path) => {
-                slot.value.lock().unwrap_or_else(PoisonError::into_inner)
+                slot.value.write().unwrap_or_else(PoisonError::into_inner)
             }
             Err(TryLockError::WouldBlock) => return Err(self.busy(name)),
             Err(TryLockError::Poisoned(value)) => {
@@ -203,6 +234,7 @@ impl<T> Table<T> {
         let Some(taken) = value.take() else { return Err(self.stale(name, handle)) };
         let next = (handle as u32).wrapping_add(1);
         slot.generation.store(next, Ordering::Release);
+        self.removals.fetch_add(1, Ordering::Release);
         drop(value);
         if next != 0 {
             self.free.lock().unwrap_or_else(PoisonError::into_inner).freed.push(place);
@@ -211,11 +243,17 @@ impl<T> Table<T> {
     }
 }
 
+#[cold]
+fn defect(name: &str) -> Failure {
+    let message = format!("{name}: a defect of cbvh ended its last use; free it, and make another one");
+    Failure::new(Status::Internal, message)
+}
+
 impl<T: Clone> Table<T> {
     /// Returns a copy of the value of a handle, which stays usable when the handle is freed.
     pub(crate) fn share(&self, name: &str, handle: u64) -> Result<T, Failure> {
         let (_, slot) = self.find(name, handle)?;
-        let value = slot.value.lock().unwrap_or_else(PoisonError::into_inner);
+        let value = slot.value.read().unwrap_or_else(PoisonError::into_inner);
         if slot.generation.load(Ordering::Acquire) != handle as u32 {
             return Err(self.stale(name, handle));
         }
@@ -271,7 +309,16 @@ mod tests {
         assert_eq!(table.hold("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
         assert_eq!(table.remove("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
         drop(held);
+        // Many may look at it together, but not while one changes it.
+        let seen = [(); 2].map(|()| table.see("querier", handle).unwrap());
+        assert_eq!(table.hold("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
+        assert_eq!(seen.map(|seen| *seen.value().unwrap()), [2, 2]);
+        let held = table.hold("querier", handle).unwrap();
+        assert_eq!(table.see("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
+        drop(held);
+        assert_eq!(table.removals(), 0);
         assert_eq!(table.remove("querier", handle).unwrap(), 2);
+        assert_eq!(table.removals(), 1);
     }
 
     #[test]

@@ -554,5 +554,3 @@ impl From<Option<SceneDistance>> for SceneDistanceRow {
         }
     }
 }
-// SAFETY: a number.
-unsafe impl Plain for i32 {}

@@ -1,6 +1,7 @@
 /* What the header promises beyond answers: lists and text that do not fit, what lives on, borrowed bytes, paths of the
  * caller, files, scenes, and cubes whose answers are known. */
 #include "support.h"
+#include <sys/stat.h>
 
 static cbvh_querier querier;
 
@@ -154,8 +155,10 @@ static void borrowed(void) {
     OK(cbvh_mesh_borrow_bytes(bytes, size, release, bytes, &lent));
     bool answer;
     OK(cbvh_collide(querier, lent, lent, &here, 1, &answer));
+    OK(cbvh_collide(querier, mesh, mesh, &here, 1, &answer));
     OK(cbvh_mesh_free(lent));
     CHECK(released == 1);
+    /* Also about a mesh that it has had at hand all the time. */
     OK(cbvh_collide(querier, mesh, mesh, &here, 1, &answer));
     CHECK(released == 2);
     /* More meshes than a querier has at hand. */
@@ -199,6 +202,28 @@ static int32_t course_pose(void *user, double t, cbvh_pose *pose) {
     return 0;
 }
 
+/* A bound that is none, for a reason. */
+static double no_bound(void *user, double radius, double t0, double t1) {
+    (void)radius, (void)t0, (void)t1;
+    const double *bound = user;
+    if (*bound < 0) {
+        OK(cbvh_callback_message("below the ground"));
+    }
+    return *bound;
+}
+
+static int32_t stands_still(void *user, double t, cbvh_pose *pose) {
+    (void)user, (void)t;
+    *pose = shift(3, 0, 0);
+    return 0;
+}
+
+static int32_t no_pose(void *user, double t, cbvh_pose *pose) {
+    (void)user, (void)t, (void)pose;
+    OK(cbvh_callback_message("the joint is at its end"));
+    return 3;
+}
+
 static double course_sagitta(void *user, double radius, double t0, double t1) {
     (void)user, (void)radius, (void)t0, (void)t1;
     /* A line, but for the rounding of two products and a sum of numbers up to 8. */
@@ -213,7 +238,7 @@ static void paths(void) {
     cbvh_path own, between, screw, polyline;
     const double origin[3] = {0, 0, 0}, x_axis[3] = {1, 0, 0};
     const cbvh_pose knots[3] = {shift(-4, 0, 0), shift(0, 0, 0), shift(4, 0, 0)};
-    OK(cbvh_path_from_functions(course_pose, course_sagitta, &of, &own));
+    OK(cbvh_path_from_functions(course_pose, course_sagitta, NULL, &of, &own));
     OK(cbvh_path_between(&start, &end, &between));
     OK(cbvh_path_screw(&start, origin, x_axis, 0, 8, &screw));
     OK(cbvh_path_polyline(knots, 3, &polyline));
@@ -288,6 +313,34 @@ static void paths(void) {
           "path: the pose at t = 0: expected a rotation");
     cbvh_pose at;
     FAILS(cbvh_path_pose(own, 0.5, &at), CBVH_CALLBACK_FAILED, "at t = 0.5");
+    /* A sagitta that is none is a failure, too, but it may be infinite. */
+    of.breaks = 0;
+    double bounds[3] = {NAN, -1, INFINITY};
+    cbvh_path unbounded;
+    for (int k = 0; k < 3; k++) {
+        OK(cbvh_path_from_functions(stands_still, no_bound, NULL, &bounds[k], &unbounded));
+        const cbvh_status status = cbvh_are_free(querier, mesh, mesh, &unbounded, 1, NULL, &answer);
+        const char *texts[2] = {"sagitta: expected a bound of at least 0 from t = 0 to t =",
+                                "found -1: below the ground"};
+        if (k < 2) {
+            FAILS(status, CBVH_CALLBACK_FAILED, texts[k]);
+        } else {
+            CHECK(status != CBVH_CALLBACK_FAILED);
+        }
+        OK(cbvh_path_free(unbounded));
+    }
+    OK(cbvh_path_from_functions(no_pose, no_bound, NULL, bounds, &unbounded));
+    FAILS(cbvh_path_pose(unbounded, 0.5, &at), CBVH_CALLBACK_FAILED, "the code 3 of its function: the joint is at its end");
+    OK(cbvh_path_free(unbounded));
+    /* What functions use is released when the path is, but not after a failure to make it. */
+    released = 0;
+    void *used = malloc(1);
+    FAILS(cbvh_path_from_functions(NULL, no_bound, release, used, &unbounded), CBVH_INVALID_ARGUMENT, "pose: ");
+    CHECK(released == 0);
+    OK(cbvh_path_from_functions(stands_still, no_bound, release, used, &unbounded));
+    CHECK(released == 0);
+    OK(cbvh_path_free(unbounded));
+    CHECK(released == 1);
     for (int k = 0; k < 4; k++) {
         OK(cbvh_path_free(all[k]));
     }
@@ -393,7 +446,7 @@ static void scenes(int parallel, int tracking) {
     CHECK(!answer);
     OK(cbvh_path_free(path));
     course of = {.from = 4, .to = 3, .fails_after = 3, .code = 5};
-    OK(cbvh_path_from_functions(course_pose, course_sagitta, &of, &path));
+    OK(cbvh_path_from_functions(course_pose, course_sagitta, NULL, &of, &path));
     FAILS(cbvh_scene_is_free(scene, &c, &path, 1, NULL, &answer), CBVH_CALLBACK_FAILED, "the code 5");
     of.fails_after = -1;
     OK(cbvh_scene_is_free(scene, &c, &path, 1, NULL, &answer));
@@ -421,6 +474,7 @@ static void scenes(int parallel, int tracking) {
     CHECK(!answer);
     char name[2];
     size_t length;
+    cbvh_mesh of_c;
     OK(cbvh_scene_instance_name(scene, b, name, 2, &length));
     CHECK(length == 1 && strcmp(name, "b") == 0);
     FAILS(cbvh_scene_instance_name(scene, b, name, 1, &length), CBVH_BUFFER_TOO_SMALL,
@@ -428,12 +482,23 @@ static void scenes(int parallel, int tracking) {
     CHECK(length == 1 && name[0] == 0);
     OK(cbvh_scene_instance_name(scene, c, name, 2, &length));
     CHECK(length == 0);
+    /* Text is cut between characters. */
+    cbvh_instance accented;
+    const cbvh_pose far = shift(0, 50, 0);
+    char cut[4];
+    OK(cbvh_scene_instance_mesh(scene, c, &of_c));
+    OK(cbvh_scene_add(scene, of_c, &far, "a\u00e9", &accented));
+    FAILS(cbvh_scene_instance_name(scene, accented, cut, 3, &length), CBVH_BUFFER_TOO_SMALL, "buffer: ");
+    CHECK(length == 3 && strcmp(cut, "a") == 0);
+    OK(cbvh_scene_instance_name(scene, accented, cut, 4, &length));
+    CHECK(strcmp(cut, "a\u00e9") == 0);
+    OK(cbvh_scene_remove(scene, accented));
+    OK(cbvh_mesh_free(of_c));
     OK(cbvh_scene_remove(scene, b));
     FAILS(cbvh_scene_remove(scene, b), CBVH_NOT_FOUND, "was it removed?");
     cbvh_pose world;
     OK(cbvh_scene_instance_pose(scene, c, &world));
     CHECK(world.rows[11] == 0.1);
-    cbvh_mesh of_c;
     uint64_t triangles;
     OK(cbvh_scene_instance_mesh(scene, c, &of_c));
     OK(cbvh_mesh_triangle_count(of_c, &triangles));
@@ -502,6 +567,12 @@ static void files(const char *folder, const char *testdata) {
     OK(cbvh_mesh_open(input, CBVH_MAP, &mesh));
     FAILS(cbvh_mesh_check(mesh), CBVH_DAMAGED, "R27");
     OK(cbvh_mesh_free(mesh));
+    /* A pipe that nobody writes to. */
+    snprintf(output, sizeof output, "%s/pipe", folder);
+    CHECK(mkfifo(output, 0600) == 0);
+    FAILS(cbvh_mesh_open(output, CBVH_MAP, &mesh), CBVH_SYSTEM, "pipe: expected a regular file, found another kind");
+    FAILS(cbvh_scene_open(output, &scene), CBVH_SYSTEM, "pipe: expected a regular file");
+    FAILS(cbvh_mesh_open(folder, CBVH_READ, &mesh), CBVH_SYSTEM, folder);
     /* Duplicates are stored once. */
     const uint32_t faces[9] = {0, 1, 2, 0, 1, 3, 0, 1, 2};
     uint32_t twins[2];

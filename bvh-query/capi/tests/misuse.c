@@ -53,6 +53,20 @@ static void handles(void) {
     const cbvh_scene no_scene = {0};
     FAILS(cbvh_scene_collide(no_scene, &answer), CBVH_INVALID_HANDLE, "scene: ");
     FAILS(cbvh_scene_add(scene, no_mesh, &pose, NULL, NULL), CBVH_INVALID_HANDLE, "mesh: ");
+    /* What should have been made is 0 then. */
+#define MAKES_NONE(type, call, name)                                                                                   \
+    do {                                                                                                               \
+        type out = {7};                                                                                                \
+        FAILS(call, CBVH_INVALID_HANDLE, name ": expected the handle");                                                \
+        CHECK(out.id == 0);                                                                                            \
+    } while (0)
+    MAKES_NONE(cbvh_mesh, cbvh_mesh_clone(no_mesh, &out), "mesh");
+    MAKES_NONE(cbvh_mesh, cbvh_mesh_object(no_mesh, 0, &out), "mesh");
+    MAKES_NONE(cbvh_mesh, cbvh_scene_instance_mesh(no_scene, instance, &out), "scene");
+    MAKES_NONE(cbvh_scene, cbvh_scene_clone(no_scene, &out), "scene");
+    MAKES_NONE(cbvh_scene, cbvh_scene_of_mesh(no_mesh, &out), "mesh");
+    MAKES_NONE(cbvh_instance, cbvh_scene_add(no_scene, mesh, &pose, NULL, &out), "scene");
+    MAKES_NONE(cbvh_instance, cbvh_scene_add(scene, no_mesh, &pose, NULL, &out), "mesh");
 }
 
 static void pointers(void) {
@@ -107,8 +121,9 @@ static void pointers(void) {
     FAILS(cbvh_path_between(NULL, &pose, &made_path), CBVH_INVALID_ARGUMENT, "start: ");
     FAILS(cbvh_path_between(&pose, NULL, &made_path), CBVH_INVALID_ARGUMENT, "end: ");
     FAILS(cbvh_path_screw(&pose, NULL, room, 1, 1, &made_path), CBVH_INVALID_ARGUMENT, "point: ");
-    FAILS(cbvh_path_from_functions(NULL, NULL, NULL, &made_path), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_path_from_functions(NULL, NULL, NULL, NULL, &made_path), CBVH_INVALID_ARGUMENT,
           "pose: expected a function, found NULL");
+    FAILS(cbvh_callback_message(NULL), CBVH_INVALID_ARGUMENT, "message: expected a pointer, found NULL");
     FAILS(cbvh_pose_check(NULL), CBVH_INVALID_ARGUMENT, "pose: ");
     FAILS(cbvh_pose_inverse(&pose, NULL), CBVH_INVALID_ARGUMENT, "result: ");
     FAILS(cbvh_pose_from_quaternion(NULL, room, &pose), CBVH_INVALID_ARGUMENT, "quaternion: ");
@@ -271,6 +286,12 @@ static void scenes(void) {
           "name: expected the name of an instance, found \"two\"");
     cbvh_motion_answer answer;
     FAILS(cbvh_scene_motion(scene, &none, &path, 1, NULL, &answer), CBVH_NOT_FOUND, "instance");
+    const cbvh_instance twice[3] = {instance, none, instance};
+    const cbvh_path ways[3] = {path, path, path};
+    bool is_free;
+    FAILS(cbvh_scene_is_free(scene, twice, ways, 3, NULL, &is_free), CBVH_INVALID_ARGUMENT,
+          "instances[2]: expected each instance once, found that of instances[0]");
+    FAILS(cbvh_scene_motion(scene, twice, ways, 3, NULL, &answer), CBVH_INVALID_ARGUMENT, "each instance once");
     cbvh_scene made;
     FAILS(cbvh_scene_of_mesh(mesh, &made), CBVH_INVALID_ARGUMENT,
           "mesh: expected a scene, a file with instances, found none");

@@ -184,7 +184,7 @@ int main(void) {
         case 36: status = cbvh_path_between(in, more, (cbvh_path *)&made); break;
         case 37: status = cbvh_path_screw(in, more, &x, y, y, (cbvh_path *)(n == 0 ? &made : NULL)); break;
         case 38: status = cbvh_path_polyline(in, n, (cbvh_path *)&made); break;
-        case 39: status = cbvh_path_from_functions(below(4) ? any_pose : NULL, any_sagitta, NULL,
+        case 39: status = cbvh_path_from_functions(below(4) ? any_pose : NULL, any_sagitta, NULL, NULL,
             (cbvh_path *)&made); break;
         case 40: status = cbvh_path_pose(p, x, out); break;
         case 41: status = cbvh_path_reach(a, p, x, y, out); break;

@@ -1,5 +1,5 @@
 /* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh and a
- * path may be freed while others use them. */
+ * path may be freed while others use them; many look at a scene; functions of paths ask by themselves. */
 #include "support.h"
 #include <pthread.h>
 
@@ -71,7 +71,111 @@ static void *hold_scene(void *instance) {
     return NULL;
 }
 
+/* Paths whose functions ask by themselves, with a lock held and all cores allowed. */
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static cbvh_querier inner;
+static cbvh_scene inner_scene;
+static int inner_calls;
+
+static int32_t asking_pose(void *user, double t, cbvh_pose *pose) {
+    static cbvh_distance_answer found[POSES];
+    bool answer;
+    cbvh_mesh baked;
+    CHECK(pthread_mutex_lock(&lock) == 0);
+    OK(cbvh_distance(inner, mesh, mesh, poses, POSES, NULL, found));
+    CHECK(memcmp(found, expected, sizeof expected) == 0);
+    OK(cbvh_scene_collide(inner_scene, &answer));
+    CHECK(answer);
+    if (inner_calls++ % 64 == 0) {
+        baked = cube(2);
+        OK(cbvh_mesh_free(baked));
+    }
+    CHECK(pthread_mutex_unlock(&lock) == 0);
+    *pose = shift(*(const double *)user + t, 0, 0);
+    return 0;
+}
+
+static void callbacks_that_ask(void) {
+    enum { PATHS = 40, QUESTIONS = 3, PLACES = 12 };
+    double places[PATHS];
+    cbvh_instance moving[PATHS];
+    cbvh_scene outer_scene;
+    bool answer;
+    cbvh_querier outer;
+    cbvh_path paths[PATHS];
+    bool answers[PATHS];
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &outer));
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &inner));
+    OK(cbvh_querier_set_parallel(outer, 1));
+    OK(cbvh_querier_set_parallel(inner, 1));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &inner_scene));
+    OK(cbvh_scene_set_parallel(inner_scene, 1));
+    for (int k = 0; k < PLACES; k++) {
+        OK(cbvh_scene_add(inner_scene, mesh, &poses[k], NULL, NULL));
+    }
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &outer_scene));
+    OK(cbvh_scene_set_parallel(outer_scene, 1));
+    for (int k = 0; k < PATHS; k++) {
+        /* Behind each other, and each where the one before will be. */
+        places[k] = 2 + 1.5 * k;
+        const cbvh_pose place = shift(places[k], 0, 0);
+        OK(cbvh_scene_add(outer_scene, mesh, &place, NULL, &moving[k]));
+        OK(cbvh_path_from_functions(asking_pose, no_sagitta, NULL, &places[k], &paths[k]));
+    }
+    for (int round = 0; round < QUESTIONS; round++) {
+        OK(cbvh_are_free(outer, mesh, mesh, paths, PATHS, NULL, answers));
+        for (int k = 0; k < PATHS; k++) {
+            CHECK(answers[k]);
+        }
+        OK(cbvh_scene_is_free(outer_scene, moving, paths, PATHS, NULL, &answer));
+        CHECK(answer);
+    }
+    OK(cbvh_scene_free(outer_scene));
+    for (int k = 0; k < PATHS; k++) {
+        OK(cbvh_path_free(paths[k]));
+    }
+    OK(cbvh_scene_free(inner_scene));
+    OK(cbvh_querier_free(inner));
+    OK(cbvh_querier_free(outer));
+}
+
+/* Looks at a scene, as others do at the same time. */
+static void *look(void *instance) {
+    for (int round = 0; round < 2000; round++) {
+        cbvh_scene copy;
+        cbvh_pose world;
+        cbvh_stats stats;
+        cbvh_instance found;
+        size_t count;
+        OK(cbvh_scene_clone(scene, &copy));
+        OK(cbvh_scene_free(copy));
+        OK(cbvh_scene_find(scene, "one", &found));
+        CHECK(found.id == ((cbvh_instance *)instance)->id);
+        OK(cbvh_scene_instance_pose(scene, found, &world));
+        OK(cbvh_scene_stats(scene, &stats));
+        OK(cbvh_scene_instances(scene, &found, 1, &count));
+    }
+    return NULL;
+}
+
+static void lookers(void) {
+    pthread_t threads[THREADS];
+    const cbvh_pose here = CBVH_IDENTITY;
+    cbvh_instance one;
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, mesh, &here, "one", &one));
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_create(&threads[k], NULL, look, &one) == 0);
+    }
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_join(threads[k], NULL) == 0);
+    }
+    OK(cbvh_scene_free(scene));
+}
+
 int main(void) {
+    /* More threads than cores, so that some wait for others. */
+    CHECK(setenv("RAYON_NUM_THREADS", "8", 1) == 0);
     random_source source = {3};
     mesh = cube(1);
     cbvh_querier querier;
@@ -93,8 +197,11 @@ int main(void) {
         CHECK(pthread_join(threads[k], NULL) == 0);
     }
 
+    callbacks_that_ask();
+    lookers();
+
     CHECK(pthread_barrier_init(&barrier, NULL, 2) == 0);
-    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, &path));
+    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, NULL, &path));
     OK(cbvh_querier_new(CBVH_BACKEND_BEST, &shared));
     OK(cbvh_mesh_clone(mesh, &temporary));
     CHECK(pthread_create(&threads[0], NULL, hold, NULL) == 0);
@@ -115,7 +222,7 @@ int main(void) {
     calls = 0;
     cbvh_instance instances[2];
     const cbvh_pose here = CBVH_IDENTITY, there = shift(3, 0, 0);
-    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, &path));
+    OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, NULL, &path));
     OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
     OK(cbvh_scene_add(scene, mesh, &here, NULL, &instances[0]));
     OK(cbvh_scene_add(scene, mesh, &there, NULL, &instances[1]));

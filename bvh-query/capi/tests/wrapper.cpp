@@ -220,6 +220,24 @@ struct Line {
     double sagitta(double, double, double) const { return 1e-14; }
 };
 
+// Frees its own path in the middle of a question: what it is made of lives until the question has ended.
+struct Leaving {
+    std::shared_ptr<std::optional<cbvh::Path>> own;
+    std::shared_ptr<int> kept;
+    bool throws;
+    cbvh::Pose pose(double t) const {
+        own->reset();
+        CHECK(*kept == 7);
+        return cbvh::Pose::translation(-4 + 8 * t, 2, 0);
+    }
+    double sagitta(double, double, double) const {
+        if (throws) {
+            throw 7;
+        }
+        return 1e-14;
+    }
+};
+
 void motions() {
     const cbvh::Mesh mesh = cube(1);
     cbvh::Querier querier;
@@ -231,7 +249,21 @@ void motions() {
     CHECK(querier.are_free(mesh, mesh, both) == std::vector<bool>({true, false}));
     CHECK(querier.motions(mesh, mesh, both)[1].outcome == CBVH_HIT && querier.motions(mesh, mesh, {}).empty());
     // Exceptions do not cross the library.
-    FAILS(querier.is_free(mesh, mesh, cbvh::Path::of(Line{2, true})), CBVH_CALLBACK_FAILED, "found the code 1");
+    FAILS(querier.is_free(mesh, mesh, cbvh::Path::of(Line{2, true})), CBVH_CALLBACK_FAILED,
+          "found the code 1 of its function: no pose");
+    for (const bool throws : {false, true}) {
+        const auto kept = std::make_shared<int>(7);
+        const auto own = std::make_shared<std::optional<cbvh::Path>>();
+        *own = cbvh::Path::of(Leaving{own, kept, throws});
+        CHECK(kept.use_count() == 2);
+        const auto ask = [&] { return querier.is_free(mesh, mesh, **own); };
+        if (throws) {
+            FAILS(ask(), CBVH_CALLBACK_FAILED, "found NaN: an exception that is no std::exception");
+        } else {
+            CHECK(ask());
+        }
+        CHECK(!own->has_value() && kept.use_count() == 1);
+    }
     const cbvh::Pose start = cbvh::Pose::translation(-4, 0, 0), end = cbvh::Pose::translation(4, 0, 0);
     CHECK(!querier.is_free(mesh, mesh, start, end) && querier.motion(mesh, mesh, start, end).at < 0.3751);
     const cbvh::Path screw = cbvh::Path::screw(start, {0, 0, 0}, {0, 0, 1}, 6.5, 0);

@@ -4,9 +4,10 @@ mod probes;
 mod questions;
 
 use crate::at_hand::MESHES;
+use crate::cores;
 use crate::entry::entry;
 use crate::input::{array, flag, optional_text, path, text};
-use crate::mesh::{hand_out, new_mesh};
+use crate::mesh::{check_regular, hand_out, new_mesh};
 use crate::output::{self, List, One};
 use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
@@ -16,7 +17,15 @@ use bvh_query::{Groups, InstanceId, Scene, SceneShape};
 use std::ffi::c_char;
 
 /// All scenes that are open.
-static SCENES: Table<Box<Scene>> = Table::new(Kind::Scene);
+static SCENES: Table<Box<Asked>> = Table::new(Kind::Scene);
+
+/// What the handle of a scene stands for.
+#[derive(Clone)]
+struct Asked {
+    scene: Scene,
+    /// Whether questions may use all cores, where they are not asked by a function of the caller.
+    parallel: bool,
+}
 
 /// Makes a scene, and hands it out.
 ///
@@ -27,14 +36,27 @@ unsafe fn make(name: &str, scene: *mut SceneHandle, make: impl FnOnce() -> Resul
         // SAFETY: the caller vouches for it.
         let mut out = unsafe { One::new(name, scene) }?;
         out.set(SceneHandle { id: 0 });
-        out.set(SceneHandle { id: SCENES.insert(Box::new(make()?))? });
+        let asked = Box::new(Asked { scene: make()?, parallel: false });
+        out.set(SceneHandle { id: SCENES.insert(asked)? });
         Ok(())
     })
 }
 
 /// Does something with a scene that nobody uses.
-pub(crate) fn with(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
-    entry(|| act(SCENES.hold("scene", scene.id)?.value()?))
+fn with(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
+    entry(|| change(scene, act))
+}
+
+fn change(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> Result<(), Failure> {
+    let mut held = SCENES.hold("scene", scene.id)?;
+    let asked = held.value()?;
+    asked.scene.set_parallel(asked.parallel && cores::may_use_all());
+    act(&mut asked.scene)
+}
+
+/// Looks at a scene that nobody changes: many threads may do it at the same time.
+fn see(scene: SceneHandle, act: impl FnOnce(&Scene) -> Result<(), Failure>) -> i32 {
+    entry(|| act(&SCENES.see("scene", scene.id)?.value()?.scene))
 }
 
 /// `cbvh_scene_new`.
@@ -48,7 +70,12 @@ pub unsafe extern "C" fn cbvh_scene_new(backend_number: i32, scene: *mut SceneHa
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_open(file: *const c_char, scene: *mut SceneHandle) -> i32 {
     // SAFETY: the header asks for it.
-    let made = || Ok(Scene::open(unsafe { path("path", file) }?)?);
+    let made = || {
+        // SAFETY: the header asks for it.
+        let file = unsafe { path("path", file) }?;
+        check_regular(&file)?;
+        Ok(Scene::open(file)?)
+    };
     // SAFETY: the header asks for it.
     unsafe { make("scene", scene, made) }
 }
@@ -67,9 +94,14 @@ pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneH
 /// `cbvh_scene_clone`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_clone(scene: SceneHandle, other: *mut SceneHandle) -> i32 {
-    let made = || Ok((**SCENES.hold("scene", scene.id)?.value()?).clone());
-    // SAFETY: the header asks for it.
-    unsafe { make("other", other, made) }
+    entry(|| {
+        // SAFETY: the header asks for it.
+        let mut out = unsafe { One::new("other", other) }?;
+        out.set(SceneHandle { id: 0 });
+        let copy = SCENES.see("scene", scene.id)?.value()?.clone();
+        out.set(SceneHandle { id: SCENES.insert(copy)? });
+        Ok(())
+    })
 }
 
 /// `cbvh_scene_free`.
@@ -81,8 +113,8 @@ pub extern "C" fn cbvh_scene_free(scene: SceneHandle) -> i32 {
 /// `cbvh_scene_set_parallel`.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> i32 {
-    with(scene, |scene| {
-        scene.set_parallel(flag("parallel", parallel)?);
+    entry(|| {
+        SCENES.hold("scene", scene.id)?.value()?.parallel = flag("parallel", parallel)?;
         Ok(())
     })
 }
@@ -114,24 +146,27 @@ pub unsafe extern "C" fn cbvh_scene_add(
     name: *const c_char,
     instance: *mut Instance,
 ) -> i32 {
-    with(scene, |scene| {
-        let shape = MESHES.share("mesh", mesh.id)?;
-        // SAFETY: the header asks for it.
-        let (world, name) = unsafe { (pose("world", world)?, optional_text("name", name)?) };
-        let out = if instance.is_null() {
+    entry(|| {
+        let mut out = if instance.is_null() {
             None
         } else {
-            // SAFETY: as above.
+            // SAFETY: the header asks for it.
             Some(unsafe { One::new("instance", instance) }?)
         };
-        let id = match name {
-            Some(name) => scene.add_named(name, shape, world)?,
-            None => scene.add(shape, world)?,
-        };
-        if let Some(mut out) = out {
-            out.set(id.into());
-        }
-        Ok(())
+        // SAFETY: as above. The pose and the name are copied before anything is written.
+        let (world, name) = unsafe { (pose("world", world), optional_text("name", name)) };
+        let name = name.map(|name| name.map(str::to_owned));
+        out.iter_mut().for_each(|out| out.set(Instance { id: 0 }));
+        change(scene, |scene| {
+            let shape = MESHES.share("mesh", mesh.id)?;
+            let (world, name) = (world?, name?);
+            let id = match name {
+                Some(name) => scene.add_named(&name, shape, world)?,
+                None => scene.add(shape, world)?,
+            };
+            out.iter_mut().for_each(|out| out.set(id.into()));
+            Ok(())
+        })
     })
 }
 
@@ -186,7 +221,7 @@ pub unsafe extern "C" fn cbvh_scene_find(
     name: *const c_char,
     instance: *mut Instance,
 ) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         // SAFETY: the header asks for it.
         let (name, mut out) = unsafe { (text("name", name)?, One::new("instance", instance)?) };
         let id = scene.find(name).ok_or_else(|| {
@@ -205,7 +240,7 @@ pub unsafe extern "C" fn cbvh_scene_instances(
     capacity: usize,
     count: *mut usize,
 ) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         // SAFETY: the header asks for it.
         let mut list = unsafe { List::new("instances", instances, capacity, count) }?;
         scene.instances().for_each(|id| list.push(id.into()));
@@ -222,7 +257,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_name(
     capacity: usize,
     length: *mut usize,
 ) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         let name = scene.name(instance.into())?.unwrap_or_default();
         // SAFETY: the header asks for it.
         unsafe { output::text("buffer", name, buffer, capacity, length) }
@@ -236,7 +271,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_pose(
     instance: Instance,
     world: *mut PoseRows,
 ) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         // SAFETY: the header asks for it.
         unsafe { One::new("world", world) }?.set(PoseRows::from(scene.pose(instance.into())?));
         Ok(())
@@ -250,10 +285,11 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     instance: Instance,
     mesh: *mut MeshHandle,
 ) -> i32 {
-    with(scene, |scene| {
+    entry(|| {
         // SAFETY: the header asks for it.
         let out = unsafe { new_mesh("mesh", mesh) }?;
-        match scene.shape(instance.into())? {
+        let seen = SCENES.see("scene", scene.id)?;
+        match seen.value()?.scene.shape(instance.into())? {
             SceneShape::Open(shape) => hand_out(out, shape.clone()),
             SceneShape::Stored(shape) => hand_out(out, shape.opened()?),
             _ => Err(Failure::new(Status::Internal, "a shape of an unknown kind")),
@@ -264,7 +300,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
 /// `cbvh_scene_stats`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_stats(scene: SceneHandle, stats: *mut StatsRow) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         // SAFETY: the header asks for it.
         unsafe { One::new("stats", stats) }?.set(StatsRow::new(scene.stats(), scene.pairs_asked()));
         Ok(())

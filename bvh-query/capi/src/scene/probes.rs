@@ -2,7 +2,7 @@
 
 use super::with;
 use crate::input::{check_within, rows_of_three};
-use crate::output::{List, Room};
+use crate::output::{Lists, Room};
 use crate::probes::{rays, segments};
 use crate::status::Failure;
 use crate::types::{ClosestRow, HitRow, RayRow, SceneHandle, SegmentRow, side};
@@ -124,16 +124,15 @@ pub unsafe extern "C" fn cbvh_scene_all_hits(
     with(scene, |scene| {
         let mut probes = Vec::new();
         // SAFETY: the header asks for it.
-        let (mut list, mut counts) = unsafe {
+        let mut lists = unsafe {
             rays(given, ray_count, &mut probes)?;
-            let count_room = if counts.is_null() { 0 } else { ray_count };
-            (List::new("hits", hits, capacity, count)?, Room::new("counts", counts, count_room)?)
+            Lists::new(("hits", hits, capacity, count), counts, ray_count)?
         };
         for (number, found) in scene.all_hits(&probes)?.into_iter().enumerate() {
-            counts.set(number, found.len());
-            found.into_iter().for_each(|hit| list.push(HitRow::from(hit)));
+            let count = found.len();
+            lists.add(number, found.into_iter().map(HitRow::from), count);
         }
-        list.finish()
+        lists.finish()
     })
 }
 

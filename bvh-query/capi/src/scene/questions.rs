@@ -1,7 +1,7 @@
 //! Questions about all pairs of a scene, in poses and on ways.
 
 use super::with;
-use crate::input::{array, options};
+use crate::input::{array, options, reserve};
 use crate::output::{List, One};
 use crate::paths::AskedPath;
 use crate::status::Failure;
@@ -115,6 +115,22 @@ pub unsafe extern "C" fn cbvh_scene_contacts(
     unsafe { list(scene, ("contacts", contacts, capacity, count), Scene::contacts) }
 }
 
+/// Refuses an instance that is named twice: only one of its ways would be looked at.
+fn each_once(instances: &[Instance]) -> Result<(), Failure> {
+    let mut numbered = Vec::new();
+    reserve("instances", instances.len(), &mut numbered)?;
+    numbered.extend(instances.iter().zip(0..).map(|(instance, number): (_, usize)| (instance.id, number)));
+    numbered.sort_unstable();
+    match numbered.windows(2).find(|two| two[0].0 == two[1].0) {
+        None => Ok(()),
+        Some(two) => Err(Failure::argument(
+            format_args!("instances[{}]", two[1].1),
+            "each instance once",
+            format_args!("that of instances[{}]", two[0].1),
+        )),
+    }
+}
+
 /// Instances, and the paths that they follow.
 struct Ways {
     instances: *const Instance,
@@ -144,6 +160,7 @@ impl Ways {
                     One::new("answer", answer)?,
                 )
             };
+            each_once(instances)?;
             let asked: Vec<AskedPath> = AskedPath::many("paths", paths)?;
             let path = |path| path as &(dyn Path + Sync);
             let ids = instances.iter().map(|&instance| InstanceId::from(instance));

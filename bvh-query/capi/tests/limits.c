@@ -1,0 +1,143 @@
+/* Little memory and little stack: not under sanitizers, which take more of both. */
+#include "support.h"
+#include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+/* What the header asks for. */
+#define STACK_BYTES (128 * 1024)
+/* Triangles around an edge that they share: each touches each. */
+#define FAN 2000
+
+static cbvh_mesh fan(void) {
+    static double vertices[3 * (FAN + 2)];
+    static uint32_t faces[3 * FAN];
+    vertices[5] = 1;
+    for (uint32_t k = 0; k < FAN; k++) {
+        vertices[3 * k + 6] = cos(0.001 * k);
+        vertices[3 * k + 7] = sin(0.001 * k);
+        faces[3 * k + 1] = 1;
+        faces[3 * k + 2] = k + 2;
+    }
+    cbvh_mesh mesh;
+    OK(cbvh_bake(vertices, FAN + 2, faces, FAN, NULL, &mesh));
+    return mesh;
+}
+
+/* What the process has already, its threads included. */
+static rlim_t address_space(void) {
+    unsigned long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    CHECK(file != NULL && fscanf(file, "%lu", &pages) == 1);
+    CHECK(fclose(file) == 0);
+    return (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE);
+}
+
+static void memory(void) {
+    cbvh_querier querier;
+    const cbvh_pose here = CBVH_IDENTITY;
+    const cbvh_mesh mesh = fan();
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    bool answer;
+    OK(cbvh_collide(querier, mesh, mesh, &here, 1, &answer));
+    /* All contacts take 64 MB. */
+    struct rlimit limit;
+    CHECK(getrlimit(RLIMIT_AS, &limit) == 0);
+    const struct rlimit before = limit;
+    limit.rlim_cur = address_space() + ((rlim_t)40 << 20);
+    CHECK(setrlimit(RLIMIT_AS, &limit) == 0);
+    static cbvh_contact some[100];
+    size_t count = 0;
+    FAILS(cbvh_contacts(querier, mesh, mesh, &here, 1, NULL, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "contacts: ");
+    CHECK(count == (size_t)FAN * FAN);
+    FAILS(cbvh_contacts(querier, mesh, mesh, &here, 1, NULL, some, 100, &count), CBVH_BUFFER_TOO_SMALL, "contacts: ");
+    CHECK(count == (size_t)FAN * FAN && some[0].triangle_a == 0);
+    for (uint32_t k = 0; k < 100; k++) {
+        CHECK(some[k].triangle_a == 0 && some[k].triangle_b == k);
+    }
+    /* Arrays that are said to be there; nothing of them is read before there is memory for a copy. */
+    const size_t many = (size_t)1 << 41;
+    const double *numbers = here.rows;
+    cbvh_mesh made;
+    cbvh_motion_answer motion;
+    FAILS(cbvh_collide(querier, mesh, mesh, &here, many, &answer), CBVH_LIMIT, "poses: expected 2");
+    FAILS(cbvh_sides(querier, mesh, NULL, numbers, many, (cbvh_side *)(void *)some), CBVH_LIMIT, "points: expected ");
+    FAILS(cbvh_any_hits(querier, mesh, NULL, (const cbvh_ray *)(const void *)numbers, many, &answer), CBVH_LIMIT,
+          "rays: expected ");
+    FAILS(cbvh_meet_segments(querier, mesh, NULL, (const cbvh_segment *)(const void *)numbers, many, &answer),
+          CBVH_LIMIT, "segments: expected ");
+    FAILS(cbvh_bake(numbers, many, NULL, 0, NULL, &made), CBVH_LIMIT, "vertices: expected ");
+    FAILS(cbvh_motions(querier, mesh, mesh, (const cbvh_path *)(const void *)numbers, many, NULL, &motion), CBVH_LIMIT,
+          "paths: expected ");
+    CHECK(setrlimit(RLIMIT_AS, &before) == 0);
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(mesh));
+}
+
+/* All kinds of questions, on a thread with little stack. */
+static void *ask(void *parallel) {
+    const int32_t cores = *(const int32_t *)parallel;
+    random_source source = {1};
+    cbvh_querier querier;
+    cbvh_tracker tracker;
+    cbvh_scene scene;
+    cbvh_instance instance;
+    cbvh_path path;
+    const cbvh_mesh mesh = cube(1), other = fan();
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    OK(cbvh_querier_set_parallel(querier, cores));
+    OK(cbvh_tracker_new(&tracker));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_set_parallel(scene, cores));
+    const cbvh_pose start = shift(-4, 0.25, 0), end = shift(4, 0.5, 0);
+    OK(cbvh_path_between(&start, &end, &path));
+    OK(cbvh_scene_add(scene, mesh, &start, NULL, NULL));
+    OK(cbvh_scene_add(scene, other, &end, NULL, &instance));
+    for (int round = 0; round < 20; round++) {
+        cbvh_pose poses[4];
+        bool answer[4];
+        cbvh_distance_answer distance[4];
+        cbvh_relation relation[4];
+        cbvh_motion_answer motion;
+        cbvh_closest_point closest;
+        cbvh_ray_hit hit;
+        cbvh_scene_distance_answer nearest;
+        size_t count;
+        for (int k = 0; k < 4; k++) {
+            poses[k] = random_pose(&source, 1.5);
+        }
+        OK(cbvh_collide(querier, mesh, other, poses, 4, answer));
+        OK(cbvh_distance(querier, mesh, other, poses, 4, NULL, distance));
+        OK(cbvh_tracker_distance(tracker, querier, mesh, other, poses, 4, distance));
+        OK(cbvh_relate(querier, mesh, other, poses, 4, relation));
+        (void)cbvh_contacts(querier, mesh, other, poses, 4, NULL, NULL, 0, &count);
+        OK(cbvh_motions(querier, other, mesh, &path, 1, NULL, &motion));
+        OK(cbvh_signed_distances(querier, mesh, NULL, poses[0].rows, 1, INFINITY, &closest));
+        const cbvh_ray ray = {{0, 0, 5}, {0.01, 0.02, -1}, INFINITY};
+        OK(cbvh_first_hits(querier, other, NULL, &ray, 1, &hit));
+        OK(cbvh_scene_distance(scene, &nearest));
+        OK(cbvh_scene_motion(scene, &instance, &path, 1, NULL, &motion));
+        OK(cbvh_scene_is_free(scene, &instance, &path, 1, NULL, answer));
+    }
+    OK(cbvh_path_free(path));
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_tracker_free(tracker));
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_mesh_free(other));
+    return NULL;
+}
+
+int main(void) {
+    memory();
+    pthread_attr_t attributes;
+    CHECK(pthread_attr_init(&attributes) == 0);
+    CHECK(pthread_attr_setstacksize(&attributes, STACK_BYTES) == 0);
+    for (int32_t parallel = 0; parallel < 2; parallel++) {
+        pthread_t thread;
+        CHECK(pthread_create(&thread, &attributes, ask, &parallel) == 0);
+        CHECK(pthread_join(thread, NULL) == 0);
+    }
+    puts("limits: a status where memory runs out, and 128 KiB of stack suffice");
+    return 0;
+}
