@@ -4,7 +4,7 @@
 //! change an array while a question runs.
 
 use crate::errors::pose_error;
-use bvh_query::Pose;
+use bvh_query::{Pose, with_default_floats};
 use numpy::npyffi::NPY_ORDER;
 use numpy::{
     PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -64,7 +64,9 @@ impl<T> Rows<T> {
                 }
             })
         };
-        Ok(Rows { rows: both.map(row).collect::<PyResult<_>>()?, one })
+        // What is made of rows may be computed.
+        let made = with_default_floats(|_| both.map(row).collect::<PyResult<_>>());
+        Ok(Rows { rows: made?, one })
     }
 }
 
@@ -213,7 +215,7 @@ pub(crate) fn pose_or_identity(value: Option<&Bound<'_, PyAny>>, name: &str) -> 
 
 fn pose_of(matrix: &[f64; 16]) -> Result<Pose, bvh_query::PoseError> {
     let row = |row: usize| [0, 1, 2, 3].map(|column| matrix[4 * row + column]);
-    Pose::from_matrix(&[0, 1, 2, 3].map(row))
+    with_default_floats(|_| Pose::from_matrix(&[0, 1, 2, 3].map(row)))
 }
 
 /// Expects one row of a shape or many, and returns whether it is one.

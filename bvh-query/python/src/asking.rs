@@ -5,7 +5,7 @@
 
 use crate::arguments::reserved;
 use crate::errors::query_error;
-use bvh_query::Querier;
+use bvh_query::{Querier, with_default_floats};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -33,6 +33,12 @@ fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> PyResult<T>) -> PyResult<T>
     answer
 }
 
+/// Works without Python's lock, and in the default state of floating-point arithmetic: a library that is loaded into
+/// Python may have changed that of its threads.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
+    py.detach(|| with_default_floats(|_| work()))
+}
+
 /// How many questions are asked before the time is looked at.
 const QUESTIONS: usize = 64;
 const QUESTIONS_ON_ALL_CORES: usize = 1024;
@@ -46,7 +52,7 @@ pub(crate) fn one_by_one<P: Sync, T: Send>(
     items: &[P],
     ask: impl Fn(&mut Querier, &P) -> PyResult<T> + Sync,
 ) -> PyResult<Vec<T>> {
-    py.detach(|| {
+    detached(py, || {
         with_querier(|querier| {
             in_turns(items, QUESTIONS, |items| items.iter().map(|item| ask(querier, item)).collect())
         })
@@ -59,7 +65,7 @@ pub(crate) fn on_all_cores<P: Sync, T: Send>(
     items: &[P],
     ask: impl Fn(&[P]) -> PyResult<Vec<T>> + Sync,
 ) -> PyResult<Vec<T>> {
-    py.detach(|| in_turns(items, QUESTIONS_ON_ALL_CORES, |items| on_pool(|| ask(items))?))
+    detached(py, || in_turns(items, QUESTIONS_ON_ALL_CORES, |items| on_pool(|| ask(items))?))
 }
 
 /// The pool of a process.

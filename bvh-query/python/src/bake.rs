@@ -1,7 +1,7 @@
 //! Bakes meshes: arrays into memory, and files into files of any size.
 
 use crate::arguments::{rows, shape_error};
-use crate::asking::on_pool;
+use crate::asking::{detached, on_pool};
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
 use bvh_bake::mesh::Mesh as Triangles;
@@ -63,7 +63,7 @@ pub(crate) fn bake(
     let faces = faces.as_slice()?.as_chunks::<3>().0.to_vec();
     let vertices = rows(vertices, "vertices")?.rows;
     let bake = || to_bytes(&Triangles::from_triangles(vertices, faces), &options);
-    let (bytes, _) = py.detach(|| on_pool(bake))?.map_err(bake_error)?;
+    let (bytes, _) = detached(py, || on_pool(bake))?.map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }
@@ -80,6 +80,6 @@ pub(crate) fn bake_files(
 ) -> PyResult<bool> {
     let options = options.read()?;
     let bake = || FileBake::new(inputs, output).options(options).max_memory(max_memory).force(force).run();
-    let outcome = py.detach(|| on_pool(bake))?.map_err(bake_error)?;
+    let outcome = detached(py, || on_pool(bake))?.map_err(bake_error)?;
     Ok(matches!(outcome, Outcome::UpToDate(_)))
 }

@@ -1,6 +1,7 @@
 //! A mesh in a `.cbvh` file, mapped or in memory: what Python code holds.
 
 use crate::answers::table;
+use crate::asking::detached;
 use crate::errors::{FormatError, open_error};
 use bvh_query::{Bvh, Object, OwnedShape};
 use numpy::PyArray2;
@@ -35,7 +36,7 @@ impl Mesh {
     /// Maps a file.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| Bvh::open(path)).map(Self::new).map_err(open_error)
+        detached(py, || Bvh::open(path)).map(Self::new).map_err(open_error)
     }
 
     /// Opens the bytes of a file, which are copied.
@@ -89,6 +90,6 @@ impl Mesh {
 
     /// Checks the whole file.
     fn check(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.shape.bvh().check_all()).map_err(crate::errors::query_error)
+        detached(py, || self.shape.bvh().check_all()).map_err(crate::errors::query_error)
     }
 }

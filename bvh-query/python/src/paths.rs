@@ -2,8 +2,9 @@
 
 use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
+use crate::asking::detached;
 use crate::errors::path_error;
-use bvh_query::{Motion, Path, Polyline, Pose};
+use bvh_query::{Motion, Path, Polyline, Pose, with_default_floats};
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::{PyIndexError, PyRecursionError, PyValueError};
 use pyo3::prelude::*;
@@ -66,7 +67,7 @@ impl Paths {
         let (angle, shift) = (number(angle, "angle")?, number(shift, "shift")?);
         let start = pose(start, "start")?;
         let (point, direction) = (vector(point, "point")?, vector(direction, "direction")?);
-        let motion = Motion::screw(&start, point, direction, angle, shift);
+        let motion = with_default_floats(|_| Motion::screw(&start, point, direction, angle, shift));
         motion.map(|motion| Self::of(Own::Motion(motion))).map_err(|error| path_error("screw", &error))
     }
 
@@ -74,7 +75,8 @@ impl Paths {
     #[staticmethod]
     fn through(knots: &Bound<'_, PyAny>) -> PyResult<Self> {
         let knots = many_poses(knots, "poses")?;
-        let polyline = Polyline::new(&knots).map_err(|error| path_error("poses", &error))?;
+        let polyline =
+            with_default_floats(|_| Polyline::new(&knots)).map_err(|error| path_error("poses", &error))?;
         Ok(Self::of(Own::Polyline(Arc::new(polyline))))
     }
 
@@ -103,7 +105,7 @@ impl Paths {
         }
         let times = times.as_slice()?.to_vec();
         let of = |path: &Own| times.iter().map(|&t| path.path().pose(t)).collect::<Vec<_>>();
-        let found: Vec<Pose> = t.py().detach(|| self.paths.iter().flat_map(of).collect());
+        let found: Vec<Pose> = detached(t.py(), || self.paths.iter().flat_map(of).collect());
         Answers { py: t.py(), one: false }.poses(&found)
     }
 
@@ -117,7 +119,8 @@ impl Paths {
         let py = radius.py();
         let (radius, t0, t1) = (number(radius, "radius")?, number(t0, "t0")?, number(t1, "t1")?);
         let of = |path: &Own| path.path().sagitta(radius, t0, t1);
-        Answers { py, one: self.one }.values(self.paths.iter().map(of))
+        let found: Vec<f64> = detached(py, || self.paths.iter().map(of).collect());
+        Answers { py, one: self.one }.values(found.into_iter())
     }
 }
 

@@ -6,7 +6,7 @@
 
 use crate::answers::{Answers, array, table};
 use crate::arguments::{self, pose_or_identity};
-use crate::asking::on_pool;
+use crate::asking::{detached, on_pool};
 use crate::errors::{FormatError, open_error, query_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
@@ -131,7 +131,7 @@ pub(crate) struct Scene(Mutex<State>);
 impl Scene {
     /// Waits for the scene without Python's lock, and calls `work` with it, without Python's lock.
     pub(crate) fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> T {
-        py.detach(|| work(&mut locked(&self.0)))
+        detached(py, || work(&mut locked(&self.0)))
     }
 
     /// Asks a question, and reads the answer while the scene is still as it was.
@@ -164,7 +164,7 @@ impl Scene {
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf, mesh: Bound<'_, PyAny>) -> PyResult<Self> {
         let damaged = |error: String| FormatError::new_err(format!("{}: {error}", path.display()));
-        let (bvh, scene) = py.detach(|| {
+        let (bvh, scene) = detached(py, || {
             let bvh = Arc::new(Bvh::open(&path).map_err(open_error)?);
             let scene = bvh_query::Scene::of_file(bvh.clone());
             Ok::<_, PyErr>((bvh, scene.map_err(|error| damaged(error.to_string()))?))

@@ -2,7 +2,7 @@
 
 use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::arguments::number;
-use crate::asking::on_pool;
+use crate::asking::{detached, on_pool};
 use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
@@ -123,7 +123,7 @@ impl Ways {
         let mut own = scene.with(py, |state| state.clone());
         own.parallel = false;
         own.scene.set_parallel(false);
-        py.detach(|| run(&mut own))
+        detached(py, || run(&mut own))
     }
 }
 

@@ -3,16 +3,19 @@
 import ast
 import concurrent.futures
 import copy
+import ctypes
 import doctest
 import inspect
 import multiprocessing
 import os
 import pathlib
 import pickle
+import platform
 import signal
 import tempfile
 import unittest
 import warnings
+from ctypes.util import find_library
 
 import numpy as np
 
@@ -95,6 +98,39 @@ class Sharing(unittest.TestCase):
         if child.exitcode is None:
             child.kill()
         self.assertEqual(child.exitcode, 0)
+
+    @unittest.skipUnless(platform.machine() == "x86_64" and find_library("m"), "roundings have other numbers here")
+    def test_answers_do_not_depend_on_how_the_thread_rounds(self):
+        vertices, faces = cube(0.1)
+        vertices = vertices @ random_poses(5, 1, 0)[0, :3, :3]
+        poses = random_poses(4, 200, 0.15)
+        set_rounding = ctypes.CDLL(find_library("m")).fesetround
+
+        def answers():
+            mesh, scene = cbvh.bake(vertices, faces), cbvh.Scene()
+            for pose in poses[:20]:
+                scene.add(mesh, pose)
+            motion = cbvh.Motion.between(poses[:20], poses[20:40])
+            yield np.frombuffer(mesh.tobytes(), np.uint8)
+            for parallel in (False, True):
+                scene.parallel = parallel
+                yield from mesh.distance(mesh, poses, parallel=parallel)
+                yield mesh.collide(mesh, poses, parallel=parallel)
+                yield mesh.motion(mesh, motion, parallel=parallel).free_until
+                yield scene.pairs_within(0.01)
+            yield motion.pose([0.3, 0.7])
+            yield motion.sagitta(1.0, 0.3, 0.7)
+            yield cbvh.relative(poses[:20], poses[20:40])
+
+        expected = list(answers())
+        for rounding in (0x400, 0x800, 0xC00):
+            try:
+                self.assertEqual(set_rounding(rounding), 0)
+                found = list(answers())
+            finally:
+                set_rounding(0)
+            for one, other in zip(found, expected, strict=True):
+                np.testing.assert_array_equal(one, other)
 
     def test_meshes_are_shared_by_copies(self):
         mesh = cbvh.bake(*cube())
