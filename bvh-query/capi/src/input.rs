@@ -155,11 +155,6 @@ pub(crate) fn flag(name: &str, value: i32) -> Result<bool, Failure> {
     }
 }
 
-/// Checks the distance up to which a closest point counts, which may be infinite.
-pub(crate) fn check_within(within: f64) -> Result<(), Failure> {
-    if within >= 0.0 { Ok(()) } else { Err(Failure::argument("within", "a distance of at least 0", within)) }
-}
-
 /// Reads three numbers.
 ///
 /// # Safety
@@ -176,6 +171,22 @@ pub(crate) fn reserve<T>(name: &str, more: usize, of: &mut Vec<T>) -> Result<(),
         let bytes = more.saturating_mul(size_of::<T>());
         Failure::new(Status::Limit, format!("{name}: expected {bytes} bytes of memory, found less"))
     })
+}
+
+/// Reads points, of which something is asked within a distance, into memory that is used again and again.
+///
+/// # Safety
+/// As for `rows_of_three`.
+pub(crate) unsafe fn points_within(
+    points: *const f64,
+    count: usize,
+    within: f64,
+    into: &mut Vec<[f64; 3]>,
+) -> Result<(), Failure> {
+    // SAFETY: the caller vouches for it.
+    unsafe { rows_of_three("points", points, count, into) }?;
+    // Up to infinity.
+    if within >= 0.0 { Ok(()) } else { Err(Failure::argument("within", "a distance of at least 0", within)) }
 }
 
 /// Reads rows of three values each into memory that is used again and again.

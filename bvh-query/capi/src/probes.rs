@@ -1,7 +1,7 @@
 //! Questions about one mesh and many points, rays or segments.
 
 use crate::entry::entry;
-use crate::input::{array, check_within, reserve, rows_of_three};
+use crate::input::{array, points_within, reserve};
 use crate::output::{Lists, Room};
 use crate::poses::pose_or_identity;
 use crate::queriers::{Asker, Probes, QUERIERS};
@@ -86,11 +86,8 @@ unsafe fn read_points(
     count: usize,
     within: f64,
 ) -> impl FnOnce(&mut Probes) -> Result<(), Failure> {
-    move |probes| {
-        // SAFETY: the caller vouches for it.
-        unsafe { rows_of_three("points", points, count, &mut probes.points) }?;
-        check_within(within)
-    }
+    // SAFETY: the caller vouches for it.
+    move |probes| unsafe { points_within(points, count, within, &mut probes.points) }
 }
 
 /// Reads rays.

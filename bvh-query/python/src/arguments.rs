@@ -108,6 +108,12 @@ pub(crate) fn copied_numbers<'py>(
         .reshape_with_order(array.shape(), NPY_ORDER::NPY_CORDER)
 }
 
+/// Checks a pose of shape (4, 4).
+#[pyfunction]
+pub(crate) fn check_pose(value: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
+    pose(value, name).map(drop)
+}
+
 /// Names the argument that numpy makes no array of, such as a list of rows of several lengths.
 fn no_array(py: Python<'_>, name: &str, error: PyErr) -> PyErr {
     let message =

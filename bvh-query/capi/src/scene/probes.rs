@@ -1,7 +1,7 @@
 //! Questions about points, rays and segments in the world, over all instances of a scene.
 
 use super::with;
-use crate::input::{check_within, rows_of_three};
+use crate::input::{points_within, rows_of_three};
 use crate::output::{Lists, Room};
 use crate::probes::{rays, segments};
 use crate::status::Failure;
@@ -40,10 +40,7 @@ pub unsafe extern "C" fn cbvh_scene_closest_points(
 ) -> i32 {
     // SAFETY: the header asks for it.
     unsafe {
-        let read = |into: &mut Vec<_>| {
-            rows_of_three("points", points, count, into)?;
-            check_within(within)
-        };
+        let read = |into: &mut Vec<_>| points_within(points, count, within, into);
         each(scene, (answers, read), |scene, points| scene.closest_points(points, within), ClosestRow::from)
     }
 }
@@ -74,10 +71,7 @@ pub unsafe extern "C" fn cbvh_scene_signed_distances(
 ) -> i32 {
     // SAFETY: the header asks for it.
     unsafe {
-        let read = |into: &mut Vec<_>| {
-            rows_of_three("points", points, count, into)?;
-            check_within(within)
-        };
+        let read = |into: &mut Vec<_>| points_within(points, count, within, into);
         each(scene, (answers, read), |scene, points| scene.signed_distances(points, within), ClosestRow::from)
     }
 }

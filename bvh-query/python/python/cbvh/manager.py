@@ -97,6 +97,7 @@ def _transform(transform: ArrayLike | None) -> Floats:
     if 2.0**-24 < error < 2.0**-16:
         u, _, v = np.linalg.svd(pose[:3, :3])
         pose[:3, :3] = u @ v
+    _cbvh.check_pose(pose, "transform")
     return pose
 
 
