@@ -12,6 +12,7 @@ use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_format::validate::{packets, validate};
 use bvh_format::{Layout, Rule};
 use cbvh_testkit::ball::ball;
+use cbvh_testkit::loosen::Loosened;
 use cbvh_testkit::seal::{seal, section};
 use cbvh_testkit::{Random, Triangle};
 use std::path::Path;
@@ -303,6 +304,31 @@ fn a_tightened_anchor_fails_the_proof() {
         repair_page(&mut bytes[at..at + PAGE]);
         let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap_err();
         assert_eq!(error.rule, Rule::BoundContains, "{}", profile.name());
+    }
+}
+
+/// Queries rely on spheres and on anchors within the nodes that lead to them, so these are proved as well.
+#[test]
+fn the_proof_refuses_a_sphere_or_an_anchor_that_is_wrong() {
+    let (good, _) =
+        to_bytes(&mesh(&soup(900, 10)), &options(Profile::Dop26U8Wide, TriangleEncoding::Packed)).unwrap();
+    let broken = |edit: &dyn Fn(&mut Loosened)| {
+        let mut file = Loosened::of(&good);
+        edit(&mut file);
+        let bytes = file.sealed();
+        prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).err().map(|error| error.rule)
+    };
+    assert_eq!(broken(&|file| file.sphere(1, 1e-3)), None);
+    assert_eq!(broken(&|file| file.shrink_sphere(0.999)), Some(Rule::BoundContains));
+    // The sphere is as small as its centre allows.
+    assert_eq!(broken(&|file| file.shrink_sphere(0.999999)), Some(Rule::BoundContains));
+    let roots = Loosened::of(&good).remote_roots();
+    assert!(roots.len() > 2);
+    for &root in &roots {
+        for (slab, end) in [(0, 1e3f32), (4, -1e3), (12, 1e30)] {
+            let error = broken(&|file| file.slab(root, slab, end.min(0.0), end.max(0.0)));
+            assert_eq!(error, Some(Rule::Nested), "root {root:?}, slab {slab}");
+        }
     }
 }
 

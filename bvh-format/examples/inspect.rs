@@ -6,7 +6,7 @@
 
 use bvh_format::Layout;
 use bvh_format::object::Object;
-use bvh_format::page::{Page, check_crossing, check_page};
+use bvh_format::page::{Page, check_page, check_parent};
 use bvh_format::treelet::Child;
 use std::error::Error;
 
@@ -60,7 +60,7 @@ fn count_triangles(layout: &Layout, bytes: &[u8], object: &Object) -> Result<u64
                 Child::Remote(link) => {
                     let to = page.remote(link);
                     let target = page_of(to.page())?;
-                    check_crossing(&target, to, number, link, layout.page_offset(to.page()))?;
+                    check_parent(&target, to, (number, link), layout.page_offset(to.page()))?;
                     stack.push((to.page(), to.root()));
                 }
                 Child::Leaf { triangles: count, .. } => triangles += u64::from(count),

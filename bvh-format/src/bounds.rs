@@ -5,7 +5,7 @@
 //! directions cannot be joined on the way up, so a turning slab is compared with all triangles below it. These are kept
 //! for subtrees that are small enough to have one.
 
-use crate::decode::decode_child;
+use crate::decode::decode_page;
 use crate::error::{FormatError, ensure};
 use crate::kdop::Kdop;
 use crate::layout::Layout;
@@ -13,7 +13,6 @@ use crate::leaf::{PACKET, Packet, decode_packet};
 use crate::object::Object;
 use crate::page::{Page, RootRef};
 use crate::rule::Rule;
-use crate::slabs::NodeSlabs;
 use crate::treelet::Child;
 use crate::turning::{MAX_TRIANGLES, TurningSlab, decode_turning};
 use crate::validate::packets as packets_of;
@@ -30,13 +29,18 @@ pub struct Bound<'a> {
     pub turning: Option<TurningSlab>,
     /// The tightest bound of the triangles below.
     pub tight: Kdop,
-    /// The triangles below a child that has a turning slab, unless there are more than [`MAX_TRIANGLES`].
+    /// The anchor of the subtree root that the child leads to; for other children [`Kdop::EMPTY`].
+    pub anchor: Kdop,
+    /// The triangles of a leaf packet, and those below a child in a profile with turning slabs, unless there are more than
+    /// [`MAX_TRIANGLES`].
     pub patch: Option<&'a [Packet]>,
 }
 
 /// What is below a subtree root.
 #[derive(Debug, Clone)]
 pub struct Subtree {
+    /// The slabs of the root's anchor.
+    pub anchor: Kdop,
     /// The tightest k-DOP of its triangles.
     pub kdop: Kdop,
     /// The number of its triangles; more than [`MAX_TRIANGLES`] if it is not known.
@@ -49,7 +53,8 @@ pub struct Subtree {
 impl Subtree {
     /// A subtree of which nothing is known.
     pub fn unknown() -> &'static Self {
-        static UNKNOWN: Subtree = Subtree { kdop: Kdop::EMPTY, triangles: usize::MAX, packets: Vec::new() };
+        static UNKNOWN: Subtree =
+            Subtree { anchor: Kdop::EMPTY, kdop: Kdop::EMPTY, triangles: usize::MAX, packets: Vec::new() };
         &UNKNOWN
     }
 }
@@ -162,43 +167,36 @@ pub fn visit_bounds<'b>(
         }
     }
     let patches = profile.has_turning_slabs().then(|| Patches::of_page(page, &packets, &below));
-    let mut decoded = vec![NodeSlabs::default(); treelets];
     for root in 0..header.roots {
-        let slot = usize::from(root);
-        decoded[slot] = page.anchor_slabs(root);
-        let (held, tight) = (decoded[slot].to_kdop(slabs), tight[slot]);
-        visit(Bound { slot: root, child: None, decoded: held, turning: None, tight, patch: None })?;
+        let decoded = page.anchor_slabs(root).to_kdop(slabs);
+        let (tight, anchor) = (tight[usize::from(root)], Kdop::EMPTY);
+        visit(Bound { slot: root, child: None, decoded, turning: None, tight, anchor, patch: None })?;
     }
-    for slot in 0..treelets {
-        let treelet = page.treelet(slot as u8);
-        let links = page.links(slot as u8);
-        for child in 0..links.children() {
-            let node = decode_child(profile, object.f16_scale, treelet, child, &decoded[slot]);
-            let turning = decode_turning(profile, treelet, child, &node);
-            let patch = match (&patches, links.child(child)) {
-                (Some(_), Child::Leaf { packet, .. }) => {
-                    packets.get(usize::from(packet)..=usize::from(packet))
-                }
-                (Some(patches), Child::Treelet(slot)) => patches.of_slot(usize::from(slot)),
-                (Some(_), Child::Remote(link)) => Some(below(page.remote(link)))
-                    .filter(|subtree| subtree.triangles <= MAX_TRIANGLES)
-                    .map(|subtree| &subtree.packets[..]),
-                _ => None,
-            };
-            visit(Bound {
-                slot: slot as u8,
-                child: Some(child),
-                decoded: node.to_kdop(slabs),
-                turning,
-                tight: children[slot * width + child],
-                patch,
-            })?;
-            if let Child::Treelet(slot) = links.child(child) {
-                decoded[usize::from(slot)] = node;
-            }
+    decode_page(page, object.f16_scale, |slot, child, _, node| {
+        let (mut anchor, link) = (Kdop::EMPTY, page.links(slot).child(child));
+        let patch = match (&patches, link) {
+            (_, Child::Leaf { packet, .. }) => packets.get(usize::from(packet)..=usize::from(packet)),
+            (Some(patches), Child::Treelet(slot)) => patches.of_slot(usize::from(slot)),
+            (Some(_), Child::Remote(link)) => Some(below(page.remote(link)))
+                .filter(|subtree| subtree.triangles <= MAX_TRIANGLES)
+                .map(|subtree| &subtree.packets[..]),
+            _ => None,
+        };
+        if let Child::Remote(link) = link {
+            anchor = below(page.remote(link)).anchor;
         }
-    }
+        visit(Bound {
+            slot,
+            child: Some(child),
+            decoded: node.to_kdop(slabs),
+            turning: decode_turning(profile, page.treelet(slot), child, node),
+            tight: children[usize::from(slot) * width + child],
+            anchor,
+            patch,
+        })
+    })?;
     let subtree = |slot: usize| Subtree {
+        anchor: page.anchor_slabs(slot as u8).to_kdop(slabs),
         kdop: tight[slot],
         triangles: patches.as_ref().map_or(usize::MAX, |patches| patches.sizes[slot].1),
         packets: patches.as_ref().and_then(|patches| patches.of_slot(slot)).unwrap_or_default().to_vec(),
@@ -206,13 +204,15 @@ pub fn visit_bounds<'b>(
     Ok((0..usize::from(header.roots)).map(subtree).collect())
 }
 
-/// Checks that each slab decoded in a page contains the triangles below it.
+/// Checks that each slab decoded in a page contains the triangles below it, and that the object's sphere contains the
+/// triangles of the page.
 ///
 /// Returns the page's subtrees, and how loose the slabs of the children are. The arguments are those of
 /// [`visit_bounds`].
 ///
 /// # Errors
-/// Rule 35, if a decoded slab cuts its triangles; rule 39, if a turning slab has too many.
+/// Rule 35, if a decoded slab or the sphere cuts its triangles; rule 39, if a turning slab has too many; rule 49, if the
+/// anchor that a child leads to reaches beyond the child's slabs.
 pub fn check_bounds<'b>(
     layout: &Layout,
     object: &Object,
@@ -224,12 +224,22 @@ pub fn check_bounds<'b>(
     let at = layout.page_offset(page.header().page_number.get());
     let mut inflation = Inflation::default();
     let subtrees = visit_bounds(object, page, leaf_block, below, |bound| {
-        let Bound { slot, child, decoded, turning, tight, patch } = bound;
+        let Bound { slot, child, decoded, turning, tight, anchor, patch } = bound;
         let place =
             || child.map_or_else(|| format!("slot {slot}"), |child| format!("slot {slot}, child {child}"));
         ensure(decoded.contains(&tight, slabs), Rule::BoundContains, at, || {
             (format!("{} to contain {tight:?}", place()), format!("{decoded:?}"))
         })?;
+        ensure(decoded.contains(&anchor, slabs), Rule::Nested, at, || {
+            (format!("{} to contain the anchor it leads to, {anchor:?}", place()), format!("{decoded:?}"))
+        })?;
+        if let (Some(child), Some(packets)) = (child, patch)
+            && matches!(page.links(slot).child(child), Child::Leaf { .. })
+        {
+            ensure(object.sphere_contains(packets), Rule::BoundContains, at, || {
+                (format!("the object's sphere to contain {}", place()), format!("{:?}", object.record))
+            })?;
+        }
         if let Some(slab) = turning {
             let patch = patch.ok_or_else(|| {
                 let expected = format!("at most {MAX_TRIANGLES} triangles below {}", place());

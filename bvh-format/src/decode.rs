@@ -2,10 +2,11 @@
 //!
 //! It is written as section 8 of `spec/format.md` reads, and it is the oracle for every vector backend.
 
+use crate::page::Page;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
 use crate::slabs::{NodeSlabs, row};
-use crate::treelet::{read_codes, read_ends};
+use crate::treelet::{Child, read_codes, read_ends};
 
 /// Decodes the slabs of one child of a treelet. `parent` holds the decoded slabs of the treelet itself.
 pub fn decode_child(
@@ -42,6 +43,33 @@ pub(crate) fn decode_slabs(
         node.hi[row] = decode_max(encoding, code_hi, parent_hi, unit);
     }
     node
+}
+
+/// Decodes the slabs of all children in a checked page, parents before their children. Calls `visit` with the slot and the
+/// number of each child, the slabs of its treelet, and its own.
+///
+/// # Errors
+/// The first error of `visit`.
+pub fn decode_page<E>(
+    page: &Page,
+    object_scale: f32,
+    mut visit: impl FnMut(u8, usize, &NodeSlabs, &NodeSlabs) -> Result<(), E>,
+) -> Result<(), E> {
+    let header = page.header();
+    let mut treelets: Vec<NodeSlabs> = (0..header.treelets)
+        .map(|slot| if slot < header.roots { page.anchor_slabs(slot) } else { NodeSlabs::default() })
+        .collect();
+    for slot in 0..header.treelets {
+        let (treelet, links, slabs) = (page.treelet(slot), page.links(slot), treelets[usize::from(slot)]);
+        for child in 0..links.children() {
+            let node = decode_child(page.profile(), object_scale, treelet, child, &slabs);
+            visit(slot, child, &slabs, &node)?;
+            if let Child::Treelet(below) = links.child(child) {
+                treelets[usize::from(below)] = node;
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

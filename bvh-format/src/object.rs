@@ -4,7 +4,7 @@
 
 use crate::error::{FormatError, ensure};
 use crate::kdop::two_sum;
-use crate::leaf::TriangleEncoding;
+use crate::leaf::{PACKET, Packet, TriangleEncoding};
 use crate::profile::Profile;
 use crate::rule::Rule;
 use zerocopy::byteorder::little_endian::{F32, F64, I32, U32, U64};
@@ -117,6 +117,22 @@ impl Object {
         let radius = f64::from(self.record.sphere_radius.get());
         // Rounding has moved the centre by `moved` at most; the next number covers the roundings of the sums.
         (centre, if moved > 0.0 { (radius + moved).next_up() } else { radius })
+    }
+
+    /// Returns whether the sphere of the record contains all corners of packets, as rule 35 asks. Differences, squares and
+    /// sums are rounded to nearest in `f64`, without overflow or underflow: a corner outside is within 2^-50 of the radius.
+    pub fn sphere_contains<'a>(&self, packets: impl IntoIterator<Item = &'a Packet>) -> bool {
+        let [a, b, c] = self.record.sphere_centre.map(|c| f64::from(c.get()));
+        let radius = f64::from(self.record.sphere_radius.get());
+        // All lanes at once, which compilers turn into vector code.
+        packets.into_iter().flat_map(|packet| &packet.corners).all(|[x, y, z]| {
+            let mut inside = true;
+            for lane in 0..PACKET {
+                let (x, y, z) = (f64::from(x[lane]) - a, f64::from(y[lane]) - b, f64::from(z[lane]) - c);
+                inside &= x * x + y * y + z * z <= radius * radius;
+            }
+            inside
+        })
     }
 
     /// The profile: how the nodes of the tree are stored.

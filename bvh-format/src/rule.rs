@@ -71,6 +71,7 @@ rules! {
     TopologyPlace = 46, "places in the topology section ascend and are those of triangles";
     TopologyNet = 47, "a listed net is not 1";
     TopologyClosed = 48, "a closed object has no boundary";
+    Nested = 49, "the slabs of a node lie within those of its parent";
 }
 
 impl Rule {

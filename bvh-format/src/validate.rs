@@ -9,6 +9,7 @@ mod counts;
 pub use counts::{Counts, CountsFromEnd};
 
 use crate::checksum::{Hasher, hex};
+use crate::decode::decode_page;
 use crate::error::{FormatError, ensure, require};
 use crate::header::SectionKind;
 use crate::ids::decode_id;
@@ -211,7 +212,7 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     Ok(ValidatedPage { bytes, leaves, counts, boundary })
 }
 
-/// Checks where the remote links of a page lead (rule 20), after all pages have been checked.
+/// Checks where the remote links of a page lead (rules 20 and 49), after all pages have been checked.
 fn check_links<S: Source + ?Sized>(
     layout: &Layout,
     source: &S,
@@ -220,12 +221,16 @@ fn check_links<S: Source + ?Sized>(
 ) -> Result<(), S::Error> {
     let bytes = layout.read_page(source, number)?;
     let page = bytes.page(object);
-    for link in 0..page.header().remotes {
+    if page.header().remotes == 0 {
+        return Ok(());
+    }
+    decode_page(&page, object.f16_scale, |slot, child, _, slabs| {
+        let Child::Remote(link) = page.links(slot).child(child) else { return Ok(()) };
         let to = page.remote(link);
         let target = layout.read_page(source, to.page())?;
-        check_crossing(&target.page(object), to, number, link, layout.page_offset(to.page()))?;
-    }
-    Ok(())
+        let at = layout.page_offset(to.page());
+        Ok(check_crossing(&target.page(object), to, (number, link), slabs, at)?)
+    })
 }
 
 /// Checks the values in the leaf and id blocks of a page, and returns the number of its triangles and, for a closed

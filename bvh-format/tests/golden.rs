@@ -236,6 +236,7 @@ fn bad_pages() -> Vec<(u32, &'static str, Vec<u8>)> {
         (38, "f16-negative", cube_of_profile(2, 1, &[0x80])),
         (38, "f16-infinite", cube_of_profile(2, 1, &[0x7c])),
         (38, "f32-nan", cube_of_profile(6, 0, &f32::NAN.to_le_bytes())),
+        (49, "f32-beyond-its-treelet", cube_of_profile(6, 0, &(-2f32).to_le_bytes())),
     ]
 }
 

@@ -1,4 +1,4 @@
-"""Checks the rules R01 to R48 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R49 of spec/format.md, section 16, in the order in which a reader reports them.
 
 Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
 exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
@@ -195,6 +195,8 @@ def touch(one, number):
     for link in range(page.remotes):
         target, _ = page.remote(link)
         need(number < target < last, 23, page.remote_at(link), f"a page from {number + 1} to {last - 1}", target)
+    if page.layout.encoding == "f32":
+        check_stored_ends(page)
     return page
 
 
@@ -227,6 +229,22 @@ def check_codes(page):
                 raise Broken(38, at, "a finite code, and for f16 none that is negative", codes[child, slab])
 
 
+def check_stored_ends(page):
+    """Checks R49 where slabs are stored as they are. Codes cannot lead out of the treelet's slabs."""
+    own_lo, own_hi, lo, hi = page.decode()
+    for slot in range(page.treelets):
+        for child in range(page.children(slot)):
+            need_nested(page.treelet_at(slot), (own_lo[slot], own_hi[slot]), (lo[slot, child], hi[slot, child]))
+
+
+def need_nested(at, outer, inner):
+    good = (outer[0] <= inner[0]) & (inner[1] <= outer[1])  # false for NaN
+    if not good.all():
+        slab = int((~good).argmax())
+        expected = f"slab {slab} within [{outer[0][slab]}, {outer[1][slab]}]"
+        raise Broken(49, at, expected, f"[{inner[0][slab]}, {inner[1][slab]}]")
+
+
 def check_numbering(page):
     counters = {TREELET: page.roots, SHORT: page.first_short, REMOTE: 0, LEAF: 0}
     rules = {TREELET: 22, SHORT: 22, REMOTE: 23, LEAF: 24}
@@ -257,13 +275,16 @@ def check_numbering(page):
 # Cross
 
 
-def cross(page, link, pages):
-    """Checks that the root to which a remote link leads names that link. `pages` are the object's, all touched."""
+def cross(page, link, slabs, pages):
+    """Checks that the root to which a remote link leads names that link, and lies within the slabs decoded for the child with
+    the link. `pages` are the object's, all touched.
+    """
     target, root = page.remote(link)
     other = pages[target - page.owner.first_page]
     need(root < other.roots, 20, page.remote_at(link), f"a root below {other.roots}", root)
     parent = other.parent(root)
     need(parent == (page.number, link), 20, other.parent_at(root), f"page {page.number}, link {link}", parent)
+    need_nested(other.anchor_at(root), slabs, other.anchor(root))
 
 
 # Block
@@ -450,8 +471,12 @@ def validate_object(one):
         check_packets(page)
         one.pages_read.append(page)
     for page in one.pages_read:
-        for link in range(page.remotes):
-            cross(page, link, one.pages_read)
+        if page.remotes:
+            _, _, lo, hi = page.decode()
+            for slot in range(page.treelets):
+                for child, (kind, target) in enumerate(page.targets(slot)):
+                    if kind == REMOTE:
+                        cross(page, target, (lo[slot, child], hi[slot, child]), one.pages_read)
     check_counts(one)
 
 
@@ -547,14 +572,26 @@ def verify_page(page, own, children):
     for root in range(page.roots):
         need_contained(page.anchor_at(root), "anchor", *page.anchor(root), own[root])
     turning = turning_slabs_that_hold(page, lo, hi, children)
+    in_sphere = packets_in_sphere(page)
     for slot in range(page.treelets):
         at = page.treelet_at(slot)
-        for child, subtree in enumerate(children[slot]):
+        for child, (subtree, (kind, target)) in enumerate(zip(children[slot], page.targets(slot))):
             need_contained(at, f"child {child}", lo[slot, child], hi[slot, child], subtree)
+            holds = kind < LEAF or in_sphere[target]
+            need(holds, 35, page.owner.place("sphere_radius"), f"a sphere around packet {target}", "one that cuts")
             if (slot, child) in turning:
                 place, count, most = at + page.layout.turning[0] + child, subtree.triangles, cbvh.TURNING_TRIANGLES
                 need(count <= most, 39, place, f"at most {most} triangles", count)
                 need(turning[slot, child], 35, place, f"a turning slab around child {child}", "one that cuts")
+
+
+def packets_in_sphere(page):
+    """Whether the sphere of the record contains the triangles of each packet, in the arithmetic of 15.5."""
+    centre, radius = page.owner.sphere_centre.astype(np.float64), np.float64(page.owner.sphere_radius)
+    corners, used = page.triangles().astype(np.float64), page.lanes_used()
+    x, y, z = np.moveaxis(corners - centre, -1, 0)
+    inside = (x * x + y * y) + z * z <= radius * radius
+    return (inside | ~used[..., None]).all(axis=(1, 2))
 
 
 def subtrees_of(page, below):

@@ -43,7 +43,7 @@ pub fn decode(bytes: &[u8]) {
                 let to = page.remote(link);
                 if let Some(target) = layout.page_bytes(bytes, to.page()) {
                     let target = Page::new(target, object.profile());
-                    let _ = check_crossing(&target, to, number, link, 0);
+                    let _ = check_crossing(&target, to, (number, link), &page.anchor_slabs(0), 0);
                 }
             }
             if checked.is_ok() && blocks {

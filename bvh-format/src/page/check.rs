@@ -2,12 +2,13 @@
 
 use super::{NO_PARENT, PAGE, Page, PageShape, RootRef, anchor_at, page_checksum};
 use crate::checksum::hex;
+use crate::decode::decode_page;
 use crate::error::{FormatError, ensure, require};
 use crate::object::Object;
 use crate::profile::Encoding;
 use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;
-use crate::slabs::row;
+use crate::slabs::{NodeSlabs, row};
 use crate::treelet::{read_codes, read_ends};
 
 /// Checks all that a page shows by itself: its checksum, shape, anchors, codes and links. `number` is the page's number
@@ -16,7 +17,7 @@ use crate::treelet::{read_codes, read_ends};
 /// The page to which a remote link leads is checked when the link is followed: see [`check_crossing`].
 ///
 /// # Errors
-/// The first of rules 15 to 25 and 38 that does not hold.
+/// The first of rules 15 to 25, 38 and 49 that does not hold.
 pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> Result<(), FormatError> {
     let page = Page::new(bytes, object.profile);
     let header = page.header();
@@ -40,7 +41,8 @@ pub fn check_page(bytes: &[u8; PAGE], number: u32, object: &Object, at: u64) -> 
     check_anchors(&page, number, object, at)?;
     check_codes(&page, at)?;
     check_links(&page, at)?;
-    check_remotes(&page, number, object, at)
+    check_remotes(&page, number, object, at)?;
+    check_nested_ends(&page, at)
 }
 
 /// The largest magnitude of a slab end: 2^122, more than the sum of three coordinates of at most 2^120.
@@ -152,13 +154,63 @@ fn check_remotes(page: &Page, number: u32, object: &Object, at: u64) -> Result<(
     Ok(())
 }
 
-/// Checks that a remote link and the root to which it leads name each other: remote link `link` of page `from` leads to
-/// `to`, whose page is `target` at byte `at` of the file.
+/// Checks that slabs which are stored as they are lie within those of their treelets. Codes cannot say anything else of slabs
+/// that contain a triangle.
+fn check_nested_ends(page: &Page, at: u64) -> Result<(), FormatError> {
+    let profile = page.profile();
+    if profile.encoding() != Encoding::F32 {
+        return Ok(());
+    }
+    let set = profile.directions();
+    decode_page(page, 1.0, |slot, child, parent, node| {
+        let place = || format!("child {child} of slot {slot}");
+        check_nested(parent, node, set.slabs(), place, at + page.treelet_at(slot) as u64)
+    })
+}
+
+/// Checks that the slabs of a node lie within those of its parent. `place` names the node, and `at` is its byte in the file.
+///
+/// # Errors
+/// Rule 49.
+pub fn check_nested(
+    parent: &NodeSlabs,
+    node: &NodeSlabs,
+    slabs: usize,
+    place: impl FnOnce() -> String,
+    at: u64,
+) -> Result<(), FormatError> {
+    let is_nested = |row| parent.lo[row] <= node.lo[row] && node.hi[row] <= parent.hi[row];
+    let Some(beyond) = (0..slabs).map(row).position(|row| !is_nested(row)) else { return Ok(()) };
+    let ends = |node: &NodeSlabs| format!("{:e} to {:e}", node.lo[row(beyond)], node.hi[row(beyond)]);
+    let expected = format!("slab {beyond} of {} within {}", place(), ends(parent));
+    Err(FormatError::new(Rule::Nested, at, expected, ends(node)))
+}
+
+/// Checks that a remote link and the root to which it leads name each other, and that the root's slabs lie within those
+/// decoded for the child with that link. `link` is the page and the number of the link, `slabs` what was decoded, and the root
+/// is in page `target` at byte `at` of the file.
+///
+/// # Errors
+/// Rules 20 and 49.
+pub fn check_crossing(
+    target: &Page,
+    to: RootRef,
+    link: (u32, u8),
+    slabs: &NodeSlabs,
+    at: u64,
+) -> Result<(), FormatError> {
+    check_parent(target, to, link, at)?;
+    let place = || format!("the anchor of root {}", to.root());
+    let count = target.profile().directions().slabs();
+    check_nested(slabs, &target.anchor_slabs(to.root()), count, place, at)
+}
+
+/// Checks that a remote link and the root to which it leads name each other, as [`check_crossing`] does.
 ///
 /// # Errors
 /// Rule 20.
 #[inline]
-pub fn check_crossing(target: &Page, to: RootRef, from: u32, link: u8, at: u64) -> Result<(), FormatError> {
+pub fn check_parent(target: &Page, to: RootRef, (from, link): (u32, u8), at: u64) -> Result<(), FormatError> {
     let found =
         if to.root() < target.header().roots { target.anchor_parent(to.root()) } else { (NO_PARENT, 0) };
     ensure(found == (from, link), Rule::AnchorParent, at, || {

@@ -9,6 +9,7 @@ pub mod ball;
 pub mod depth;
 pub mod forge;
 pub mod hard_cases;
+pub mod loosen;
 pub mod random;
 pub mod seal;
 

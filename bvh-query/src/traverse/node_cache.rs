@@ -9,10 +9,11 @@ use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::decode_group;
 use crate::traverse::node_test::Reach;
+use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
-use bvh_format::page::{Page, check_crossing};
+use bvh_format::page::{Page, RootRef, check_crossing, check_parent};
 use bvh_format::slabs::{Group, NodeSlabs};
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::{Child, Links, child_slabs};
 use bvh_format::turning::TurningCodes;
 use bvh_format::{FormatError, Rule};
 
@@ -318,6 +319,10 @@ pub(super) fn open_child<'a, I: Isa>(
         Child::Remote(link) => {
             (at, slot) = cross(bvh, object, page, link)?;
             anchor = spread(isa, &at.anchor_slabs(slot));
+            let decoded = (&groups[(child / 4) & 1], child % 4);
+            if !is_nested(isa, object.profile().directions(), decoded, &anchor) {
+                refuse(bvh, (page, link), decoded, &at, slot)?;
+            }
             (&anchor, 0)
         }
         Child::Leaf { .. } | Child::Empty => return Ok(None),
@@ -337,8 +342,42 @@ pub(super) fn open_child<'a, I: Isa>(
 fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page<'a>, u8), QueryError> {
     let to = bvh.page(object, from)?.remote(link);
     let page = bvh.page(object, to.page())?;
-    check_crossing(&page, to, from, link, bvh.layout().page_offset(to.page()))?;
+    check_parent(&page, to, (from, link), bvh.layout().page_offset(to.page()))?;
     Ok((page, to.root()))
+}
+
+/// Returns whether the slabs of an anchor, in all columns, lie within those of a column: rule 49. What is rounded along the
+/// way down is charged by the magnitudes of the object's root, which bound those of all nodes only because of this.
+#[inline(always)]
+fn is_nested<I: Isa>(isa: I, set: DirectionSet, (decoded, column): (&Group, usize), anchor: &Group) -> bool {
+    // A bit for each lane of a row with a slab, by register.
+    let rows_with_slabs: &[u16] = match set {
+        DirectionSet::Dop6 => &[0x0fff],
+        DirectionSet::Dop14 => &[0xffff, 0x0fff],
+        DirectionSet::Dop26 => &[0xffff, 0x0fff, 0xffff, 0x00ff],
+    };
+    let mut beyond = 0;
+    for (q, &rows) in rows_with_slabs.iter().enumerate() {
+        let above = isa.quad_splat(isa.load(&decoded.lo[q]), column).le(isa.load(&anchor.lo[q]));
+        let below = isa.load(&anchor.hi[q]).le(isa.quad_splat(isa.load(&decoded.hi[q]), column));
+        // False for NaN, which a forged file may decode to.
+        beyond |= !(I::V::bits(above) & I::V::bits(below)) & rows;
+    }
+    beyond == 0
+}
+
+/// Returns the error of the reference check, which names what the anchor of a forged file breaks.
+#[cold]
+fn refuse(
+    bvh: &Bvh,
+    link: (u32, u8),
+    (decoded, column): (&Group, usize),
+    page: &Page,
+    root: u8,
+) -> Result<(), QueryError> {
+    let number = page.header().page_number.get();
+    let (to, slabs) = (RootRef::new(number, root), child_slabs(decoded, column));
+    Ok(check_crossing(page, to, link, &slabs, bvh.layout().page_offset(number))?)
 }
 
 /// Returns a group with the same node in all four columns.

@@ -44,6 +44,11 @@ impl Truth {
         Self { a: a.to_vec(), b: b.to_vec(), corners_a, corners_b, contacts, nearest, tolerance }
     }
 
+    /// The contacts, in the order of answers.
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
     /// Asks every query on all backends. Returns the distance, on which they must agree.
     pub(crate) fn check(&self, a: &Bvh, b: &Bvh, pose: &Pose, queriers: &mut [Querier]) -> Distance {
         let first = queriers[0].distance(a, b, pose).unwrap();

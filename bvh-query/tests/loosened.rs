@@ -1,0 +1,224 @@
+//! Asks about files whose bounds are looser than they need to be, by up to 2^122: what keeps every rule is answered as
+//! exactly as any file, and a bound that no rule limits does not exist.
+//!
+//! What a query charges for rounding grows with the magnitudes of bounds. Each test loosens one kind of bound that
+//! `spec/numerics.md`, section 9, names, in files of all profiles, and compares every answer of every backend with brute force
+//! in exact arithmetic.
+
+mod common;
+
+use bvh_bake::{Options, prove_bounds, to_bytes};
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+use bvh_format::validate::validate;
+use bvh_format::{FormatError, Rule};
+use bvh_query::{Bvh, Pose, Querier, QueryError};
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::loosen::Loosened;
+use common::asked::ask;
+use common::shapes::{plate, soup, sphere};
+use common::truth::Truth;
+use common::{Random, Stored, Triangle, bake, mesh, options, queriers, random_pose, stored};
+
+/// Checks every rule, bounds included.
+fn prove(bytes: &[u8]) -> Result<(), FormatError> {
+    prove_bounds(&validate(bytes)?, bytes).map(|_| ())
+}
+
+/// A soup of triangles, and flat sides along the axes: their turning slabs are along axes, too.
+fn triangles() -> Vec<Triangle> {
+    let mut triangles = soup(700, 3);
+    for axis in 0..3 {
+        for at in [-1.0, -0.25, 0.5] {
+            let turned =
+                |p: [f64; 3]| [0, 1, 2].map(|k| p[(k + axis) % 3] + if k == axis { at } else { 0.0 });
+            let side = plate(4).into_iter().map(|triangle| triangle.map(|p| turned([p[0], p[1], p[2]])));
+            triangles.extend(side);
+        }
+    }
+    triangles
+}
+
+/// Files of all profiles of one mesh in several pages, plain and packed.
+fn files() -> Vec<Vec<u8>> {
+    let mesh = mesh(&triangles());
+    let encodings = [TriangleEncoding::F32, TriangleEncoding::Packed];
+    let both =
+        |profile: Profile| encodings.map(|encoding| to_bytes(&mesh, &options(profile, encoding)).unwrap().0);
+    Profile::ALL.into_iter().flat_map(both).collect()
+}
+
+/// The mesh that is asked about beside them, and poses in which the two touch here and there, or are just apart.
+struct Other {
+    bvh: Bvh,
+    stored: Vec<Stored>,
+    poses: Vec<Pose>,
+}
+
+impl Other {
+    fn new(random: &mut Random) -> Self {
+        // Turning slabs are tested where both sides have them.
+        let bvh = bake(&mesh(&sphere(1)), &options(Profile::Dop26U8Wide, TriangleEncoding::F32));
+        let near = [(); 2].map(|()| random_pose(random, 1.2));
+        let apart = Pose::new(*random_pose(random, 0.0).rotation(), [1.6, 1.1, 0.9]).unwrap();
+        let poses = near.into_iter().chain([apart]).collect();
+        Self { stored: stored(&bvh), bvh, poses }
+    }
+
+    /// Compares the answers about a loosened file with brute force over the triangles of the file that it was made from.
+    fn check(&self, queriers: &mut [Querier], triangles: &[Stored], bytes: Vec<u8>, pose: &Pose) {
+        let loosened = Bvh::from_bytes(bytes).unwrap();
+        Truth::new(triangles, &self.stored, pose).check(&loosened, &self.bvh, pose, queriers);
+        Truth::new(&self.stored, triangles, pose).check(&self.bvh, &loosened, pose, queriers);
+    }
+}
+
+/// A power of two from 2^10 to 2^120, or its negative, somewhat off.
+fn far(random: &mut Random) -> f32 {
+    let magnitude = 2f32.powi(10 + random.below(111) as i32) * (1.0 + random.signed() as f32 / 4.0);
+    if random.below(2) == 0 { magnitude } else { -magnitude }
+}
+
+/// Returns a slab to loosen. Turning slabs are measured from boxes, for which only the first three count.
+fn some_slab(random: &mut Random, profile: Profile) -> usize {
+    random.below(if profile.has_turning_slabs() { 3 } else { profile.directions().slabs() })
+}
+
+/// Loosens each file as `edit` does, and asks about what comes out. A file that `edit` leaves as it is does not count.
+fn search(seed: u64, edit: impl Fn(&mut Random, &mut Loosened)) {
+    let random = &mut Random::new(seed);
+    let mut queriers = queriers();
+    let mut asked = 0;
+    for file in files() {
+        let triangles = stored(&Bvh::from_bytes(file.clone()).unwrap());
+        for _ in 0..rounds(1) {
+            let mut loosened = Loosened::of(&file);
+            edit(random, &mut loosened);
+            let bytes = loosened.sealed();
+            if bytes == file {
+                continue;
+            }
+            prove(&bytes).unwrap();
+            let other = Other::new(random);
+            let pose = &other.poses[random.below(other.poses.len())];
+            other.check(&mut queriers, &triangles, bytes, pose);
+            asked += 1;
+        }
+    }
+    assert!(asked >= Profile::ALL.len(), "{asked} files asked");
+}
+
+/// Without the rule, contacts were lost along the other directions, in which the anchor is tight: each backend lost others.
+#[test]
+fn an_anchor_beyond_the_child_that_leads_to_it_is_refused() {
+    let random = &mut Random::new(1);
+    let mut queriers = queriers();
+    let (mut refused, mut answered) = (0, 0);
+    for file in files() {
+        let triangles = stored(&Bvh::from_bytes(file.clone()).unwrap());
+        let profile = Loosened::of(&file).profile();
+        // Turning slabs are measured from boxes.
+        let (slabs, most) =
+            if profile.has_turning_slabs() { (3, 10) } else { (profile.directions().slabs(), 2) };
+        for _ in 0..rounds(most) {
+            let mut loosened = Loosened::of(&file);
+            let roots = loosened.remote_roots();
+            if roots.is_empty() {
+                // The smallest profile holds the mesh in one page.
+                continue;
+            }
+            let (root, end) = (roots[random.below(roots.len())], far(random));
+            loosened.slab(root, some_slab(random, profile), end.min(0.0), end.max(0.0));
+            let bytes = loosened.sealed();
+            assert_eq!(validate(&bytes).unwrap_err().rule, Rule::Nested);
+            let other = Other::new(random);
+            let pose = &other.poses[random.below(2)];
+            let as_a = Truth::new(&triangles, &other.stored, pose);
+            let as_b = Truth::new(&other.stored, &triangles, pose);
+            for querier in &mut queriers {
+                // A new querier has not opened any node.
+                *querier = Querier::with_backend(querier.backend());
+                let asked = ask(querier, &bytes, &other.bvh, pose).unwrap();
+                for (answers, truth) in asked.into_iter().zip([&as_a, &as_b]) {
+                    match answers.contacts {
+                        Ok(contacts) => {
+                            assert_eq!(contacts, truth.contacts(), "{}", querier.backend());
+                            answered += 1;
+                        }
+                        Err(QueryError::Damaged(error)) => {
+                            assert_eq!(error.rule, Rule::Nested);
+                            refused += 1;
+                        }
+                        Err(error) => panic!("{error}"),
+                    }
+                }
+            }
+        }
+    }
+    assert!(refused > answered / 8, "{refused} refused, {answered} answered");
+}
+
+#[test]
+fn slabs_of_the_root_and_of_all_nodes() {
+    search(2, |random, file| {
+        let slab = some_slab(random, file.profile());
+        let end = far(random);
+        file.slab((0, 0), slab, end.min(0.0), end.max(0.0));
+        // Some of the anchors below keep their ends.
+        for root in file.remote_roots() {
+            if random.below(2) == 0 {
+                file.anchor(root, slab, end > 0.0, end);
+            }
+        }
+    });
+}
+
+#[test]
+fn boxes_of_records() {
+    search(4, |random, file| {
+        for _ in 0..1 + random.below(3) {
+            let end = far(random);
+            file.bounding_box(random.below(3), end > 0.0, end);
+        }
+    });
+}
+
+#[test]
+fn spheres_of_records() {
+    search(5, |random, file| {
+        let by = far(random);
+        file.sphere(random.below(3), by);
+    });
+}
+
+#[test]
+fn lanes_without_triangles() {
+    search(6, |random, file| {
+        let coordinate = far(random);
+        file.unused_lanes(coordinate);
+    });
+}
+
+/// Ends that are stored as they are could be anything.
+#[test]
+fn a_stored_slab_beyond_its_treelet_is_refused_at_first_touch() {
+    let mesh = mesh(&soup(900, 3));
+    let file = to_bytes(&mesh, &options(Profile::Dop14F32, TriangleEncoding::F32)).unwrap().0;
+    let other = bake(&common::mesh(&sphere(1)), &Options::default());
+    for slab in 0..7 {
+        let mut wide = Loosened::of(&file);
+        wide.slab((0, 0), slab, -1e20, 1e20);
+        let mut bytes = wide.bytes.clone();
+        // Only the anchors are as they were.
+        let tight = Loosened::of(&file);
+        let anchor = bvh_format::Layout::read(&file).unwrap().page_offset(0) as usize + 64;
+        bytes[anchor..anchor + 64].copy_from_slice(&tight.bytes[anchor..anchor + 64]);
+        cbvh_testkit::seal::seal(&mut bytes);
+        assert_eq!(validate(&bytes).unwrap_err().rule, Rule::Nested);
+        for querier in &mut queriers() {
+            let bvh = Bvh::from_bytes(bytes.clone()).unwrap();
+            let refused = querier.contacts(&bvh, &other, &Pose::IDENTITY);
+            assert!(matches!(refused, Err(QueryError::Damaged(error)) if error.rule == Rule::Nested));
+        }
+    }
+}
