@@ -442,6 +442,31 @@ class AgainstCbvh(unittest.TestCase):
                 broken.add(ours)
             self.assertEqual(broken, {0, 35})
 
+    def test_anchors_and_spheres(self):
+        """Changes an end of an anchor or the sphere each: `cbvh verify` and this reader find the same rule broken."""
+        for profile in ("dop26-u8-wide", "dop14-f32", "dop6-f16"):
+            file = load(self.bake(ROOM, profile, "packed"))
+            one = file.objects[0]
+            anchors = [(page, root) for page in one.pages_read[1:] for root in range(page.roots)]
+            broken = set()
+            for _ in range(20):
+                data = bytearray(file.data)
+                if self.chance.random() < 0.25:
+                    at = one.place("sphere_radius")
+                    factor = self.chance.choice((0.99, 1.0, 1.5))
+                else:
+                    page, root = self.chance.choice(anchors)
+                    at = page.anchor_at(root) + 4 * self.chance.randrange(2 * page.layout.slabs)
+                    factor = self.chance.choice((0.9, 1.1, 1e9))
+                value = np.frombuffer(data, "<f4", 1, at)[0] * np.float32(factor)
+                data[at : at + 4] = value.tobytes()
+                mutate.seal(data)
+                ours = mutate.verdict(data, bounds=True)
+                forged = self.written("forged.cbvh", data)
+                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), at)
+                broken.add(ours)
+            self.assertLessEqual({35, 49}, broken)
+
     def test_limit_of_turning_slabs(self):
         """R39 depends on the greatest number of triangles that occurs, and comes after R35 in a later page."""
         file = load(self.bake(ROOM, "dop26-u8-wide", "f32"))
