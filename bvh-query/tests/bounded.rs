@@ -6,107 +6,23 @@
 //! of things that are not there.
 
 mod common;
+#[path = "common/counted.rs"]
+mod counted;
 
 use bvh_bake::to_bytes;
 use bvh_format::Layout as FileLayout;
 use bvh_format::Rule;
-use bvh_format::ids::encode_ids;
 use bvh_format::leaf::TriangleEncoding;
-use bvh_format::page::{MAX_PACKETS_PER_PAGE, Page};
+use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use bvh_query::{Backend, Bvh, Querier, QueryError};
 use cbvh_testkit::seal::{put, put_together, seal, take_apart};
-use common::shapes::{cube, soup};
+use common::forged::{blown_up, duplicated};
+use common::shapes::soup;
 use common::{mesh, options, translation};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use counted::peak;
 use std::ops::ControlFlow;
-
-thread_local! {
-    /// The bytes that this thread holds, and the most bytes that it has held.
-    static HELD: Cell<[isize; 2]> = const { Cell::new([0; 2]) };
-}
-
-struct Counting;
-
-fn count(bytes: isize) {
-    // A thread that is ending has no counter any more.
-    let _ = HELD.try_with(|held| {
-        let [now, most] = held.get();
-        held.set([now + bytes, most.max(now + bytes)]);
-    });
-}
-
-// SAFETY: every call is passed to the system's allocator unchanged. Counting touches only thread-local integers,
-// which need no allocation and have no destructor.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
-
-/// Returns the most bytes that this thread held at once while `work` ran, beyond those that it held before.
-fn peak<R>(work: impl FnOnce() -> R) -> (usize, R) {
-    let [before, _] = HELD.get();
-    HELD.set([before, before]);
-    let result = work();
-    ((HELD.get()[1] - before) as usize, result)
-}
-
-/// Forges a file in which every inner node reaches from -1000 to 1000: with codes of 0, each node is as large as its
-/// root. Leaf packets are flat at the upper end of y. Pairs of inner nodes therefore overlap more than pairs of
-/// packets and are visited first, because nearer pairs are visited first. Works for profiles of `u8` codes in
-/// 64 bytes.
-fn blown_up(triangles: usize, seed: u64, profile: Profile) -> Vec<u8> {
-    let mut bytes =
-        to_bytes(&mesh(&soup(triangles, seed)), &options(profile, TriangleEncoding::Packed)).unwrap().0;
-    let layout = FileLayout::read(&bytes).unwrap();
-    let (slabs, anchor, size) =
-        (profile.directions().slabs(), profile.anchor_bytes(), profile.treelet_bytes());
-    for number in 0..layout.page_count() {
-        let at = layout.page_offset(number) as usize;
-        let page = layout.page_bytes(&bytes, number).unwrap().to_owned();
-        let header = *Page::new(&page, profile).header();
-        for root in 0..usize::from(header.roots) {
-            for end in 0..2 * slabs {
-                let value = if end < slabs { -1000.0f32 } else { 1000.0 };
-                put(&mut bytes, at + 64 + root * anchor + 4 * end, &value.to_le_bytes());
-            }
-        }
-        for slot in 0..header.treelets {
-            let view = Page::new(&page, profile);
-            let mut treelet = vec![0; view.treelet(slot).len()];
-            let links = view.links(slot);
-            let (part, last) = if treelet.len() < size { (16, 0x0f) } else { (32, 255) };
-            for child in (0..links.children()).filter(|child| links.leaves() >> (4 * child) & 1 == 1) {
-                treelet[(child / 4) * part + profile.width().min(4) + child % 4] = last;
-            }
-            links.write(profile, &mut treelet);
-            put(&mut bytes, at + view.treelet_at(slot), &treelet);
-        }
-    }
-    // The object's box and sphere are enlarged, too.
-    let record = layout.sections[0].range.start + 16;
-    for end in 0..6 {
-        let value = if end < 3 { -1000.0f32 } else { 1000.0 };
-        put(&mut bytes, record + 32 + 4 * end, &value.to_le_bytes());
-    }
-    put(&mut bytes, record + 148, &2000.0f32.to_le_bytes());
-    seal(&mut bytes);
-    bytes
-}
 
 /// Returns the numbers of treelets and of leaf packets of the only object.
 fn sizes(bvh: &Bvh) -> (u64, u64) {
@@ -184,19 +100,7 @@ fn a_budget_ends_any_query() {
 /// Gives all triangles the same id, to which all duplicates belong. Each contact would stand for thousands.
 #[test]
 fn contacts_without_number_are_refused() {
-    let plain = to_bytes(&mesh(&cube()), &options(Profile::Dop14U8, TriangleEncoding::F32)).unwrap().0;
-    let duplicates: Vec<u8> = (1..3000u32).flat_map(|id| [0, id]).flat_map(u32::to_le_bytes).collect();
-    let mut sections = take_apart(&plain);
-    sections.retain(|section| section.0 < 4);
-    let nodes = sections.iter_mut().find(|section| section.0 == 2).unwrap();
-    // The file has one page. All its lanes get id 0.
-    let packets = usize::from(u16::from_le_bytes([nodes.2[56], nodes.2[57]]));
-    let ids = encode_ids(&vec![[0; 4]; packets]);
-    put(&mut nodes.2, 32, &0u64.to_le_bytes());
-    put(&mut nodes.2, 52, &(ids.len() as u32 / 8).to_le_bytes());
-    sections.push((4, 0, ids));
-    sections.push((5, 0, duplicates));
-    let forged = Bvh::from_bytes(put_together(&sections)).unwrap();
+    let forged = Bvh::from_bytes(duplicated(2999)).unwrap();
     let mut querier = Querier::new().unwrap();
     let mut calls = 0u64;
     let asked = querier.visit_contacts(&forged, &forged, &translation(0.5, 0.25, 0.125), |_| {

@@ -268,8 +268,10 @@ cbvh_status cbvh_querier_free(cbvh_querier querier);
 /* Lets questions about many poses, paths or probes use all cores (1), or the calling thread alone (0, the default).
  * Answers are the same. Give poses that follow a path in the order of the path: neighbours share what was found. */
 cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
-/* Lets the question about each pose, path or probe visit at most so many pairs of nodes, of some 100 ns each; more ends
- * with CBVH_LIMIT. Without it, only the sizes of the files bound a question. */
+/* Lets the question about each pose, path or probe make at most so many visits, of some 100 ns each; more ends with
+ * CBVH_LIMIT. A visit is a pair of objects or of nodes, or a node for a probe, a contact with each of its duplicates, a
+ * component and an object of a relation, or an interval of a motion. Without it, only the sizes of the files bound a
+ * question. */
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 
 /* How much work the last question was. */
@@ -595,7 +597,9 @@ cbvh_status cbvh_scene_free(cbvh_scene scene);
 cbvh_status cbvh_scene_set_parallel(cbvh_scene scene, int32_t parallel);
 /* Lets the scene remember (1) what it found about each pair: faster where instances move little between questions. */
 cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
-/* Bounds the question about each pair and each probe, as cbvh_querier_set_budget does. */
+/* Lets each question make at most so many visits over all its pairs, and each probe over all instances: those of
+ * cbvh_querier_set_budget, and each pair of boxes that the search for near pairs looks at. On several threads, each may
+ * make so many before they find out. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
 
 /* Adds a mesh at a pose in the world. Its rotation is rigid to within 2^-23 and its translation at most 2^118 along

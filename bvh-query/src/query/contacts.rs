@@ -24,7 +24,8 @@ impl Querier {
     /// Returns all pairs of triangles in contact, in ascending order.
     ///
     /// The answer is that of exact predicates on all pairs of the input's triangles. An exact duplicate that the baker
-    /// left out is in contact wherever the triangle that replaces it is, if the file has ids.
+    /// left out is in contact wherever the triangle that replaces it is, if the file has ids. Each contact counts as a visit
+    /// ([`Querier::set_budget`]).
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
@@ -85,6 +86,16 @@ impl Querier {
         }
         self.queue.clear();
         self.packets.iter_mut().for_each(PlacedPackets::start);
+        // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
+        let budget = *self.memory.budget();
+        let mut contacts = 0;
+        let mut count = |contact| {
+            if contacts == budget.left() {
+                return Err(budget.error());
+            }
+            contacts += 1;
+            Ok(visit(contact))
+        };
         let mut visitor = ContactVisitor {
             packets: &mut self.packets,
             order: Order::Any,
@@ -94,7 +105,7 @@ impl Querier {
                 drain_at: TriangleQueue::FULL,
                 stats: QueryStats::default(),
                 recent: Default::default(),
-                visit: |candidate| report(placed, candidate, visit),
+                visit: |candidate| report(placed, candidate, &mut count),
                 found: None,
             },
         };
@@ -102,6 +113,7 @@ impl Querier {
         let tests = self.backend.run(task)?;
         let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
+        self.memory.charge(contacts)?;
         Ok(found)
     }
 }
@@ -110,9 +122,13 @@ impl Querier {
 /// room for. In a forged file any number of triangles may have the id that all duplicates belong to, so that the
 /// number of their pairs would have no bound.
 fn max_triangles(side: Shape<'_>) -> u64 {
-    let pages: u64 = side.objects().iter().map(|object| u64::from(object.record().pages.get())).sum();
     let (layout, bytes) = (side.bvh().layout(), side.bvh().bytes());
-    pages * MAX_TRIANGLES_PER_PAGE + layout.duplicate_ids(bytes).len() as u64
+    let pages = match side.objects() {
+        [object] => object.record().pages.get(),
+        // A shape of several objects is a whole file.
+        _ => layout.page_count(),
+    };
+    u64::from(pages) * MAX_TRIANGLES_PER_PAGE + layout.duplicate_ids(bytes).len() as u64
 }
 
 /// More triangles than a page has.
@@ -131,7 +147,7 @@ fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
 fn report(
     placed: &PlacedPair<'_>,
     candidate: TrianglePair,
-    visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
+    visit: &mut dyn FnMut(Contact) -> Result<ControlFlow<()>, QueryError>,
 ) -> Result<ControlFlow<TrianglePair>, QueryError> {
     let pair = &placed.pair;
     let id_a = triangle_id(pair.bvh_a, pair.object_a, candidate.place_a())?;
@@ -139,7 +155,7 @@ fn report(
     for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)?) {
         for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)?) {
             let (object_a, object_b) = placed.numbers;
-            if visit(Contact { object_a, triangle_a, object_b, triangle_b }).is_break() {
+            if visit(Contact { object_a, triangle_a, object_b, triangle_b })?.is_break() {
                 return Ok(ControlFlow::Break(candidate));
             }
         }

@@ -1,13 +1,14 @@
 //! The querier: the backend and the memory that every query works with.
 
 use crate::error::QueryError;
+use crate::file::shape::Shape;
 use crate::isa::Backend;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::search::BoundedPair;
-use crate::traverse::walk_memory::WalkMemory;
+use crate::traverse::walk_memory::{Budget, WalkMemory};
 
 /// Asks questions about two meshes.
 ///
@@ -39,7 +40,7 @@ pub struct Querier {
     pub(super) at_end: Ends,
     pub(super) bounded: Vec<BoundedPair>,
     pub(super) bounded_triangles: Vec<BoundedTriangle>,
-    budget: u64,
+    budget: Budget,
     pub(super) stats: QueryStats,
     questions: u64,
 }
@@ -72,20 +73,51 @@ impl Querier {
             at_end: Ends::default(),
             bounded: Vec::new(),
             bounded_triangles: Vec::new(),
-            budget: u64::MAX,
+            budget: Budget::new(u64::MAX),
             stats: QueryStats::default(),
             questions: 0,
         }
     }
 
-    /// Lets each query from now on visit at most this many pairs of objects and of nodes. A query that needs more ends with
+    /// Lets each query from now on make at most this many visits. A query that needs more ends with
     /// [`QueryError::Budget`]. Without a budget, only the sizes of the files bound a query, and those of a motion and its
     /// tolerance.
     ///
-    /// A visit takes some 100 ns. Queries of scans and of CAD models with 10^5 to 10^6 triangles take from some hundred
-    /// visits, for separated meshes, to some 10^6, for all contacts of a deep overlap.
+    /// These count as one visit each, so that the budget bounds the time of a query, and the memory that it adds, whatever
+    /// the files hold:
+    ///
+    /// - a pair of objects, and a pair of nodes or of leaf packets of both trees;
+    /// - for a point or a line: an object, a node that is opened, and a leaf packet;
+    /// - a contact that is reported: one that stands for duplicates counts once for each pair of them;
+    /// - for [`Querier::relation`]: each pair of a component of one mesh and an object of the other;
+    /// - for a motion: each interval of time, and each object of B in it beyond the first.
+    ///
+    /// A visit takes some 100 ns; the first one of a page takes some microseconds more, because the page is checked. Queries of
+    /// scans and of CAD models with 10^5 to 10^6 triangles take from some hundred visits, for separated meshes, to some 10^6,
+    /// for all contacts of a deep overlap. What is stated once for a whole file is not charged: the lists of duplicates and
+    /// of the topology are checked when a query first needs them, in one pass.
     pub fn set_budget(&mut self, visits: u64) {
-        self.budget = visits;
+        self.budget = Budget::new(visits);
+    }
+
+    /// Lets each query from now on make the visits that are left of a budget.
+    pub(crate) fn set_rest(&mut self, rest: Budget) {
+        self.budget = rest;
+    }
+
+    /// Returns how many visits the last query made.
+    pub(crate) fn visits(&self) -> u64 {
+        self.memory.budget().made()
+    }
+
+    /// Charges a visit that is made outside of queries, by what puts them together.
+    pub(crate) fn charge_visit(&mut self) -> Result<(), QueryError> {
+        self.memory.visit()
+    }
+
+    /// Charges a look at each object of a shape. The first one comes with the question.
+    pub(super) fn look_at_objects(&mut self, shape: Shape<'_>) -> Result<(), QueryError> {
+        self.memory.charge(shape.objects().len().saturating_sub(1) as u64)
     }
 
     /// Returns the backend in use.

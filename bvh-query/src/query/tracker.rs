@@ -41,7 +41,7 @@ use crate::query::search::Search;
 /// allocates nothing that the querier would not.
 ///
 /// A query through a tracker visits less, so that it may have an answer where the querier alone meets a damaged page or
-/// exceeds its budget.
+/// exceeds its budget. Each object of B beyond the first counts as a visit, because the tracker bounds how far it has moved.
 ///
 /// ```
 /// use bvh_query::{Bvh, Pose, Querier, Tracker};
@@ -113,6 +113,7 @@ impl Tracker {
     ) -> Result<bool, QueryError> {
         let (a, b) = (a.into(), b.into());
         querier.start();
+        querier.look_at_objects(b)?;
         let moved = self.turn_to(a, b, pose);
         if self.bounds(b, pose).is_some_and(|(lower, _)| lower > 0.0) {
             return Ok(false);
@@ -144,6 +145,7 @@ impl Tracker {
     ) -> Result<Distance, QueryError> {
         let (a, b) = (a.into(), b.into());
         querier.start();
+        querier.look_at_objects(b)?;
         let moved = self.turn_to(a, b, pose);
         let search = || Search::new(DistanceOptions::default(), f64::INFINITY);
         let (mut limited, mut found) = (search(), None);
@@ -188,6 +190,7 @@ impl Tracker {
             return self.collide(querier, a, b, pose);
         }
         querier.start();
+        querier.look_at_objects(b)?;
         let moved = self.turn_to(a, b, pose);
         match self.bounds(b, pose) {
             Some((lower, _)) if lower > d => return Ok(false),

@@ -7,16 +7,24 @@
 //!
 //! A tree is split at the median along the longest side. Each node also has the union of the groups below it, so that parts
 //! of the scene that are not asked about each other are left out at once.
+//!
+//! Where a file puts all instances in one place, or gives them groups of which only the unions meet, each pair has to be looked
+//! at. So each step of a search is charged to the budget of the question, and no search holds all pairs.
 
+use crate::error::QueryError;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
+use crate::traverse::walk_memory::Budget;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
 
 /// Stands for no node.
 const NONE: u32 = u32::MAX;
 /// A tree is built anew when the girths of its inner nodes have grown by this factor.
 const MAX_GROWTH: f64 = 1.5;
+/// A search for the nearest boxes is given up when more pairs than this wait: 2.5 MiB.
+const MAX_OPEN_PAIRS: usize = 1 << 16;
 
 /// An instance, as the broad phase knows it.
 #[derive(Clone, Copy, Debug)]
@@ -86,37 +94,51 @@ impl BroadPhase {
     }
 
     /// Calls `visit` with each pair of places whose groups meet and whose boxes are at most `limit` apart, and with the square
-    /// of their gap.
-    pub(super) fn pairs(&self, limit: f64, mut visit: impl FnMut(u32, u32, f64)) {
-        pairs((&self.still, &self.still), limit, &mut visit);
-        pairs((&self.moving, &self.still), limit, &mut visit);
-        pairs((&self.moving, &self.moving), limit, &mut visit);
+    /// of their gap, until it breaks.
+    pub(super) fn pairs(
+        &self,
+        limit: f64,
+        budget: &mut Budget,
+        mut visit: impl FnMut(u32, u32, f64) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        for trees in [(&self.still, &self.still), (&self.moving, &self.still), (&self.moving, &self.moving)] {
+            if pairs(trees, limit, budget, &mut visit)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
     }
 
-    /// Calls `visit` with each place whose groups meet those given and whose box is near another box. How far apart they may
-    /// be, `limit` says of a box or of one that holds it.
+    /// Calls `visit` with each place whose groups meet those given and whose box is near another box, and with the square of
+    /// their gap. How far apart they may be, `limit` says of a box or of one that holds it.
     pub(super) fn near(
         &self,
         bounds: &WorldBox,
         groups: Groups,
         limit: impl Fn(&WorldBox) -> f64,
-        mut visit: impl FnMut(u32),
-    ) {
+        budget: &mut Budget,
+        mut visit: impl FnMut(u32, f64),
+    ) -> Result<(), QueryError> {
         for tree in [&self.still, &self.moving] {
             let mut open: Vec<u32> = if tree.nodes.is_empty() { vec![] } else { vec![0] };
             while let Some(number) = open.pop() {
+                budget.visit()?;
                 let node = &tree.nodes[number as usize];
-                let is_near = || bounds.squared_gap(&node.bounds) <= limit(&node.bounds).powi(2);
-                if !node.groups.meet(groups) || !is_near() {
+                if !node.groups.meet(groups) {
+                    continue;
+                }
+                let squared_gap = bounds.squared_gap(&node.bounds);
+                if squared_gap > limit(&node.bounds).powi(2) {
                     continue;
                 }
                 if node.is_leaf() {
-                    visit(node.children[1]);
+                    visit(node.children[1], squared_gap);
                 } else {
                     open.extend(node.children);
                 }
             }
         }
+        Ok(())
     }
 
     /// Returns the places whose boxes have a finite key, in ascending order of the keys. The key of a box is at most that of any
@@ -231,15 +253,21 @@ impl Tree {
     }
 }
 
-/// Visits the near pairs of two trees, or of one tree with itself.
-fn pairs((a, b): (&Tree, &Tree), limit: f64, visit: &mut impl FnMut(u32, u32, f64)) {
+/// Visits the near pairs of two trees, or of one tree with itself, until `visit` breaks.
+fn pairs(
+    (a, b): (&Tree, &Tree),
+    limit: f64,
+    budget: &mut Budget,
+    visit: &mut impl FnMut(u32, u32, f64) -> ControlFlow<()>,
+) -> Result<ControlFlow<()>, QueryError> {
     if a.nodes.is_empty() || b.nodes.is_empty() {
-        return;
+        return Ok(ControlFlow::Continue(()));
     }
     let is_one = std::ptr::eq(a, b);
     let squared_limit = limit * limit;
     let mut open: Vec<(u32, u32)> = vec![(0, 0)];
     while let Some((first, second)) = open.pop() {
+        budget.visit()?;
         let (node_a, node_b) = (&a.nodes[first as usize], &b.nodes[second as usize]);
         if !node_a.groups.meet(node_b.groups) {
             continue;
@@ -256,13 +284,18 @@ fn pairs((a, b): (&Tree, &Tree), limit: f64, visit: &mut impl FnMut(u32, u32, f6
             continue;
         }
         match (node_a.is_leaf(), node_b.is_leaf()) {
-            (true, true) => visit(node_a.children[1], node_b.children[1], squared_gap),
+            (true, true) => {
+                if visit(node_a.children[1], node_b.children[1], squared_gap).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
             (false, is_leaf) if is_leaf || node_a.bounds.girth() >= node_b.bounds.girth() => {
                 open.extend(node_a.children.map(|child| (child, second)));
             }
             _ => open.extend(node_b.children.map(|child| (first, child))),
         }
     }
+    Ok(ControlFlow::Continue(()))
 }
 
 /// The pairs of places whose groups meet, those with the nearest boxes first: a search of the trees by the least gap.
@@ -321,15 +354,22 @@ impl NearestFirst {
         Self { open }
     }
 
-    /// Returns the next pair of places and the square of the gap of their boxes.
-    pub(super) fn next(&mut self, broad: &BroadPhase) -> Option<(u32, u32, f64)> {
-        while let Some(Open { squared_gap, trees, nodes }) = self.open.pop() {
+    /// Returns the next pair of places and the square of the gap of their boxes; nothing either if too many pairs wait to be
+    /// looked at.
+    pub(super) fn next(
+        &mut self,
+        broad: &BroadPhase,
+        budget: &mut Budget,
+    ) -> Result<Option<(u32, u32, f64)>, QueryError> {
+        while self.open.len() <= MAX_OPEN_PAIRS {
+            let Some(Open { squared_gap, trees, nodes }) = self.open.pop() else { break };
+            budget.visit()?;
             let (a, b) = (broad.tree(trees[0]), broad.tree(trees[1]));
             let (node_a, node_b) = (&a.nodes[nodes[0] as usize], &b.nodes[nodes[1] as usize]);
             let is_one = trees[0] == trees[1] && nodes[0] == nodes[1];
             if node_a.is_leaf() && node_b.is_leaf() {
                 if !is_one {
-                    return Some((node_a.children[1], node_b.children[1], squared_gap));
+                    return Ok(Some((node_a.children[1], node_b.children[1], squared_gap)));
                 }
                 continue;
             }
@@ -353,7 +393,7 @@ impl NearestFirst {
                 node_b.children.into_iter().for_each(|child| add(nodes[0], child));
             }
         }
-        None
+        Ok(None)
     }
 }
 
@@ -406,16 +446,21 @@ impl<K: Fn(&WorldBox) -> f64> ByKey<K> {
         }
     }
 
-    /// Returns the next place and the key of its box.
-    pub(super) fn next(&mut self, broad: &BroadPhase) -> Option<(u32, f64)> {
+    /// Returns the next place and the key of its box. `charge` is called for each box that is looked at.
+    pub(super) fn next(
+        &mut self,
+        broad: &BroadPhase,
+        mut charge: impl FnMut() -> Result<(), QueryError>,
+    ) -> Result<Option<(u32, f64)>, QueryError> {
         while let Some(Keyed { key, tree, node, place }) = self.open.pop() {
+            charge()?;
             let node = &broad.tree(tree).nodes[node as usize];
             if node.is_leaf() {
-                return Some((place, key));
+                return Ok(Some((place, key)));
             }
             node.children.into_iter().for_each(|child| self.push(broad, tree, child));
         }
-        None
+        Ok(None)
     }
 }
 
@@ -492,22 +537,40 @@ mod tests {
                 check(&broad.moving);
                 let limit = [0.0, 1.5, f64::INFINITY][step % 3];
                 let mut found = Vec::new();
-                broad.pairs(limit, |a, b, _| found.push((a.min(b), a.max(b))));
-                found.sort_unstable();
+                let mut budget = Budget::new(u64::MAX);
+                let visited = broad.pairs(limit, &mut budget, |a, b, squared_gap| {
+                    found.push((a.min(b), a.max(b), squared_gap));
+                    ControlFlow::Continue(())
+                });
+                assert_eq!(visited, Ok(ControlFlow::Continue(())));
+                found.sort_unstable_by_key(|&(a, b, _)| (a, b));
                 let mut expected = Vec::new();
                 for (number, a) in items.iter().enumerate() {
                     for b in &items[number + 1..] {
                         let gap = a.bounds.squared_gap(&b.bounds);
                         if a.groups.meet(b.groups) && gap <= limit * limit {
-                            expected.push((a.place, b.place));
+                            expected.push((a.place, b.place, gap));
                         }
                     }
                 }
                 seen += expected.len();
                 assert_eq!(found, expected, "{count} {step}");
+                // The same pairs and gaps, place by place.
+                found.clear();
+                for item in &items {
+                    let visit = |place, gap| {
+                        if place > item.place {
+                            found.push((item.place, place, gap));
+                        }
+                    };
+                    broad.near(&item.bounds, item.groups, |_| limit, &mut budget, visit).unwrap();
+                }
+                found.sort_unstable_by_key(|&(a, b, _)| (a, b));
+                assert_eq!(found, expected, "{count} {step}");
+                let expected: Vec<_> = expected.into_iter().map(|(a, b, _)| (a, b)).collect();
                 let (mut found, mut last) = (Vec::new(), 0.0);
                 let mut nearest = NearestFirst::new(&broad);
-                while let Some((a, b, squared_gap)) = nearest.next(&broad) {
+                while let Some((a, b, squared_gap)) = nearest.next(&broad, &mut budget).unwrap() {
                     assert!(squared_gap >= last);
                     last = squared_gap;
                     if squared_gap <= limit * limit {

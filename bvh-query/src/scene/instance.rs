@@ -107,6 +107,8 @@ pub(super) struct Instance {
     pub(super) shape: SceneShape,
     pub(super) world: Pose,
     pub(super) bounds: WorldBox,
+    /// The largest diagonal of the boxes of its objects, in mesh units.
+    pub(super) size: f64,
     pub(super) groups: Groups,
     /// The places of the instances that it may touch, in ascending order.
     pub(super) allowed: Vec<u32>,

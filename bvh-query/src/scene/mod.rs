@@ -29,6 +29,7 @@ use crate::file::owned_shape::OwnedShape;
 use crate::isa::Backend;
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
+use crate::query::motion::size;
 use broad_phase::BroadPhase;
 use bvh_format::FormatError;
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
@@ -174,7 +175,8 @@ impl Scene {
     ///
     /// On the project's test scenes, where instances move by some 3 degrees a frame, a frame takes 0.95 to 1.17 times as long;
     /// with a twentieth of the steps 0.84 to 1.12 times, and with a two-hundredth 0.61 to 0.83 times. A tracker holds some 300
-    /// bytes; there is one for each pair that the last question was about, and at most as many more as the one before was about, and 1,024.
+    /// bytes; there is one for each of the first 16,384 pairs that the last question was about, and at most as many more as the one before was
+    /// about, and 1,024.
     ///
     /// What a tracker knows need not be looked up: a question may have an answer where it would otherwise meet a damaged page or
     /// exceed the budget.
@@ -182,8 +184,16 @@ impl Scene {
         self.trackers.on = tracking;
     }
 
-    /// Lets the question about each pair visit at most this many pairs of nodes, and that about each point, ray or segment so
-    /// many nodes over all instances, as [`Querier::set_budget`](crate::Querier::set_budget) does.
+    /// Lets each question make at most this many visits over all its pairs, and each point, ray or segment so many over all
+    /// instances. Without a budget, only the number of instances and the sizes of the files bound a question.
+    ///
+    /// Visits are those of [`Querier::set_budget`](crate::Querier::set_budget) for each pair that is asked about, and those of
+    /// the broad phase: a pair of boxes, or for a probe a box, that the search for near ones looks at. So both time and memory
+    /// are bounded, however many instances a file puts in one place. Where the visits run out, the error is
+    /// [`SceneError::Pair`] or [`SceneError::Instance`] with [`QueryError::Budget`](crate::QueryError::Budget), or
+    /// [`SceneError::Query`] with it if that was in the broad phase. Whether they suffice does not depend on the number of
+    /// threads where the answer needs all pairs; which pair the error names does, and t threads may make t times as many visits
+    /// before they find out.
     pub fn set_budget(&mut self, visits: u64) {
         self.workers.budget = visits;
     }
@@ -231,7 +241,8 @@ impl Scene {
             self.names.insert(name.clone(), place);
         }
         let bounds = WorldBox::of(shape.objects(), &world);
-        let instance = Instance { generation, name, shape, world, bounds, groups, allowed: Vec::new() };
+        let size = size(shape.objects());
+        let instance = Instance { generation, name, shape, world, bounds, size, groups, allowed: Vec::new() };
         if self.free.pop().is_some() {
             self.instances[place as usize] = Some(instance);
         } else {
@@ -432,6 +443,7 @@ impl Scene {
     /// Starts a question: builds the broad phase, if it does not show all instances as they are.
     fn start(&mut self) {
         (self.stats, self.pairs_asked) = (QueryStats::default(), 0);
+        self.workers.start();
         self.trackers.start();
         let item = |(place, instance): (u32, &Option<Instance>)| Some(instance.as_ref()?.item(place));
         self.broad.refresh((0..).zip(&self.instances).filter_map(item), self.instances.len());

@@ -7,13 +7,14 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::{Path, RelativePath};
-use crate::query::motion::{Earliest, MotionAnswer, MotionOptions, radius, tolerance};
+use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
 use crate::query::querier::Querier;
 use crate::scene::instance::{Instance, InstanceId};
-use crate::scene::question::{SceneDistance, ScenePair};
+use crate::scene::question::{MAX_KNOWN_PAIRS, SceneDistance, ScenePair};
 use crate::scene::world_box::WorldBox;
 use crate::scene::{Scene, SceneError, check_world};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Into how many slices the time is divided at most, so that boxes follow the paths.
@@ -102,30 +103,22 @@ impl Scene {
         options: &MotionOptions,
     ) -> Result<SceneMotion, SceneError> {
         let ways = self.ways(paths, options)?;
-        let encounters = self.encounters(&ways);
         let earliest = Earliest::new();
-        let answers = self.each_way(&encounters, &ways, |querier, pair, a, b, path| {
-            let answer = querier.motion_before(a, b, path, options, &earliest);
-            Ok((!matches!(answer, Ok(MotionAnswer::Free))).then_some((pair, answer)))
-        })?;
-        let (mut found, mut errors) = (Vec::new(), Vec::new());
-        for (pair, answer) in answers {
-            match answer {
-                Ok(answer) => found.push((pair, answer)),
-                Err(error) => errors.push((pair, error)),
-            }
-        }
-        let answer = together(&found);
-        // An error that a search meets after the earliest hit does not matter: searches may end there before they meet it.
-        let last =
-            if let SceneMotion::Hit { touching_at, .. } = answer { touching_at } else { f64::INFINITY };
-        match errors
-            .into_iter()
-            .filter(|(_, ended)| ended.decided_until <= last)
-            .min_by_key(|(pair, _)| *pair)
-        {
-            Some((pair, ended)) => Err(self.pair_error(pair, ended.error)),
-            None => Ok(answer),
+        let mut together = Together::default();
+        self.each_way(
+            &ways,
+            |querier, pair, a, b, path| {
+                let answer = querier.motion_before(a, b, path, options, &earliest);
+                Ok((!matches!(answer, Ok(MotionAnswer::Free))).then_some((pair, answer)))
+            },
+            |answers| {
+                together.add(answers);
+                ControlFlow::Continue(())
+            },
+        )?;
+        match together.first_error() {
+            Some((pair, error)) => Err(self.pair_error(pair, error)),
+            None => Ok(together.answer()),
         }
     }
 
@@ -140,24 +133,36 @@ impl Scene {
         options: &MotionOptions,
     ) -> Result<bool, SceneError> {
         let ways = self.ways(paths, options)?;
-        let encounters = self.encounters(&ways);
         let is_hit = AtomicBool::new(false);
-        let answers = self.each_way(&encounters, &ways, |querier, pair, a, b, path| {
-            if is_hit.load(Ordering::Relaxed) {
-                return Ok(None);
-            }
-            let answer = querier.is_free(a, b, path, options);
-            if answer == Ok(false) {
-                is_hit.store(true, Ordering::Relaxed);
-            }
-            Ok((answer != Ok(true)).then_some((pair, answer)))
-        })?;
-        if answers.iter().any(|(_, answer)| answer.is_ok()) {
-            return Ok(false);
-        }
-        match answers.into_iter().next() {
-            Some((pair, Err(source))) => Err(self.pair_error(pair, source)),
-            _ => Ok(true),
+        let mut first_error = None;
+        self.each_way(
+            &ways,
+            |querier, pair, a, b, path| {
+                if is_hit.load(Ordering::Relaxed) {
+                    return Ok(None);
+                }
+                match querier.is_free(a, b, path, options) {
+                    Ok(true) => Ok(None),
+                    Ok(false) => {
+                        is_hit.store(true, Ordering::Relaxed);
+                        Ok(None)
+                    }
+                    Err(source) => Ok(Some((pair, source))),
+                }
+            },
+            |errors| {
+                first_error = first_error.take().or(errors.into_iter().next());
+                if is_hit.load(Ordering::Relaxed) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        )?;
+        match first_error {
+            _ if is_hit.into_inner() => Ok(false),
+            Some((pair, source)) => Err(self.pair_error(pair, source)),
+            None => Ok(true),
         }
     }
 
@@ -182,8 +187,13 @@ impl Scene {
         Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })
     }
 
-    /// Returns the pairs that may come within the clearance, in the order in which their boxes do.
-    fn encounters(&self, ways: &Ways<'_>) -> Vec<Encounter> {
+    /// Calls `visit` with the pairs that may come within the clearance, so many at a time as are known, until it breaks. Those
+    /// of a piece are in the order in which their boxes come near each other.
+    fn each_piece_of_encounters(
+        &self,
+        ways: &Ways<'_>,
+        mut visit: impl FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError>,
+    ) -> Result<(), SceneError> {
         let all = |slices: usize| -> Vec<Moving<'_>> {
             ways.paths.iter().filter_map(|(&place, &path)| self.moving(place, path, slices)).collect()
         };
@@ -197,7 +207,10 @@ impl Scene {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
             let mut near = Vec::new();
             let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other);
-            self.broad.near(&whole, one.instance.groups, limit, |place| near.push(place));
+            self.charged(|budget| {
+                budget.charge((moving.len() - number) as u64)?;
+                self.broad.near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
+            })?;
             for place in near.into_iter().filter(|place| !ways.paths.contains_key(place)) {
                 let Some(other) = self.instances.get(place as usize).and_then(Option::as_ref) else {
                     continue;
@@ -210,9 +223,15 @@ impl Scene {
                 let pair = [one, other].map(|of| (of.place, of.instance, of.slices.as_slice()));
                 encounters.extend(self.encounter(pair, ways));
             }
+            if encounters.len() >= MAX_KNOWN_PAIRS || number + 1 == moving.len() {
+                encounters.sort_unstable_by_key(|encounter| (encounter.slice, encounter.a, encounter.b));
+                if visit(&encounters)?.is_break() {
+                    break;
+                }
+                encounters.clear();
+            }
         }
-        encounters.sort_unstable_by_key(|encounter| (encounter.slice, encounter.a, encounter.b));
-        encounters
+        Ok(())
     }
 
     /// Returns a moving instance with its boxes.
@@ -241,39 +260,47 @@ impl Scene {
         if !one.groups.meet(other.groups) || one.allows(b) {
             return None;
         }
-        let tolerance = tolerance(one.shape.objects(), other.shape.objects(), ways.options);
+        let tolerance = tolerance(one.size.max(other.size), ways.options);
         let limit = (ways.options.clearance + tolerance).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
         let slice = slices.iter().zip(others).position(is_near);
         slice.map(|slice| Encounter { slice, a, b })
     }
 
-    /// Asks about each pair with the path of B in A's frame.
+    /// Asks about each pair with the path of B in A's frame, and calls `adopt` with the answers about a piece of them, until it
+    /// breaks.
     fn each_way<R: Send>(
         &mut self,
-        encounters: &[Encounter],
         ways: &Ways<'_>,
         ask: impl Fn(&mut Querier, ScenePair, Shape<'_>, Shape<'_>, &dyn Path) -> Result<Option<R>, QueryError>
         + Sync,
-    ) -> Result<Vec<R>, SceneError> {
-        let mut stats = self.stats;
+        mut adopt: impl FnMut(Vec<R>) -> ControlFlow<()>,
+    ) -> Result<(), SceneError> {
+        let (mut stats, mut pairs_asked) = (self.stats, 0);
         let scene = &*self;
-        let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
-            let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
-            let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
-            let (shape_a, shape_b) = (one.shape.opened()?, other.shape.opened()?);
-            let pair = ScenePair { a: one.id(a), b: other.id(b) };
-            ask(querier, pair, shape_a.shape(), shape_b.shape(), &path)
+        let asked = scene.each_piece_of_encounters(ways, |encounters| {
+            pairs_asked += encounters.len() as u64;
+            let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
+                let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
+                let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
+                let (shape_a, shape_b) = (one.shape.opened()?, other.shape.opened()?);
+                let pair = ScenePair { a: one.id(a), b: other.id(b) };
+                let (a, b) = (shape_a.shape(), shape_b.shape());
+                scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, &path))
+            });
+            let found = found.map_err(|(number, source)| {
+                let Encounter { a, b, .. } = encounters[number];
+                match scene.instances_at(a, b) {
+                    Some((one, other)) => {
+                        scene.pair_error(ScenePair { a: one.id(a), b: other.id(b) }, source)
+                    }
+                    None => source.into(),
+                }
+            })?;
+            Ok(adopt(found))
         });
-        self.stats = stats;
-        self.pairs_asked = encounters.len() as u64;
-        found.map_err(|(number, source)| {
-            let Encounter { a, b, .. } = encounters[number];
-            match self.instances_at(a, b) {
-                Some((one, other)) => self.pair_error(ScenePair { a: one.id(a), b: other.id(b) }, source),
-                None => source.into(),
-            }
-        })
+        (self.stats, self.pairs_asked) = (stats, pairs_asked);
+        asked
     }
 }
 
@@ -294,27 +321,70 @@ impl Ways<'_> {
     }
 }
 
-/// Puts the answers about pairs together; pairs that are free are not among them.
-fn together(answers: &[(ScenePair, MotionAnswer)]) -> SceneMotion {
-    let (mut free, mut hit, mut near) = (f64::INFINITY, None, None);
-    for &(pair, answer) in answers {
-        let of = |time: f64, distance| (time, SceneDistance { pair, distance });
-        let (free_until, found, first) = match answer {
-            MotionAnswer::Free => continue,
-            MotionAnswer::Hit { free_until, touching_at, contact } => {
-                (free_until, of(touching_at, contact), &mut hit)
-            }
-            MotionAnswer::Near { free_until, at, distance } => (free_until, of(at, distance), &mut near),
-        };
-        free = free.min(free_until);
-        let order = |&(time, ref distance): &(f64, SceneDistance)| (time, distance.pair);
-        if first.as_ref().is_none_or(|first| order(&found) < order(first)) {
-            *first = Some(found);
-        }
+/// The answers about pairs so far, put together; pairs that are free add nothing.
+struct Together {
+    free_until: f64,
+    /// The earliest, with its time, and of equally early ones the first pair.
+    hit: Option<(f64, SceneDistance)>,
+    near: Option<(f64, SceneDistance)>,
+    /// In ascending order of the pairs; each search ended earlier than those of all pairs before.
+    errors: Vec<(ScenePair, EndedByError)>,
+}
+
+impl Default for Together {
+    fn default() -> Self {
+        Self { free_until: f64::INFINITY, hit: None, near: None, errors: Vec::new() }
     }
-    match (hit, near) {
-        (Some((touching_at, contact)), _) => SceneMotion::Hit { free_until: free, touching_at, contact },
-        (None, Some((at, distance))) => SceneMotion::Near { free_until: free, at, distance },
-        (None, None) => SceneMotion::Free,
+}
+
+impl Together {
+    fn add(&mut self, answers: Vec<(ScenePair, Result<MotionAnswer, EndedByError>)>) {
+        for (pair, answer) in answers {
+            let of = |time: f64, distance| (time, SceneDistance { pair, distance });
+            let (free_until, found, first) = match answer {
+                Ok(MotionAnswer::Free) => continue,
+                Ok(MotionAnswer::Hit { free_until, touching_at, contact }) => {
+                    (free_until, of(touching_at, contact), &mut self.hit)
+                }
+                Ok(MotionAnswer::Near { free_until, at, distance }) => {
+                    (free_until, of(at, distance), &mut self.near)
+                }
+                Err(ended) => {
+                    self.errors.push((pair, ended));
+                    continue;
+                }
+            };
+            self.free_until = self.free_until.min(free_until);
+            let order = |&(time, ref distance): &(f64, SceneDistance)| (time, distance.pair);
+            if first.as_ref().is_none_or(|first| order(&found) < order(first)) {
+                *first = Some(found);
+            }
+        }
+        // Which of the errors is the answer depends on the earliest hit. None is where an earlier pair ended no later.
+        self.errors.sort_unstable_by_key(|(pair, _)| *pair);
+        let mut ended_at = f64::INFINITY;
+        self.errors.retain(|(_, ended)| {
+            let is_earlier = ended.decided_until < ended_at;
+            ended_at = ended_at.min(ended.decided_until);
+            is_earlier
+        });
+    }
+
+    /// Takes the error of the first pair that has no answer before the earliest hit. Errors after that do not matter: searches
+    /// may end there before they meet them.
+    fn first_error(&mut self) -> Option<(ScenePair, QueryError)> {
+        let last = self.hit.as_ref().map_or(f64::INFINITY, |(time, _)| *time);
+        let first = self.errors.iter().position(|(_, ended)| ended.decided_until <= last)?;
+        let (pair, ended) = self.errors.swap_remove(first);
+        Some((pair, ended.error))
+    }
+
+    fn answer(&self) -> SceneMotion {
+        let free_until = self.free_until;
+        match (self.hit, self.near) {
+            (Some((touching_at, contact)), _) => SceneMotion::Hit { free_until, touching_at, contact },
+            (None, Some((at, distance))) => SceneMotion::Near { free_until, at, distance },
+            (None, None) => SceneMotion::Free,
+        }
     }
 }

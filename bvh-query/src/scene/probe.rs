@@ -244,7 +244,7 @@ impl Asked<'_> {
     ) -> Result<(), SceneError> {
         let Self { scene, querier } = self;
         let mut order = scene.broad.by_key(&key);
-        while let Some((place, key)) = order.next(&scene.broad) {
+        while let Some((place, key)) = order.next(&scene.broad, || querier.charge_visit())? {
             let Some(instance) = scene.instances.get(place as usize).and_then(Option::as_ref) else {
                 continue;
             };

@@ -10,6 +10,7 @@ use crate::query::tracker::Tracker;
 use crate::scene::broad_phase::NearestFirst;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::{Scene, SceneError};
+use crate::traverse::walk_memory::Budget;
 use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -45,6 +46,18 @@ pub struct SceneDistance {
     pub distance: Distance,
 }
 
+/// How many pairs of a question are known at a time: 1.5 MiB of them. If more are near each other, the pairs of one instance
+/// after the other are found, until so many are known, and asked about before the next.
+pub(super) const MAX_KNOWN_PAIRS: usize = 1 << 16;
+
+/// Which pairs of a question are found next.
+enum Next {
+    /// All of them, unless they are too many.
+    All,
+    /// Those of which A is in this place or a later one.
+    From(u32),
+}
+
 /// A pair to ask about: places of instances, and the square of a lower bound of the distance.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
@@ -78,6 +91,12 @@ impl PlacedPair<'_> {
             None => querier.within(self.a, self.b, &self.pose, d),
         }
     }
+}
+
+/// Sorts candidates by the gaps of their boxes.
+fn nearest_first(candidates: &mut [Candidate]) {
+    candidates
+        .sort_unstable_by(|x, y| x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b))));
 }
 
 impl Candidate {
@@ -130,8 +149,7 @@ impl Scene {
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
     pub fn relations(&mut self) -> Result<Vec<(ScenePair, Relation)>, SceneError> {
-        let candidates = self.near(0.0);
-        self.each(&candidates, |querier, pair| {
+        self.each_near(0.0, |querier, pair| {
             let relation = querier.relation(pair.a, pair.b, &pair.pose)?;
             Ok((relation != Relation::Apart).then_some((pair.ids, relation)))
         })
@@ -142,8 +160,7 @@ impl Scene {
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`].
     pub fn contacts(&mut self) -> Result<Vec<SceneContact>, SceneError> {
-        let candidates = self.near(0.0);
-        let of_pairs = self.each(&candidates, |querier, pair| {
+        let of_pairs = self.each_near(0.0, |querier, pair| {
             let contacts = querier.contacts(pair.a, pair.b, &pair.pose)?;
             Ok((!contacts.is_empty()).then_some((pair.ids, contacts)))
         })?;
@@ -164,16 +181,17 @@ impl Scene {
         mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
         check_distance(d)?;
-        let candidates = self.near(d);
-        self.remember(&candidates);
-        for candidate in candidates {
-            let found =
-                self.each(&[candidate], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
-            if found.into_iter().any(|pair| visit(pair).is_break()) {
-                break;
+        self.each_piece(d, |scene, candidates| {
+            scene.remember(&candidates);
+            for candidate in candidates {
+                let found = scene
+                    .each(&[candidate], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
+                if found.into_iter().any(|pair| visit(pair).is_break()) {
+                    return Ok(ControlFlow::Break(()));
+                }
             }
-        }
-        Ok(())
+            Ok(ControlFlow::Continue(()))
+        })
     }
 
     /// Calls `visit` with each pair of instances that touch and its pairs of triangles in contact, in ascending order of the
@@ -185,16 +203,18 @@ impl Scene {
         &mut self,
         mut visit: impl FnMut(ScenePair, &[Contact]) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
-        for candidate in self.near(0.0) {
-            let found = self.each(&[candidate], |querier, pair| {
-                Ok(Some((pair.ids, querier.contacts(pair.a, pair.b, &pair.pose)?)))
-            })?;
-            let mut touching = found.iter().filter(|(_, contacts)| !contacts.is_empty());
-            if touching.any(|(pair, contacts)| visit(*pair, contacts).is_break()) {
-                break;
+        self.each_piece(0.0, |scene, candidates| {
+            for candidate in candidates {
+                let found = scene.each(&[candidate], |querier, pair| {
+                    Ok(Some((pair.ids, querier.contacts(pair.a, pair.b, &pair.pose)?)))
+                })?;
+                let mut touching = found.iter().filter(|(_, contacts)| !contacts.is_empty());
+                if touching.any(|(pair, contacts)| visit(*pair, contacts).is_break()) {
+                    return Ok(ControlFlow::Break(()));
+                }
             }
-        }
-        Ok(())
+            Ok(ControlFlow::Continue(()))
+        })
     }
 
     /// Returns the nearest pair and its distance; `None` if there are no pairs.
@@ -207,32 +227,51 @@ impl Scene {
         let mut nearest = None;
         // The pair that was nearest in the last question is likely to be near. Else the one with the nearest boxes is, and a
         // distance says how near other boxes have to be.
-        if let Some(first) = self.likely_candidate().or_else(|| self.nearest_boxes()) {
+        let first = match self.likely_candidate() {
+            None => self.nearest_boxes()?,
+            likely => likely,
+        };
+        if let Some(first) = first {
             self.improve(&mut nearest, &[first])?;
         }
-        let mut candidates = nearest.map_or(Vec::new(), |held| self.collect(held.distance.upper));
-        candidates.sort_unstable_by(|x, y| {
-            x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b)))
-        });
-        for run in candidates.chunks(self.workers.threads()) {
-            if nearest.is_some_and(|held| run[0].squared_gap > held.distance.upper.powi(2)) {
-                break;
+        let mut next = Next::All;
+        let limit =
+            |nearest: &Option<SceneDistance>| nearest.map_or(f64::INFINITY, |held| held.distance.upper);
+        while let Some(mut candidates) = self.next_piece(&mut next, limit(&nearest))? {
+            nearest_first(&mut candidates);
+            for run in candidates.chunks(self.workers.threads()) {
+                if run[0].squared_gap > limit(&nearest).powi(2) {
+                    break;
+                }
+                self.improve(&mut nearest, run)?;
             }
-            self.improve(&mut nearest, run)?;
         }
         self.likely = nearest.map(|held| (held.pair.a.place, held.pair.b.place));
         Ok(nearest)
     }
 
-    /// Returns the pair asked about whose boxes are nearest.
-    fn nearest_boxes(&self) -> Option<Candidate> {
+    /// Returns the pair asked about whose boxes are nearest, unless finding it takes too much memory.
+    fn nearest_boxes(&self) -> Result<Option<Candidate>, SceneError> {
         let mut order = NearestFirst::new(&self.broad);
-        while let Some((x, y, squared_gap)) = order.next(&self.broad) {
-            if let Some(candidate) = self.candidate(x, y, squared_gap) {
-                return Some(candidate);
+        self.charged(|budget| {
+            while let Some((x, y, squared_gap)) = order.next(&self.broad, budget)? {
+                if let Some(candidate) = self.candidate(x, y, squared_gap) {
+                    return Ok(Some(candidate));
+                }
             }
-        }
-        None
+            Ok(None)
+        })
+    }
+
+    /// Searches the broad phase and charges the question for it.
+    pub(super) fn charged<R>(
+        &self,
+        search: impl FnOnce(&mut Budget) -> Result<R, QueryError>,
+    ) -> Result<R, SceneError> {
+        let mut budget = self.workers.rest();
+        let found = search(&mut budget);
+        self.workers.charge(budget.made())?;
+        Ok(found?)
     }
 
     /// Adopts the least distance of candidates, if it is less than the one held, or as little and of an earlier pair.
@@ -275,13 +314,20 @@ impl Scene {
         {
             return Ok(true);
         }
-        // The nearest boxes are the likeliest.
-        let mut candidates = self.collect(limit);
-        candidates.retain(|candidate| likely.is_none_or(|likely| !candidate.is_of(&likely)));
-        candidates.sort_unstable_by(|x, y| {
-            x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b)))
-        });
-        self.any_of(&candidates, &ask)
+        let (mut next, mut first_error) = (Next::All, None);
+        while let Some(mut candidates) = self.next_piece(&mut next, limit)? {
+            candidates.retain(|candidate| likely.is_none_or(|likely| !candidate.is_of(&likely)));
+            // The nearest boxes are the likeliest.
+            nearest_first(&mut candidates);
+            match self.any_of(&candidates, &ask) {
+                Ok(false) => {}
+                Ok(true) => return Ok(true),
+                // Where no visits are left, none of the other pairs has an answer.
+                Err(error) if self.workers.rest().left() == 0 => return Err(error),
+                Err(error) => first_error = first_error.or(Some(error)),
+            }
+        }
+        first_error.map_or(Ok(false), Err)
     }
 
     /// Asks candidates until one says yes. Where one says yes, an error about another does not matter.
@@ -290,15 +336,16 @@ impl Scene {
         candidates: &[Candidate],
         ask: &(impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
     ) -> Result<bool, SceneError> {
-        let is_found = AtomicBool::new(false);
+        // By a pair that says yes, or because no visits are left.
+        let is_decided = AtomicBool::new(false);
         self.remember(candidates);
         let answers = self.each(candidates, |querier, pair| {
-            if is_found.load(Ordering::Relaxed) {
+            if is_decided.load(Ordering::Relaxed) {
                 return Ok(None);
             }
             let answer = ask(querier, pair);
-            if answer == Ok(true) {
-                is_found.store(true, Ordering::Relaxed);
+            if matches!(answer, Ok(true) | Err(QueryError::Budget { .. })) {
+                is_decided.store(true, Ordering::Relaxed);
             }
             Ok((answer != Ok(false)).then_some((pair.ids, answer)))
         })?;
@@ -318,24 +365,90 @@ impl Scene {
         limit: f64,
         ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<Vec<ScenePair>, SceneError> {
-        let candidates = self.near(limit);
-        self.remember(&candidates);
-        self.each(&candidates, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))
+        let mut all = Vec::new();
+        self.each_piece(limit, |scene, candidates| {
+            scene.remember(&candidates);
+            all.extend(scene.each(&candidates, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))?);
+            Ok(ControlFlow::Continue(()))
+        })?;
+        Ok(all)
     }
 
-    /// Starts a question, and returns the pairs asked about whose boxes are at most `limit` apart, in ascending order.
-    fn near(&mut self, limit: f64) -> Vec<Candidate> {
+    /// Starts a question, and asks about all pairs at most `limit` apart, in ascending order.
+    fn each_near<R: Send>(
+        &mut self,
+        limit: f64,
+        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
+    ) -> Result<Vec<R>, SceneError> {
+        let mut all = Vec::new();
+        self.each_piece(limit, |scene, candidates| {
+            all.extend(scene.each(&candidates, &ask)?);
+            Ok(ControlFlow::Continue(()))
+        })?;
+        Ok(all)
+    }
+
+    /// Starts a question, and calls `visit` with the pairs asked about whose boxes are at most `limit` apart, in ascending
+    /// order, so many at a time as are known, until it breaks.
+    fn each_piece(
+        &mut self,
+        limit: f64,
+        mut visit: impl FnMut(&mut Self, Vec<Candidate>) -> Result<ControlFlow<()>, SceneError>,
+    ) -> Result<(), SceneError> {
         self.start();
-        let mut candidates = self.collect(limit);
-        candidates.sort_unstable_by_key(|candidate| (candidate.a, candidate.b));
-        candidates
+        let mut next = Next::All;
+        while let Some(mut candidates) = self.next_piece(&mut next, limit)? {
+            candidates.sort_unstable_by_key(|candidate| (candidate.a, candidate.b));
+            if visit(self, candidates)?.is_break() {
+                break;
+            }
+        }
+        Ok(())
     }
 
-    /// Returns the pairs asked about whose boxes are at most `limit` apart.
-    fn collect(&self, limit: f64) -> Vec<Candidate> {
+    /// Returns the next pairs asked about whose boxes are at most `limit` apart, in any order: all of them, unless they are too
+    /// many. Each piece comes before the next one in the order of the pairs.
+    fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<Candidate>>, SceneError> {
         let mut candidates = Vec::new();
-        self.broad.pairs(limit, |x, y, squared_gap| candidates.extend(self.candidate(x, y, squared_gap)));
-        candidates
+        let places = self.instances.len() as u32;
+        self.charged(|budget| {
+            if matches!(next, Next::All) {
+                let all = self.broad.pairs(limit, budget, |x, y, squared_gap| {
+                    if candidates.len() == MAX_KNOWN_PAIRS {
+                        return ControlFlow::Break(());
+                    }
+                    candidates.extend(self.candidate(x, y, squared_gap));
+                    ControlFlow::Continue(())
+                })?;
+                if all.is_continue() {
+                    *next = Next::From(places);
+                    return Ok(());
+                }
+                *next = Next::From(0);
+                candidates.clear();
+            }
+            while let Next::From(place) = next
+                && *place < places
+                && candidates.len() < MAX_KNOWN_PAIRS
+            {
+                let a = *place;
+                *place += 1;
+                let Some(one) = &self.instances[a as usize] else { continue };
+                self.broad.near(
+                    &one.bounds,
+                    one.groups,
+                    |_| limit,
+                    budget,
+                    |b, squared_gap| {
+                        if b > a {
+                            candidates.extend(self.candidate(a, b, squared_gap));
+                        }
+                    },
+                )?;
+            }
+            Ok(())
+        })?;
+        Ok((!candidates.is_empty()).then_some(candidates))
     }
 
     /// Returns a pair of places in order, unless it may touch.
@@ -374,7 +487,8 @@ impl Scene {
             let before = querier.questions();
             let (a, b) = (a.shape.opened()?, b.shape.opened()?);
             let tracker = scene.trackers.get((candidate.a, candidate.b));
-            let answer = ask(querier, &mut PlacedPair { ids, a: &a, b: &b, pose, tracker });
+            let pair = &mut PlacedPair { ids, a: &a, b: &b, pose, tracker };
+            let answer = scene.workers.ask_rest(querier, |querier| ask(querier, pair));
             asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
             answer
         });

@@ -8,6 +8,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// How many trackers are kept for pairs that are no longer asked about, before they are let go.
 const MOST_IDLE: usize = 1024;
 
+/// How many pairs of a question have trackers at most: some 20 MiB of them.
+const MOST_TRACKED: usize = 1 << 14;
+
 /// A tracker for each pair of places, in scenes that want them.
 #[derive(Default)]
 pub(super) struct Trackers {
@@ -49,12 +52,15 @@ impl Trackers {
         self.asked = 0;
     }
 
-    /// Makes a tracker for each pair that the question is about and that has none.
+    /// Makes a tracker for each pair that the question is about and that has none, as long as they are not too many.
     pub(super) fn expect(&mut self, pairs: impl Iterator<Item = (u32, u32)>) {
         if !self.on {
             return;
         }
         for pair in pairs {
+            if self.asked >= MOST_TRACKED {
+                return;
+            }
             let asked = &mut self.of.entry(pair).or_default().0;
             self.asked += usize::from(*asked != self.questions);
             *asked = self.questions;

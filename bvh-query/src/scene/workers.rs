@@ -4,13 +4,17 @@ use crate::error::QueryError;
 use crate::isa::Backend;
 use crate::query::answers::QueryStats;
 use crate::query::querier::Querier;
+use crate::traverse::walk_memory::Budget;
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Queriers that keep their memory from question to question.
 pub(super) struct Workers {
     backend: Backend,
     pub(super) budget: u64,
+    /// How many visits the question may still make, over all its pairs and on all threads.
+    left: AtomicU64,
     #[cfg(feature = "parallel")]
     pub(super) parallel: bool,
     idle: Mutex<Vec<Querier>>,
@@ -22,6 +26,7 @@ impl Clone for Workers {
         Self {
             backend: self.backend,
             budget: self.budget,
+            left: AtomicU64::new(self.budget),
             #[cfg(feature = "parallel")]
             parallel: self.parallel,
             idle: Mutex::default(),
@@ -40,6 +45,7 @@ impl Workers {
         Self {
             backend,
             budget: u64::MAX,
+            left: AtomicU64::new(u64::MAX),
             #[cfg(feature = "parallel")]
             parallel: false,
             idle: Mutex::default(),
@@ -53,6 +59,40 @@ impl Workers {
             return rayon::current_num_threads();
         }
         1
+    }
+
+    /// Starts a question.
+    pub(super) fn start(&mut self) {
+        *self.left.get_mut() = self.budget;
+    }
+
+    /// Returns what is left of the budget of the question.
+    pub(super) fn rest(&self) -> Budget {
+        Budget::new(self.budget).rest(self.left.load(Ordering::Relaxed))
+    }
+
+    /// Charges visits to the question.
+    pub(super) fn charge(&self, visits: u64) -> Result<(), QueryError> {
+        let take = |left: u64| Some(left.saturating_sub(visits));
+        // Nothing else is read that depends on it. The update never fails.
+        let left = self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).unwrap_or_default();
+        if visits <= left { Ok(()) } else { Err(self.rest().error()) }
+    }
+
+    /// Asks one of several queries of the question, which may make the visits that are left and is charged those it made.
+    /// Queries that other threads ask at the same time may together make more, and then one of them fails.
+    pub(super) fn ask_rest<R>(
+        &self,
+        querier: &mut Querier,
+        ask: impl FnOnce(&mut Querier) -> Result<R, QueryError>,
+    ) -> Result<R, QueryError> {
+        querier.set_rest(self.rest());
+        let questions = querier.questions();
+        let answer = ask(querier);
+        if querier.questions() != questions {
+            self.charge(querier.visits())?;
+        }
+        answer
     }
 
     /// Lends a querier to `work`.

@@ -19,6 +19,7 @@ use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::node_cache::{Opened, leaf_at, leaf_lanes, max_nodes, open_child, spread, too_many};
+use crate::traverse::walk_memory::Budget;
 use bvh_format::object::Object;
 use bvh_format::slabs::Group;
 use bvh_format::treelet::Links;
@@ -125,9 +126,7 @@ pub(crate) struct ProbeWalk<'a, V> {
     pub(crate) bvh: &'a Bvh,
     pub(crate) object: &'a Object,
     pub(crate) stack: &'a mut ProbeStack,
-    /// The visits that may still be made.
-    pub(crate) left: &'a mut u64,
-    pub(crate) budget: u64,
+    pub(crate) budget: &'a mut Budget,
     pub(crate) visitor: &'a mut V,
 }
 
@@ -137,7 +136,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let Self { bvh, object, stack, left, budget, visitor } = self;
+        let Self { bvh, object, stack, budget, visitor } = self;
         stack.start(isa, bvh, object)?;
         let (parts, max_nodes) = (object.profile().groups(), max_nodes(object));
         let (mut opened, mut depth) = (0, 1);
@@ -183,8 +182,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
                 inner |= near & !are_leaves;
                 leaves |= (near & are_leaves) << (4 * part);
             }
-            let visits = 1 + u64::from(leaves.count_ones());
-            *left = left.checked_sub(visits).ok_or(QueryError::Budget { visits: budget })?;
+            budget.charge(1 + u64::from(leaves.count_ones()))?;
             while leaves != 0 {
                 let (mut near, mut count) = ([LeafPacket { page, packet: 0, triangles: 0 }; 4], 0);
                 while leaves != 0 && count < 4 {

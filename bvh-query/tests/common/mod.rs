@@ -4,6 +4,7 @@
 
 pub(crate) mod asked;
 pub(crate) mod exact;
+pub(crate) mod forged;
 pub(crate) mod nearest;
 pub(crate) mod shapes;
 pub(crate) mod truth;

@@ -172,7 +172,10 @@ fn what_no_instance_can_answer_is_an_error() {
     assert!(matches!(scene.closest_points(&[], -1.0), Err(SceneError::Query(_))));
     assert!(matches!(scene.first_hits(&[Ray::new([0.0; 3], [0.0; 3])]), Err(SceneError::Query(_))));
     assert_eq!(scene.closest_points(&[], 1.0), Ok(vec![]));
+    // The broad phase looks at a box on each level of its tree, before there is an instance to ask.
     scene.set_budget(1);
+    assert!(matches!(scene.closest_points(&[[0.0; 3]], 9.0), Err(SceneError::Query(_))));
+    scene.set_budget(5);
     assert!(matches!(scene.closest_points(&[[0.0; 3]], 9.0), Err(SceneError::Instance { .. })));
     let mut empty = Scene::with_backend(Backend::Scalar);
     assert_eq!(empty.closest_points(&[[0.0; 3]], f64::INFINITY), Ok(vec![None]));

@@ -19,7 +19,7 @@ mod question;
 mod search;
 mod sweep;
 
-pub(crate) use question::{radius, tolerance};
+pub(crate) use question::{radius, size, tolerance};
 pub(crate) use search::Earliest;
 
 use crate::error::QueryError;
@@ -145,8 +145,9 @@ impl Querier {
         earliest: &Earliest,
     ) -> Result<MotionAnswer, EndedByError> {
         let at_start = |error| EndedByError { decided_until: 0.0, error };
-        let question = Question::new(a, b, path, options).map_err(at_start)?;
         self.start();
+        self.look_at_objects(a).and_then(|()| self.look_at_objects(b)).map_err(at_start)?;
+        let question = Question::new(a, b, path, options).map_err(at_start)?;
         let mut search = TimeSearch::new(self, &question);
         let outcome = search.first(earliest);
         let decided_until = search.decided_until;
@@ -181,8 +182,11 @@ impl Querier {
         path: &dyn Path,
         options: &MotionOptions,
     ) -> Result<bool, QueryError> {
-        let question = Question::new(a.into(), b.into(), path, options)?;
+        let (a, b) = (a.into(), b.into());
         self.start();
+        self.look_at_objects(a)?;
+        self.look_at_objects(b)?;
+        let question = Question::new(a, b, path, options)?;
         TimeSearch::new(self, &question).is_free()
     }
 

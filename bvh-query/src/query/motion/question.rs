@@ -53,8 +53,9 @@ impl<'a> Question<'a> {
         options: &MotionOptions,
     ) -> Result<Self, QueryError> {
         options.check()?;
-        let (clearance, tolerance) = (options.clearance, tolerance(a.objects(), b.objects(), options));
-        Ok(Self { clearance, tolerance, ..Self::unchecked(a, b, path) })
+        let question = Self::unchecked(a, b, path);
+        let tolerance = tolerance(question.size, options);
+        Ok(Self { clearance: options.clearance, tolerance, ..question })
     }
 
     /// A question without clearance and tolerance.
@@ -104,9 +105,8 @@ impl<'a> Question<'a> {
     }
 }
 
-/// Returns the tolerance of a question about two shapes.
-pub(crate) fn tolerance(a: &[Object], b: &[Object], options: &MotionOptions) -> f64 {
-    let size = size(a).max(size(b));
+/// Returns the tolerance of a question about two shapes, given the larger of their sizes.
+pub(crate) fn tolerance(size: f64, options: &MotionOptions) -> f64 {
     // Two points have no diagonal.
     let default = if size > 0.0 { DEFAULT_TOLERANCE * size } else { DEFAULT_TOLERANCE };
     options.tolerance.unwrap_or(default)
@@ -126,7 +126,7 @@ pub(crate) fn radius(objects: &[Object]) -> f64 {
 }
 
 /// Returns the largest diagonal of the boxes of objects, in mesh units.
-fn size(objects: &[Object]) -> f64 {
+pub(crate) fn size(objects: &[Object]) -> f64 {
     let diagonal = |object: &Object| {
         let [lo, hi] = object.bounding_box();
         (0..3).map(|axis| (hi[axis] - lo[axis]).powi(2)).sum::<f64>().sqrt()

@@ -134,8 +134,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             if self.decided_until > earliest.time() {
                 break;
             }
-            self.querier.memory.visit()?;
-            let middle = self.question.middle(&interval.stretch);
+            let middle = self.middle(&interval.stretch)?;
             if self.is_cell(&middle) {
                 let start = interval.stretch.times[0];
                 match self.decide(&interval, &middle)? {
@@ -168,8 +167,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             let Some(mut interval) = (if spread { todo.pop_front() } else { todo.pop_back() }) else {
                 return Ok(true);
             };
-            self.querier.memory.visit()?;
-            let middle = self.question.middle(&interval.stretch);
+            let middle = self.middle(&interval.stretch)?;
             if self.is_cell(&middle) {
                 if !matches!(self.decide(&interval, &middle)?, Cell::Clear) {
                     return Ok(false);
@@ -193,6 +191,12 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     fn whole(&self) -> Interval {
         Interval { stretch: self.question.stretch(0.0, 1.0), depth: 0, ends_within: None, pairs: None }
+    }
+
+    /// Returns the middle of a stretch of time, which is charged: it takes a look at each object of B.
+    fn middle(&mut self, stretch: &Stretch) -> Result<Middle, QueryError> {
+        self.querier.memory.charge(self.question.b.objects().len() as u64)?;
+        Ok(self.question.middle(stretch))
     }
 
     fn is_cell(&self, middle: &Middle) -> bool {
@@ -260,7 +264,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     ) -> Result<(), QueryError> {
         let mut passed = Vec::new();
         loop {
-            let middle = self.question.middle(&interval.stretch);
+            let middle = self.middle(&interval.stretch)?;
             let is_fine = time.is_none() && middle.reach <= FINE * self.question.size;
             // An interval too deep to be halved is an error only when its turn comes.
             if is_fine || self.is_cell(&middle) || interval.depth == MAX_DEPTH {

@@ -93,13 +93,14 @@ impl Querier {
         question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
         for (index, object) in placed.shape.objects().iter().enumerate() {
+            self.memory.visit()?;
             let into = IntoObject::new(placed.pose.as_ref(), object);
             self.ask_line_of_object(placed, index, &into, question)?;
         }
         Ok(())
     }
 
-    /// Asks a question about a line and one object of a shape.
+    /// Asks a question about a line and one object of a shape, which the caller has charged.
     pub(super) fn ask_line_of_object(
         &mut self,
         placed: &PlacedShape<'_>,
@@ -107,7 +108,6 @@ impl Querier {
         into: &IntoObject,
         question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
-        self.memory.visit()?;
         if let Some(clipped) = Clipped::new(&question.line(), into, question.limit()) {
             let memory = &mut self.memory;
             let (tests, stats) = self.backend.run(AskObject { placed, index, clipped, question, memory })?;

@@ -67,21 +67,24 @@ impl Querier {
             let topology = bvh.topology(mesh.shape.first() + index)?;
             let mut is_known = true;
             for other in 0..container.shape.objects().len() {
+                self.memory.visit()?;
                 let number = container.shape.first() + other;
                 is_known &= container.shape.bvh().topology(number)?.closed || !may_contain(index, other);
             }
+            let mut listed = topology.components();
+            if !is_known {
+                components.undefined +=
+                    if listed.len() == 0 { object.triangles() } else { listed.len() as u64 };
+                continue;
+            }
             let mut ask = |place: TrianglePlace| -> Result<(), QueryError> {
-                if !is_known {
-                    components.undefined += 1;
-                    return Ok(());
-                }
                 let corner = stored_at(bvh, object, place)?[0];
                 let point = mesh.pose.map_or(corner, |pose| pose.place(corner));
                 components.count(self.side_of(container, &point, OpenObject::Empty)?);
                 Ok(())
             };
-            if topology.components().len() != 0 {
-                topology.components().try_for_each(|place| ask(bvh.triangle_place(object, place)?))?;
+            if listed.len() != 0 {
+                listed.try_for_each(|place| ask(bvh.triangle_place(object, place)?))?;
             } else {
                 each_triangle(bvh, object, ask)?;
             }
