@@ -3,7 +3,9 @@
 use crate::common::Random;
 use crate::common::shapes::{moved, on_lattice, outward, plate, sphere, torus};
 use crate::{place, shape};
-use bvh_query::{Backend, InstanceId, OwnedShape, Pose, Querier, Ray, Relation, Scene, SceneError, Side};
+use bvh_query::{
+    Backend, InstanceId, OwnedShape, Pose, Querier, QueryError, Ray, Relation, Scene, SceneError, Side,
+};
 use cbvh_testkit::depth::rounds;
 
 /// A scene of instances in random places, and the instances.
@@ -172,11 +174,14 @@ fn what_no_instance_can_answer_is_an_error() {
     assert!(matches!(scene.closest_points(&[], -1.0), Err(SceneError::Query(_))));
     assert!(matches!(scene.first_hits(&[Ray::new([0.0; 3], [0.0; 3])]), Err(SceneError::Query(_))));
     assert_eq!(scene.closest_points(&[], 1.0), Ok(vec![]));
-    // The broad phase looks at a box on each level of its tree, before there is an instance to ask.
-    scene.set_budget(1);
-    assert!(matches!(scene.closest_points(&[[0.0; 3]], 9.0), Err(SceneError::Query(_))));
-    scene.set_budget(5);
-    assert!(matches!(scene.closest_points(&[[0.0; 3]], 9.0), Err(SceneError::Instance { .. })));
+    // The broad phase looks at some boxes before there is an instance to ask.
+    let mut spent = |budget: u64| {
+        scene.set_budget(budget);
+        scene.closest_points(&[[0.0; 3]], 9.0).unwrap_err()
+    };
+    let source = QueryError::Budget { visits: 1 };
+    assert_eq!(spent(1), SceneError::Query(source));
+    assert!((2..20).map(spent).any(|error| matches!(error, SceneError::Instance { .. })));
     let mut empty = Scene::with_backend(Backend::Scalar);
     assert_eq!(empty.closest_points(&[[0.0; 3]], f64::INFINITY), Ok(vec![None]));
     assert_eq!(empty.sides(&[[0.0; 3]]), Ok(vec![Side::Outside]));
