@@ -536,11 +536,9 @@ fn pairs_in_pieces_are_all_pairs() {
     let count = 400;
     let (mut scene, ids, shape) = crowd(count);
     let mut querier = Querier::new().unwrap();
-    let (mut near, mut contacts, mut nearest): (
-        _,
-        Vec<(ScenePair, Vec<Contact>)>,
-        Option<(ScenePair, Distance)>,
-    ) = (Vec::new(), Vec::new(), None);
+    let mut near = Vec::new();
+    let mut contacts: Vec<(ScenePair, Vec<Contact>)> = Vec::new();
+    let mut nearest: Option<(ScenePair, Distance)> = None;
     let poses: Vec<Pose> = ids.iter().map(|id| *scene.pose(*id).unwrap()).collect();
     let d = 0.2503;
     for a in 0..count {
