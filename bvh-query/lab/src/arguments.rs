@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::search::Kind;
 use bvh_query::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -22,6 +23,8 @@ pub(crate) enum Experiment {
     Layouts(LayoutArguments),
     /// Count what one more slab per child, along a direction of its own, would save, and where the bytes of files are
     Slabs(SlabArguments),
+    /// Search for wrong answers for hours: pairs near the boundary of contact, and forged files
+    Search(SearchArguments),
 }
 
 /// Writes hard.md, hard.csv and hard.json. Each case is a pair of small meshes in a pose with an exactly known answer; it is
@@ -121,6 +124,31 @@ pub(crate) struct SlabArguments {
     #[arg(long, value_name = "N", default_value = "1000000",
           value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
     pub(crate) largest: u64,
+}
+
+/// Goes on where the record ends, and saves it at least once a minute, so that it may be killed at any time. Everything in a
+/// round follows from its kind and number. A wrong answer, a panic and a round of minutes are findings: they are shrunk,
+/// kept in the record, and end with exit code 1 at the end.
+#[derive(Debug, Args)]
+pub(crate) struct SearchArguments {
+    /// The record, a JSON file; made if it does not exist
+    #[arg(long, value_name = "FILE", default_value = "target/lab/search.json")]
+    pub(crate) record: PathBuf,
+    /// The time to search
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(crate) hours: f64,
+    /// The kinds of rounds, which share the time
+    #[arg(long, value_name = "KIND[,KIND...]", value_delimiter = ',', default_values = ["pairs"])]
+    pub(crate) kinds: Vec<Kind>,
+    /// The number of threads
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(crate) threads: usize,
+    /// The largest number of rounds of this run [default: as many as the time allows]
+    #[arg(long, value_name = "N")]
+    pub(crate) rounds: Option<u64>,
+    /// Run only this round of each kind again, without a record, and print what it finds
+    #[arg(long, value_name = "ROUND")]
+    pub(crate) again: Option<u64>,
 }
 
 fn backend(name: &str) -> Result<Backend, String> {

@@ -10,6 +10,7 @@ mod layouts;
 mod output;
 mod placed;
 mod scaling;
+mod search;
 mod slabs;
 mod tree;
 mod walk;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Experiment::Scaling(arguments) => scaling::run(arguments),
         Experiment::Layouts(arguments) => layouts::run(arguments),
         Experiment::Slabs(arguments) => slabs::run(arguments),
+        Experiment::Search(arguments) => search::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {
         Ok(()) => ExitCode::SUCCESS,
