@@ -138,7 +138,7 @@ pub(crate) struct SearchArguments {
     #[arg(long, value_name = "N", default_value = "1")]
     pub(crate) hours: f64,
     /// The kinds of rounds, which share the time
-    #[arg(long, value_name = "KIND[,KIND...]", value_delimiter = ',', default_values = ["pairs"])]
+    #[arg(long, value_name = "KIND[,KIND...]", value_delimiter = ',', default_values = ["pairs", "hostile", "probes", "motions"])]
     pub(crate) kinds: Vec<Kind>,
     /// The number of threads
     #[arg(long, value_name = "N", default_value = "1")]

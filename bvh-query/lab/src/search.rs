@@ -6,7 +6,11 @@
 
 mod exact;
 mod files;
+mod hostile;
+mod loosen;
+mod motions;
 mod pairs;
+mod probes;
 mod record;
 mod shrink;
 mod slow;
@@ -26,6 +30,12 @@ use std::time::{Duration, Instant};
 pub(crate) enum Kind {
     /// Pairs of triangles near the boundary of contact
     Pairs,
+    /// Files that a stranger may have made, valid ones with loose bounds among them
+    Hostile,
+    /// Points and segments that touch a mesh or almost do
+    Probes,
+    /// Motions into contact, past it and along it
+    Motions,
 }
 
 /// How often the record is saved.
@@ -39,6 +49,9 @@ impl Kind {
     fn name(self) -> &'static str {
         match self {
             Self::Pairs => "pairs",
+            Self::Hostile => "hostile",
+            Self::Probes => "probes",
+            Self::Motions => "motions",
         }
     }
 
@@ -46,12 +59,17 @@ impl Kind {
     fn share(self) -> f64 {
         match self {
             Self::Pairs => 12.0,
+            Self::Hostile => 4.0,
+            Self::Probes | Self::Motions => 1.0,
         }
     }
 
     fn round(self, seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Failure> {
         match self {
             Self::Pairs => pairs::round(seed, |querier, a, b, pose| querier.contacts(a, b, pose), counts),
+            Self::Hostile => hostile::round(seed, counts),
+            Self::Probes => probes::round(seed, counts),
+            Self::Motions => motions::round(seed, counts),
         }
     }
 

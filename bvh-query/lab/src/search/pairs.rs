@@ -324,3 +324,51 @@ fn differences(found: &[Contact], truth: &[Pair]) -> String {
     let (missed, invented) = (lacks(truth, &found), lacks(&found, truth));
     format!("contacts: {} of {}; missed {missed:?}, invented {invented:?}", found.len(), truth.len())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The library gives no wrong answers, so the tests make some: a contact is missed, or one is invented.
+    #[test]
+    fn planted_wrong_answers_are_found_and_shrunk_to_a_pair() {
+        let plants: [Contacts; 2] = [
+            |querier, a, b, pose| {
+                let mut contacts = querier.contacts(a, b, pose)?;
+                contacts.pop();
+                Ok(contacts)
+            },
+            |querier, a, b, pose| {
+                let mut contacts = querier.contacts(a, b, pose)?;
+                contacts.extend(contacts.last().copied());
+                Ok(contacts)
+            },
+        ];
+        for plant in plants {
+            let findings = round(3, plant, &mut Counts::default()).unwrap();
+            let [Finding { case: Some(case), wrong, .. }] = &findings[..] else { panic!("{findings:?}") };
+            assert!(wrong.starts_with("contacts: "), "{wrong}");
+            assert_eq!((case.a.len(), case.b.len()), (1, 1), "{case:?}");
+            assert_eq!(ask_again(case, plant).as_ref(), Some(wrong));
+            assert_eq!(ask_again(case, |querier, a, b, pose| querier.contacts(a, b, pose)), None);
+        }
+    }
+
+    /// Nearly all pairs that are counted are near the boundary, on either side of it.
+    #[test]
+    fn pairs_are_near_the_boundary() {
+        let mut counts = Counts::default();
+        for seed in 0..6 {
+            let findings =
+                round(seed, |querier, a, b, pose| querier.contacts(a, b, pose), &mut counts).unwrap();
+            assert!(findings.is_empty(), "{findings:?}");
+        }
+        let count = |name: &str| counts.0[name];
+        assert!(20 * count("sampled near the boundary") > 19 * count("sampled"), "{:?}", counts.0);
+        assert!(
+            count("contacts") * 5 > count("pairs") && count("contacts") * 5 < 4 * count("pairs"),
+            "{:?}",
+            counts.0
+        );
+    }
+}

@@ -53,8 +53,17 @@ pub(super) struct Finding {
     pub(super) wrong: String,
     /// The shrunk question about pairs.
     pub(super) case: Option<Case>,
-    /// The forged file, as hexadecimal digits.
-    pub(super) file: Option<String>,
+    /// The forged file that takes the place of one of the two.
+    pub(super) file: Option<Forged>,
+}
+
+/// A forged file.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Forged {
+    /// Whether it is A.
+    pub(super) is_a: bool,
+    /// Its bytes, as hexadecimal digits.
+    pub(super) hex: String,
 }
 
 impl Record {
