@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::lab;
+use common::{lab, names};
 use std::fs;
 
 #[test]
@@ -22,6 +22,7 @@ fn a_search_goes_on_where_its_record_ends() {
         assert!(counted > pairs && json["findings"].as_array().unwrap().is_empty());
         pairs = counted;
     }
+    assert_eq!(names(folder.path()), ["record.json"]);
     assert_eq!(json()["sessions"].as_array().unwrap().len(), 2);
     fs::write(&path, "[]").unwrap();
     let ended = lab(&["search", "--record", record]);

@@ -258,8 +258,7 @@ struct Asked<'a> {
 impl Asked<'_> {
     /// Returns the first wrong answer.
     fn wrong(&self, querier: &mut Querier, contacts: Contacts, depth: Depth) -> Option<String> {
-        self.answers(querier, contacts, depth)
-            .map_or_else(|error| Some(format!("refused: {error}")), |wrong| wrong)
+        self.answers(querier, contacts, depth).unwrap_or_else(|error| Some(format!("refused: {error}")))
     }
 
     fn answers(
