@@ -117,10 +117,7 @@ fn an_anchor_beyond_the_child_that_leads_to_it_is_refused() {
     for file in files() {
         let triangles = stored(&Bvh::from_bytes(file.clone()).unwrap());
         let profile = Loosened::of(&file).profile();
-        // Turning slabs are measured from boxes.
-        let (slabs, most) =
-            if profile.has_turning_slabs() { (3, 10) } else { (profile.directions().slabs(), 2) };
-        for _ in 0..rounds(most) {
+        for _ in 0..rounds(if profile.has_turning_slabs() { 10 } else { 2 }) {
             let mut loosened = Loosened::of(&file);
             let roots = loosened.remote_roots();
             if roots.is_empty() {
