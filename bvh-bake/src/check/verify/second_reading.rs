@@ -7,11 +7,11 @@
 //! that do not fit in memory, are read once.
 
 use super::VerifyError;
+use crate::error::Fault;
 use crate::input::gather::InputOrder;
 use crate::input::polygon::Cutter;
 use crate::input::{InputFile, MeshFormat};
 use crate::progress::Progress;
-use std::convert::Infallible;
 
 /// Bytes of memory per byte of a file: text, what the parser makes of it, triangles.
 const BYTES_PER_BYTE: u64 = 8;
@@ -60,10 +60,11 @@ impl SecondReading {
             for &arity in &mesh.face_arities {
                 let (polygon, after) = rest.split_at((arity as usize).min(rest.len()));
                 rest = after;
-                let Ok(()) = cutter.cut_polygon(polygon, |triangle| {
+                let cut = cutter.cut_polygon(polygon, |triangle| {
                     self.triangles.push(triangle.map(|place| polygon[place]));
-                    Ok::<_, Infallible>(())
+                    Ok::<_, Fault>(())
                 });
+                cut.ok()?;
             }
         }
         Some(())

@@ -2,7 +2,7 @@
 
 use super::Gatherer;
 use super::vertex_counter::Counter;
-use crate::error::Halt;
+use crate::error::{Fault, Halt};
 use crate::input::indexed::{FaceRun, IndexedFaces, LookedUp};
 use crate::input::names::Names;
 use crate::input::polygon::Cutter;
@@ -22,7 +22,7 @@ impl Gatherer<'_> {
     ) -> Result<(), Halt> {
         let first = self.names.len();
         for name in names.all() {
-            self.object(name.clone());
+            self.object(name.clone())?;
         }
         let mut counter = Counter::default();
         let mut last: Option<(usize, u32)> = None;
@@ -35,7 +35,7 @@ impl Gatherer<'_> {
                     self.add_vertices(first + object, counter.end_run());
                 }
                 last = Some(of);
-                let triangles = Triangles::of(runs, start, &positions);
+                let triangles = Triangles::of(runs, start, &positions)?;
                 start += runs.iter().map(|run| run.faces as usize * run.corners as usize).sum::<usize>();
                 let counts = self.counts_vertices();
                 let mut gather = || {
@@ -80,9 +80,9 @@ enum Triangles {
 
 impl Triangles {
     /// Returns the triangles of runs of faces. The first run starts at the place `start` of a window.
-    fn of(runs: &[FaceRun], start: usize, positions: &LookedUp) -> Self {
+    fn of(runs: &[FaceRun], start: usize, positions: &LookedUp) -> Result<Self, Fault> {
         if runs.iter().all(|run| run.corners == 3) {
-            return Self::Faces { start, count: runs.iter().map(|run| run.faces as usize).sum() };
+            return Ok(Self::Faces { start, count: runs.iter().map(|run| run.faces as usize).sum() });
         }
         let mut faces = Vec::new();
         let mut at = start;
@@ -99,17 +99,17 @@ impl Triangles {
                 polygon.extend((start..start + corners).map(|place| positions.at(place)));
                 let keep = |triangle: [usize; 3]| {
                     triangles.push(triangle.map(|corner| (start + corner) as u32));
-                    Ok::<_, std::convert::Infallible>(())
+                    Ok::<_, Fault>(())
                 };
-                let Ok(()) = cutter.cut_polygon(&polygon, keep);
+                cutter.cut_polygon(&polygon, keep)?;
             }
-            triangles
+            Ok(triangles)
         };
         if faces.len() < FACES_PER_TASK {
-            return Self::Cut(cut(&faces));
+            return Ok(Self::Cut(cut(&faces)?));
         }
-        let cut: Vec<Vec<[u32; 3]>> = faces.par_chunks(FACES_PER_TASK).map(cut).collect();
-        Self::Cut(cut.concat())
+        let cut: Result<Vec<Vec<[u32; 3]>>, Fault> = faces.par_chunks(FACES_PER_TASK).map(cut).collect();
+        Ok(Self::Cut(cut?.concat()))
     }
 
     fn count(&self) -> usize {

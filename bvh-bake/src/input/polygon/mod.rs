@@ -2,19 +2,31 @@
 //!
 //! A polygon is projected along the dominant axis of its Newell normal (Sutherland, Sproull and Schumacker 1974;
 //! Tampieri, Graphics Gems III). The projection drops a coordinate, so that nothing is rounded. Triangles need no cut.
-//! A quad is cut along the diagonal that lies inside it. Larger polygons are cut by ear clipping (`earcut`), because a
-//! fan would cover area outside a concave polygon. Ear clipping leaves out vertices that lie on an edge in projection.
+//! A quad is cut along the diagonal that lies inside it. Larger polygons are cut by ear clipping, by the crate `earcut` or,
+//! if they are long, in module `ears`, because a fan would cover area outside a concave polygon. Ear clipping leaves out vertices that lie on an edge in projection.
 //! If such a vertex lies off that edge in space, the triangle between the two is added.
 //!
 //! A polygon without area (its Newell normal is zero or not finite, or nothing is left to clip) becomes a fan, which
 //! keeps the points and segments of the polygon. A long polygon that crosses itself also becomes a fan: definitions of
 //! its inside differ, a fan covers every point that the polygon winds around, and clipping such polygons takes cubic
 //! time. The same input always gives the same triangles.
+//!
+//! A file decides how many corners its polygons have and where, and the worst of them would take time that grows with the
+//! square of their number. So the steps for a long polygon are limited per corner, which limits the time per byte of a
+//! file. Usual outlines, and combs of 32,000 teeth, take less than a quarter of the limit.
 
+mod ears;
+
+use crate::error::{Fault, Place};
 use earcut::Earcut;
+use ears::{OutOfSteps, Steps};
 
-/// The most corners of a polygon, because clipping takes up to quadratic time.
+/// The most corners of a polygon.
 pub(crate) const MAX_CORNERS: usize = 1 << 16;
+/// The most corners of a polygon that `earcut` cuts, which takes up to quadratic time and counts no steps.
+const MAX_UNCOUNTED: usize = 1 << 10;
+/// The most steps per corner of a longer polygon: tests of one edge or one corner against another.
+const STEPS_PER_CORNER: u64 = 1 << 10;
 /// The most corners of a polygon that is clipped even if it crosses itself.
 const MAX_TANGLED: usize = 256;
 /// The most visits of a long polygon to one point. A hole that is connected by a bridge takes two visits.
@@ -31,8 +43,8 @@ pub(crate) struct Cutter {
 
 impl Cutter {
     /// Cuts a polygon, given by the positions of its corners. Passes the triangles on one after the other, as places
-    /// among the corners.
-    pub(crate) fn cut_polygon<E>(
+    /// among the corners. A long polygon that takes too many steps is refused.
+    pub(crate) fn cut_polygon<E: From<Fault>>(
         &mut self,
         corners: &[[f64; 3]],
         mut give: impl FnMut([usize; 3]) -> Result<(), E>,
@@ -42,11 +54,21 @@ impl Cutter {
         }
         let polygon: Vec<u32> = (0..corners.len() as u32).collect();
         let mut triangles = Vec::new();
-        self.cut(corners, &polygon, &mut triangles);
+        self.cut(corners, &polygon, &mut triangles).map_err(|OutOfSteps| Fault::Limit {
+            place: Place::File,
+            most: STEPS_PER_CORNER,
+            what: "steps per corner to cut a face of more than 1024 corners into triangles (cut it into smaller faces)",
+        })?;
         triangles.into_iter().try_for_each(|triangle| give(triangle.map(|corner| corner as usize)))
     }
 
-    fn cut(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    fn cut(
+        &mut self,
+        positions: &[[f64; 3]],
+        polygon: &[u32],
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Result<(), OutOfSteps> {
+        let mut steps = Steps { left: STEPS_PER_CORNER * polygon.len().max(MAX_UNCOUNTED) as u64 };
         match *polygon {
             [] | [_] | [_, _] => {}
             [a, b, c] => triangles.push([a, b, c]),
@@ -61,13 +83,27 @@ impl Cutter {
                     triangles.extend([[a, b, c], [a, c, d]]);
                 }
             }
-            _ if polygon.len() > MAX_TANGLED && is_tangled(&self.flat) => fan(polygon, triangles),
-            _ => self.clip(positions, polygon, triangles),
+            _ if polygon.len() > MAX_TANGLED && is_tangled(&self.flat, &mut steps)? => {
+                fan(polygon, triangles);
+            }
+            _ if polygon.len() <= MAX_UNCOUNTED => {
+                self.earcut.earcut_slice::<u32>(&self.flat, &[], &mut self.ears);
+                self.keep_ears(positions, polygon, triangles);
+            }
+            _ => {
+                self.ears.clear();
+                if ears::clip(&self.flat, &mut steps, &mut self.ears)? {
+                    self.keep_ears(positions, polygon, triangles);
+                } else {
+                    fan(polygon, triangles);
+                }
+            }
         }
+        Ok(())
     }
 
-    fn clip(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
-        self.earcut.earcut_slice::<u32>(&self.flat, &[], &mut self.ears);
+    /// Turns ears into triangles of the polygon, and adds the corners that were left out.
+    fn keep_ears(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
         let ears = self.ears.as_chunks::<3>().0;
         // Ear clipping has a winding of its own. The polygon's winding is positive here, and the triangles must keep
         // it.
@@ -149,27 +185,51 @@ fn has_area([a, b, c]: [[f64; 3]; 3]) -> bool {
 }
 
 /// Returns whether two edges cross in their interiors, or whether more edges meet in one point than in any sensible
-/// polygon. Sweeps over the edges sorted by x, which usually takes n log n steps, and at worst one test per pair.
-fn is_tangled(flat: &[[f64; 2]]) -> bool {
+/// polygon. Compares the edges that overlap along one axis: the one along which fewer pairs do. That usually takes
+/// n log n steps.
+fn is_tangled(flat: &[[f64; 2]], steps: &mut Steps) -> Result<bool, OutOfSteps> {
     let mut points: Vec<[u64; 2]> = flat.iter().map(|point| point.map(|c| (c + 0.0).to_bits())).collect();
     points.sort_unstable();
     if points.windows(MAX_VISITS + 1).any(|visits| visits[0] == visits[MAX_VISITS]) {
-        return true;
+        return Ok(true);
     }
-    let mut edges: Vec<[[f64; 2]; 2]> = flat
-        .iter()
-        .zip(flat.iter().cycle().skip(1))
-        .map(|(&p, &q)| if p[0] <= q[0] { [p, q] } else { [q, p] })
-        .collect();
-    edges.sort_unstable_by(|a, b| a[0][0].total_cmp(&b[0][0]));
-    edges.iter().enumerate().any(|(place, &[a, b])| {
-        edges[place + 1..].iter().take_while(|other| other[0][0] < b[0]).any(|&[c, d]| {
-            a[1].min(b[1]) < c[1].max(d[1])
-                && c[1].min(d[1]) < a[1].max(b[1])
-                && doubled_area(a, b, c) * doubled_area(a, b, d) < 0.0
-                && doubled_area(c, d, a) * doubled_area(c, d, b) < 0.0
+    let along_x = Sweep::of(flat.iter().copied());
+    let along_y = Sweep::of(flat.iter().map(|&[x, y]| [y, x]));
+    let sweep = if along_x.pairs <= along_y.pairs { along_x } else { along_y };
+    steps.take(sweep.pairs)?;
+    Ok(sweep.finds_crossing())
+}
+
+/// The edges of a polygon, from their lower to their upper end along the first axis, sorted by the lower end.
+struct Sweep {
+    edges: Vec<[[f64; 2]; 2]>,
+    /// The pairs of edges that overlap along the first axis.
+    pairs: usize,
+}
+
+impl Sweep {
+    fn of(flat: impl Iterator<Item = [f64; 2]> + Clone) -> Self {
+        let next = flat.clone().cycle().skip(1);
+        let upwards = |(p, q): ([f64; 2], [f64; 2])| if p[0] <= q[0] { [p, q] } else { [q, p] };
+        let mut edges: Vec<[[f64; 2]; 2]> = flat.zip(next).map(upwards).collect();
+        edges.sort_unstable_by(|a, b| a[0][0].total_cmp(&b[0][0]));
+        let later = |(place, [_, b]): (usize, &[[f64; 2]; 2])| {
+            edges[place + 1..].partition_point(|other| other[0][0] < b[0])
+        };
+        let pairs = edges.iter().enumerate().map(later).sum();
+        Self { edges, pairs }
+    }
+
+    fn finds_crossing(&self) -> bool {
+        self.edges.iter().enumerate().any(|(place, &[a, b])| {
+            self.edges[place + 1..].iter().take_while(|other| other[0][0] < b[0]).any(|&[c, d]| {
+                a[1].min(b[1]) < c[1].max(d[1])
+                    && c[1].min(d[1]) < a[1].max(b[1])
+                    && doubled_area(a, b, c) * doubled_area(a, b, d) < 0.0
+                    && doubled_area(c, d, a) * doubled_area(c, d, b) < 0.0
+            })
         })
-    })
+    }
 }
 
 /// Returns twice the signed area of a flat triangle, which is positive if the triangle is counter-clockwise.
@@ -186,7 +246,7 @@ mod tests {
         let (mut cutter, mut triangles, mut rest) = (Cutter::default(), Vec::new(), corners);
         for &arity in arities {
             let (polygon, after) = rest.split_at(arity.min(rest.len()));
-            cutter.cut(positions, polygon, &mut triangles);
+            cutter.cut(positions, polygon, &mut triangles).unwrap();
             rest = after;
         }
         triangles
@@ -310,6 +370,101 @@ mod tests {
         let (_, triangles) = cut(&points, |[x, y]| [x, y, 0.0]);
         let (signed, unsigned) = areas(&points, &triangles);
         assert!((unsigned - shoelace(&points).abs()).abs() <= 1e-12 * unsigned, "{signed} {unsigned}");
+    }
+
+    /// Returns a comb with `teeth` teeth, whose edges all overlap along y.
+    fn comb(teeth: usize) -> Vec<[f64; 2]> {
+        let mut points = vec![[0.0, -1.0], [2.0 * teeth as f64, -1.0]];
+        for tooth in (0..teeth).rev() {
+            points.extend([[2.0 * tooth as f64 + 2.0, 0.0], [2.0 * tooth as f64 + 1.0, 1e4]]);
+        }
+        points.push([0.0, 0.0]);
+        points
+    }
+
+    /// Returns a strip of `corners` corners that is wound up `turns` times.
+    fn coil(corners: usize, turns: f64) -> Vec<[f64; 2]> {
+        let half = corners / 2;
+        let point = |i: usize| {
+            let (step, lift) = if i < half { (i, 0.0) } else { (2 * half - 1 - i, 0.5) };
+            let angle = std::f64::consts::TAU * turns * step as f64 / half as f64;
+            let radius = 2.0 + angle / std::f64::consts::TAU + lift;
+            [radius * angle.cos(), radius * angle.sin()]
+        };
+        (0..2 * half).map(point).collect()
+    }
+
+    /// Returns a square with square holes, each of which a bridge connects to the outline.
+    fn holes(count: usize) -> Vec<[f64; 2]> {
+        let width = 4.0 * count as f64;
+        let mut points = vec![[width, 0.0], [width, 8.0], [0.0, 8.0], [0.0, 0.0]];
+        for hole in 0..count {
+            let x = 4.0 * hole as f64 + 1.0;
+            points.extend([[x, 0.0], [x, 2.0], [x, 4.0], [x + 2.0, 4.0], [x + 2.0, 2.0], [x, 2.0], [x, 0.0]]);
+        }
+        points
+    }
+
+    /// Usual long polygons are far from the limit, and are covered exactly once.
+    #[test]
+    fn long_polygons_take_few_steps() {
+        let circle = |i: usize| {
+            let angle = std::f64::consts::TAU * i as f64 / 65_536.0;
+            [angle.cos(), angle.sin()]
+        };
+        let all = [
+            (0..65_536).map(circle).collect(),
+            comb(32_000),
+            coil(60_000, 10.0),
+            coil(3000, 3.0),
+            holes(9000),
+        ];
+        for (number, points) in all.iter().enumerate() {
+            let given = STEPS_PER_CORNER * points.len() as u64;
+            let mut steps = Steps { left: given };
+            assert_eq!(is_tangled(points, &mut steps), Ok(false), "{number}");
+            let mut ears = Vec::new();
+            assert_eq!(ears::clip(points, &mut steps, &mut ears), Ok(true), "{number}");
+            let taken = given - steps.left;
+            assert!(taken < given / 4, "polygon {number}: {taken} steps for {} corners", points.len());
+            let triangles = ears.as_chunks::<3>().0;
+            let (signed, unsigned) = areas(points, triangles);
+            let area = shoelace(points);
+            assert!((signed - area).abs() <= 1e-9 * area, "polygon {number}: {signed}, not {area}");
+            assert!((unsigned - area).abs() <= 1e-9 * area, "polygon {number}: {unsigned}, not {area}");
+        }
+    }
+
+    /// Polygons whose edges are all near each other along both axes, as hostile files have them.
+    #[test]
+    fn hostile_polygons_are_given_up() {
+        let corners = MAX_CORNERS;
+        // A strip that is folded to and fro between two lines, turned by 45 degrees.
+        let folded = |i: usize| {
+            let (step, lift) = if i < corners / 2 { (i, 0.0) } else { (corners - 1 - i, 0.5) };
+            let (x, y) = (step as f64, lift + if step.is_multiple_of(2) { 0.0 } else { 1e6 });
+            [x - y, x + y]
+        };
+        let square = |i: usize| {
+            let (step, lift) = if i < corners / 2 { (i, 0.0) } else { (corners - 1 - i, 0.25) };
+            let radius = (step / 4) as f64 + 2.0 + lift;
+            [[radius, -radius + 1.0], [radius, radius], [-radius, radius], [-radius, -radius]][step % 4]
+        };
+        let shapes: [Vec<[f64; 2]>; 2] =
+            [(0..corners).map(folded).collect(), (0..corners).map(square).collect()];
+        for (number, points) in shapes.iter().enumerate() {
+            let corners: Vec<[f64; 3]> = points.iter().map(|&[x, y]| [x, y, 0.0]).collect();
+            let given: Result<(), Fault> = Cutter::default().cut_polygon(&corners, |_| Ok(()));
+            assert!(matches!(given, Err(Fault::Limit { most: STEPS_PER_CORNER, .. })), "{number}: {given:?}");
+        }
+        // The same shapes are cut where they have fewer corners.
+        let short: Vec<[f64; 3]> = shapes[0][..900].iter().map(|&[x, y]| [x, y, 0.0]).collect();
+        let mut count = 0;
+        let given: Result<(), Fault> = Cutter::default().cut_polygon(&short, |_| {
+            count += 1;
+            Ok(())
+        });
+        assert!(given.is_ok() && count >= 898, "{given:?} {count}");
     }
 
     #[test]
