@@ -313,6 +313,82 @@ fn gltf_buffers_are_found_wherever_they_are() {
     }
 }
 
+/// Reads a file on a thread of its own, because a reader that waits for a pipe waits for ever.
+#[cfg(unix)]
+fn read_in_time(path: &Path) -> Result<Mesh, ReadError> {
+    let (send, receive) = std::sync::mpsc::channel();
+    let path = path.to_owned();
+    std::thread::spawn(move || send.send(read(&path)));
+    receive.recv_timeout(std::time::Duration::from_secs(60)).expect("the reader waits for ever")
+}
+
+#[cfg(unix)]
+#[test]
+fn gltf_names_lead_to_files_below_its_folder_only() {
+    use std::os::unix::fs::symlink;
+    let directory = tempfile::tempdir().unwrap();
+    let (outside, inside) = (directory.path().join("secret.bin"), directory.path().join("models"));
+    fs::create_dir_all(inside.join("sub")).unwrap();
+    fs::write(&outside, gltf_buffer()).unwrap();
+    fs::write(inside.join("sub/b.bin"), gltf_buffer()).unwrap();
+    symlink("../secret.bin", inside.join("link.bin")).unwrap();
+    symlink("..", inside.join("up")).unwrap();
+    symlink("/dev/zero", inside.join("zero.bin")).unwrap();
+    symlink("sub/b.bin", inside.join("inner.bin")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(inside.join("pipe")).status().unwrap().success());
+    let path = inside.join("a.gltf");
+    let read_with = |uri: &str| {
+        fs::write(&path, gltf(r#"{"mesh":0}"#, INDEXED, &format!(r#","uri":"{uri}""#))).unwrap();
+        read_in_time(&path)
+    };
+    for uri in ["sub/b.bin", "sub/../sub/b.bin", "sub%2fb.bin", "inner.bin", "up/models/sub/b.bin"] {
+        assert_eq!(read_with(uri).unwrap().triangle_count(), 1, "{uri}");
+    }
+    for uri in [
+        "../secret.bin",
+        "..%2fsecret.bin",
+        "%2e%2e/secret.bin",
+        "sub/../../secret.bin",
+        "link.bin",
+        "up/secret.bin",
+        "zero.bin",
+        outside.to_str().unwrap(),
+        "/dev/zero",
+        "file:///dev/zero",
+        "C:/secret.bin",
+        "C:secret.bin",
+        "sub/b.bin%00",
+    ] {
+        let error = read_with(uri).unwrap_err();
+        assert!(!error.is_system() && one_line(&error).contains("expected a "), "{uri}: {error}");
+    }
+    for uri in ["pipe", "sub", "..%5csecret.bin"] {
+        let error = read_with(uri).unwrap_err();
+        assert!(error.is_system(), "{uri}: {error}");
+    }
+}
+
+/// Textures, and the materials of OBJ files, are none of a reader's business.
+#[cfg(unix)]
+#[test]
+fn what_no_triangle_needs_is_not_opened() {
+    let directory = tempfile::tempdir().unwrap();
+    let pipe = directory.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let path = directory.path().join("a.obj");
+    fs::write(&path, format!("mtllib pipe\n{CORNERS}usemtl a\nmap_Kd pipe\nf 1 2 3\n")).unwrap();
+    assert_eq!(read_in_time(&path).unwrap().triangle_count(), 1);
+    fs::write(directory.path().join("b.bin"), gltf_buffer()).unwrap();
+    let path = directory.path().join("a.gltf");
+    let document = gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"b.bin""#);
+    // A third buffer, which no accessor of a triangle uses, and a texture.
+    let document =
+        document.replace(r#""data:;base64,"}"#, r#""data:;base64,"},{"byteLength":9,"uri":"pipe"}"#);
+    let document = document.replacen('{', r#"{"images":[{"uri":"pipe"}],"textures":[{"source":0}],"#, 1);
+    fs::write(&path, document).unwrap();
+    assert_eq!(read_in_time(&path).unwrap().triangle_count(), 1);
+}
+
 #[test]
 fn gltf_reads_sparse_accessors_strips_and_no_indices() {
     for (primitive, expected) in [
@@ -389,6 +465,43 @@ fn the_format_is_told_by_name_or_content() {
     assert!(read(directory.path()).unwrap_err().is_system());
     let error = at("b.obj", b"v 0 0").unwrap_err();
     assert!(matches!(error, ReadError::Invalid { place: Place::Line(1), .. }));
+}
+
+/// A strip that is folded to and fro, turned by 45 degrees, so that all its edges are near each other along both axes.
+fn folded(corners: usize) -> String {
+    let mut text = String::new();
+    for i in 0..corners {
+        let (step, lift) = if i < corners / 2 { (i, 0) } else { (corners - 1 - i, 1) };
+        let (x, y) = (step, lift + if step % 2 == 0 { 0 } else { 1_000_000 });
+        text += &format!("v {} {} 0\n", x as i64 - y, x as i64 + y);
+    }
+    let face: Vec<String> = (1..=corners).map(|corner| corner.to_string()).collect();
+    text + "f " + &face.join(" ") + "\n"
+}
+
+#[test]
+fn faces_that_take_too_long_to_cut_are_refused() {
+    for corners in [2000, 60_000] {
+        let error = try_bytes(folded(corners).as_bytes(), MeshFormat::Obj);
+        if corners == 2000 {
+            assert_eq!(error.unwrap().triangle_count(), 1998);
+            continue;
+        }
+        let error = error.unwrap_err();
+        assert!(error.is_limit() && one_line(&error).contains("cut it into smaller faces"), "{error}");
+    }
+}
+
+#[test]
+fn ply_headers_have_a_limit() {
+    let declared = "element nothing 0\nproperty char x\n".repeat(20_000);
+    let text = String::from_utf8(ply("ascii")).unwrap().replacen(
+        "element extra",
+        &format!("{declared}element extra"),
+        1,
+    );
+    let error = try_bytes(text.as_bytes(), MeshFormat::Ply).unwrap_err();
+    assert!(error.is_limit(), "{error}");
 }
 
 /// For each file, the number of triangles if it can be read, or else a part of the error message.

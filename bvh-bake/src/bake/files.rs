@@ -11,11 +11,11 @@ use super::summary::FileSummary;
 use crate::bake;
 use crate::error::{BakeError, InputError};
 use crate::input::gather::Gatherer;
-use crate::input::{Checksums, GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
+use crate::input::{Checksums, InputFile};
 use crate::options::Options;
 use crate::progress::{Progress, Step};
 use crate::storage::output::Output;
-use crate::storage::resources::Resources;
+use crate::storage::resources::{Allowance, READING_BYTES, Resources};
 use crate::storage::{self, atomic, disk_space};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -67,6 +67,7 @@ pub struct FileBake<'a> {
     options: Options,
     force: bool,
     max_memory: Option<u64>,
+    allow_outside: bool,
     scratch: Option<PathBuf>,
     progress: Progress,
     on_step: Box<dyn FnMut(Step) + 'a>,
@@ -81,6 +82,7 @@ impl<'a> FileBake<'a> {
             options: Options::default(),
             force: false,
             max_memory: None,
+            allow_outside: false,
             scratch: None,
             progress: Progress::default(),
             on_step: Box::new(|_| ()),
@@ -98,11 +100,17 @@ impl<'a> FileBake<'a> {
     }
 
     /// Sets the most memory that the whole process may have resident, in bytes; `None` for no limit. What does not fit
-    /// goes to scratch files. glTF files, and files that are not regular such as pipes, are read into memory as a
-    /// whole, other inputs piece by piece. Some allocators keep much of the freed memory, such as that of the GNU C
+    /// goes to scratch files. Inputs are read piece by piece; only the JSON of glTF files, and files that are not
+    /// regular such as pipes, are read into memory as a whole. What is too large for the budget is refused. Some allocators keep much of the freed memory, such as that of the GNU C
     /// library. Such an allocator must be told not to: see its `mallopt`.
     pub fn max_memory(self, bytes: impl Into<Option<u64>>) -> Self {
         Self { max_memory: bytes.into(), ..self }
+    }
+
+    /// Sets whether a glTF file may name buffers outside its own folder, by `..` or by symbolic links. By default that is
+    /// refused, because whoever made the file would choose which files of this system end up in the output.
+    pub fn allow_outside(self, allow: bool) -> Self {
+        Self { allow_outside: allow, ..self }
     }
 
     /// Sets the directory for scratch files; `None` for the directory of the output. Scratch files have no names there,
@@ -140,10 +148,16 @@ impl<'a> FileBake<'a> {
         // If the budget is too small for any mesh, the inputs are not even read.
         self.require_memory(0, Resources::least(0))?;
         let inputs = self.find_inputs()?;
+        let longest = inputs.iter().map(InputFile::length).max().unwrap_or_default();
+        self.require_memory(0, Resources::least(0) + longest.min(READING_BYTES))?;
         // Reading the inputs gives their checksums. They are needed before that only if an existing output may be up to
         // date.
+        let taken = inputs.iter().map(InputFile::bytes_in_memory).sum();
         if !self.force && self.output.exists() {
-            let checksums = inputs.iter().map(|input| Checksums::of(input, &self.progress));
+            let memory = self.memory_of_inputs(taken);
+            let checksums = inputs.iter().map(|input| {
+                Checksums::of(input, memory, &self.progress).map_err(|halt| halt.in_file(input.path()))
+            });
             let provenance = self.provenance(&checksums.collect::<Result<Vec<_>, _>>()?);
             if let Some(summary) = provenance::up_to_date(&self.output, &provenance, &self.progress) {
                 return Ok(Outcome::UpToDate(summary));
@@ -154,7 +168,7 @@ impl<'a> FileBake<'a> {
         let resources = match self.max_memory {
             Some(budget) => {
                 disk_space::check(&[(self.scratch_directory(), file_lengths(&self.inputs))])?;
-                Resources::within(budget, self.scratch_directory(), &self.progress)
+                Resources::within(budget, taken, self.scratch_directory(), &self.progress)
             }
             None => Resources::unlimited(&self.progress),
         };
@@ -163,7 +177,7 @@ impl<'a> FileBake<'a> {
         let checksums = inputs.iter().map(|input| gatherer.read(input)).collect::<Result<Vec<_>, _>>()?;
         drop(inputs);
         if self.max_memory.is_some() {
-            self.require_resources(gatherer.triangles())?;
+            self.require_resources(gatherer.triangles(), taken + resources.kept())?;
         } else {
             start = Instant::now();
         }
@@ -182,16 +196,19 @@ impl<'a> FileBake<'a> {
     }
 
     fn find_inputs(&self) -> Result<Vec<InputFile<'_>>, BakeError> {
-        let mut inputs = Vec::new();
+        let (mut inputs, mut taken) = (Vec::new(), 0);
         for path in &self.inputs {
-            let input = InputFile::find(path, &self.progress)?.for_scene(self.options.scene);
-            if input.format() == MeshFormat::Gltf {
-                let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
-                self.require_memory(0, Resources::least(0).saturating_add(bytes))?;
-            }
-            inputs.push(input);
+            let input = InputFile::find(path, self.memory_of_inputs(taken), &self.progress)
+                .map_err(|halt| halt.in_file(path))?;
+            taken += input.bytes_in_memory();
+            inputs.push(input.for_scene(self.options.scene).allow_outside(self.allow_outside));
         }
         Ok(inputs)
+    }
+
+    /// Returns the memory for what is read as a whole, of which inputs have taken `taken` bytes.
+    fn memory_of_inputs(&self, taken: u64) -> Allowance {
+        self.max_memory.map_or(Allowance::UNLIMITED, |budget| Allowance::of_inputs(budget, taken))
     }
 
     fn provenance(&self, checksums: &[Checksums]) -> Provenance {
@@ -203,9 +220,10 @@ impl<'a> FileBake<'a> {
         self.scratch.as_deref().unwrap_or_else(|| atomic::directory_of(&self.output))
     }
 
-    /// Refuses a mesh of `triangles` triangles that needs more memory or more room on disk than there is.
-    fn require_resources(&self, triangles: u64) -> Result<(), BakeError> {
-        self.require_memory(triangles, Resources::least(triangles))?;
+    /// Refuses a mesh of `triangles` triangles that needs more memory, besides what inputs have taken, or more room on disk
+    /// than there is.
+    fn require_resources(&self, triangles: u64, taken: u64) -> Result<(), BakeError> {
+        self.require_memory(triangles, Resources::least(triangles).saturating_add(taken))?;
         let bytes = |each: u64| triangles.saturating_mul(each);
         disk_space::check(&[
             (self.scratch_directory(), bytes(disk_space::SCRATCH_BYTES_PER_TRIANGLE)),

@@ -101,6 +101,18 @@ pub(crate) enum Halt {
     Io(io::Error),
     /// The data that were read could not be kept.
     Bake(Box<BakeError>),
+    /// The file takes more memory at once than the budget allows.
+    Memory {
+        /// The bytes of the budget that are enough.
+        needed: u64,
+        budget: u64,
+    },
+}
+
+impl From<ReadError> for Halt {
+    fn from(error: ReadError) -> Self {
+        Self::Bake(Box::new(error.into()))
+    }
 }
 
 impl From<Fault> for Halt {
@@ -121,6 +133,9 @@ impl Halt {
             Self::Fault(fault) => fault.in_file(path).into(),
             Self::Io(source) => ReadError::Io { path: path.to_owned(), source }.into(),
             Self::Bake(error) => *error,
+            Self::Memory { needed, budget } => {
+                BakeError::Memory { input: path.to_owned(), triangles: 0, needed, budget }
+            }
         }
     }
 }

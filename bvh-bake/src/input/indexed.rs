@@ -163,13 +163,14 @@ impl IndexedFaces {
         Ok(None)
     }
 
-    /// Returns the vertex of the first corner that the format cannot hold. If there is an `end`, only the corners
-    /// before it are searched. All corners must be vertices of the file.
-    pub(crate) fn first_misfit(&self, end: Option<u64>) -> Result<Option<u64>, BakeError> {
+    /// Returns the first corner that the format cannot hold: its place among all corners, and its vertex. If there is an
+    /// `end`, only the corners before it are searched. All corners must be vertices of the file.
+    pub(crate) fn first_misfit(&self, end: Option<u64>) -> Result<Option<(u64, u32)>, BakeError> {
         if !self.has_misfits {
             return Ok(None);
         }
-        let mut left = end.unwrap_or(u64::MAX).min(self.corners.count());
+        let all = end.unwrap_or(u64::MAX).min(self.corners.count());
+        let mut left = all;
         let mut corners = CornerReader::new(self);
         let mut window = Vec::new();
         while left > 0 {
@@ -180,7 +181,7 @@ impl IndexedFaces {
             let positions = self.sorted_look_up(&window)?;
             let misfit = positions.iter().position(|position| !position.iter().all(|&c| coordinate_fits(c)));
             if let Some(misfit) = misfit {
-                return Ok(Some(window[misfit].into()));
+                return Ok(Some((all - left - now + misfit as u64, window[misfit])));
             }
         }
         Ok(None)
@@ -227,7 +228,7 @@ impl IndexedFaces {
     }
 
     /// Finds the positions of the given vertices, and reads each piece at most once.
-    fn sorted_look_up(&self, vertices: &[u32]) -> Result<Vec<[f64; 3]>, BakeError> {
+    pub(crate) fn sorted_look_up(&self, vertices: &[u32]) -> Result<Vec<[f64; 3]>, BakeError> {
         let mut ends = vec![0u32; self.positions.len()];
         let piece_of = |vertex: u32| vertex as usize / PIECE_VERTICES;
         vertices.iter().for_each(|&vertex| ends[piece_of(vertex)] += 1);

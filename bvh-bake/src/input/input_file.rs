@@ -3,9 +3,12 @@
 
 use super::MeshFormat;
 use super::byte_reader::ByteReader;
+use super::gltf::{self, Sink};
 use super::read_ahead::ReadAhead;
 use crate::error::{Halt, ReadError};
 use crate::progress::{Progress, Step, Tally};
+use crate::storage::read_exact_at;
+use crate::storage::resources::Allowance;
 use bvh_format::checksum::Hasher;
 use std::borrow::Cow;
 use std::fs::File;
@@ -16,6 +19,8 @@ use std::thread::Scope;
 
 /// The number of bytes that are read at a time if a file is read as a whole.
 const READ_BYTES: u64 = 4 << 20;
+/// The number of bytes that are read at a time for a checksum.
+const CHECKSUM_BYTES: usize = 1 << 18;
 /// The number of bytes from which the format is recognised.
 const HEAD_BYTES: u64 = 4096;
 
@@ -26,6 +31,8 @@ pub(crate) struct InputFile<'a> {
     length: u64,
     /// Whether the nodes of a glTF file become instances.
     as_scene: bool,
+    /// Whether a glTF file may name files outside its folder.
+    allows_outside: bool,
     /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
     bytes: Option<Cow<'a, [u8]>>,
 }
@@ -35,7 +42,7 @@ impl<'a> InputFile<'a> {
     pub(crate) fn of_bytes(bytes: &'a [u8], format: MeshFormat, path: &'a Path) -> Self {
         let length = bytes.len() as u64;
         let bytes = Some(Cow::Borrowed(bytes));
-        Self { path: Cow::Borrowed(path), format, length, as_scene: false, bytes }
+        Self { path: Cow::Borrowed(path), format, length, as_scene: false, allows_outside: false, bytes }
     }
 
     /// Sets whether the nodes of a glTF file become instances.
@@ -47,13 +54,26 @@ impl<'a> InputFile<'a> {
         self.as_scene
     }
 
+    /// Sets whether a glTF file may name files outside its folder.
+    pub(crate) fn allow_outside(self, allows_outside: bool) -> Self {
+        Self { allows_outside, ..self }
+    }
+
+    pub(crate) fn allows_outside(&self) -> bool {
+        self.allows_outside
+    }
+
     /// Finds a file. The format is that of its extension or, if the extension is unknown or missing, the one that its
-    /// content suggests. A pipe or another file without a length is read as a whole.
-    pub(crate) fn find(path: &'a Path, progress: &Progress) -> Result<Self, ReadError> {
+    /// content suggests. A pipe or another file without a length is read as a whole, which `memory` must allow.
+    pub(crate) fn find(path: &'a Path, memory: Allowance, progress: &Progress) -> Result<Self, Halt> {
         let failed = |source| ReadError::Io { path: path.to_owned(), source };
         let mut reader = InputReader::open(path, progress, 0).map_err(failed)?;
         let is_regular = reader.is_regular().map_err(failed)?;
-        let bytes = if is_regular { None } else { Some(reader.read_up_to(u64::MAX).map_err(failed)?) };
+        let bytes = match is_regular {
+            true => None,
+            false => Some(reader.read_up_to(memory.free.saturating_add(1)).map_err(failed)?),
+        };
+        memory.require(bytes.as_ref().map_or(0, |bytes| bytes.len() as u64))?;
         let length = bytes.as_ref().map_or(reader.length, |bytes| bytes.len() as u64);
         let format = match (MeshFormat::from_extension(path), &bytes) {
             (Some(format), _) => Some(format),
@@ -62,7 +82,7 @@ impl<'a> InputFile<'a> {
         };
         let format = format.ok_or_else(|| super::unknown_format(path))?;
         let bytes = bytes.map(Cow::Owned);
-        Ok(Self { path: Cow::Borrowed(path), format, length, as_scene: false, bytes })
+        Ok(Self { path: Cow::Borrowed(path), format, length, as_scene: false, allows_outside: false, bytes })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -76,6 +96,11 @@ impl<'a> InputFile<'a> {
     /// Returns the number of bytes.
     pub(crate) fn length(&self) -> u64 {
         self.length
+    }
+
+    /// Returns the bytes of memory that the input takes before it is read.
+    pub(crate) fn bytes_in_memory(&self) -> u64 {
+        if matches!(self.bytes, Some(Cow::Owned(_))) { self.length } else { 0 }
     }
 
     /// Starts to read the bytes. Reading them is a pass of the given weight.
@@ -99,11 +124,26 @@ impl<'a> InputFile<'a> {
         bytes.map(Cow::Owned).map_err(|source| self.failed(source))
     }
 
-    /// Returns the checksum of all bytes. Reading them does not count as progress.
-    pub(crate) fn checksum(&self, progress: &Progress) -> Result<u64, ReadError> {
+    /// Opens the input, to read it at stated offsets.
+    pub(crate) fn random_access(&self) -> Result<RandomAccess<'_>, ReadError> {
+        match &self.bytes {
+            Some(bytes) => Ok(RandomAccess::Memory(bytes)),
+            None => {
+                let open = || {
+                    let file = File::open(&self.path)?;
+                    let length = file.metadata()?.len();
+                    Ok(RandomAccess::File { file, length })
+                };
+                open().map_err(|source| self.failed(source))
+            }
+        }
+    }
+
+    /// Returns the checksum of all bytes. Reading them is a pass of the given weight.
+    pub(crate) fn checksum(&self, progress: &Progress, weight: u64) -> Result<u64, ReadError> {
         let mut hasher = Hasher::default();
-        let mut block = vec![0; READ_BYTES as usize];
-        let mut reader = self.reader(progress, 0).map_err(|source| self.failed(source))?;
+        let mut block = vec![0; CHECKSUM_BYTES];
+        let mut reader = self.reader(progress, weight).map_err(|source| self.failed(source))?;
         loop {
             match reader.read(&mut block) {
                 Ok(0) => return Ok(hasher.finish()),
@@ -117,6 +157,38 @@ impl<'a> InputFile<'a> {
     /// Returns the error for an input that the system refused to read.
     pub(crate) fn failed(&self, source: io::Error) -> ReadError {
         ReadError::Io { path: self.path.clone().into_owned(), source }
+    }
+}
+
+/// An input that is read at stated offsets.
+pub(crate) enum RandomAccess<'a> {
+    Memory(&'a [u8]),
+    File { file: File, length: u64 },
+}
+
+impl RandomAccess<'_> {
+    /// Returns the number of bytes.
+    pub(crate) fn length(&self) -> u64 {
+        match self {
+            Self::Memory(bytes) => bytes.len() as u64,
+            Self::File { length, .. } => *length,
+        }
+    }
+
+    /// Reads bytes from an offset on.
+    pub(crate) fn read_at(&self, into: &mut [u8], offset: u64, progress: &Progress) -> io::Result<()> {
+        match self {
+            Self::Memory(bytes) => {
+                let rest = bytes.get(offset as usize..).unwrap_or_default();
+                let found = rest.get(..into.len()).ok_or(ErrorKind::UnexpectedEof)?;
+                into.copy_from_slice(found);
+                Ok(())
+            }
+            Self::File { file, .. } => {
+                progress.add_input_read(into.len() as u64);
+                read_exact_at(file, into, offset)
+            }
+        }
     }
 }
 
@@ -220,10 +292,23 @@ pub(crate) struct Checksums {
 
 impl Checksums {
     /// Reads an input only for its checksums.
-    pub(crate) fn of(input: &InputFile, progress: &Progress) -> Result<Self, ReadError> {
+    pub(crate) fn of(input: &InputFile, memory: Allowance, progress: &Progress) -> Result<Self, Halt> {
         if input.format() == MeshFormat::Gltf {
-            return Ok(super::read_gltf(input, progress, 0)?.1);
+            return Self::of_gltf(input, &mut (), memory, progress, 0);
         }
-        Ok(Self { file: input.checksum(progress)?, mesh: None })
+        Ok(Self { file: input.checksum(progress, 0)?, mesh: None })
+    }
+
+    /// Reads a glTF file into `sink`, which is a pass of the given weight.
+    pub(crate) fn of_gltf(
+        input: &InputFile,
+        sink: &mut impl Sink,
+        memory: Allowance,
+        progress: &Progress,
+        weight: u64,
+    ) -> Result<Self, Halt> {
+        let mesh = gltf::read(input, &input.random_access()?, sink, memory, progress)?;
+        // The document is not in memory any more.
+        Ok(Self { file: input.checksum(progress, weight)?, mesh: Some(mesh) })
     }
 }

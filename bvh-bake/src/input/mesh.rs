@@ -7,9 +7,7 @@ pub use crate::error::InputError;
 use crate::error::excerpt;
 use crate::limits::coordinate_fits;
 pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
-use bvh_format::checksum::Hasher;
 pub use bvh_format::instances::Instance;
-use bvh_format::instances::write_instances;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
@@ -67,22 +65,6 @@ impl Mesh {
             // -0.0 + 0.0 is 0.0; every other number stays as it is.
             object.positions.par_iter_mut().for_each(|position| *position = position.map(|c| c + 0.0));
         }
-    }
-
-    /// Returns a checksum of everything that a bake takes from the mesh.
-    pub(crate) fn checksum(&self) -> u64 {
-        let mut hasher = Hasher::default();
-        for object in &self.objects {
-            let lengths = [object.name.len(), object.positions.len(), object.triangles.len()];
-            lengths.iter().for_each(|&length| hasher.update(&(length as u64).to_le_bytes()));
-            hasher.update(object.name.as_bytes());
-            object.positions.iter().flatten().for_each(|value| hasher.update(&value.to_le_bytes()));
-            object.triangles.iter().flatten().for_each(|index| hasher.update(&index.to_le_bytes()));
-        }
-        if !self.instances.is_empty() {
-            hasher.update(&write_instances(&self.instances));
-        }
-        hasher.finish()
     }
 
     /// Checks the contract: between 1 and 2^32 - 2 triangles, at most 2^32 - 1 vertices, ascending ids, vertex numbers
@@ -222,7 +204,7 @@ pub(crate) fn tell_apart(instances: &mut [Instance]) {
     }
 }
 
-fn check_instances(instances: &[Instance], objects: usize) -> Result<(), InputError> {
+pub(crate) fn check_instances(instances: &[Instance], objects: usize) -> Result<(), InputError> {
     if instances.len() as u64 > MAX_INSTANCES {
         return Err(InputError::TooManyInstances(instances.len() as u64));
     }

@@ -3,8 +3,8 @@
 //! There is one reader per format. It reads a file piece by piece and passes what it finds either to a bake (module
 //! `gather`), which keeps to its memory budget, or into a [`Mesh`] that keeps the contract of [`Mesh::check`]
 //! ([`read`]). If a file is malformed, one line states what is wrong and where. No reader panics, and no reader
-//! allocates from a count that the file declares before checking that the file is long enough for it. glTF files, whose
-//! parts may be in any order, are read as a whole.
+//! allocates from a count that the file declares before checking that the file is long enough for it. Of glTF files,
+//! whose parts may be in any order, the JSON is read as a whole, and buffers block by block.
 //!
 //! Polygons are triangulated (module `polygon`), objects without triangles are left out, degenerate triangles are kept,
 //! and -0.0 is read as 0.0.
@@ -12,7 +12,7 @@
 mod byte_reader;
 mod collect;
 pub(crate) mod gather;
-mod gltf;
+pub(crate) mod gltf;
 mod indexed;
 mod input_file;
 pub mod mesh;
@@ -28,8 +28,7 @@ use crate::error::BakeError;
 use crate::error::{Fault, Halt, excerpt};
 pub use crate::error::{Place, ReadError};
 use crate::progress::{Progress, WHOLE};
-use crate::storage::resources::Resources;
-use bvh_format::checksum::checksum;
+use crate::storage::resources::{Allowance, Resources};
 use collect::mesh_of_faces;
 use indexed::IndexedFaces;
 use input_file::Opener;
@@ -101,13 +100,14 @@ pub(crate) fn stem(path: &Path) -> String {
 }
 
 /// Reads a mesh file into memory. The format is that of the file's extension or, if the extension is unknown or
-/// missing, the one that the content suggests.
+/// missing, the one that the content suggests. The buffers that a glTF file names must be in regular files in its folder or
+/// below it, whatever `..` or symbolic links lead to; [`FileBake::allow_outside`](crate::FileBake::allow_outside) reads
+/// others.
 ///
 /// # Errors
 /// [`ReadError`]: the error of the system, or the first defect of the file.
 pub fn read(path: &Path) -> Result<Mesh, ReadError> {
-    let progress = Progress::default();
-    Ok(collect(&InputFile::find(path, &progress)?, &progress, WHOLE)?.0)
+    collect(&find(path)?)
 }
 
 /// Reads a mesh file as a scene, which has instances. In a glTF file, each node with a mesh is an instance, nodes share
@@ -122,42 +122,42 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
 /// # Errors
 /// The errors of [`read`].
 pub fn read_scene(path: &Path) -> Result<Mesh, ReadError> {
-    let progress = Progress::default();
-    Ok(collect(&InputFile::find(path, &progress)?.for_scene(true), &progress, WHOLE)?.0)
+    collect(&find(path)?.for_scene(true))
 }
 
 /// Reads a mesh from the bytes of a file. `source` names the file in errors. Other files that a glTF file names are
-/// looked up in the folder of `source`.
+/// looked up in the folder of `source`, as [`read`] does.
 ///
 /// # Errors
 /// The errors of [`read`].
 pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
-    Ok(collect(&InputFile::of_bytes(bytes, format, source), &Progress::default(), WHOLE)?.0)
+    collect(&InputFile::of_bytes(bytes, format, source))
 }
 
-/// Reads a glTF file, which is a pass of the given weight. Also returns the checksums that show whether the file has
-/// changed.
-pub(crate) fn read_gltf(
-    input: &InputFile,
-    progress: &Progress,
-    weight: u64,
-) -> Result<(Mesh, Checksums), ReadError> {
-    let (mesh, file) = collect(input, progress, weight)?;
-    let checksums = Checksums { file, mesh: Some(mesh.checksum()) };
-    Ok((mesh, checksums))
+/// Finds a file that may take as much memory as there is.
+fn find(path: &Path) -> Result<InputFile<'_>, ReadError> {
+    InputFile::find(path, Allowance::UNLIMITED, &Progress::default()).map_err(|halt| read_error(halt, path))
 }
 
-/// Reads an input into a mesh that keeps the contract. Reading is a pass of the given weight. Also returns the checksum
-/// of the input's bytes.
-fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh, u64), ReadError> {
-    let (mesh, checksum) = if input.format() == MeshFormat::Gltf {
-        let bytes = input.read_all(progress, weight)?;
-        (gltf::read(&bytes, input.path(), input.is_scene(), progress).map_err(Halt::from), checksum(&bytes))
+/// Turns the reason why reading a file stopped into an error. Nothing is stored outside memory, which is not limited.
+fn read_error(halt: Halt, path: &Path) -> ReadError {
+    match halt.in_file(path) {
+        BakeError::Read(error) => error,
+        other => ReadError::Io { path: path.to_owned(), source: std::io::Error::other(other.to_string()) },
+    }
+}
+
+/// Reads an input into a mesh that keeps the contract.
+fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
+    let (progress, checksum) = (&Progress::default(), OnceLock::new());
+    let mesh = if input.format() == MeshFormat::Gltf {
+        let mut mesh = gltf::InMemory::default();
+        let read = gltf::read(input, &input.random_access()?, &mut mesh, Allowance::UNLIMITED, progress);
+        read.map(|_| mesh.into_mesh())
     } else {
-        let file = OnceLock::new();
-        let mesh = thread::scope(|scope| {
-            let opener = Opener { input, progress, checksum: &file, scope };
-            let open = |is_first| opener.open(if is_first { weight } else { 0 });
+        thread::scope(|scope| {
+            let opener = Opener { input, progress, checksum: &checksum, scope };
+            let open = |_| opener.open(WHOLE);
             // Nothing goes to scratch files.
             let resources = Resources::unlimited(progress);
             let mut faces = IndexedFaces::new(&resources);
@@ -172,14 +172,9 @@ fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh,
                     mesh_of_faces(&faces, &names)
                 }
             }
-        });
-        (mesh, file.into_inner().unwrap_or_default())
+        })
     };
-    let mut mesh = mesh.map_err(|halt| match halt.in_file(input.path()) {
-        BakeError::Read(error) => error,
-        // This reader stores nothing outside memory.
-        other => input.failed(std::io::Error::other(other.to_string())),
-    })?;
+    let mut mesh = mesh.map_err(|halt| read_error(halt, input.path()))?;
     mesh.drop_empty_objects();
     if input.is_scene() {
         // As a bake of files names them.
@@ -190,7 +185,7 @@ fn collect(input: &InputFile, progress: &Progress, weight: u64) -> Result<(Mesh,
     }
     mesh.drop_negative_zeros();
     mesh.check().map_err(|error| ReadError::Mesh { path: input.path().to_owned(), source: error })?;
-    Ok((mesh, checksum))
+    Ok(mesh)
 }
 
 /// Returns the error for a file of no known format.
@@ -201,9 +196,6 @@ pub(crate) fn unknown_format(path: &Path) -> ReadError {
     };
     Fault::new(Place::File, KNOWN, found).in_file(path)
 }
-
-/// The least bytes of memory per byte of a glTF file.
-pub(crate) const GLTF_BYTES_PER_BYTE: u64 = 8;
 
 /// Reads mesh files as [`crate::FileBake`] does: the objects of one file follow those of the previous one, and the ids
 /// are consecutive.

@@ -26,15 +26,20 @@ impl Names {
         Self { names: vec![String::new()], ..Self::default() }
     }
 
+    /// Makes objects with these names, in order. A group is an object.
+    pub(crate) fn of_objects(names: Vec<String>) -> Self {
+        Self { names, ..Self::default() }
+    }
+
     /// Returns the names by number.
     pub(crate) fn all(&self) -> &[String] {
         &self.names
     }
 
-    /// Makes the object with a name the current one.
-    pub(super) fn enter(&mut self, is_object: bool, name: &[u8]) {
+    /// Makes the object with a name the current one. Returns whether the name is new.
+    pub(super) fn enter(&mut self, is_object: bool, name: &[u8]) -> bool {
         if !is_object && self.first_group > 0 {
-            return;
+            return false;
         }
         self.groups += 1;
         if is_object && self.first_group == 0 {
@@ -44,7 +49,9 @@ impl Names {
             }
             self.first_group = self.groups;
         }
+        let before = self.names.len();
         self.current = Some(self.number(name));
+        self.names.len() > before
     }
 
     /// Returns the object and the group for the faces that follow. Faces above the first name have no name.

@@ -13,6 +13,9 @@ use crate::error::{Fault, Halt, Place, excerpt};
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES, coordinate_fits};
 use std::io::Read;
 
+/// The most elements and properties of a header, which are kept in memory.
+const MAX_DECLARED: u64 = 1 << 14;
+
 /// Takes the vertices and faces of a file in order. Either kind may come first.
 pub(crate) trait Faces {
     /// Returns the number of vertices taken.
@@ -39,7 +42,8 @@ pub(crate) fn read<R: Read>(
     }
     match faces.first_misfit(None)? {
         None => Ok(()),
-        Some(vertex) => {
+        Some((_, vertex)) => {
+            let vertex = vertex.into();
             // The second reading meets the misfit again and reports its place.
             stream(open(false)?, &mut MisfitFinder { vertex, vertices: 0 })?;
             Err(changed_meanwhile().into())
@@ -136,13 +140,19 @@ impl Header {
         }
         let only_returns = head.get(3..5).is_some_and(|ending| ending[0] == b'\r' && ending[1] != b'\n');
         let mut elements: Vec<Element> = Vec::new();
-        let mut format = None;
+        let (mut format, mut declared) = (None, 0);
         let ended_by_both = loop {
             let Some((line, both)) = lines.line() else {
                 return Err(Fault::new(lines.place(), "end_header", "the end of the file"));
             };
             let (line, place) = (&line[..], lines.place());
             let invalid = |expected: &'static str| Fault::new(place, expected, excerpt(line));
+            if line.starts_with(b"element") || line.starts_with(b"property") {
+                declared += 1;
+            }
+            if declared > MAX_DECLARED {
+                return Err(Fault::Limit { place, most: MAX_DECLARED, what: "elements and properties" });
+            }
             // No statement has more words; a list has five.
             let mut parts: [&[u8]; 6] = [b""; 6];
             parts.iter_mut().zip(words(line)).for_each(|(part, word)| *part = word);

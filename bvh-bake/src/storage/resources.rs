@@ -1,10 +1,12 @@
 //! Divides the memory budget of a bake or a check among its stages, and names the scratch files for the rest.
 
 use super::{Scratch, Stream};
+use crate::error::Halt;
 use crate::progress::Progress;
 use bytemuck::Pod;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The most triangles of a brick, which is what a bake builds at once. The bytes of a file depend on this number.
 pub(crate) const MAX_BRICK_TRIANGLES: usize = 1 << 18;
@@ -27,6 +29,44 @@ const CHECK_BUFFER_BYTES: [u64; 2] = [4 << 20, 32 << 20];
 /// their leaf blocks.
 const CHECK_BUFFERS: u64 = 8;
 
+/// Bytes of memory for blocks and pieces while a file is read that is larger.
+pub(crate) const READING_BYTES: u64 = 6 << 20;
+
+/// Memory that is needed for a while or to the end, beside what goes to scratch files when there is too much of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Allowance {
+    /// The most bytes.
+    pub(crate) free: u64,
+    /// The budget of the whole process.
+    budget: u64,
+    /// The bytes by which the budget must grow for one more byte.
+    cost: u64,
+}
+
+impl Allowance {
+    /// Allows as much as there is.
+    pub(crate) const UNLIMITED: Self = Self { free: u64::MAX, budget: u64::MAX, cost: 1 };
+
+    /// Allows what a budget leaves for inputs, of which `taken` bytes are in memory.
+    pub(crate) fn of_inputs(budget: u64, taken: u64) -> Self {
+        Self { free: budget.saturating_sub(MIN_BYTES).saturating_sub(taken), budget, cost: 1 }
+    }
+
+    /// Allows `bytes` bytes less.
+    pub(crate) fn less(self, bytes: u64) -> Self {
+        Self { free: self.free.saturating_sub(bytes), ..self }
+    }
+
+    /// Refuses more bytes than are allowed.
+    pub(crate) fn require(self, bytes: u64) -> Result<(), Halt> {
+        if bytes <= self.free {
+            return Ok(());
+        }
+        let needed = self.budget.saturating_add((bytes - self.free).saturating_mul(self.cost));
+        Err(Halt::Memory { needed, budget: self.budget })
+    }
+}
+
 /// The memory and the scratch files that a bake or a check may use, and the counters of its progress.
 pub(crate) struct Resources {
     pub(crate) scratch: Arc<Scratch>,
@@ -37,6 +77,11 @@ pub(crate) struct Resources {
     pub(crate) brick_bytes: usize,
     /// Bytes of each buffer, or `None` where everything stays in memory.
     buffers: Option<u64>,
+    /// What a document may take that is read as a whole. The memory for bricks is free meanwhile.
+    pub(crate) document: Allowance,
+    /// What names, objects and instances may take together, and what they take.
+    keeping: Allowance,
+    kept: AtomicU64,
 }
 
 /// Returns the bytes that `bricks` bricks take while they are built.
@@ -54,11 +99,16 @@ impl Resources {
             bricks,
             brick_bytes: bytes_of_bricks(bricks as u64),
             buffers: None,
+            document: Allowance::UNLIMITED,
+            keeping: Allowance::UNLIMITED,
+            kept: AtomicU64::new(0),
         }
     }
 
-    /// Allows `budget` bytes of memory for the whole process. What does not fit goes to scratch files in `directory`.
-    pub(crate) fn within(budget: u64, directory: &Path, progress: &Progress) -> Self {
+    /// Allows `budget` bytes of memory for the whole process, of which inputs have taken `taken`. What does not fit goes
+    /// to scratch files in `directory`.
+    pub(crate) fn within(budget: u64, taken: u64, directory: &Path, progress: &Progress) -> Self {
+        let (whole, budget) = (budget, budget.saturating_sub(taken));
         let threads = rayon::current_num_threads() as u64;
         let brick = MAX_BRICK_TRIANGLES as u64 * BRICK_BYTES_PER_TRIANGLE;
         let fixed = MIN_BYTES + 2 * BUFFER_BYTES;
@@ -69,8 +119,10 @@ impl Resources {
             scratch: Scratch::in_directory(directory, left / 2, progress),
             progress: progress.clone(),
             bricks: bricks as usize,
-            brick_bytes: bytes_of_bricks(bricks),
+            // A budget for a small mesh is less than a brick takes.
+            brick_bytes: bytes_of_bricks(bricks).min(budget.saturating_sub(MIN_BYTES) as usize),
             buffers: Some(BUFFER_BYTES),
+            ..Self::keeping_within(whole, budget.saturating_sub(MIN_BYTES + left / 2))
         }
     }
 
@@ -87,7 +139,32 @@ impl Resources {
             bricks: 1,
             brick_bytes: 2 * buffer as usize,
             buffers: Some(buffer),
+            ..Self::keeping_within(budget, budget.saturating_sub(MIN_BYTES + left / 2))
         }
+    }
+
+    /// Allows `free` bytes for a document, and as many for what is kept to the end.
+    fn keeping_within(budget: u64, free: u64) -> Self {
+        let allowance = Allowance { free, budget, cost: 2 };
+        Self { document: allowance, keeping: allowance, ..Self::unlimited(&Progress::default()) }
+    }
+
+    /// Counts names, objects and instances, and refuses more of them than there is memory for. Pieces have less room then.
+    pub(crate) fn keep(&self, bytes: u64) -> Result<(), Halt> {
+        self.scratch.hold(bytes);
+        let kept = self.kept.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+        self.keeping.require(kept).map_err(|halt| match halt {
+            // How many follow is not known. The budget that is told is enough for as many as there were.
+            Halt::Memory { needed, budget } => {
+                Halt::Memory { needed: needed.saturating_add(2 * kept), budget }
+            }
+            other => other,
+        })
+    }
+
+    /// Returns the bytes of names, objects and instances.
+    pub(crate) fn kept(&self) -> u64 {
+        self.kept.load(Ordering::Relaxed)
     }
 
     /// Returns the bytes of memory without which no file can be compared with a mesh.

@@ -49,6 +49,11 @@ impl Scratch {
         Spill { scratch: self.clone(), files: (0..threads).map(|_| Mutex::new(None)).collect() }
     }
 
+    /// Takes `bytes` bytes of the allowance for good, for data that are no pieces.
+    pub(crate) fn hold(&self, bytes: u64) {
+        self.kept.fetch_add(bytes, Ordering::Relaxed);
+    }
+
     /// Reserves `bytes` bytes of the allowance, if that many are free.
     fn lease(self: &Arc<Self>, bytes: u64) -> Option<Lease> {
         let within = |kept: u64| kept.checked_add(bytes).filter(|&kept| kept <= self.allowance);

@@ -8,7 +8,7 @@ use crate::storage::resources::{CHECK_BYTES_PER_THREAD, MIN_BYTES};
 use bvh_format::FormatError;
 use bvh_format::source::Source;
 use std::borrow::Cow;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -65,14 +65,17 @@ impl StoredFile {
     /// table shows only when that is read.
     pub fn open(path: &Path, max_memory: Option<u64>) -> Result<Self, FileError> {
         let open = || {
+            let require_regular = |metadata: &Metadata| {
+                if metadata.is_dir() {
+                    return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));
+                }
+                if metadata.is_file() { Ok(()) } else { Err(io::Error::other("not a regular file")) }
+            };
+            // Opening a named pipe would wait for its other end. Another file may take the name meanwhile.
+            require_regular(&std::fs::metadata(path)?)?;
             let file = File::open(path)?;
             let metadata = file.metadata()?;
-            if metadata.is_dir() {
-                return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));
-            }
-            if !metadata.is_file() {
-                return Err(io::Error::other("not a regular file"));
-            }
+            require_regular(&metadata)?;
             Ok((file, metadata.len()))
         };
         let (file, length) = open().map_err(|source| FileError::Io { path: path.to_owned(), source })?;

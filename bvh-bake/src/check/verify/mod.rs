@@ -16,9 +16,9 @@ mod surfaces;
 
 use crate::check::prove::{prove_bounds, validate_in_parallel};
 use crate::error::BakeError;
+use crate::input::InputFile;
 use crate::input::gather::Gatherer;
 use crate::input::mesh::{InputError, Instance, Mesh};
-use crate::input::{GLTF_BYTES_PER_BYTE, InputFile, MeshFormat};
 use crate::progress::Progress;
 use crate::storage::resources::Resources;
 use crate::storage::stored_file::{FileError, StoredFile};
@@ -117,12 +117,16 @@ pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
 #[non_exhaustive]
 pub struct VerifyOptions {
     /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. What does not fit goes
-    /// to scratch files. glTF files are read into memory, other meshes piece by piece. If the allocator keeps much of
+    /// to scratch files. Of the meshes, only the JSON of glTF files and files that are not regular are read into memory as a
+    /// whole. If the allocator keeps much of
     /// the freed memory, tell it not to; see [`FileBake::max_memory`](crate::FileBake::max_memory).
     pub max_memory: Option<u64>,
     /// The directory for scratch files; `None` for the system's directory for temporary files. Scratch files have no
     /// names there, so that nothing is left however the process ends.
     pub scratch: Option<PathBuf>,
+    /// Whether a glTF file may name buffers outside its own folder; see
+    /// [`FileBake::allow_outside`](crate::FileBake::allow_outside).
+    pub allow_outside: bool,
 }
 
 impl VerifyOptions {
@@ -130,6 +134,12 @@ impl VerifyOptions {
     #[must_use]
     pub fn max_memory(self, bytes: impl Into<Option<u64>>) -> Self {
         Self { max_memory: bytes.into(), ..self }
+    }
+
+    /// Sets whether a glTF file may name buffers outside its own folder.
+    #[must_use]
+    pub fn allow_outside(self, allow: bool) -> Self {
+        Self { allow_outside: allow, ..self }
     }
 
     /// Sets the directory for scratch files; `None` for the system's directory for temporary files.
@@ -171,14 +181,12 @@ pub fn verify_files(
     let scratch = options.scratch.clone().unwrap_or_else(std::env::temp_dir);
     let resources = Resources::of_check(budget, &scratch);
     let mut gatherer = Gatherer::in_input_order(&resources);
-    let mut inputs = Vec::new();
+    let (mut inputs, mut taken) = (Vec::new(), 0);
     for mesh in meshes {
-        let input = InputFile::find(mesh, &resources.progress).map_err(BakeError::from)?;
-        let input = input.for_scene(layout.has_instances());
-        if input.format() == MeshFormat::Gltf && options.max_memory.is_some() {
-            let bytes = input.length().saturating_mul(GLTF_BYTES_PER_BYTE);
-            enough(mesh, bytes.saturating_add(Resources::least_of_check()))?;
-        }
+        let input = InputFile::find(mesh, resources.document.less(taken), &resources.progress)
+            .map_err(|halt| halt.in_file(mesh))?;
+        let input = input.for_scene(layout.has_instances()).allow_outside(options.allow_outside);
+        taken += input.bytes_in_memory();
         gatherer.read(&input)?;
         inputs.push(input);
     }

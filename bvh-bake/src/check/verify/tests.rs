@@ -170,7 +170,7 @@ fn files_are_told_as_meshes_in_memory() {
             write_obj(&mesh, &obj);
             let in_memory = verify(&bytes, &mesh).map_err(|error| error.to_string());
             for max_memory in [None, Some(100 << 20)] {
-                let options = VerifyOptions { max_memory, scratch: scratch.clone() };
+                let options = VerifyOptions { max_memory, scratch: scratch.clone(), ..Default::default() };
                 let streamed = verify_files(&file, std::slice::from_ref(&obj), &options);
                 assert_eq!(streamed.map_err(|error| error.to_string()), in_memory);
             }
@@ -215,7 +215,7 @@ fn a_small_budget_is_refused() {
     let file = folder.path().join("f.cbvh");
     let (bytes, _) = to_bytes(&sheet(5, 0.0), &Options::default()).unwrap();
     std::fs::write(&file, bytes).unwrap();
-    let options = VerifyOptions { max_memory: Some(Resources::least_of_check() - 1), scratch: None };
+    let options = VerifyOptions::default().max_memory(Resources::least_of_check() - 1);
     let refused = verify_files(&file, &[folder.path().join("m.obj")], &options).unwrap_err();
     assert!(matches!(refused, VerifyError::File(FileError::Memory { .. })), "{refused}");
 }

@@ -12,7 +12,7 @@ impl Gatherer<'_> {
     pub(crate) fn add_mesh(&mut self, mesh: &Mesh) -> Result<(), Halt> {
         let (first, first_id) = (self.names.len(), self.id_end);
         for object in &mesh.objects {
-            let number = self.object(object.name.clone());
+            let number = self.object(object.name.clone())?;
             // Objects that are joined lose their names, even if one of them has no triangles.
             self.names[number].1 |= !self.split;
             self.add_vertices(number, used_vertices(object));

@@ -6,6 +6,7 @@
 mod faces;
 mod input_order;
 mod mesh;
+mod scene;
 mod solids;
 mod vertex_counter;
 
@@ -36,6 +37,11 @@ use std::thread;
 /// corners.
 const OBJ_TEXT: u64 = 10;
 const PLY_BYTES: u64 = 10;
+
+/// Bytes of memory per object, besides its name.
+const BYTES_PER_OBJECT: u64 = 64;
+/// Bytes of memory per object that gets a tree of its own, besides its name and its triangles.
+const BYTES_PER_BODY: u64 = 2048;
 
 /// Bytes of memory to fill a part.
 const BYTES_PER_OPEN_PART: usize = TRIANGLES_PER_PART * (size_of::<WideTriangle>() + size_of::<Triangle>());
@@ -121,13 +127,11 @@ impl<'a> Gatherer<'a> {
         self.id_end
     }
 
-    /// Reads a file: glTF as a whole, other formats piece by piece.
+    /// Reads a file piece by piece.
     pub(crate) fn read(&mut self, input: &InputFile) -> Result<Checksums, BakeError> {
         let (before, first_object) = (self.triangles, self.names.len());
         let checksums = if input.format() == MeshFormat::Gltf {
-            let (mesh, checksums) = super::read_gltf(input, &self.resources.progress, WHOLE)?;
-            self.add_mesh(&mesh).map_err(|halt| halt.in_file(input.path()))?;
-            checksums
+            self.read_gltf(input).map_err(|halt| halt.in_file(input.path()))?
         } else {
             let (progress, checksum) = (&self.resources.progress, OnceLock::new());
             let read = thread::scope(|scope| {
@@ -196,12 +200,14 @@ impl<'a> Gatherer<'a> {
     }
 
     /// Begins an object and returns its number.
-    fn object(&mut self, name: String) -> usize {
+    fn object(&mut self, name: String) -> Result<usize, Halt> {
+        let bytes = if self.split { BYTES_PER_BODY } else { BYTES_PER_OBJECT };
+        self.resources.keep(bytes + name.len() as u64)?;
         self.names.push((name, false));
         if self.split || self.bodies.is_empty() {
             self.bodies.push(Body::new());
         }
-        self.names.len() - 1
+        Ok(self.names.len() - 1)
     }
 
     /// Returns the number of the body of an object.

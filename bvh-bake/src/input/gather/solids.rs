@@ -25,7 +25,7 @@ impl<'a, 'b> SolidsForBake<'a, 'b> {
 
 impl stl::Solids for SolidsForBake<'_, '_> {
     fn begin(&mut self, name: String, _: usize) -> Result<(), Halt> {
-        self.object = self.gatherer.object(name);
+        self.object = self.gatherer.object(name)?;
         Ok(())
     }
 

@@ -1,27 +1,48 @@
-//! Reads the numbers of an accessor, dense or sparse, and checks every offset against the buffer.
+//! Reads the numbers of an accessor, dense or sparse, block by block, and checks every offset against the buffer.
 
-use super::buffer::Buffers;
-use crate::error::{Fault, Place};
+use super::buffer::{Buffers, Bytes};
+use crate::error::{Fault, Halt, Place};
 use gltf::Accessor;
 use gltf::accessor::{DataType, Dimensions, sparse::IndexType};
 use gltf::buffer::View;
 
-/// Reads positions in the type in which they are stored: f32, or integers under `KHR_mesh_quantization`.
-pub(super) fn positions(accessor: &Accessor, buffers: &mut Buffers) -> Result<Vec<[f64; 3]>, Fault> {
-    if accessor.dimensions() != Dimensions::Vec3 || accessor.data_type() == DataType::U32 {
-        return Err(unexpected(accessor, "positions of three f32 or of three 8- or 16-bit integers"));
-    }
-    read::<3, _>(accessor, buffers, |position| position)
+/// The number of bytes that are read at a time.
+const BLOCK_BYTES: usize = 1 << 18;
+/// The number of values that are passed on at a time.
+const BLOCK_VALUES: usize = 1 << 14;
+
+/// Finds the buffers of an accessor, so that their bytes count.
+pub(super) fn find(accessor: &Accessor, buffers: &mut Buffers) -> Result<(), Fault> {
+    let sparse = accessor.sparse();
+    let of_sparse = sparse.iter().flat_map(|sparse| [sparse.indices().view(), sparse.values().view()]);
+    accessor.view().into_iter().chain(of_sparse).try_for_each(|view| buffers.bytes(&view.buffer()).map(drop))
 }
 
-/// Reads vertex numbers.
-pub(super) fn indices(accessor: &Accessor, buffers: &mut Buffers) -> Result<Vec<u32>, Fault> {
+/// Reads positions in the type in which they are stored: f32, or integers under `KHR_mesh_quantization`. Passes them on
+/// in order, some at a time.
+pub(super) fn positions(
+    accessor: &Accessor,
+    buffers: &mut Buffers,
+    give: impl FnMut(&mut [[f64; 3]]) -> Result<(), Halt>,
+) -> Result<(), Halt> {
+    if accessor.dimensions() != Dimensions::Vec3 || accessor.data_type() == DataType::U32 {
+        return Err(unexpected(accessor, "positions of three f32 or of three 8- or 16-bit integers").into());
+    }
+    read::<3, _>(accessor, buffers, |position| position, give)
+}
+
+/// Reads vertex numbers. Passes them on in order, some at a time.
+pub(super) fn indices(
+    accessor: &Accessor,
+    buffers: &mut Buffers,
+    mut give: impl FnMut(&[u32]) -> Result<(), Halt>,
+) -> Result<(), Halt> {
     let unsigned = matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32);
     if accessor.dimensions() != Dimensions::Scalar || !unsigned || accessor.normalized() {
-        return Err(unexpected(accessor, "vertex numbers of 8, 16 or 32 bits"));
+        return Err(unexpected(accessor, "vertex numbers of 8, 16 or 32 bits").into());
     }
     // Every index is exact in f64 and in the range of u32.
-    read::<1, _>(accessor, buffers, |[index]| index as u32)
+    read::<1, _>(accessor, buffers, |[index]| index as u32, |indices| give(indices))
 }
 
 fn unexpected(accessor: &Accessor, expected: &'static str) -> Fault {
@@ -34,72 +55,177 @@ fn read<const N: usize, T: Clone>(
     accessor: &Accessor,
     buffers: &mut Buffers,
     make: impl Fn([f64; N]) -> T,
-) -> Result<Vec<T>, Fault> {
+    mut give: impl FnMut(&mut [T]) -> Result<(), Halt>,
+) -> Result<(), Halt> {
     let (kind, normalized) = (accessor.data_type(), accessor.normalized());
     let size = N * width(kind);
     let value = |bytes: &[u8]| {
         make(std::array::from_fn(|place| component(kind, normalized, &bytes[place * width(kind)..])))
     };
-    let mut values = match accessor.view() {
-        Some(view) => rows(&view, accessor.offset(), accessor.count(), size, buffers)?.map(value).collect(),
+    let count = accessor.count();
+    let mut dense = match accessor.view() {
+        Some(view) => Some(Rows::of(&view, accessor.offset(), count, size, buffers)?),
         None => {
             // The values are zero except for the sparse ones, or they are the fallback of an extension that this reader
             // does not know.
             let room = match accessor.sparse() {
-                Some(sparse) => buffers.bytes(&sparse.values().view().buffer())?.len(),
+                Some(sparse) => buffers.bytes(&sparse.values().view().buffer())?.length,
                 None => 0,
             };
-            if accessor.count() > room {
-                return Err(unexpected(accessor, "an accessor with a buffer view"));
+            if count as u64 > room {
+                return Err(unexpected(accessor, "an accessor with a buffer view").into());
             }
-            vec![make([0.0; N]); accessor.count()]
+            None
         }
     };
-    if let Some(sparse) = accessor.sparse() {
-        let index_kind = match sparse.indices().index_type() {
+    let mut sparse = Sparse::of(accessor, size, buffers)?;
+    let mut values = Vec::with_capacity(count.min(BLOCK_VALUES));
+    let mut first = 0;
+    while first < count {
+        let now = (count - first).min(BLOCK_VALUES);
+        values.clear();
+        match &mut dense {
+            Some(rows) => {
+                for _ in 0..now {
+                    values.push(value(rows.next()?));
+                }
+            }
+            None => values.resize(now, make([0.0; N])),
+        }
+        if let Some(sparse) = &mut sparse {
+            sparse.replace(first, &mut values, value)?;
+        }
+        give(&mut values)?;
+        first += now;
+    }
+    sparse.map_or(Ok(()), |sparse| sparse.finish(count))
+}
+
+/// The values of a sparse accessor that replace others.
+struct Sparse<'a> {
+    kind: DataType,
+    indices: Rows<'a>,
+    values: Rows<'a>,
+    /// The place that the next value replaces.
+    next: Option<usize>,
+    last: usize,
+}
+
+impl<'a> Sparse<'a> {
+    fn of(accessor: &Accessor, size: usize, buffers: &mut Buffers<'a>) -> Result<Option<Self>, Fault> {
+        let Some(sparse) = accessor.sparse() else { return Ok(None) };
+        let (at, replacements) = (sparse.indices(), sparse.values());
+        let kind = match at.index_type() {
             IndexType::U8 => DataType::U8,
             IndexType::U16 => DataType::U16,
             IndexType::U32 => DataType::U32,
         };
-        let at = sparse.indices();
-        let places: Vec<usize> = rows(&at.view(), at.offset(), sparse.count(), width(index_kind), buffers)?
-            .map(|bytes| component(index_kind, false, bytes) as usize)
-            .collect();
-        let replacements = sparse.values();
-        let rows = rows(&replacements.view(), replacements.offset(), sparse.count(), size, buffers)?;
-        for (place, bytes) in places.into_iter().zip(rows) {
-            let count = values.len();
-            let slot = values.get_mut(place).ok_or_else(|| {
-                Fault::new(Place::File, format!("sparse indices below {count}"), place.to_string())
-            })?;
-            *slot = value(bytes);
+        let indices = Rows::of(&at.view(), at.offset(), sparse.count(), width(kind), buffers)?;
+        let values = Rows::of(&replacements.view(), replacements.offset(), sparse.count(), size, buffers)?;
+        let mut sparse = Self { kind, indices, values, next: None, last: 0 };
+        sparse.advance()?;
+        Ok(Some(sparse))
+    }
+
+    fn advance(&mut self) -> Result<(), Fault> {
+        if self.indices.left == 0 {
+            self.next = None;
+            return Ok(());
+        }
+        let next = component(self.kind, false, self.indices.next()?) as usize;
+        if next < self.last {
+            let expected = format!("sparse indices in ascending order, after {}", self.last);
+            return Err(Fault::new(Place::File, expected, next.to_string()));
+        }
+        (self.next, self.last) = (Some(next), next);
+        Ok(())
+    }
+
+    /// Replaces values that begin with the one at the place `first`.
+    fn replace<T>(&mut self, first: usize, values: &mut [T], make: impl Fn(&[u8]) -> T) -> Result<(), Fault> {
+        while let Some(slot) = self.next.and_then(|place| values.get_mut(place - first)) {
+            *slot = make(self.values.next()?);
+            self.advance()?;
+        }
+        Ok(())
+    }
+
+    /// Checks that nothing is left after `count` values.
+    fn finish(self, count: usize) -> Result<(), Halt> {
+        match self.next {
+            None => Ok(()),
+            Some(place) => {
+                let expected = format!("sparse indices below {count}");
+                Err(Fault::new(Place::File, expected, place.to_string()).into())
+            }
         }
     }
-    Ok(values)
 }
 
-/// Returns the bytes of each of `count` rows of `size` bytes.
-fn rows<'b>(
-    view: &View,
-    offset: usize,
-    count: usize,
+/// The bytes of rows, which are read in order.
+struct Rows<'a> {
+    bytes: Bytes<'a>,
+    /// The offset of the row after those in the block.
+    offset: u64,
+    stride: usize,
     size: usize,
-    buffers: &'b mut Buffers,
-) -> Result<impl Iterator<Item = &'b [u8]> + use<'b>, Fault> {
-    let buffer = buffers.bytes(&view.buffer())?;
-    let stride = view.stride().unwrap_or(size);
-    let bytes = buffer.get(view.offset()..).and_then(|rest| rest.get(..view.length())).unwrap_or_default();
-    let bytes = bytes.get(offset..).unwrap_or_default();
-    let needed = match count {
-        0 => Some(0),
-        _ => (count - 1).checked_mul(stride).and_then(|whole| whole.checked_add(size)),
-    };
-    if needed.is_none_or(|needed| needed > bytes.len()) {
-        let expected =
-            format!("at most {} bytes, which is what buffer view {} holds", bytes.len(), view.index());
-        return Err(Fault::new(Place::File, expected, format!("{count} rows of {stride} bytes")));
+    /// The rows that have not been returned.
+    left: usize,
+    block: Vec<u8>,
+    /// The place in the block of the next row, and the number of rows from there on.
+    at: usize,
+    in_block: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// Makes a reader of `count` rows of `size` bytes.
+    fn of(
+        view: &View,
+        offset: usize,
+        count: usize,
+        size: usize,
+        buffers: &mut Buffers<'a>,
+    ) -> Result<Self, Fault> {
+        let bytes = buffers.bytes(&view.buffer())?;
+        let stride = view.stride().unwrap_or(size);
+        let (start, length) = (view.offset() as u64, view.length() as u64);
+        let is_inside = start.checked_add(length).is_some_and(|end| end <= bytes.length);
+        let room = if is_inside { length.saturating_sub(offset as u64) } else { 0 };
+        let needed = match count {
+            0 => Some(0),
+            _ => (count - 1).checked_mul(stride).and_then(|whole| whole.checked_add(size)),
+        };
+        if needed.is_none_or(|needed| needed as u64 > room) {
+            let expected = format!("at most {room} bytes, which is what buffer view {} holds", view.index());
+            return Err(Fault::new(Place::File, expected, format!("{count} rows of {stride} bytes")));
+        }
+        let offset = start + offset as u64;
+        Ok(Self { bytes, offset, stride, size, left: count, block: Vec::new(), at: 0, in_block: 0 })
     }
-    Ok((0..count).map(move |row| &bytes[row * stride..row * stride + size]))
+
+    /// Returns the next row, of which there must be one.
+    #[inline]
+    fn next(&mut self) -> Result<&[u8], Fault> {
+        if self.in_block == 0 {
+            self.fill()?;
+        }
+        let row = self.at..self.at + self.size;
+        self.at += self.stride;
+        self.in_block -= 1;
+        self.left -= 1;
+        Ok(&self.block[row])
+    }
+
+    /// Reads the next rows.
+    #[cold]
+    fn fill(&mut self) -> Result<(), Fault> {
+        let rows = (BLOCK_BYTES / self.stride.max(1)).clamp(1, self.left.max(1));
+        self.block.resize((rows - 1) * self.stride + self.size, 0);
+        self.bytes.read(self.offset, &mut self.block)?;
+        self.offset += (rows * self.stride) as u64;
+        (self.at, self.in_block) = (0, rows);
+        Ok(())
+    }
 }
 
 fn width(kind: DataType) -> usize {

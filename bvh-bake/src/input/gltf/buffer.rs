@@ -1,80 +1,177 @@
 //! Finds the bytes of glTF buffers: embedded in the file, in a base64 URI, or in a file beside it.
+//!
+//! Bytes are read where and when an accessor needs them, so that no buffer of a file is in memory.
 
+use super::beside::{Beside, Folder};
 use crate::error::{Fault, Place, excerpt};
-use crate::input::input_file::InputReader;
+use crate::input::input_file::RandomAccess;
 use crate::progress::Progress;
+use crate::storage::read_exact_at;
 use gltf::Buffer;
 use gltf::buffer::Source;
-use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
-/// The buffers read so far.
+/// The most files that are open at the same time, because systems limit that.
+const MAX_OPEN_FILES: usize = 64;
+
+/// The buffers of a document.
 pub(super) struct Buffers<'a> {
-    blob: Option<&'a [u8]>,
     document: &'a Path,
+    blob: Option<Bytes<'a>>,
+    folder: Folder<'a>,
     progress: &'a Progress,
-    read: HashMap<usize, Cow<'a, [u8]>>,
-    /// The number of bytes of all buffers.
+    /// The decoded URIs, by the number of the buffer.
+    decoded: HashMap<usize, Rc<Vec<u8>>>,
+    /// The open files, by the number of the buffer.
+    open: HashMap<usize, Bytes<'a>>,
+    /// The files that count in `total`, and the buffers in memory that do.
+    counted: HashSet<PathBuf>,
+    counted_in_memory: HashSet<usize>,
+    /// The bytes of all buffers found so far. A file that several buffers name counts once.
     pub(super) total: u64,
 }
 
-impl<'a> Buffers<'a> {
-    pub(super) fn new(blob: Option<&'a [u8]>, document: &'a Path, progress: &'a Progress) -> Self {
-        Buffers { blob, document, progress, read: HashMap::new(), total: 0 }
-    }
+/// The bytes of a buffer.
+#[derive(Clone)]
+pub(super) struct Bytes<'a> {
+    place: Found<'a>,
+    /// The offset of the first byte.
+    start: u64,
+    pub(super) length: u64,
+    progress: &'a Progress,
+    /// The file for messages.
+    path: Rc<Path>,
+}
 
-    /// Returns the bytes of a buffer, exactly as many as it declares.
-    pub(super) fn bytes(&mut self, buffer: &Buffer) -> Result<&[u8], Fault> {
-        let index = buffer.index();
-        if !self.read.contains_key(&index) {
-            let bytes = self.find(buffer)?;
-            self.total += bytes.len() as u64;
-            self.read.insert(index, bytes);
-        }
-        let bytes = self.read.get(&index).map(|bytes| &bytes[..]).unwrap_or_default();
-        bytes.get(..buffer.length()).ok_or_else(|| {
-            let expected = format!("{} bytes in buffer {index}", buffer.length());
-            Fault::new(Place::File, expected, bytes.len().to_string())
-        })
-    }
+#[derive(Clone)]
+enum Found<'a> {
+    Document(&'a RandomAccess<'a>),
+    Decoded(Rc<Vec<u8>>),
+    File(Rc<File>),
+}
 
-    fn find(&self, buffer: &Buffer) -> Result<Cow<'a, [u8]>, Fault> {
-        let uri = match buffer.source() {
-            Source::Bin => {
-                let blob = self.blob.filter(|_| buffer.index() == 0).map(Cow::Borrowed);
-                let missing = || {
-                    Fault::new(Place::File, "a BIN chunk with buffer 0", format!("buffer {}", buffer.index()))
-                };
-                return blob.ok_or_else(missing);
+impl Bytes<'_> {
+    /// Reads bytes from an offset on. The caller has compared their end with `length`.
+    pub(super) fn read(&self, offset: u64, into: &mut [u8]) -> Result<(), Fault> {
+        let offset = self.start + offset;
+        let read = match &self.place {
+            Found::Document(document) => document.read_at(into, offset, self.progress),
+            Found::Decoded(bytes) => {
+                into.copy_from_slice(&bytes[offset as usize..][..into.len()]);
+                Ok(())
             }
-            Source::Uri(uri) => uri,
+            Found::File(file) => {
+                self.progress.add_input_read(into.len() as u64);
+                read_exact_at(file, into, offset)
+            }
         };
-        let refused = |expected: &'static str| Fault::new(Place::File, expected, excerpt(uri.as_bytes()));
-        if let Some(data) = uri.strip_prefix("data:") {
-            let encoded =
-                data.split_once(";base64,").and_then(|(_, encoded)| decode_base64(encoded.as_bytes()));
-            return encoded.map(Cow::Owned).ok_or_else(|| refused("a data URI in base64"));
-        }
-        let relative = decode_percent(uri).ok_or_else(|| refused("a percent-encoded URI"))?;
-        let relative = PathBuf::from(relative);
-        if uri.contains("://") || !relative.is_relative() {
-            return Err(refused("a buffer in a file named relative to this one"));
-        }
-        let path = self.document.parent().unwrap_or(Path::new("")).join(relative);
-        self.read_file(&path, buffer.length()).map(Cow::Owned).map_err(|source| Fault::Io { path, source })
-    }
-
-    /// Reads no more than `length` bytes, because the file may be one without an end.
-    fn read_file(&self, path: &Path, length: usize) -> std::io::Result<Vec<u8>> {
-        let mut input = InputReader::open(path, self.progress, 0)?;
-        if !input.is_regular()? {
-            return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));
-        }
-        input.read_up_to(length as u64)
+        read.map_err(|source| Fault::Io { path: self.path.to_path_buf(), source })
     }
 }
 
+impl<'a> Buffers<'a> {
+    /// Makes the buffers of a document. `blob` is where the document has bytes embedded: their offset and number.
+    pub(super) fn new(
+        document: &'a Path,
+        access: &'a RandomAccess<'a>,
+        blob: Option<(u64, u64)>,
+        allows_outside: bool,
+        progress: &'a Progress,
+    ) -> Self {
+        let blob = blob.map(|(start, length)| Bytes {
+            place: Found::Document(access),
+            start,
+            length,
+            progress,
+            path: document.into(),
+        });
+        Buffers {
+            document,
+            blob,
+            folder: Folder::of(document, allows_outside),
+            progress,
+            decoded: HashMap::new(),
+            open: HashMap::new(),
+            counted: HashSet::new(),
+            counted_in_memory: HashSet::new(),
+            total: 0,
+        }
+    }
+
+    /// Returns the bytes of a buffer, exactly as many as it declares.
+    pub(super) fn bytes(&mut self, buffer: &Buffer) -> Result<Bytes<'a>, Fault> {
+        let mut bytes = self.find(buffer)?;
+        let declared = buffer.length() as u64;
+        if bytes.length < declared {
+            let expected = format!("{declared} bytes in buffer {}", buffer.index());
+            return Err(Fault::new(Place::File, expected, bytes.length.to_string()));
+        }
+        bytes.length = declared;
+        Ok(bytes)
+    }
+
+    fn find(&mut self, buffer: &Buffer) -> Result<Bytes<'a>, Fault> {
+        let index = buffer.index();
+        let uri = match buffer.source() {
+            Source::Bin => {
+                let missing =
+                    || Fault::new(Place::File, "a BIN chunk with buffer 0", format!("buffer {index}"));
+                let blob = self.blob.clone().filter(|_| index == 0).ok_or_else(missing)?;
+                self.count_in_memory(index, blob.length);
+                return Ok(blob);
+            }
+            Source::Uri(uri) => uri,
+        };
+        if let Some(data) = uri.strip_prefix("data:") {
+            let bytes = match self.decoded.get(&index) {
+                Some(bytes) => bytes.clone(),
+                None => {
+                    let encoded = data
+                        .split_once(";base64,")
+                        .and_then(|(_, encoded)| decode_base64(encoded.as_bytes()));
+                    let refused = || Fault::new(Place::File, "a data URI in base64", excerpt(uri.as_bytes()));
+                    let bytes = Rc::new(encoded.ok_or_else(refused)?);
+                    self.decoded.insert(index, bytes.clone());
+                    bytes
+                }
+            };
+            let length = bytes.len() as u64;
+            self.count_in_memory(index, length);
+            let (path, progress) = (self.document.into(), self.progress);
+            return Ok(Bytes { place: Found::Decoded(bytes), start: 0, length, progress, path });
+        }
+        if let Some(bytes) = self.open.get(&index) {
+            return Ok(bytes.clone());
+        }
+        if self.open.len() == MAX_OPEN_FILES {
+            self.open.clear();
+        }
+        let Beside { file, path, length } = self.folder.open(uri)?;
+        let bytes = Bytes {
+            place: Found::File(Rc::new(file)),
+            start: 0,
+            length,
+            progress: self.progress,
+            path: path.as_path().into(),
+        };
+        if self.counted.insert(path) {
+            self.total += length;
+        }
+        self.open.insert(index, bytes.clone());
+        Ok(bytes)
+    }
+
+    fn count_in_memory(&mut self, index: usize, length: u64) {
+        if self.counted_in_memory.insert(index) {
+            self.total += length;
+        }
+    }
+}
+
+/// Decodes base64, with or without padding, in the usual alphabet or the one for URLs.
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let text = text.strip_suffix(b"=").unwrap_or(text);
     let text = text.strip_suffix(b"=").unwrap_or(text);
@@ -101,22 +198,6 @@ fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-fn decode_percent(uri: &str) -> Option<String> {
-    let mut bytes = Vec::with_capacity(uri.len());
-    let mut rest = uri.as_bytes();
-    while let Some((&first, after)) = rest.split_first() {
-        rest = after;
-        if first == b'%' {
-            let digits = std::str::from_utf8(rest.get(..2)?).ok()?;
-            bytes.push(u8::from_str_radix(digits, 16).ok()?);
-            rest = &rest[2..];
-        } else {
-            bytes.push(first);
-        }
-    }
-    String::from_utf8(bytes).ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,12 +210,5 @@ mod tests {
         for text in ["T", "TWF=u", "TW\n", "====="] {
             assert_eq!(decode_base64(text.as_bytes()), None, "{text}");
         }
-    }
-
-    #[test]
-    fn percent_signs_are_decoded() {
-        assert_eq!(decode_percent("my%20mesh%C3%A9.bin").as_deref(), Some("my meshé.bin"));
-        assert_eq!(decode_percent("a%2"), None);
-        assert_eq!(decode_percent("a%zz"), None);
     }
 }

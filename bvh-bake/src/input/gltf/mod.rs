@@ -1,9 +1,10 @@
 //! Reads glTF 2.0 scenes, in one of two ways. As a mesh, each node with a mesh becomes an object, and the nodes above it
 //! place it. As a scene, each mesh becomes an object, or one per scale (module `frame`), and each node an instance of it.
 //!
-//! The `gltf` crate reads and validates the document. Accessors are read in module `accessor`, because the crate's own
-//! iterators panic on counts and strides that a file may contain; buffers are found in module `buffer`. The reader
-//! takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without a parent.
+//! The `gltf` crate reads and validates the document (module `document`), which is all that is in memory as a whole.
+//! Accessors are read block by block in module `accessor`, because the crate's own iterators panic on counts and strides
+//! that a file may contain; buffers are found in module `buffer`, and files that the document names are opened in module
+//! `beside`. The reader takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without a parent.
 //! Transforms are read as f32 and multiplied in f64. Triangles, strips and fans are read; points and lines are not.
 //! Skins, morph targets and animations move nothing. As a mesh, what several nodes share is copied for each. The degenerate
 //! triangles that join the parts of a strip are left out, because they are no part of the surface; other degenerate
@@ -13,141 +14,75 @@
 //! extension (Draco, meshopt) is refused.
 
 mod accessor;
+mod beside;
 mod buffer;
+mod document;
 mod frame;
+mod sink;
 
-use super::next_ids;
-use crate::error::{Fault, Place, excerpt};
-use crate::input::mesh::{Mesh, Object};
+use crate::error::{Fault, Halt, Place, excerpt};
+use crate::input::input_file::{InputFile, RandomAccess};
+use crate::limits::MAX_VERTICES;
 use crate::progress::Progress;
+use crate::storage::resources::Allowance;
 use buffer::Buffers;
+use bvh_format::checksum::Hasher;
 use bvh_format::instances::Instance;
 use frame::{Affine, Frame, IDENTITY, Scales};
 use gltf::Document;
-use gltf::json::{self, validation::Checked};
 use gltf::mesh::{Mode, Semantic};
+pub(crate) use sink::{InMemory, Sink};
 use std::collections::HashMap;
-use std::path::Path;
 
 /// The number of vertices and indices that a scene may have besides one per byte of its buffers. A small file can
 /// require any number of them by placing one mesh many times.
 const MAX_COPIES: u64 = 1 << 26;
 /// The number of vertices that a primitive counts as, besides its own, to bound the time that primitives take.
-const PRIMITIVE_ITEMS: usize = 16;
+const PRIMITIVE_ITEMS: u64 = 16;
 
-/// Reads a file as a mesh or as a scene.
-pub(super) fn read(bytes: &[u8], path: &Path, as_scene: bool, progress: &Progress) -> Result<Mesh, Fault> {
-    let (text, blob) = split(bytes)?;
-    let document = parse(text, blob.is_some())?;
+/// Reads a file as a mesh or as a scene, and passes on what it finds. The document must fit in `memory`. Returns a
+/// checksum of all that was passed on.
+pub(crate) fn read(
+    input: &InputFile,
+    access: &RandomAccess,
+    sink: &mut impl Sink,
+    memory: Allowance,
+    progress: &Progress,
+) -> Result<u64, Halt> {
+    let parsed = document::read(input, access, memory, progress)?;
+    let document = &parsed.document;
+    let buffers = Buffers::new(input.path(), access, parsed.blob, input.allows_outside(), progress);
     let mut scene = Scene {
-        document: &document,
-        as_scene,
-        buffers: Buffers::new(blob, path, progress),
-        mesh: Mesh::default(),
+        document,
+        as_scene: input.is_scene(),
+        buffers,
+        sink,
+        hasher: Hasher::default(),
+        objects: 0,
         variants: HashMap::new(),
         scales: Scales::of(document.nodes().map(|node| node.transform())),
-        next_id: 0,
         items: 0,
     };
     scene.read_nodes()?;
-    Ok(scene.mesh)
-}
-
-/// Splits a binary file into its JSON and the embedded bytes.
-fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
-    if !bytes.starts_with(b"glTF") {
-        return Ok((bytes, None));
-    }
-    let word =
-        |at: usize| -> Option<u32> { Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?)) };
-    let (version, length) = (word(4).unwrap_or(0), word(8).unwrap_or(0));
-    if version != 2 {
-        return Err(Fault::new(Place::Byte(4), "binary glTF of version 2", version.to_string()));
-    }
-    let file = bytes.get(..length as usize);
-    let file = file.ok_or_else(|| {
-        Fault::new(Place::Byte(8), format!("a length of at most {}", bytes.len()), length.to_string())
-    })?;
-    let mut chunks = [None; 2];
-    let mut at = 12;
-    for (chunk, kind) in chunks.iter_mut().zip([b"JSON", b"BIN\0"]) {
-        let Some(head) = file.get(at..at + 8) else { break };
-        let (size, name) = head.split_at(4);
-        let size = u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize;
-        let content = file.get(at + 8..).and_then(|rest| rest.get(..size));
-        *chunk = content.filter(|_| name == kind);
-        if chunk.is_none() {
-            let expected = format!("a chunk {} inside the file", excerpt(kind));
-            return Err(Fault::new(
-                Place::Byte(at as u64),
-                expected,
-                format!("{} of {size} bytes", excerpt(name)),
-            ));
-        }
-        at += 8 + size;
-    }
-    let [text, blob] = chunks;
-    let text = text.ok_or_else(|| Fault::new(Place::Byte(12), "a JSON chunk", "the end of the file"))?;
-    Ok((text, blob))
-}
-
-fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
-    let mut root: json::Root = json::deserialize::from_slice(text).map_err(|error| {
-        let place = if is_binary { Place::File } else { Place::Line(error.line() as u64) };
-        Fault::new(place, "a glTF document", excerpt(error.to_string().as_bytes()))
-    })?;
-    let changes_triangles = |name: &str| {
-        !["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"]
-            .iter()
-            .any(|kind| name.starts_with(kind))
-            && name != "KHR_mesh_quantization"
-    };
-    if let Some(name) = root.extensions_required.iter().find(|name| changes_triangles(name)) {
-        return Err(Fault::new(
-            Place::File,
-            "no required extension that changes triangles",
-            excerpt(name.as_bytes()),
-        ));
-    }
-    root.extensions_required.clear();
-    // The crate's validation looks up each POSITION before it checks the number, and requires bounds that are not used
-    // here.
-    let accessors = root.accessors.len();
-    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-        if let Some(index) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) {
-            let Some(accessor) = root.accessors.get_mut(index.value()) else {
-                let expected = format!("an accessor below {accessors}");
-                return Err(Fault::new(Place::File, expected, index.value().to_string()));
-            };
-            let anything = || json::serialize::to_value([0.0f32; 3]).ok();
-            accessor.min = anything();
-            accessor.max = anything();
-        }
-    }
-    Document::from_json(root).map_err(|error| {
-        let found = match error {
-            gltf::Error::Validation(errors) => {
-                errors.first().map_or(String::new(), |(path, error)| format!("{error} at {path}"))
-            }
-            other => other.to_string(),
-        };
-        Fault::new(Place::File, "glTF that follows its schema", excerpt(found.as_bytes()))
-    })
+    Ok(scene.hasher.finish())
 }
 
 /// Whether S of a [`Frame`] is the same, to the bit.
 type ShapeBits = [[u64; 3]; 3];
 
-struct Scene<'a> {
+struct Scene<'a, S> {
     document: &'a Document,
     /// Whether nodes become instances.
     as_scene: bool,
     buffers: Buffers<'a>,
-    mesh: Mesh,
+    sink: &'a mut S,
+    /// Hashes what the sink gets.
+    hasher: Hasher,
+    /// The number of objects so far.
+    objects: u32,
     /// The object of each mesh and shape, as a scene.
     variants: HashMap<(usize, ShapeBits), u32>,
     scales: Scales,
-    next_id: u32,
     items: u64,
 }
 
@@ -167,9 +102,9 @@ impl Parent {
     }
 }
 
-impl Scene<'_> {
+impl<S: Sink> Scene<'_, S> {
     /// Visits the nodes of the scene, each before its children.
-    fn read_nodes(&mut self) -> Result<(), Fault> {
+    fn read_nodes(&mut self) -> Result<(), Halt> {
         let document = self.document;
         let scene = document.default_scene().or_else(|| document.scenes().next());
         let mut seen = vec![false; document.nodes().len()];
@@ -192,7 +127,7 @@ impl Scene<'_> {
         while let Some((node, parent)) = todo.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {
                 let found = format!("node {} twice", node.index());
-                return Err(Fault::new(Place::File, "nodes that form trees", found));
+                return Err(Fault::new(Place::File, "nodes that form trees", found).into());
             }
             let own = parent.of_child(&node, &mut self.scales);
             if let Some(mesh) = node.mesh() {
@@ -219,14 +154,14 @@ impl Scene<'_> {
     }
 
     /// Adds an instance of a mesh, which is read once for each shape.
-    fn add_instance(&mut self, name: &str, mesh: &gltf::Mesh, frame: &Frame) -> Result<(), Fault> {
+    fn add_instance(&mut self, name: &str, mesh: &gltf::Mesh, frame: &Frame) -> Result<(), Halt> {
         // An inherited name is a copy.
-        self.spend(name.len() / 8 + PRIMITIVE_ITEMS)?;
+        self.spend(name.len() as u64 / 8 + PRIMITIVE_ITEMS)?;
         let key = (mesh.index(), frame.shape.map(|row| row.map(|value| (value + 0.0).to_bits())));
         let object = match self.variants.get(&key) {
             Some(&object) => object,
             None => {
-                let object = self.mesh.objects.len() as u32;
+                let object = self.objects;
                 let of_mesh = mesh.name().unwrap_or(name);
                 self.read_mesh(of_mesh, mesh, frame.mirrors(), |point| frame.shaped(point))?;
                 self.variants.insert(key, object);
@@ -234,10 +169,18 @@ impl Scene<'_> {
             }
         };
         let (rotation, translation) = (frame.rotation, frame.translation);
+        self.hash_name(name);
+        self.hasher.update(&object.to_le_bytes());
+        let pose = rotation.as_flattened().iter().chain(&translation);
+        pose.for_each(|value| self.hasher.update(&value.to_le_bytes()));
         let instance =
             Instance { name: name.to_owned(), rotation, translation, ..Instance::of_object(object) };
-        self.mesh.instances.push(instance);
-        Ok(())
+        self.sink.instance(instance)
+    }
+
+    fn hash_name(&mut self, name: &str) {
+        self.hasher.update(&(name.len() as u64).to_le_bytes());
+        self.hasher.update(name.as_bytes());
     }
 
     /// Reads a mesh as an object whose vertices are moved by `place`.
@@ -247,56 +190,79 @@ impl Scene<'_> {
         mesh: &gltf::Mesh,
         mirrors: bool,
         place: impl Fn([f64; 3]) -> [f64; 3],
-    ) -> Result<(), Fault> {
-        let mut object = Object { name: name.to_owned(), ..Object::default() };
-        // Primitives often share their vertices. The map leads from an accessor to its first vertex and its number of
-        // vertices.
-        let mut shared: HashMap<usize, (usize, usize)> = HashMap::new();
+    ) -> Result<(), Halt> {
+        self.hash_name(name);
+        self.sink.begin(name)?;
+        self.objects += 1;
+        // Primitives often share their vertices. The map leads from an accessor to its first vertex, as the sink and as the
+        // object count, and to its number of vertices.
+        let mut shared: HashMap<usize, (u64, u64, u64)> = HashMap::new();
+        let mut vertices = 0;
         for primitive in mesh.primitives() {
             let mode = primitive.mode();
             if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
                 continue;
             }
             let Some(accessor) = primitive.get(&Semantic::Positions) else { continue };
-            let (first, count) = match shared.get(&accessor.index()) {
+            let (first, own, count) = match shared.get(&accessor.index()) {
                 Some(&known) => known,
                 None => {
-                    let first = object.positions.len();
-                    let positions = accessor::positions(&accessor, &mut self.buffers)?;
-                    self.spend(positions.len())?;
-                    object.positions.extend(positions.iter().map(|&position| place(position)));
-                    let known = (first, positions.len());
+                    let count = accessor.count() as u64;
+                    let known = (self.sink.next_vertex(), vertices, count);
+                    accessor::find(&accessor, &mut self.buffers)?;
+                    self.spend(count)?;
+                    vertices += count;
+                    let Self { buffers, sink, hasher, .. } = self;
+                    accessor::positions(&accessor, buffers, |positions| {
+                        positions.iter_mut().for_each(|position| *position = place(*position));
+                        hasher.update(bytemuck::cast_slice(positions));
+                        sink.vertices(positions)
+                    })?;
                     shared.insert(accessor.index(), known);
                     known
                 }
             };
-            let indices = match primitive.indices() {
-                Some(accessor) => accessor::indices(&accessor, &mut self.buffers)?,
-                None => (0..count as u32).collect(),
-            };
-            self.spend(indices.len() + PRIMITIVE_ITEMS)?;
-            if let Some(found) = indices.iter().find(|&&index| index as usize >= count) {
-                let expected =
-                    format!("vertex numbers below {count} in object \"{}\"", excerpt(name.as_bytes()));
-                return Err(Fault::new(Place::File, expected, found.to_string()));
+            if first + count > MAX_VERTICES {
+                return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" }.into());
             }
-            let triangles = assemble(mode, &indices)?;
-            // Only a checked mesh has all its vertices in 32 bits. Before the check, a number may be out of range.
-            let first = u32::try_from(first).unwrap_or(u32::MAX);
-            object.triangles.extend(triangles.iter().map(|&[a, b, c]| {
-                let [a, b, c] = [a, b, c].map(|corner| corner.saturating_add(first));
-                if mirrors { [a, c, b] } else { [a, b, c] }
-            }));
+            let indices = primitive.indices();
+            if let Some(accessor) = &indices {
+                accessor::find(accessor, &mut self.buffers)?;
+            }
+            self.spend(indices.as_ref().map_or(count, |indices| indices.count() as u64) + PRIMITIVE_ITEMS)?;
+            let mut triangles = Triangles::of(mode, first as u32, mirrors);
+            let Self { buffers, sink, hasher, .. } = self;
+            hasher.update(&[mode.as_gl_enum() as u8, u8::from(mirrors)]);
+            hasher.update(&own.to_le_bytes());
+            let mut give = |indices: &[u32]| {
+                if let Some(found) = indices.iter().find(|&&index| u64::from(index) >= count) {
+                    let expected =
+                        format!("vertex numbers below {count} in object \"{}\"", excerpt(name.as_bytes()));
+                    return Err(Fault::new(Place::File, expected, found.to_string()).into());
+                }
+                hasher.update(bytemuck::cast_slice(indices));
+                sink.triangles(triangles.add(indices))
+            };
+            match indices {
+                Some(accessor) => accessor::indices(&accessor, buffers, &mut give)?,
+                None => {
+                    let mut block = Vec::new();
+                    for start in (0..count as u32).step_by(PLAIN_INDICES) {
+                        block.clear();
+                        block.extend((start..count as u32).take(PLAIN_INDICES));
+                        give(&block)?;
+                    }
+                }
+            }
+            triangles.finish()?;
         }
-        object.triangle_ids = next_ids(&mut self.next_id, object.triangles.len())?;
-        self.mesh.objects.push(object);
         Ok(())
     }
 
-    /// Counts what was read against the limit. Each single accessor is no longer than its buffer.
-    fn spend(&mut self, items: usize) -> Result<(), Fault> {
+    /// Counts what is about to be read against the limit. Each single accessor is no longer than its buffer.
+    fn spend(&mut self, items: u64) -> Result<(), Fault> {
         let most = MAX_COPIES + self.buffers.total;
-        self.items += items as u64;
+        self.items += items;
         if self.items > most {
             return Err(Fault::Limit {
                 place: Place::File,
@@ -308,30 +274,70 @@ impl Scene<'_> {
     }
 }
 
-/// Turns vertex numbers into triangles of one winding.
-fn assemble(mode: Mode, indices: &[u32]) -> Result<Vec<[u32; 3]>, Fault> {
-    let joins = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-    match mode {
-        Mode::TriangleStrip => {
-            let windows = indices.windows(3).enumerate();
-            let turned = windows
-                .map(|(place, w)| if place % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
-            Ok(turned.filter(|triangle| !joins(triangle)).collect())
-        }
-        Mode::TriangleFan => {
-            let Some((&hub, rim)) = indices.split_first() else { return Ok(Vec::new()) };
-            Ok(rim.windows(2).map(|pair| [hub, pair[0], pair[1]]).collect())
-        }
-        _ => match indices.as_chunks::<3>() {
-            (triangles, []) => Ok(triangles.to_vec()),
-            _ => {
-                let found = indices.len().to_string();
-                Err(Fault::new(
-                    Place::File,
-                    "a multiple of three vertex numbers in a list of triangles",
-                    found,
-                ))
+/// The number of indices that are made at a time for a primitive that states none.
+const PLAIN_INDICES: usize = 1 << 14;
+
+/// Turns vertex numbers into triangles of one winding, some at a time.
+struct Triangles {
+    mode: Mode,
+    /// The vertex that has the number 0.
+    first: u32,
+    mirrors: bool,
+    /// The numbers before those that come next, on which they depend: of a list those that are no triangle yet, of a
+    /// strip the last two, of a fan the first and the last.
+    before: [u32; 2],
+    waiting: usize,
+    /// The number of indices so far.
+    count: usize,
+    made: Vec<[u32; 3]>,
+}
+
+impl Triangles {
+    fn of(mode: Mode, first: u32, mirrors: bool) -> Self {
+        Self { mode, first, mirrors, before: [0; 2], waiting: 0, count: 0, made: Vec::new() }
+    }
+
+    /// Adds indices, and returns the triangles that they complete.
+    fn add(&mut self, indices: &[u32]) -> &[[u32; 3]] {
+        self.made.clear();
+        for &index in indices {
+            self.count += 1;
+            if self.waiting < 2 {
+                self.before[self.waiting] = index;
+                self.waiting += 1;
+                continue;
             }
-        },
+            let [a, b] = self.before;
+            let triangle = match self.mode {
+                Mode::TriangleStrip => {
+                    self.before = [b, index];
+                    // The degenerate triangles that join parts of a strip are left out.
+                    if a == b || b == index || index == a {
+                        continue;
+                    }
+                    if self.count % 2 == 1 { [a, b, index] } else { [b, a, index] }
+                }
+                Mode::TriangleFan => {
+                    self.before = [a, index];
+                    [a, b, index]
+                }
+                _ => {
+                    self.waiting = 0;
+                    [a, b, index]
+                }
+            };
+            let [a, b, c] = triangle.map(|corner| self.first + corner);
+            self.made.push(if self.mirrors { [a, c, b] } else { [a, b, c] });
+        }
+        &self.made
+    }
+
+    /// Checks that no indices are left over.
+    fn finish(&self) -> Result<(), Fault> {
+        if self.mode == Mode::Triangles && self.waiting > 0 {
+            let expected = "a multiple of three vertex numbers in a list of triangles";
+            return Err(Fault::new(Place::File, expected, self.count.to_string()));
+        }
+        Ok(())
     }
 }

@@ -28,6 +28,9 @@ use std::io::Read;
 /// Bytes of memory per block: its text and its parsed content.
 const BYTES_PER_BLOCK: usize = 4 * BLOCK_BYTES;
 
+/// Bytes of memory per name, besides two copies of its letters.
+const BYTES_PER_NAME: u64 = 160;
+
 /// Reads a file into `faces` and returns the names of its objects. After a success, all corners are vertices that the
 /// format can hold. `open` opens the file at its beginning; its argument states whether this is the first time.
 pub(crate) fn read<R: Read>(
@@ -35,7 +38,8 @@ pub(crate) fn read<R: Read>(
     faces: &mut IndexedFaces,
     resources: &Resources,
 ) -> Result<Names, Halt> {
-    let mut reading = Reading { faces, names: Names::default(), triangles: 0, has_wrong_face: false };
+    let mut reading =
+        Reading { faces, names: Names::default(), resources, triangles: 0, has_wrong_face: false };
     let mut reader = open(true)?;
     skip_mark(&mut reader);
     let again = || open(false);
@@ -67,12 +71,12 @@ pub(crate) fn read<R: Read>(
         }
     }
     reader.finish(Ok(()))?;
-    let Reading { faces, names, triangles, has_wrong_face } = reading;
+    let Reading { faces, names, triangles, has_wrong_face, .. } = reading;
     faces.finish()?;
     let out_of_range = faces.first_out_of_range()?.map(|(place, _)| place);
     // A vertex that the format cannot hold is an error at the first face that uses it, which comes before errors below.
-    if let Some(vertex) = faces.first_misfit(out_of_range)? {
-        return Err(faults::misfit(again()?, vertex));
+    if let Some((_, vertex)) = faces.first_misfit(out_of_range)? {
+        return Err(faults::misfit(again()?, vertex.into()));
     }
     if has_wrong_face || out_of_range.is_some() {
         return Err(faults::find(again));
@@ -87,6 +91,7 @@ pub(crate) fn read<R: Read>(
 struct Reading<'a> {
     faces: &'a mut IndexedFaces,
     names: Names,
+    resources: &'a Resources,
     triangles: u64,
     has_wrong_face: bool,
 }
@@ -116,7 +121,11 @@ impl Reading<'_> {
         let mut rest = &block.corners[..];
         for event in block.events {
             match event {
-                Event::Name { is_object, name } => self.names.enter(is_object, &name),
+                Event::Name { is_object, name } => {
+                    if self.names.enter(is_object, &name) {
+                        self.resources.keep(BYTES_PER_NAME + 2 * name.len() as u64)?;
+                    }
+                }
                 Event::Faces { corners, faces } => {
                     let (object, group) = self.names.current();
                     let count = (u64::from(corners) * u64::from(faces)).min(rest.len() as u64) as usize;
