@@ -4,7 +4,7 @@
 mod common;
 
 use common::sheet::write_sheet;
-use common::{cbvh_in, names};
+use common::{Ended, cbvh_in, cbvh_within, gltf, names};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -129,4 +129,162 @@ fn memory_of_checks_stays_within_the_budget() {
     };
     assert_eq!(damaged(&[]), damaged(&["--max-memory", &budget]));
     assert_eq!(names(directory), ["out.cbvh", "sheet.stl"]);
+}
+
+/// Addresses that the process takes and that are no memory of the bake, in KiB: the program, its libraries and its stacks.
+const ADDRESSES_KIB: u64 = 96 << 10;
+
+/// Bakes at the least budget that is accepted, which the error names, under a hard limit on the address space. Returns that
+/// budget in MiB.
+#[track_caller]
+fn bakes_at_its_limit(directory: &Path, arguments: &[&str]) -> u64 {
+    let within = |mebibytes: u64| -> Ended {
+        let budget = format!("{mebibytes}MiB");
+        let more = ["--force", "--max-memory", &budget, "--jobs", "1", "--scratch", ".", "--json"];
+        cbvh_within(directory, (mebibytes << 10) + ADDRESSES_KIB, &[&["bake"], arguments, &more].concat())
+    };
+    let mut mebibytes = 9;
+    for _ in 0..8 {
+        let ended = within(mebibytes);
+        if ended.code == 0 {
+            let told = ended.json();
+            let peak = told["peak_rss_bytes"].as_u64().unwrap();
+            assert!(peak <= mebibytes << 20, "{arguments:?}: {peak} bytes, not {mebibytes} MiB");
+            return mebibytes;
+        }
+        let remedy = ended.err.split("give --max-memory ").nth(1).and_then(|rest| rest.split("MiB").next());
+        assert_eq!(ended.code, 4, "{arguments:?}: {ended:?}");
+        mebibytes = remedy.unwrap_or_else(|| panic!("{ended:?}")).parse().unwrap();
+    }
+    panic!("{arguments:?}: no budget is enough, not even {mebibytes} MiB");
+}
+
+#[test]
+fn each_format_bakes_at_its_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    // The mesh has two bricks.
+    let side = 400;
+    for name in ["sheet.obj", "sheet.stl", "sheet.ply"] {
+        write_sheet(&directory.join(name), side);
+    }
+    // The same sheet as text, and as glTF in each way that buffers can be stored.
+    let stl = fs::read(directory.join("sheet.stl")).unwrap();
+    let (mut text, mut ply, mut positions, mut faces) =
+        (String::from("solid\n"), String::new(), Vec::new(), String::new());
+    for (number, triangle) in stl[84..].as_chunks::<50>().0.iter().enumerate() {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for corner in triangle[12..48].as_chunks::<12>().0 {
+            let [x, y, z] = [0, 4, 8].map(|at| f32::from_le_bytes(corner[at..at + 4].try_into().unwrap()));
+            text += &format!("vertex {x} {y} {z}\n");
+            ply += &format!("{x} {y} {z}\n");
+            positions.extend_from_slice(corner);
+        }
+        text += "endloop\nendfacet\n";
+        faces += &format!("3 {} {} {}\n", 3 * number, 3 * number + 1, 3 * number + 2);
+    }
+    fs::write(directory.join("text.stl"), text + "endsolid\n").unwrap();
+    let count = positions.len() / 12;
+    let head = format!(
+        "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        count / 3
+    );
+    fs::write(directory.join("text.ply"), head + &ply + &faces).unwrap();
+    let indices: Vec<u8> = (0..count as u32).flat_map(u32::to_le_bytes).collect();
+    fs::write(directory.join("p.bin"), &positions).unwrap();
+    fs::write(directory.join("i.bin"), &indices).unwrap();
+    fs::write(directory.join("beside.gltf"), gltf(count, count, "p.bin", "i.bin")).unwrap();
+    let uri = |bytes: &[u8]| format!("data:;base64,{}", base64(bytes));
+    let inside = gltf(count, count, &uri(&positions), &uri(&indices));
+    fs::write(directory.join("inside.gltf"), inside).unwrap();
+    let mut limits = Vec::new();
+    for input in ["sheet.obj", "sheet.stl", "sheet.ply", "text.stl", "text.ply", "beside.gltf", "inside.gltf"]
+    {
+        limits.push((input, bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"])));
+    }
+    // Formats that are read piece by piece need no more for a longer file.
+    let least = limits.iter().map(|(_, limit)| *limit).min().unwrap();
+    let piecewise = limits.iter().filter(|(input, _)| *input != "inside.gltf");
+    assert!(piecewise.clone().all(|(_, limit)| *limit == least), "{limits:?}");
+    // Two inputs are one mesh, and a folder is many.
+    bakes_at_its_limit(directory, &["sheet.obj", "beside.gltf", "-o", "out.cbvh", "-q"]);
+}
+
+/// Files much larger than the budget, most of whose bytes are vertices that no triangle uses.
+#[test]
+fn large_buffers_of_small_meshes_take_little_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let count = 18 << 20;
+    let file = fs::File::create(directory.join("p.bin")).unwrap();
+    file.set_len(12 * count as u64).unwrap();
+    fs::write(directory.join("i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
+    fs::write(directory.join("a.gltf"), gltf(count, 3, "p.bin", "i.bin")).unwrap();
+    assert!(bakes_at_its_limit(directory, &["a.gltf", "-o", "out.cbvh", "-q"]) <= 128);
+    // The same as one binary file.
+    let json = gltf(count, 3, "", "i.bin").replace(r#","uri":"""#, "");
+    let json = format!("{json:width$}", width = json.len().next_multiple_of(4));
+    let length = 12 * count as u32;
+    let mut head = [b"glTF".as_slice(), &2u32.to_le_bytes()].concat();
+    head.extend((28 + json.len() as u32 + length).to_le_bytes());
+    head.extend([&(json.len() as u32).to_le_bytes(), b"JSON".as_slice(), json.as_bytes()].concat());
+    head.extend([&length.to_le_bytes(), b"BIN\0".as_slice()].concat());
+    fs::write(directory.join("a.glb"), &head).unwrap();
+    let file = fs::File::options().write(true).open(directory.join("a.glb")).unwrap();
+    file.set_len(head.len() as u64 + u64::from(length)).unwrap();
+    assert!(bakes_at_its_limit(directory, &["a.glb", "-o", "out.cbvh", "-q"]) <= 128);
+    // Many buffers name one file.
+    let views: Vec<String> = (0..500).map(|i| format!(r#"{{"buffer":{i},"byteLength":36}}"#)).collect();
+    let buffers = vec![r#"{"byteLength":36,"uri":"p.bin"}"#; 500].join(",");
+    let accessor = |i| format!(r#"{{"bufferView":{i},"componentType":5126,"count":3,"type":"VEC3"}}"#);
+    let accessors: Vec<String> = (0..500).map(accessor).collect();
+    let primitive = |i| format!(r#"{{"attributes":{{"POSITION":{i}}}}}"#);
+    let primitives: Vec<String> = (0..500).map(primitive).collect();
+    let many = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}],
+        "accessors":[{}],"bufferViews":[{}],"buffers":[{buffers}]}}"#,
+        primitives.join(","),
+        accessors.join(","),
+        views.join(",")
+    );
+    fs::write(directory.join("many.gltf"), many).unwrap();
+    assert!(bakes_at_its_limit(directory, &["many.gltf", "-o", "out.cbvh", "-q"]) <= 16);
+}
+
+/// What a file makes the bake keep in memory counts: JSON, names, objects.
+#[test]
+fn what_is_kept_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    let nodes = vec!["{}"; 300_000].join(",");
+    let document =
+        gltf(3, 3, "p.bin", "i.bin").replacen("[{\"mesh\":0}", &format!("[{{\"mesh\":0}},{nodes}"), 1);
+    fs::write(directory.join("nodes.gltf"), document).unwrap();
+    fs::write(
+        directory.join("p.bin"),
+        [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat(),
+    )
+    .unwrap();
+    fs::write(directory.join("i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
+    let objects: String = (0..60_000).map(|i| format!("o {i}\nf 1 2 3\n")).collect();
+    fs::write(directory.join("objects.obj"), format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{objects}")).unwrap();
+    let solids = "solid\nfacet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\nendsolid\n";
+    fs::write(directory.join("solids.stl"), solids.repeat(60_000)).unwrap();
+    for input in ["nodes.gltf", "objects.obj", "solids.stl"] {
+        bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"]);
+    }
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digit = |bits: u32, place: u32| char::from(DIGITS[(bits >> (18 - 6 * place) & 63) as usize]);
+    let mut text = String::with_capacity(bytes.len() / 3 * 4 + 4);
+    for group in bytes.chunks(3) {
+        let bits = (0..3).fold(0, |bits, at| bits << 8 | u32::from(group.get(at).copied().unwrap_or(0)));
+        (0..4).for_each(|place| {
+            text.push(if place as usize <= group.len() { digit(bits, place) } else { '=' })
+        });
+    }
+    text
 }

@@ -3,7 +3,7 @@
 //! [`ReadAhead`] states what a mapped file asks of its user, and why mapping is a safe function.
 
 use memmap2::{Mmap, MmapMut};
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::Path;
@@ -47,10 +47,10 @@ pub enum ReadAhead {
 
 /// Maps a whole file for reading.
 pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
+    // Opening a named pipe would wait for its other end, and another file may take the name before it is opened.
+    require_mappable(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
-    if file.metadata()?.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));
-    }
+    require_mappable(&file.metadata()?)?;
     // SAFETY: the map is only ever read, as slices of bytes and as types for which any bytes are valid. That nobody
     // changes the file meanwhile is what the documentation of `ReadAhead` asks of the user.
     let map = unsafe { Mmap::map(&file) }?;
@@ -62,6 +62,14 @@ pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
         ReadAhead::Whole => map.advise(memmap2::Advice::WillNeed),
     };
     Ok(map)
+}
+
+/// Refuses what has no bytes of its own.
+fn require_mappable(metadata: &Metadata) -> io::Result<()> {
+    if metadata.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));
+    }
+    if metadata.is_file() { Ok(()) } else { Err(io::Error::other("not a regular file")) }
 }
 
 /// Asks the system to read a part of a map, all of which is about to be needed.

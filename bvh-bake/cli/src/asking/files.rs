@@ -2,6 +2,7 @@
 
 use super::arguments::AskingArguments;
 use crate::console::Failure;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Reads all files of a list, so that a mistake in the last one is told before the first one is asked about. Returns their
@@ -30,6 +31,21 @@ pub(crate) fn read_all<T>(
         Ok((stem(&file), questions))
     };
     files.into_iter().map(read).collect()
+}
+
+/// Refuses what is no regular file, without opening it: opening a named pipe would wait for its other end. Files that the
+/// command line names may be pipes; those that a text or a folder names may not.
+pub(crate) fn regular_file(path: &Path) -> io::Result<()> {
+    match std::fs::metadata(path)? {
+        metadata if metadata.is_file() => Ok(()),
+        metadata if metadata.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),
+    }
+}
+
+/// Refuses a file that a text names and that is no regular file.
+pub(crate) fn require_regular(path: &Path) -> Result<(), Failure> {
+    regular_file(path).map_err(|error| Failure::from_input(path, &error))
 }
 
 /// Reads a file of one question per line. `#` starts a comment, and blank lines are skipped. `none` is the message for a file

@@ -146,11 +146,15 @@ pub(crate) fn refuse_scene(path: &Path, bvh: &Bvh) -> Result<(), Failure> {
 /// reported as such.
 pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
     let failed = |error| Failure::from_input(path, &error);
-    let mut file = std::fs::File::open(path).map_err(failed)?;
-    let mut head = Vec::new();
-    file.by_ref().take(MAGIC.len() as u64).read_to_end(&mut head).map_err(failed)?;
     let named = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cbvh"));
-    Ok(head == MAGIC || named)
+    // What is read from a pipe here would be missing later.
+    if named || !std::fs::metadata(path).map_err(failed)?.is_file() {
+        return Ok(named);
+    }
+    let mut head = Vec::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(MAGIC.len() as u64).read_to_end(&mut head).map_err(failed)?;
+    Ok(head == MAGIC)
 }
 
 fn bake(path: &Path, options: &Options, object: Option<&str>) -> Result<(Bvh, f64), Failure> {

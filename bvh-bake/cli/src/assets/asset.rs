@@ -20,6 +20,32 @@ pub(super) struct Asset {
     pub(super) options: Options,
 }
 
+/// The most bytes of memory per asset for what is known of it besides its paths: its options, and its line of results until
+/// the end.
+const BYTES_PER_ASSET: u64 = 4096;
+/// The copies of its paths: as they are named, as they are opened, compared and told.
+const COPIES_OF_PATHS: u64 = 4;
+
+impl Asset {
+    /// Returns the bytes of memory that the asset takes until the end.
+    pub(super) fn bytes(&self) -> u64 {
+        let paths = [self.input.as_os_str().len(), self.output.as_os_str().len()];
+        BYTES_PER_ASSET + COPIES_OF_PATHS * paths.iter().sum::<usize>() as u64
+    }
+}
+
+/// Refuses more assets than there is memory for. They take `known` bytes so far.
+pub(super) fn require_memory(list: &Path, known: u64, max_memory: Option<u64>) -> Result<(), Failure> {
+    match max_memory {
+        Some(budget) if known > budget => Err(Failure::Limit(format!(
+            "{}: expected assets that are listed in at most {budget} bytes of memory, found more; raise --max-memory, or \
+             divide the list",
+            shown(list)
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Refuses two assets with the same output, and outputs that are an input, the manifest or the output manifest.
 ///
 /// Paths are compared after the system has resolved their folders; folders that do not exist yet contain no links.

@@ -1,6 +1,6 @@
 //! Finds the meshes in a folder and its subfolders, and gives each an output at the same place in another folder.
 
-use super::asset::Asset;
+use super::asset::{Asset, require_memory};
 use super::shown;
 use crate::console::Failure;
 use bvh_bake::Options;
@@ -10,7 +10,12 @@ use std::path::{Path, PathBuf};
 
 /// Returns all files with the extension of a mesh, sorted by path. Links to folders are not followed, because they may
 /// form a cycle.
-pub(super) fn read(folder: &Path, output: &Path, options: &Options) -> Result<Vec<Asset>, Failure> {
+pub(super) fn read(
+    folder: &Path,
+    output: &Path,
+    options: &Options,
+    max_memory: Option<u64>,
+) -> Result<Vec<Asset>, Failure> {
     if output.exists() && !output.is_dir() {
         return Err(Failure::Usage(format!(
             "{}: expected a folder, existing or new, found a file",
@@ -43,5 +48,10 @@ pub(super) fn read(folder: &Path, output: &Path, options: &Options) -> Result<Ve
         let (named_input, named_output) = (shown(&input), shown(&output));
         Asset { line, input, output, named_input, named_output, options: options.clone() }
     };
-    Ok((1..).zip(inputs).map(asset).collect())
+    let mut known = 0;
+    let assets = (1..).zip(inputs).map(asset).map(|asset| {
+        known += asset.bytes();
+        require_memory(folder, known, max_memory).map(|()| asset)
+    });
+    assets.collect()
 }

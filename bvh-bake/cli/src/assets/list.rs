@@ -1,6 +1,6 @@
 //! Reads a manifest: one asset per line, as a JSON object with an input, an output and options.
 
-use super::asset::Asset;
+use super::asset::{Asset, require_memory};
 use super::shown;
 use crate::bake;
 use crate::console::Failure;
@@ -9,8 +9,11 @@ use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use serde::Deserialize;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+
+/// The most bytes of a line. Paths that a system opens are much shorter.
+const MAX_LINE_BYTES: u64 = 1 << 16;
 
 /// A line. The command line gives the defaults of its options.
 #[derive(Deserialize)]
@@ -29,12 +32,26 @@ struct Line {
 }
 
 /// Returns all assets of a manifest, in order. Paths are relative to its folder. Empty lines are skipped, but counted.
-pub(super) fn read(manifest: &Path, options: &Options) -> Result<Vec<Asset>, Failure> {
+pub(super) fn read(
+    manifest: &Path,
+    options: &Options,
+    max_memory: Option<u64>,
+) -> Result<Vec<Asset>, Failure> {
     let failed = |error| Failure::from_input(manifest, &error);
     let folder = manifest.parent().unwrap_or(Path::new(""));
-    let mut assets = Vec::new();
-    for (number, bytes) in (1..).zip(BufReader::new(File::open(manifest).map_err(failed)?).split(b'\n')) {
-        let bytes = bytes.map_err(failed)?;
+    let (mut assets, mut known) = (Vec::new(), 0);
+    let mut lines = BufReader::new(File::open(manifest).map_err(failed)?);
+    for number in 1.. {
+        let mut bytes = Vec::new();
+        if lines.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut bytes).map_err(failed)? == 0 {
+            break;
+        }
+        bytes.pop_if(|last| *last == b'\n');
+        if bytes.len() as u64 > MAX_LINE_BYTES {
+            let what =
+                format!("line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more");
+            return Err(Failure::Limit(format!("{}: {what}", shown(manifest))));
+        }
         if bytes.trim_ascii().is_empty() {
             continue;
         }
@@ -47,7 +64,10 @@ pub(super) fn read(manifest: &Path, options: &Options) -> Result<Vec<Asset>, Fai
         };
         let (input, output): (PathBuf, PathBuf) = (place(&line.input)?, place(&line.output)?);
         let (named_input, named_output) = (line.input, line.output);
-        assets.push(Asset { line: number, input, output, named_input, named_output, options });
+        let asset = Asset { line: number, input, output, named_input, named_output, options };
+        known += asset.bytes();
+        require_memory(manifest, known, max_memory)?;
+        assets.push(asset);
     }
     Ok(assets)
 }

@@ -10,11 +10,12 @@ mod list;
 mod shares;
 mod summary;
 
+use crate::asking::files::regular_file;
 use crate::bake::{self, BakeArguments, FileOptions, Report};
 use crate::console::{self, Failure, spinner};
 use crate::process::signals;
 use asset::Asset;
-use bvh_bake::{BakeError, Progress};
+use bvh_bake::{BakeError, Progress, ReadError};
 use indicatif::ProgressBar;
 use journal::Journal;
 use serde::Serialize;
@@ -23,9 +24,6 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 use summary::Summary;
-
-/// The most bytes of memory per asset for what is known of it: its paths, and its line of results until the end.
-const BYTES_PER_ASSET: u64 = 4096;
 
 /// Returns whether the command line is about many assets: a manifest, or one folder.
 pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
@@ -37,13 +35,13 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let (options, file_options) = bake::prepare(arguments)?;
     let start = Instant::now();
     let mut assets = match (&arguments.manifest, &arguments.inputs[..], &arguments.output) {
-        (Some(manifest), ..) => list::read(manifest, &options)?,
-        (None, [folder], Some(output)) => folder::read(folder, output, &options)?,
+        (Some(manifest), ..) => list::read(manifest, &options, file_options.max_memory)?,
+        (None, [folder], Some(output)) => folder::read(folder, output, &options, file_options.max_memory)?,
         _ => return Err(Failure::Usage("expected a manifest or one folder (see --help)".into())),
     };
     let results = arguments.out_manifest.as_deref();
     asset::refuse_shared_outputs(&assets, arguments.manifest.as_deref(), results)?;
-    let known = BYTES_PER_ASSET * assets.len() as u64;
+    let known = assets.iter().map(Asset::bytes).sum();
     if let Some(shard) = arguments.shard {
         let mut number = 0..;
         assets.retain(|_| number.next().is_some_and(|number| shard.has(number)));
@@ -160,6 +158,8 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
                 source,
             })?;
         }
+        // The user has not seen these names, so that none of them may make the command wait.
+        regular_file(&asset.input).map_err(|source| ReadError::Io { path: asset.input.clone(), source })?;
         let file_options = FileOptions { max_memory, ..self.file_options.clone() };
         let inputs = std::slice::from_ref(&asset.input);
         let progress = Progress::default();

@@ -24,9 +24,14 @@ With --scene the output is a scene: it also states where the objects stand in th
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
 
---max-memory SIZE keeps the whole process within SIZE, however large the mesh is. OBJ, STL and PLY files are read piece \
-by piece, and up to 200 bytes per triangle go to scratch files, which have no names and vanish however the process \
-ends. The output has the same bytes. A SIZE that is too small for the mesh exits with code 4.
+A glTF file may name buffers in files. Such a file must be in the folder of the glTF file or below it; what a symbolic \
+link leads to counts. --allow-outside allows buffers elsewhere: then whoever made the glTF file chooses which files are \
+read.
+
+--max-memory SIZE keeps the whole process within SIZE, however large the mesh is. Files are read piece by piece, and up to 200 bytes per triangle go to scratch files, which have no names and vanish however the process \
+ends. The output has the same bytes. Pipes and \
+the JSON of glTF files are held in memory as a whole, data URIs included. A SIZE that is too small for the mesh exits \
+with code 4.
 
 On a terminal, a line on standard error shows the stage, the share of it that is done, triangles per second, the bytes \
 spilled to scratch files, the elapsed time and the estimated time left.
@@ -44,7 +49,8 @@ Many assets:
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
 profile, triangles, max_error, effort, split_objects, scene and ids; the options on the command line are their defaults. Paths \
-are relative to the manifest, and missing folders of outputs are created. Assets are baked side by side within --jobs \
+are relative to the manifest and may lead anywhere, but an input is a regular file: a manifest or a folder never makes \
+the command wait for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
 input: the number of its line, exit_code, and either the fields of --json or an error. Until all assets are done, the \
 lines of finished assets are in out.jsonl.part. --json prints one object with counts and sums, which add up over \
@@ -93,6 +99,9 @@ pub(crate) struct BakeArguments {
     /// With --max-memory: the folder for scratch files [default: the folder of the output]
     #[arg(long, value_name = "DIR", requires = "max_memory")]
     pub(crate) scratch: Option<PathBuf>,
+    /// Let glTF files name buffers outside their own folders, which is otherwise refused
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
     /// The number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub(crate) jobs: Option<u16>,

@@ -64,6 +64,8 @@ pub(crate) struct FileOptions {
     pub(crate) max_memory: Option<u64>,
     /// The folder for scratch files; `None` for that of the output.
     pub(crate) scratch: Option<PathBuf>,
+    /// Whether glTF files may name buffers outside their own folders.
+    pub(crate) allow_outside: bool,
 }
 
 /// Turns the arguments into options, and applies those that concern the whole process: threads and memory.
@@ -95,6 +97,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         force: arguments.force,
         max_memory: arguments.max_memory,
         scratch: arguments.scratch.clone(),
+        allow_outside: arguments.allow_outside,
     };
     Ok((options, file_options))
 }
@@ -118,9 +121,9 @@ pub(crate) fn bake(
 ) -> Result<Report, BakeError> {
     let start = Instant::now();
     let mut stages = Stages::new(progress);
-    let FileOptions { force, max_memory, scratch } = file_options.clone();
+    let FileOptions { force, max_memory, scratch, allow_outside } = file_options.clone();
     let bake = FileBake::new(inputs, output).options(options.clone()).force(force).max_memory(max_memory);
-    let bake = bake.scratch(scratch).progress(progress).on_step(|step| {
+    let bake = bake.allow_outside(allow_outside).scratch(scratch).progress(progress).on_step(|step| {
         watch(Event::Begins(step));
         stages.begin(step, &mut |line| watch(Event::Ended(line)));
     });

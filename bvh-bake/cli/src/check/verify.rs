@@ -15,7 +15,7 @@ Example:
 
 Give the meshes in the same order as to bake. Any difference exits with code 3.
 
-File and mesh are read piece by piece; glTF meshes are read whole. What does not fit into 1.5 GiB of memory, or into \
+File and mesh are read piece by piece. What does not fit into 1.5 GiB of memory, or into \
 --max-memory, goes to scratch files: up to 350 bytes per triangle. They have no names and vanish however the process \
 ends. --max-memory SIZE keeps the whole process within SIZE; a SIZE that is too small exits with code 4.";
 
@@ -34,6 +34,9 @@ pub(crate) struct VerifyArguments {
     /// The folder for scratch files [default: the system's folder for temporary files]
     #[arg(long, value_name = "DIR")]
     scratch: Option<PathBuf>,
+    /// Let glTF files name buffers outside their own folders, as for bake
+    #[arg(long)]
+    allow_outside: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -46,8 +49,10 @@ pub(crate) fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
         std::fs::read_dir(folder).map_err(|error| Failure::from_folder(folder, &error))?;
     }
     let meshes = names(&arguments.meshes);
-    let options =
-        VerifyOptions::default().max_memory(arguments.max_memory).scratch(arguments.scratch.clone());
+    let options = VerifyOptions::default()
+        .max_memory(arguments.max_memory)
+        .scratch(arguments.scratch.clone())
+        .allow_outside(arguments.allow_outside);
     if arguments.max_memory.is_some() {
         resident::give_back();
     }

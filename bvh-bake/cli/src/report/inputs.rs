@@ -3,10 +3,11 @@
 use super::arguments::ReportArguments;
 use super::kind::Kind;
 use super::source;
+use crate::asking::files::require_regular;
 use crate::console::Failure;
 use bvh_bake::mesh::Mesh;
 use cbvh_measure::pairs::{self, Pair};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A pair with what its files hold.
 pub(super) struct Input<T> {
@@ -28,6 +29,8 @@ pub(super) fn read<K: Kind>(
     // Files of items are small, so that they come before the meshes of all pairs.
     let given = pairs.iter().map(items::<K>).collect::<Result<Vec<_>, _>>()?;
     let with_meshes = pairs.into_iter().zip(given).map(|(pair, given)| {
+        require_regular(&pair.a)?;
+        require_regular(&pair.b)?;
         let meshes = [source::mesh(&pair.a)?, source::mesh(&pair.b)?];
         Ok(Input { pair, given, meshes })
     });
@@ -36,6 +39,7 @@ pub(super) fn read<K: Kind>(
 
 /// Reads the files of a pair.
 fn items<K: Kind>(pair: &Pair) -> Result<Vec<K::Item>, Failure> {
-    let read = pair.files.iter().map(|file| K::read(file)).collect::<Result<Vec<_>, _>>()?;
+    let read = |file: &PathBuf| require_regular(file).and_then(|()| K::read(file));
+    let read = pair.files.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     Ok(read.into_iter().flatten().collect())
 }

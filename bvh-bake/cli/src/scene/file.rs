@@ -1,5 +1,6 @@
 //! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
 
+use crate::asking::files::require_regular;
 use crate::asking::mesh::{How, LoadedMesh};
 use crate::asking::poses;
 use crate::console::Failure;
@@ -172,6 +173,7 @@ pub(super) fn load(
     };
     let mut shapes = Vec::new();
     for (_, _, file) in &text.meshes {
+        require_regular(file)?;
         let mut mesh = LoadedMesh::load(file, &how)?;
         mesh.check()?;
         loaded.triangles = loaded.triangles.saturating_add(mesh.triangles());

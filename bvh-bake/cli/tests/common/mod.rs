@@ -28,6 +28,18 @@ pub(crate) fn cbvh_in(directory: &Path, arguments: &[&str]) -> Ended {
         .env_remove("CBVH_ISA"))
 }
 
+/// Runs the command under a hard limit on its address space, in KiB.
+pub(crate) fn cbvh_within(directory: &Path, kibibytes: u64, arguments: &[&str]) -> Ended {
+    let command = "ulimit -v \"$0\" && exec \"$@\"";
+    run(Command::new("sh")
+        .args(["-c", command, &kibibytes.to_string(), env!("CARGO_BIN_EXE_cbvh")])
+        .args(arguments)
+        .current_dir(directory)
+        // Each arena of the GNU C library reserves 64 MiB of addresses, which are no memory.
+        .env("MALLOC_ARENA_MAX", "1")
+        .env_remove("CBVH_ISA"))
+}
+
 /// Runs the command with a forced backend.
 pub(crate) fn cbvh_with_isa(directory: &Path, isa: &str, arguments: &[&str]) -> Ended {
     run(Command::new(env!("CARGO_BIN_EXE_cbvh")).args(arguments).current_dir(directory).env("CBVH_ISA", isa))
@@ -85,6 +97,20 @@ impl Ended {
         assert_eq!(lines.len(), 1, "{}", self.out);
         lines.into_iter().next().unwrap()
     }
+}
+
+/// Returns a glTF document of one mesh whose positions and 32-bit indices are in the buffers named, positions first.
+pub(crate) fn gltf(vertices: usize, indices: usize, positions_uri: &str, indices_uri: &str) -> String {
+    let (positions_length, indices_length) = (12 * vertices, 4 * indices);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3"}},
+            {{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{positions_length}}},{{"buffer":1,"byteLength":{indices_length}}}],
+        "buffers":[{{"byteLength":{positions_length},"uri":"{positions_uri}"}},
+            {{"byteLength":{indices_length},"uri":"{indices_uri}"}}]}}"#
+    )
 }
 
 /// Returns the names of all files in a directory, sorted.

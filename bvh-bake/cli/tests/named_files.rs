@@ -1,0 +1,138 @@
+//! Checks which files the command opens because a text or a folder names them, and that none of them makes it wait.
+#![cfg(unix)]
+
+mod common;
+
+use common::{cbvh_in, cube, gltf};
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Returns a folder with a cube and with a named pipe that nobody writes to, under several names.
+fn with_pipes() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cube.obj"), cube()).unwrap();
+    for name in ["pipe", "pipe.obj", "pipe.cbvh", "pipe.txt"] {
+        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+    }
+    folder
+}
+
+const POSE: &str = "1 0 0 0 0 1 0 0 0 0 1 0";
+
+#[test]
+fn no_named_file_makes_the_command_wait() {
+    let folder = with_pipes();
+    let directory = folder.path();
+    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    for pipe in ["pipe.obj", "pipe.cbvh", "pipe"] {
+        write(
+            "cell.scene",
+            &format!("mesh a cube.obj\nmesh b {pipe}\ninstance a a {POSE}\ninstance b b {POSE}\nmoving a\n"),
+        );
+        write("frames.txt", &format!("{POSE}\n"));
+        cbvh_in(directory, &["scene", "cell.scene", "frames.txt"]).failed(2, &[pipe, "not a regular file"]);
+        write("pairs.txt", &format!("one cube.obj {pipe}\n"));
+        let report = ["report", "pairs.txt", "--out", "report"];
+        cbvh_in(directory, &report).failed(2, &[pipe, "not a regular file"]);
+    }
+    write("pairs.txt", "one cube.obj cube.obj pipe.txt\n");
+    cbvh_in(directory, &["report", "pairs.txt", "--out", "report"])
+        .failed(2, &["pipe.txt", "not a regular file"]);
+    for check in
+        [&["validate", "pipe.cbvh"][..], &["dump", "pipe.cbvh"], &["verify", "pipe.cbvh", "cube.obj"]]
+    {
+        cbvh_in(directory, check).failed(2, &["pipe.cbvh", "not a regular file"]);
+    }
+    cbvh_in(directory, &["query", "pipe.cbvh", "cube.obj", "--pose", POSE])
+        .failed(2, &["pipe.cbvh", "not a regular file"]);
+}
+
+/// The assets beside the pipe are baked.
+#[test]
+fn no_asset_makes_the_command_wait() {
+    let folder = with_pipes();
+    let directory = folder.path();
+    let manifest = r#"{"input":"pipe.obj","output":"out/a.cbvh"}
+{"input":"cube.obj","output":"out/b.cbvh"}
+{"input":"/dev/zero","output":"out/c.cbvh"}
+"#;
+    fs::write(directory.join("in.jsonl"), manifest).unwrap();
+    let ended = cbvh_in(directory, &["bake", "--manifest", "in.jsonl", "--out-manifest", "out.jsonl", "-q"]);
+    assert_eq!(ended.code, 2, "{ended:?}");
+    assert_eq!(ended.err.matches("not a regular file").count(), 2, "{ended:?}");
+    assert!(directory.join("out/b.cbvh").is_file());
+    fs::create_dir(directory.join("meshes")).unwrap();
+    fs::rename(directory.join("pipe.obj"), directory.join("meshes/pipe.obj")).unwrap();
+    fs::copy(directory.join("cube.obj"), directory.join("meshes/cube.obj")).unwrap();
+    symlink("/dev/zero", directory.join("meshes/zero.stl")).unwrap();
+    let ended = cbvh_in(directory, &["bake", "meshes", "-o", "baked", "-q"]);
+    assert_eq!(ended.code, 2, "{ended:?}");
+    assert_eq!(ended.err.matches("not a regular file").count(), 2, "{ended:?}");
+    assert!(directory.join("baked/cube.cbvh").is_file());
+}
+
+/// What the command line itself names may be a pipe.
+#[test]
+fn arguments_may_be_pipes() {
+    let folder = with_pipes();
+    let directory = folder.path();
+    fs::write(directory.join("p.txt"), format!("{POSE}\n")).unwrap();
+    let piped = |input: &str, arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_cbvh"))
+            .args(arguments)
+            .current_dir(directory)
+            .stdin(Stdio::from(cat(&directory.join(input))))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+    };
+    piped("p.txt", &["query", "cube.obj", "cube.obj", "/dev/stdin", "--json"]);
+    piped("cube.obj", &["query", "/dev/stdin", "cube.obj", "p.txt", "--json"]);
+    piped("cube.obj", &["bake", "/dev/stdin", "-o", "out.cbvh", "--max-memory", "200MiB"]);
+    cbvh_in(directory, &["verify", "out.cbvh", "cube.obj"]).done();
+}
+
+/// A pipe has no end that could be known beforehand.
+#[test]
+fn a_pipe_keeps_to_the_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("long.obj"), "# nothing\n".repeat(4 << 20)).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_cbvh"))
+        .args(["bake", "/dev/stdin", "-o", "out.cbvh", "--max-memory", "24MiB"])
+        .current_dir(directory)
+        .stdin(Stdio::from(cat(&directory.join("long.obj"))))
+        .output()
+        .unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(4), "{told}");
+    assert!(told.contains("/dev/stdin: expected a mesh that bakes in at most 25165824 bytes"), "{told}");
+}
+
+/// Starts to write a file to a pipe, and returns the end to read.
+fn cat(path: &Path) -> std::process::ChildStdout {
+    Command::new("cat").arg(path).stdout(Stdio::piped()).spawn().unwrap().stdout.unwrap()
+}
+
+#[test]
+fn buffers_outside_are_read_if_that_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::create_dir(directory.join("models")).unwrap();
+    let values = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    fs::write(directory.join("p.bin"), values.map(f32::to_le_bytes).concat()).unwrap();
+    fs::write(directory.join("models/i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
+    symlink("../p.bin", directory.join("models/link.bin")).unwrap();
+    for uri in ["../p.bin", "link.bin"] {
+        fs::write(directory.join("models/a.gltf"), gltf(3, 3, uri, "i.bin")).unwrap();
+        let bake = ["bake", "models/a.gltf", "-o", "a.cbvh", "--force", "-q"];
+        cbvh_in(directory, &bake)
+            .failed(3, &["models/a.gltf", uri, "below the folder", "allow files outside"]);
+        cbvh_in(directory, &[&bake[..], &["--allow-outside"]].concat()).done();
+        let verify = ["verify", "a.cbvh", "models/a.gltf"];
+        cbvh_in(directory, &verify).failed(3, &["models/a.gltf", uri]);
+        cbvh_in(directory, &[&verify[..], &["--allow-outside"]].concat()).done();
+    }
+}
