@@ -257,6 +257,18 @@ pub fn check_bounds<'b>(
     Ok((subtrees, inflation))
 }
 
+/// Checks that the box of an object's record contains its triangles, given those below its root.
+///
+/// # Errors
+/// Rule 35.
+pub fn check_box(layout: &Layout, object: &Object, root: &Subtree) -> Result<(), FormatError> {
+    let (record, kdop) = (&object.record, &root.kdop);
+    let inside = (0..3).all(|a| record.box_lo[a].get() <= kdop.lo[a] && kdop.hi[a] <= record.box_hi[a].get());
+    ensure(inside, Rule::BoundContains, layout.page_offset(record.first_page.get()), || {
+        ("the object's box to contain its triangles".into(), format!("{record:?}"))
+    })
+}
+
 /// How much wider decoded bounds are than tight ones, as sums over nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Inflation {

@@ -6,7 +6,7 @@
 
 use super::InParallel;
 use crate::progress::{Progress, Stage, Step, WHOLE};
-use bvh_format::bounds::{Inflation, Subtree, check_bounds};
+use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef};
 use bvh_format::source::{Block, PageBytes, Source};
@@ -179,13 +179,7 @@ impl Walk<'_> {
             let found = format!("{} roots without a link", self.roots.len());
             return Err(FormatError::new(Rule::AnchorParent, at, "the object's root and no other", found));
         };
-        let kdop = &root.subtree.kdop;
-        let inside =
-            (0..3).all(|a| record.box_lo[a].get() <= kdop.lo[a] && kdop.hi[a] <= record.box_hi[a].get());
-        if !inside {
-            let expected = "the object's box to contain its triangles";
-            return Err(FormatError::new(Rule::BoundContains, at, expected, format!("{record:?}")));
-        }
+        check_box(self.layout, self.object, &root.subtree)?;
         Ok(self.inflation)
     }
 }

@@ -13,7 +13,7 @@ use super::record::{Counts, Finding, Forged};
 use super::shrink::Case;
 use super::stars::{Stars, rotation};
 use crate::Failure;
-use bvh_format::bounds::{Subtree, check_bounds};
+use bvh_format::bounds::{Subtree, check_bounds, check_box};
 use bvh_format::page::{Page, RootRef};
 use bvh_format::validate::validate;
 use bvh_query::{
@@ -458,7 +458,7 @@ fn bounds_hold(bvh: &Bvh) -> bool {
     bvh.objects().iter().all(|object| {
         let mut subtrees: BTreeMap<(u32, u8), Subtree> = BTreeMap::new();
         let first = object.record().first_page.get();
-        (first..first + object.record().pages.get()).rev().all(|number| {
+        let pages_hold = (first..first + object.record().pages.get()).rev().all(|number| {
             let Some(page) = layout.page_bytes(bytes, number) else { return false };
             let page = Page::new(page, object.profile());
             let below = |to: RootRef| subtrees.get(&(to.page(), to.root())).unwrap_or(Subtree::unknown());
@@ -469,7 +469,8 @@ fn bounds_hold(bvh: &Bvh) -> bool {
             };
             subtrees.extend((0..).zip(found).map(|(root, subtree)| ((number, root), subtree)));
             true
-        })
+        });
+        pages_hold && check_box(layout, object, &subtrees[&(first, 0)]).is_ok()
     })
 }
 
