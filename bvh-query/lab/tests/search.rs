@@ -35,7 +35,7 @@ fn a_search_goes_on_where_its_record_ends() {
 
 #[test]
 fn every_kind_of_round_is_repeated_by_its_number() {
-    for kind in ["pairs", "probes", "motions"] {
+    for kind in ["pairs", "hostile", "probes", "motions"] {
         let [first, again] = [(); 2].map(|()| lab(&["search", "--kinds", kind, "--again", "1"]));
         assert!(first.status.success() && first.stdout == again.stdout, "{first:?}");
     }

@@ -157,23 +157,31 @@ mod tests {
     use cbvh_testkit::Random;
     use cbvh_testkit::depth::rounds;
 
-    /// Makes corners of which many coincide, are collinear or coplanar, and moves some by a rounding.
-    fn triangle(random: &mut Random, spread: usize, moved: bool) -> Triangle {
+    /// Makes a triangle of small integers, or a segment or a point.
+    fn triangle(random: &mut Random, spread: usize) -> Triangle {
         let mut number = || random.below(2 * spread + 1) as f64 - spread as f64;
-        let (p, u, v) = ([(); 3].map(|()| number()), [(); 3].map(|()| number()), [(); 3].map(|()| number()));
+        let [p, u, v] = [(); 3].map(|()| [(); 3].map(|()| number()));
         let plus = |q: [f64; 3], x: f64| [0, 1, 2].map(|k| p[k] + x * q[k]);
-        let mut t = match random.below(8) {
+        match random.below(8) {
             0 => [p, p, p],
             1 => [p, plus(u, 1.0), plus(u, 2.0)],
             2 => [p, plus(u, 1.0), p],
             3 => [p, plus(u, 1.0), plus(u, -0.5)],
             _ => [p, plus(u, 1.0), plus(v, 1.0)],
-        };
-        if moved {
-            let x = &mut t[random.below(3)][random.below(3)];
-            *x = if random.below(2) == 0 { x.next_up() } else { x.next_down() };
         }
-        t
+    }
+
+    /// Moves a triangle so that a corner of it is a corner of another or the middle of an edge.
+    fn touching(t: Triangle, other: &Triangle, random: &mut Random) -> Triangle {
+        let [i, j] = [0; 2].map(|_| random.below(3));
+        let from = t[random.below(3)];
+        t.map(|p| [0, 1, 2].map(|k| p[k] - from[k] + (other[i][k] + other[j][k]) / 2.0))
+    }
+
+    /// Moves a coordinate by a rounding.
+    fn nudge(t: &mut Triangle, random: &mut Random) {
+        let x = &mut t[random.below(3)][random.below(3)];
+        *x = if random.below(2) == 0 { x.next_up() } else { x.next_down() };
     }
 
     /// The slow oracle tests the same theorem in other arithmetic; both must say the same.
@@ -182,11 +190,18 @@ mod tests {
         let (mut random, mut fast, mut met) = (Random::new(1), 0u64, 0u64);
         let pairs = rounds(100_000);
         for pair in 0..pairs {
-            let (spread, moved) = (1 + (pair % 5) as usize, pair % 3 == 0);
+            let spread = 1 + (pair % 5) as usize;
+            let a = triangle(&mut random, spread);
+            let mut b = triangle(&mut random, spread);
+            if pair % 3 != 0 {
+                b = touching(b, &a, &mut random);
+            }
             let scale = 2f64.powi(random.below(200) as i32 - 100);
             let far = if pair % 4 == 0 { 2f64.powi(random.below(50) as i32) } else { 0.0 };
-            let [a, b] =
-                [(); 2].map(|()| triangle(&mut random, spread, moved).map(|p| p.map(|x| (x + far) * scale)));
+            let [a, mut b] = [a, b].map(|t| t.map(|p| p.map(|x| (x + far) * scale)));
+            if random.below(2) == 0 {
+                nudge(&mut b, &mut random);
+            }
             let (answer, was_fast) = meet(&a, &b);
             let slow = intersect(&Boxed::new(a), &Boxed::new(b), &mut Decided::default());
             assert_eq!(answer, slow, "{a:?} {b:?}");
@@ -200,8 +215,11 @@ mod tests {
     fn the_largest_integers_do_not_overflow() {
         let most = (1i64 << MAX_BITS) - 1;
         let corners = [[most, most, -most], [-most, most, most], [most, -most, most]];
+        // In parallel planes, whose x + y + z differ by 1.
         let shifted = corners.map(|p| p.map(|x| if x < 0 { x + 1 } else { x }));
-        assert!(triangles_meet(&corners, &shifted) && triangles_meet(&shifted, &corners));
+        assert!(!triangles_meet(&corners, &shifted) && !triangles_meet(&shifted, &corners));
+        let tilted = [shifted[0], shifted[1], [most, -most, most - 1]];
+        assert!(triangles_meet(&corners, &corners) && triangles_meet(&corners, &tilted));
         let product = [i128::from(most) * i128::from(most) * 8, 0, 0];
         assert_eq!(sign_of_dot(product, [2 * most, 0, 0]), Greater);
         assert_eq!(sign_of_dot(product.map(|x| -x), [2 * most, 0, 0]), Less);
