@@ -1,7 +1,7 @@
 //! Reads what callers give: numbers, and arrays of one row alone, such as a pose of shape (4, 4), or of N rows.
 //!
-//! Messages begin with the name of the argument. Everything is copied while Python's lock is held: another thread may
-//! change an array while a question runs.
+//! Messages begin with the name of the argument. Everything is copied while Python's lock is held, and checked in the
+//! copy: another thread may change an array while a question runs, and numpy fills large arrays without the lock.
 
 use crate::errors::pose_error;
 use bvh_query::{Pose, with_default_floats};

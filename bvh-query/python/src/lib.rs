@@ -20,7 +20,8 @@ mod scene_probes;
 
 use pyo3::prelude::*;
 
-#[pymodule]
+// Arrays are read where they lie. Without the lock, another thread might resize one meanwhile.
+#[pymodule(gil_used = true)]
 fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<mesh::Mesh>()?;
     module.add_class::<paths::Paths>()?;

@@ -75,6 +75,27 @@ class Sharing(unittest.TestCase):
                 for one, other in zip(found, expected):
                     np.testing.assert_array_equal(one, other)
 
+    def test_arrays_may_change_while_a_question_runs(self):
+        mesh = cbvh.bake(*cube())
+        poses = np.empty((20_000, 4, 4))
+        choices = [memoryview(np.tile(shifts(offset), (len(poses), 1, 1))).cast("B") for offset in ((0, 0, 0), (3, 0, 0))]
+        # Unlike numpy, this keeps the lock until all is written.
+        written = memoryview(poses).cast("B")
+        written[:] = choices[0]
+        found = set()
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            for parallel in (False, True):
+                for _ in range(20):
+                    asked = pool.submit(mesh.collide, mesh, poses, parallel=parallel)
+                    rounds = 0
+                    while not asked.done():
+                        rounds += 1
+                        written[:] = choices[rounds % 2]
+                    answers = asked.result()
+                    self.assertIn(answers.sum(), (0, len(poses)))
+                    found.add(rounds > 2)
+        self.assertIn(True, found, "nothing was written while a question ran")
+
     def test_threads_may_save_one_file(self):
         mesh = cbvh.bake(*cube())
         with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(4) as pool:

@@ -25,7 +25,9 @@ arrays where each question finds as many as there are. Lengths are in mesh units
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
 ``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about
-one `Scene` wait for each other, and a path of your own is called on the thread of its question.
+one `Scene` wait for each other, and a path of your own is called on the thread of its question. Arrays are copied before
+a question runs, so that changing one meanwhile changes no answer. An interpreter without a global lock turns it on when
+it imports this module.
 
 Errors are exceptions: ``ValueError`` for arguments that mean nothing, ``TypeError`` for those of another kind,
 ``KeyError`` for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError``
