@@ -485,17 +485,17 @@ cbvh_status cbvh_edges_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, 
  * Questions about one mesh and many points, rays or segments. `pose` is where the mesh stands in the frame of the
  * probes; NULL for the mesh's own frame. Points are 3 numbers each. */
 
-/* On which side of a mesh a point is. */
+/* On which side of a mesh a point is. The command prints the same numbers. */
 typedef int32_t cbvh_side;
 enum {
-    /* In answers of cbvh_closest_points, which does not ask for sides. */
-    CBVH_SIDE_NOT_ASKED = -1,
-    CBVH_OUTSIDE = 0,
-    CBVH_INSIDE = 1,
+    CBVH_OUTSIDE = -1,
     /* On the surface. */
-    CBVH_ON = 2,
+    CBVH_ON = 0,
+    CBVH_INSIDE = 1,
     /* The mesh is not closed, and has no inside. */
-    CBVH_SIDE_UNDEFINED = 3
+    CBVH_SIDE_UNDEFINED = 2,
+    /* In answers of cbvh_closest_points, which does not ask for sides. */
+    CBVH_SIDE_NOT_ASKED = 3
 };
 
 /* The closest point of a mesh. */

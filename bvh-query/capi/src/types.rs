@@ -209,7 +209,7 @@ pub struct ClosestRow {
 /// No instance: the answer is about one mesh, or there is none.
 const NO_INSTANCE: Instance = Instance { id: 0 };
 /// `CBVH_SIDE_NOT_ASKED`.
-pub(crate) const SIDE_NOT_ASKED: i32 = -1;
+pub(crate) const SIDE_NOT_ASKED: i32 = 3;
 
 impl ClosestRow {
     const NONE: Self = Self {
@@ -432,10 +432,10 @@ pub(crate) fn relation(of: Relation) -> i32 {
 /// The number of a side.
 pub(crate) fn side(of: Side) -> i32 {
     match of {
-        Side::Outside => 0,
+        Side::Outside => -1,
+        Side::On => 0,
         Side::Inside => 1,
-        Side::On => 2,
-        Side::Undefined => 3,
+        Side::Undefined => 2,
     }
 }
 

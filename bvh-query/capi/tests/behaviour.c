@@ -42,6 +42,8 @@ static void cubes(const char *parallel) {
     cbvh_closest_point closest[4];
     OK(cbvh_sides(querier, one, NULL, points, 4, sides));
     CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_OUTSIDE && sides[2] == CBVH_ON && sides[3] == CBVH_OUTSIDE);
+    /* The numbers that the command prints. */
+    CHECK(sides[0] == 1 && sides[1] == -1 && sides[2] == 0);
     OK(cbvh_signed_distances(querier, one, &world, points, 4, 2, closest));
     CHECK(closest[0].distance == 0.25 && closest[0].side == CBVH_INSIDE && closest[1].distance == 1.5);
     CHECK(closest[1].point[2] == 0.5 && closest[2].distance == 0 && closest[2].side == CBVH_ON);

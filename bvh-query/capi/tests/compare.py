@@ -21,8 +21,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 TESTDATA, SHARED = ROOT / "testdata", ROOT.parent / "shared"
 ANSWERS = sys.argv[1]
 COMMAND = os.environ["CBVH"]
-# What the command prints for the numbers of `cbvh_outcome` and `cbvh_side`.
-OUTCOMES, SIDES = ["free", "hit", "near"], [-1.0, 1.0, 0.0, 2.0]
+# What the command prints for the numbers of `cbvh_outcome`.
+OUTCOMES = ["free", "hit", "near"]
 
 CUBE_FACES = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
 
@@ -104,8 +104,6 @@ class Comparison:
         for mode, probes in (("closest", points), ("side", points), ("ray", rays), ("segment", segments)):
             numbers = self.doubles("probes", numbers_of(probes, limit))
             found = [float(line[0]) for line in self.command("probe", file, probes, "--mode", mode, "--limit", limit)]
-            if mode == "side":
-                found = [float(SIDES.index(side)) for side in found]
             self.check(mode, [[number] for number in found], file, numbers)
 
     def scene(self, scene, frames, limit, within):

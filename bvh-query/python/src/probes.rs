@@ -79,7 +79,7 @@ pub(crate) fn sides<'py>(
     let question = Question::new(points.py(), mesh, read_points(points, "points")?, pose, parallel)?;
     let found = question
         .ask(|batch, points| batch.sides(points), |querier, shape, &point| querier.side(shape, point))?;
-    question.answers().values(found.into_iter().map(|side| side as u8))
+    question.answers().values(found.into_iter().map(|side| side as i8))
 }
 
 /// NaN where the mesh has no inside.

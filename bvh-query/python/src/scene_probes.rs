@@ -41,7 +41,7 @@ pub(crate) fn scene_closest_points<'py>(
 pub(crate) fn scene_sides<'py>(scene: &Scene, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let (py, points) = (points.py(), read_points(points, "points")?);
     let found = scene.ask(py, |scene| scene.sides(&points.rows), |_, found| found)?;
-    Answers { py, one: points.one }.values(found.into_iter().map(|side| side as u8))
+    Answers { py, one: points.one }.values(found.into_iter().map(|side| side as i8))
 }
 
 /// NaN where there is no inside, and where there is nothing.

@@ -93,18 +93,19 @@ pub enum Relation {
     Undefined = 5,
 }
 
-/// Where a point is with regard to a mesh. Bindings of other languages use its numbers: `side as u8`.
+/// Where a point is with regard to a mesh. The command and the bindings of other languages use its numbers:
+/// `side as i8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u8)]
+#[repr(i8)]
 pub enum Side {
     /// The point is neither on the surface nor inside.
-    Outside = 0,
+    Outside = -1,
+    /// The point is on the surface.
+    On = 0,
     /// The surface winds around the point.
     Inside = 1,
-    /// The point is on the surface.
-    On = 2,
     /// The point is not on the surface, and the mesh is not closed and consistently oriented: it has no inside.
-    Undefined = 3,
+    Undefined = 2,
 }
 
 /// The distance of a point from a mesh, and the side that it is on.

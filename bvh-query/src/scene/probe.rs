@@ -196,18 +196,19 @@ impl Asked<'_> {
     }
 
     fn side(&mut self, point: &Point) -> Result<Side, SceneError> {
-        let mut sides = [false; 4];
+        let order = [Side::Inside, Side::On, Side::Undefined];
+        let mut found = [false; 3];
         let at = WorldBox { lo: *point, hi: *point };
         self.visit(
             |bounds| if at.squared_gap(bounds) > 0.0 { f64::INFINITY } else { 0.0 },
             |querier, _, shape, _| {
                 let side = querier.side_of(&shape, point, OpenObject::Undefined)?;
-                sides[side as usize] = true;
+                found.iter_mut().zip(order).for_each(|(found, of)| *found |= side == of);
                 Ok(if side == Side::Inside { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             },
         )?;
-        let order = [Side::Inside, Side::On, Side::Undefined];
-        Ok(order.into_iter().find(|side| sides[*side as usize]).unwrap_or(Side::Outside))
+        let first = found.iter().position(|&found| found);
+        Ok(first.map_or(Side::Outside, |first| order[first]))
     }
 
     /// Asks a question about a line and all instances that it may matter for.

@@ -34,10 +34,7 @@ impl asking::Answer for Answer {
     fn value(&self) -> f64 {
         match self {
             Self::Closest(closest) => closest.map_or(f64::INFINITY, |closest| closest.distance),
-            Self::Side(Side::Inside) => 1.0,
-            Self::Side(Side::On) => 0.0,
-            Self::Side(Side::Outside) => -1.0,
-            Self::Side(Side::Undefined) => 2.0,
+            Self::Side(side) => f64::from(*side as i8),
             Self::Hit(hit) => hit.map_or(-1.0, |hit| hit.t),
             Self::Meets(meets) => f64::from(u8::from(*meets)),
         }

@@ -31,14 +31,14 @@ class Relation(enum.IntEnum):
 class Side(enum.IntEnum):
     """Where a point is with regard to a mesh.
 
-    - ``OUTSIDE``, ``INSIDE``, ``ON``: the point is outside, inside, or on the surface.
+    - ``OUTSIDE``, ``ON``, ``INSIDE``: the point is outside, on the surface, or inside.
     - ``UNDEFINED``: the point is not on the surface, and the mesh has no inside: it is not closed.
     """
 
-    OUTSIDE = 0
+    OUTSIDE = -1
+    ON = 0
     INSIDE = 1
-    ON = 2
-    UNDEFINED = 3
+    UNDEFINED = 2
 
 
 class MotionKind(enum.IntEnum):
