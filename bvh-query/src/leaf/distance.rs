@@ -39,6 +39,9 @@ fn slack(local: &Local<'_>) -> f32 {
 
 /// Lanes whose triangles may be closer than `limit`, looking along `direction` (at most of length 1)
 /// alone.
+///
+/// An offset may overflow: packets of tiny meshes are more than 2^128 of their units apart. Its product with a direction
+/// is then infinite or NaN, and so is the slack, so that no gap exceeds it.
 #[inline(always)]
 pub(crate) fn near_along<I: Isa>(isa: I, local: &Local<'_>, direction: [f32; 3], limit: f32) -> u16 {
     let axis = splat4(isa, direction);
@@ -47,7 +50,7 @@ pub(crate) fn near_along<I: Isa>(isa: I, local: &Local<'_>, direction: [f32; 3],
     let lower = min3(project(&local.b.quads(isa), axis));
     isa.store4(lower.add(local.offset_along(isa, axis)), &mut lower_b);
     let gap = isa.tile(&lower_b).sub(isa.repeat(&upper_a));
-    I::V::bits(gap.le(isa.splat(limit + slack(local))))
+    !I::V::bits(isa.splat(limit + slack(local)).lt(gap))
 }
 
 /// Lanes whose triangles may be closer than `limit`, looking along three directions of each pair: from centroid to
@@ -299,4 +302,102 @@ pub(super) fn certify<I: Isa>(isa: I, slack: I::V, gap: I::V, guess: Guess<I::V>
         isa.store(n[axis], &mut bounds.direction[axis]);
     }
     bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::place::LeafPacket;
+    use crate::isa::{Backend, Task};
+    use crate::leaf::collide::{Sides, face_planes};
+    use crate::leaf::frame::LocalFrame;
+    use crate::leaf::placed_packet::PlacedPacket;
+    use crate::leaf::queue::TrianglePair;
+    use bvh_format::leaf::Packet;
+
+    const LEAF: LeafPacket = LeafPacket { page: 0, packet: 0, triangles: 4 };
+
+    /// What all filters say of two packets with B's first corner at `offset`.
+    struct Filters {
+        offset: [f64; 3],
+        direction: [f32; 3],
+        limit: f32,
+    }
+
+    struct Found {
+        near: [u16; 4],
+        planes: Sides,
+        bounds: Bounds,
+    }
+
+    impl Task for Filters {
+        type Output = Found;
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) -> Found {
+            let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let triangle = |x: f32| [[x, 0.0, 0.0], [x, 1.0, 0.25], [x - 0.5, 0.25, 1.0]];
+            let packet = Packet::new(&[triangle(0.0), triangle(0.25), triangle(0.5), triangle(1.0)]);
+            let frame = LocalFrame {
+                rotation: unit.map(|row| row.map(f64::from)),
+                translation: self.offset,
+                rotation32: unit,
+                scale: 1.0,
+                error: f32::MIN_POSITIVE,
+            };
+            let (mut a, mut b) = (PlacedPacket::NONE, PlacedPacket::NONE);
+            a.place_a(isa, &frame, &packet);
+            b.place_b(isa, &frame, &packet);
+            let local = Local::new(&frame, &a, &b);
+            let mut queue = TriangleQueue::default();
+            for lane in 0..16 {
+                queue.push(&local, TrianglePair::in_lane(LEAF, LEAF, lane));
+            }
+            Found {
+                near: [
+                    near_along(isa, &local, self.direction, self.limit),
+                    near(isa, &local, self.limit),
+                    swept_near(isa, [&local, &local], self.limit),
+                    swept_bounds(isa, [&queue, &queue], self.limit),
+                ],
+                planes: face_planes(isa, &local, LEAF, LEAF),
+                bounds: bounds(isa, &queue),
+            }
+        }
+    }
+
+    /// Offsets beyond the range of f32, and products of them beyond it, are infinite or NaN, and decide nothing.
+    #[test]
+    fn what_overflows_is_never_discarded() {
+        let lengths = [0.0, 2.0, 60.0, 64.0, 100.0, 127.0, 127.9, 128.0, 200.0];
+        let lengths = || lengths.iter().flat_map(|&l: &f64| [l.exp2() - 1.0, 1.0 - l.exp2()]);
+        let directions = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.7, -0.7, 0.0], [0.5, 0.5, -0.7]];
+        let mut decided = 0;
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            for x in lengths() {
+                for (y, z) in lengths().flat_map(|y| lengths().map(move |z| (y, z))) {
+                    let far = [x, y, z].iter().map(|c| c * c).sum::<f64>().sqrt();
+                    for (number, direction) in directions.into_iter().enumerate() {
+                        // All triangles are within 4 of the first corners of their packets.
+                        let limit = if number == 0 { f32::INFINITY } else { (1.001 * far + 8.0) as f32 };
+                        let what = format!("{backend}: {x:e} {y:e} {z:e}, {direction:?}, {limit:e}");
+                        let found = backend.run(Filters { offset: [x, y, z], direction, limit });
+                        assert_eq!(found.near, [0xffff; 4], "{what}");
+                        assert!(found.planes.overlap == 0 || far < 8.0, "{what}");
+                        let Bounds { lower, upper, .. } = found.bounds;
+                        assert!(
+                            lower.iter().all(|&lower| f64::from(lower) <= far + 8.0),
+                            "{what}: {lower:?}"
+                        );
+                        assert!(
+                            upper.iter().all(|&upper| f64::from(upper) >= far - 8.0),
+                            "{what}: {upper:?}"
+                        );
+                        decided += u32::from(found.planes.apart != 0);
+                    }
+                }
+            }
+        }
+        assert!(decided > 0);
+    }
 }

@@ -35,7 +35,7 @@ pub(crate) struct PlacedPacket {
 }
 
 impl PlacedPacket {
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         corners: [[[0.0; 4]; 3]; 3],
         normal: [[0.0; 4]; 3],
         squared: [0.0; 4],

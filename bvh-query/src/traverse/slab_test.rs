@@ -127,6 +127,8 @@ pub(crate) struct SlabTest {
     translation: Rows,
     /// Bound on the error of a gap.
     slack: f32,
+    /// The least square of a distance between centres for which the line between them is looked along.
+    least_square: f32,
 }
 
 impl SlabTest {
@@ -137,6 +139,7 @@ impl SlabTest {
         columns: [Rows::ZERO; 3],
         translation: Rows::ZERO,
         slack: 0.0,
+        least_square: f32::INFINITY,
     };
 
     /// Prepares a pose. `magnitudes` bound the coordinates of A's and of B's nodes.
@@ -155,6 +158,7 @@ impl SlabTest {
         let t = placement.translation.iter().map(|x| x.abs()).sum::<f64>();
         let (a, b) = (f64::from(magnitudes.0), f64::from(magnitudes.1));
         self.slack = round_up(U * (64.0 * a + 112.0 * b + 16.0 * t) + 6.0 * placement.error + UNDERFLOW);
+        self.least_square = if a + b + t < MAX_MAGNITUDES { LEAST_SQUARE } else { f32::INFINITY };
     }
 
     /// What B sees of four nodes of A.
@@ -204,7 +208,7 @@ impl SlabTest {
         if measure == Measure::Overlap {
             return I::V::bits(gap.le(isa.splat(limit)));
         }
-        // Along the line between the centres, at first not normalised. Where squares underflow or overflow it has no say.
+        // Along the line between the centres, at first not normalised. Where squares might underflow or overflow it has no say.
         let square = dot::<I>(to_b, to_b);
         let inverse = isa.splat(1.0).div(square.sqrt());
         let r = &self.rotation;
@@ -218,8 +222,7 @@ impl SlabTest {
         let rest_a = rest::<I>(to_b, alpha_a, u_a, half_a, alpha_a.abs().mul(width_a));
         let rest_b = rest::<I>(to_b_in_b, alpha_b, u_b, half_b, alpha_b.abs().mul(width_b));
         let along_line = rest_a.add(rest_b).neg_mul_add(outward, distance).mul(inverse).sub(slack);
-        let is_normal = isa.splat(LEAST_SQUARE).le(square);
-        // NaN, too, gives way to the other gap.
+        let is_normal = isa.splat(self.least_square).le(square);
         let gap = I::V::select(is_normal, along_line, gap).max(gap);
         // No direction is longer than 1 by more than 2^-19.
         let gap = gap.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32)).max(isa.load(bounds));
@@ -233,6 +236,10 @@ impl SlabTest {
 const UNDERFLOW: f64 = f64::from_bits((1023 - 110) << 52);
 /// The least square of a distance between centres that is used, 2^-60.
 const LEAST_SQUARE: f32 = f32::from_bits((127 - 60) << 23);
+/// What the coordinates of A and of B and the translation may be together for the line between centres to be looked along:
+/// 2^60 mesh units. Products along it are then below 2^127. One that overflows may have the sign of a gap where there is
+/// none.
+const MAX_MAGNITUDES: f64 = (1u64 << 60) as f64;
 
 /// Three rows of nodes of A, in the lanes of their pairs.
 #[inline(always)]
@@ -427,6 +434,36 @@ mod tests {
             }
         }
         assert!(near > found / 8, "{near} of {found}");
+    }
+
+    /// Nodes so large that products along the line between their centres overflow: the slab of B lies far from the centre of
+    /// its box, which is near that of A's.
+    #[test]
+    fn bounds_hold_where_products_overflow() {
+        let mut found = 0.0f64;
+        for exponent in 30..=118 {
+            let h = 2f32.powi(exponent);
+            let direction = TurningDirection::near([1.0; 3]);
+            let flat = |h: f32, at: f32| {
+                vec![[[at - h, at + h, at + h], [at + h, at - h, at + h], [at + h, at + h, at - h]]]
+            };
+            let nodes = [flat(h / 1024.0, 0.0), flat(h, h / 1024.0)]
+                .map(|patch| Node::of_patches(vec![patch; 4], |_| Some(direction)));
+            let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let (test, _) = prepared(&nodes, unit, [0.0; 3]);
+            // Both planes are perpendicular to (1, 1, 1).
+            let h = f64::from(h);
+            let least = ((h + 3.0 * h / 1024.0) - h / 1024.0) / 3f64.sqrt();
+            for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                let nodes = [&nodes[0], &nodes[1]];
+                let run = Run { test: &test, nodes, measure: Measure::Distance, limit: 0.0 };
+                let (_, bounds) = backend.run(run);
+                let what = format!("2^{exponent}, {backend}: {} > {least:e}", bounds[0]);
+                assert!(bounds.iter().all(|&bound| f64::from(bound) <= least), "{what}");
+                found = found.max(f64::from(bounds[0]) / least);
+            }
+        }
+        assert!(found > 0.5, "{found}");
     }
 
     /// Decodes the turning slabs of a treelet whose fixed slabs are given.
