@@ -102,13 +102,23 @@ pub use scene::{
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
 /// The path is that of `include_bytes!`. For a file that a build script baked, it is
-/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. Nothing is copied, whatever the alignment.
+/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. The file starts at a cache line, so that queries read plain triangles where
+/// they are.
 #[macro_export]
 macro_rules! include_cbvh {
     ($path:expr $(,)?) => {
-        $crate::Bvh::from_static(::core::include_bytes!($path))
+        $crate::Bvh::from_static({
+            static FILE: &$crate::Embedded<[u8]> = &$crate::Embedded(*::core::include_bytes!($path));
+            &FILE.0
+        })
     };
 }
+
+/// The bytes of [`include_cbvh!`], at the start of a cache line: those of `include_bytes!` may start anywhere.
+#[doc(hidden)]
+#[repr(C, align(64))]
+#[derive(Debug)]
+pub struct Embedded<B: ?Sized>(pub B);
 
 pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::Object;

@@ -376,3 +376,39 @@ fn plain_packet<'a>(object: &Object, block: &'a [u8], packet: u16) -> Option<&'a
         block.get(usize::from(packet) * F32_PACKET_BYTES..)?.first_chunk()?;
     bytemuck::try_from_bytes(bytes).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::include_cbvh;
+
+    /// The type is what aligns them: linkers may do so by chance.
+    #[test]
+    fn embedded_files_are_aligned_and_lend_their_packets() {
+        assert_eq!(align_of::<crate::Embedded<[u8; 1]>>(), 64);
+        let files = [
+            include_cbvh!("../../../testdata/ok-everything.cbvh").unwrap(),
+            include_cbvh!("../../../testdata/ok-plain.cbvh").unwrap(),
+            include_cbvh!("../../../testdata/ok-profiles.cbvh").unwrap(),
+            include_cbvh!("../../../testdata/ok-scene.cbvh").unwrap(),
+            include_cbvh!("../../../testdata/ok-topology.cbvh").unwrap(),
+            include_cbvh!("../../../testdata/ok-turning.cbvh").unwrap(),
+        ];
+        let mut lent = 0;
+        for bvh in &files {
+            assert_eq!(bvh.bytes().as_ptr() as usize % 64, 0);
+            let plain = |object: &&Object| object.triangle_encoding() == TriangleEncoding::F32;
+            for object in bvh.objects().iter().filter(plain) {
+                for number in object.pages() {
+                    let page = bvh.page(object, number).unwrap();
+                    let block = bvh.layout().leaf_block(bvh.bytes(), page.header());
+                    for packet in 0..page.header().packets.get() {
+                        assert!(plain_packet(object, block, packet).is_some());
+                        lent += 1;
+                    }
+                }
+            }
+        }
+        assert!(lent > 10, "{lent}");
+    }
+}
