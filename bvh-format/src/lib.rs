@@ -1,4 +1,4 @@
-//! The `.cbvh` file format: bounding volume hierarchies of triangle meshes, in treelets of 64 bytes.
+//! The `.cbvh` file format: bounding volume hierarchies of triangle meshes, in treelets of 32 to 256 bytes.
 //!
 //! This crate knows the bytes: where each one stands, how it is written and read, and which rules it obeys. It builds no
 //! trees and answers no questions about them. Most applications need only its siblings: `bvh-bake` makes `.cbvh` files

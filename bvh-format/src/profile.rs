@@ -22,7 +22,7 @@ pub enum Encoding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Profile {
-    /// 14-DOP, 8-bit residuals, 4 children, 64 bytes: the default.
+    /// 14-DOP, 8-bit residuals, 4 children, 64 bytes.
     Dop14U8 = 0,
     /// 6-DOP, 8-bit residuals, 8 children, 64 bytes.
     Dop6U8 = 1,

@@ -7,6 +7,5 @@ pub(crate) mod mapped;
 pub(crate) mod owned_shape;
 pub(crate) mod place;
 pub(crate) mod shape;
-#[allow(dead_code, reason = "questions about what is inside a mesh use the rest of it")]
 pub(crate) mod topology;
 pub(crate) mod unpack;

@@ -7,13 +7,13 @@
 //!   measured in f64 with a certified upper bound, limits the walk before it begins, and the direction between its
 //!   closest points is the first witness direction. The pair is no answer itself: the walk prunes strictly beyond the
 //!   limit, meets this pair or a nearer one, and decides as it always does.
-//! - *A clearance*: certified bounds of the distance in an earlier pose. No vertex of B moves farther than
+//! - *Bounds* of the distance in an earlier pose, which are certified. No vertex of B moves farther than
 //!   [`displacement`] from that pose to a new one, so that the distance changes by no more. Where the bounds decide the
 //!   question, there is no walk.
 //!
 //! Both belong to two open files and the objects asked about. They are forgotten when a question is about others.
 //!
-//! A walk that only looks for contact learns nothing of the clearance. So after the answer no, the tracker at times asks
+//! A walk that only looks for contact learns nothing of the distance. So after the answer no, the tracker at times asks
 //! whether the meshes come as near as [`LOOK_AHEAD_MOTIONS`] times the last motion, with no more work than the question
 //! took. If they do not, the next few answers are known. If they do, or if that takes too much work, the tracker waits
 //! longer before it asks again.
@@ -65,7 +65,7 @@ pub struct Tracker {
     /// What the last question was about.
     last: Option<Asked>,
     pair: Option<Found>,
-    clearance: Option<Clearance>,
+    bounds: Option<DistanceBounds>,
     /// How many questions to let pass before looking ahead again.
     wait: u32,
     /// The value that `wait` was last set to.
@@ -80,7 +80,7 @@ struct Asked {
 
 /// Certified bounds of the distance in a pose, in mesh units.
 #[derive(Debug, Clone, Copy)]
-struct Clearance {
+struct DistanceBounds {
     pose: Pose,
     lower: f64,
     upper: f64,
@@ -168,7 +168,7 @@ impl Tracker {
         };
         let answer = best.distance(limited.proved());
         self.pair = Some(best.found);
-        self.clearance = Some(Clearance { pose: *pose, lower: answer.lower, upper: answer.upper });
+        self.bounds = Some(DistanceBounds { pose: *pose, lower: answer.lower, upper: answer.upper });
         Ok(answer)
     }
 
@@ -230,7 +230,7 @@ impl Tracker {
 
     /// Returns certified bounds of the distance in a new pose.
     fn bounds(&self, b: Shape<'_>, pose: &Pose) -> Option<(f64, f64)> {
-        let held = self.clearance.as_ref()?;
+        let held = self.bounds.as_ref()?;
         let moved = displacement(b, &held.pose, pose);
         Some(((held.lower - moved).next_down(), (held.upper + moved).next_up()))
     }
@@ -270,7 +270,7 @@ impl Tracker {
         let mut search = Search::new(DistanceOptions::default(), room);
         querier.memory.allow_as_much_again();
         if querier.search(a, b, pose, &mut search).is_ok() && !search.done {
-            self.clearance = Some(Clearance { pose: *pose, lower: room, upper: f64::INFINITY });
+            self.bounds = Some(DistanceBounds { pose: *pose, lower: room, upper: f64::INFINITY });
             self.waited = 0;
         } else {
             // The nearest pair known is perhaps the first to touch.

@@ -48,9 +48,9 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, effort, split_objects, scene and ids; the options on the command line are their defaults. Paths \
-are relative to the manifest and may lead anywhere, but an input is a regular file: a manifest or a folder never makes \
-the command wait for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
+profile, triangles, max_error, effort, split_objects, scene, ids and topology; the options on the command line are their \
+defaults. Paths are relative to the manifest and may lead anywhere, but an input is a regular file: a manifest or a folder \
+never makes the command wait for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
 input: the number of its line, exit_code, and either the fields of --json or an error. Until all assets are done, the \
 lines of finished assets are in out.jsonl.part. --json prints one object with counts and sums, which add up over \

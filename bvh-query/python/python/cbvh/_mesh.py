@@ -226,7 +226,7 @@ class Mesh:
         return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel))
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
-        """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as uint8, shape (N,).
+        """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as int8, shape (N,).
 
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
@@ -305,8 +305,10 @@ _open_file = open
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size.
 
-    Bytes of the file may change meanwhile: what is damaged is a FormatError. But if the file is cut short, the system ends
-    the process as soon as a question needs what is missing. `Mesh.from_bytes` copies instead.
+    The bytes of the file must not change while it is open: answers are undefined then, and formally all that the process
+    does. If the file is cut short, the system ends the process as soon as a question needs what is missing. Replace a
+    file by renaming another one over it, as `save` does. `Mesh.from_bytes` copies instead. A file that was damaged before
+    is a FormatError.
     """
     name = os.fsdecode(path)
     mesh = Mesh(_cbvh.Mesh.open(name), os.path.abspath(name))
