@@ -13,6 +13,7 @@ mod ball;
 mod boundary;
 mod decide;
 mod dyadic;
+mod far_apart;
 mod features;
 mod frames;
 mod hard_cases;
