@@ -15,7 +15,7 @@ use std::ops::Range;
 const CHUNK_BYTES: usize = 1 << 16;
 
 /// The most bytes of a block that keeps the rules.
-const MAX_BLOCK_BYTES: usize = 1 << 20;
+pub const MAX_BLOCK_BYTES: usize = 1 << 20;
 
 /// The most bytes of a packed block: a head, 110 bits per packet, 65535 further slots of 16 bits, 65535 vertices of 96 bits,
 /// spare bytes and the rest of a line.

@@ -12,12 +12,14 @@ mod counted;
 use bvh_bake::to_bytes;
 use bvh_format::Layout as FileLayout;
 use bvh_format::Rule;
+use bvh_format::header::SectionKind;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::profile::Profile;
+use bvh_format::source::MAX_BLOCK_BYTES;
 use bvh_format::validate::validate;
 use bvh_query::{Backend, Bvh, Querier, QueryError};
-use cbvh_testkit::seal::{put, put_together, seal, take_apart};
+use cbvh_testkit::seal::{put, put_together, seal, seal_pages, take_apart};
 use common::forged::{blown_up, duplicated};
 use common::shapes::soup;
 use common::{mesh, options, translation};
@@ -170,4 +172,25 @@ fn shared_names_are_not_copied() {
     let (memory, opened) = peak(|| FileLayout::read(&bytes).map(|_| ()));
     assert!(memory <= 2 * length, "{memory} bytes for a table of {length}");
     assert_eq!(opened.unwrap_err().rule, Rule::ObjectTable);
+}
+
+/// Whoever claims the whole section as the block of one page would have it read again by each question.
+#[test]
+fn a_block_too_long_for_any_page_is_not_read() {
+    let options = options(Profile::Dop14U8, TriangleEncoding::Packed);
+    let mut bytes = to_bytes(&mesh(&soup(80_000, 1)), &options).unwrap().0;
+    let layout = FileLayout::read(&bytes).unwrap();
+    let leaves = layout.sections.iter().find(|section| section.kind == SectionKind::Leaves).unwrap();
+    let lines = (leaves.range.len() / 64) as u32;
+    assert!(leaves.range.len() > MAX_BLOCK_BYTES);
+    for page in 0..layout.page_count() {
+        let at = layout.page_offset(page) as usize;
+        put(&mut bytes, at + 24, &0u64.to_le_bytes());
+        put(&mut bytes, at + 48, &lines.to_le_bytes());
+    }
+    seal_pages(&mut bytes);
+    let forged = Bvh::from_bytes(bytes).unwrap();
+    let refused = Querier::new().unwrap().contacts(&forged, &forged, &translation(0.0, 0.0, 0.0));
+    // The checksum is wrong as well, but nobody computes it.
+    assert!(matches!(refused, Err(QueryError::Damaged(error)) if error.rule == Rule::LeafPlace));
 }

@@ -10,6 +10,7 @@ use bvh_format::leaf::{
 };
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
+use bvh_format::source::MAX_BLOCK_BYTES;
 use bvh_format::topology::ObjectTopology;
 use bvh_format::treelet::Links;
 use bvh_format::{FormatError, Layout, Rule, ids};
@@ -241,7 +242,15 @@ impl Bvh {
 
     #[cold]
     fn check_leaves(&self, object: &Object, page: &Page, number: u32) -> Result<(), QueryError> {
-        self.will_need(self.layout.leaf_block(self.bytes(), page.header()));
+        let block = self.layout.leaf_block(self.bytes(), page.header());
+        // A page may state any length, and be met again by each pair of a scene: what is too long for any page is not read.
+        if block.len() > MAX_BLOCK_BYTES {
+            let (at, expected) =
+                (self.layout.page_offset(number), format!("at most {MAX_BLOCK_BYTES} bytes"));
+            let found = format!("{} bytes", block.len());
+            return Err(FormatError::new(Rule::LeafPlace, at + 24, expected, found).into());
+        }
+        self.will_need(block);
         self.layout.check_leaf_block(self.bytes(), page, object)?;
         self.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
         Ok(())

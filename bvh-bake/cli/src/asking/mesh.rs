@@ -148,7 +148,8 @@ pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
     let failed = |error| Failure::from_input(path, &error);
     let named = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cbvh"));
     // What is read from a pipe here would be missing later.
-    if named || !std::fs::metadata(path).map_err(failed)?.is_file() {
+    let is_file = std::fs::metadata(path).map_err(failed)?.is_file();
+    if named || !is_file {
         return Ok(named);
     }
     let mut head = Vec::new();

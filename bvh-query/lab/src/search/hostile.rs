@@ -134,11 +134,13 @@ impl Answers {
             hits.sort_unstable();
             hits
         };
+        let is_undefined = |answers: &Self| answers.relation == Ok(Relation::Undefined);
         let cases = [
             ("collide", self.collide != other.collide),
             ("contacts", self.contacts != other.contacts),
             ("distance", differ(interval(self), interval(other))),
-            ("relation", self.relation != other.relation),
+            // Nothing is known about an open object whose box or sphere, which may be loose, meets that of another.
+            ("relation", self.relation != other.relation && !is_undefined(self) && !is_undefined(other)),
             ("closest point", differ(closest(self), closest(other))),
             ("side", self.side != other.side),
             ("hits", self.hits.as_ref().map(hit) != other.hits.as_ref().map(hit)),
@@ -298,6 +300,8 @@ fn forged(bytes: &[u8], other: &[u8], way: Way, random: &mut Random) -> Option<V
             Some(forge(&mut Input(&description)))
         }
         Way::Sealed | Way::Plain => {
+            // The whole head of another file hides itself by its checksums.
+            let other = if way == Way::Plain { bytes } else { other };
             let mut bytes = bytes.to_vec();
             (0..1 + random.below(3)).for_each(|_| damage(&mut bytes, other, random));
             if way == Way::Sealed && bytes.len() >= 64 {
