@@ -3,7 +3,6 @@
 
 use super::MeshFormat;
 use super::byte_reader::ByteReader;
-use super::gltf::{self, Sink};
 use super::read_ahead::ReadAhead;
 use crate::error::{Halt, ReadError};
 use crate::progress::{Progress, Step, Tally};
@@ -278,37 +277,5 @@ impl Read for InputReader<'_> {
             }
         }
         Ok(count)
-    }
-}
-
-/// The checksums that show whether an input has changed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Checksums {
-    /// The checksum of the file's bytes.
-    pub(crate) file: u64,
-    /// The checksum of the mesh, if the bytes of the file do not suffice: a glTF file may name other files.
-    pub(crate) mesh: Option<u64>,
-}
-
-impl Checksums {
-    /// Reads an input only for its checksums.
-    pub(crate) fn of(input: &InputFile, memory: Allowance, progress: &Progress) -> Result<Self, Halt> {
-        if input.format() == MeshFormat::Gltf {
-            return Self::of_gltf(input, &mut (), memory, progress, 0);
-        }
-        Ok(Self { file: input.checksum(progress, 0)?, mesh: None })
-    }
-
-    /// Reads a glTF file into `sink`, which is a pass of the given weight.
-    pub(crate) fn of_gltf(
-        input: &InputFile,
-        sink: &mut impl Sink,
-        memory: Allowance,
-        progress: &Progress,
-        weight: u64,
-    ) -> Result<Self, Halt> {
-        let mesh = gltf::read(input, &input.random_access()?, sink, memory, progress)?;
-        // The document is not in memory any more.
-        Ok(Self { file: input.checksum(progress, weight)?, mesh: Some(mesh) })
     }
 }

@@ -10,6 +10,7 @@
 //! and -0.0 is read as 0.0.
 
 mod byte_reader;
+mod checksums;
 mod collect;
 pub(crate) mod gather;
 pub(crate) mod gltf;
@@ -29,10 +30,11 @@ use crate::error::{Fault, Halt, excerpt};
 pub use crate::error::{Place, ReadError};
 use crate::progress::{Progress, WHOLE};
 use crate::storage::resources::{Allowance, Resources};
+pub(crate) use checksums::Checksums;
 use collect::mesh_of_faces;
 use indexed::IndexedFaces;
+pub(crate) use input_file::InputFile;
 use input_file::Opener;
-pub(crate) use input_file::{Checksums, InputFile};
 use mesh::Mesh;
 use names::Names;
 use std::path::{Path, PathBuf};
