@@ -140,9 +140,9 @@ pub(crate) struct SearchArguments {
     /// The kinds of rounds, which share the time
     #[arg(long, value_name = "KIND[,KIND...]", value_delimiter = ',', default_values = ["pairs", "hostile", "probes", "motions"])]
     pub(crate) kinds: Vec<Kind>,
-    /// The number of threads
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub(crate) threads: usize,
+    /// The number of threads, up to 256
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: u16,
     /// The largest number of rounds of this run [default: as many as the time allows]
     #[arg(long, value_name = "N")]
     pub(crate) rounds: Option<u64>,

@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &SearchArguments) -> Result<String, Failure> {
             .map_err(|_| "--hours: expected a time, found a negative or an endless one")?;
     let mut record = Record::open(path)?;
     let known = record.findings.len();
-    record.sessions.push(Session::new(arguments.threads));
+    record.sessions.push(Session::new(arguments.threads.into()));
     record.save(path)?;
     let state =
         Mutex::new(State { record, running: BTreeMap::new(), left: arguments.rounds.unwrap_or(u64::MAX) });
