@@ -13,20 +13,17 @@ pub enum Effort {
     /// Splits near the leaves are fine; then the largest tenth of all subtrees moves to better places.
     #[default]
     Default,
-    /// All subtrees move to better places, three times.
-    High,
 }
 
 impl Effort {
     /// All efforts, the fastest first.
-    pub const ALL: [Self; 3] = [Self::Fast, Self::Default, Self::High];
+    pub const ALL: [Self; 2] = [Self::Fast, Self::Default];
 
     /// Returns the name used in options and in the provenance.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",
             Self::Default => "default",
-            Self::High => "high",
         }
     }
 
@@ -41,8 +38,8 @@ impl Effort {
 /// ```
 /// use bvh_bake::{Effort, Options};
 ///
-/// let options = Options::default().effort(Effort::High).ids(false);
-/// assert_eq!(options.effort, Effort::High);
+/// let options = Options::default().effort(Effort::Fast).ids(false);
+/// assert_eq!(options.effort, Effort::Fast);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

@@ -129,7 +129,7 @@ fn meshes_of_every_scale() {
 fn the_bytes_depend_on_mesh_and_options_alone() {
     for encoding in TriangleEncoding::ALL {
         for profile in [Profile::Dop14U8, Profile::Dop6U8, Profile::Dop26U4] {
-            let effort = Effort::ALL[encoding as usize];
+            let effort = Effort::ALL[encoding as usize % 2];
             let options = options(profile, encoding).effort(effort);
             let mesh = mesh(&soup(20_000, 6));
             let bake = |threads: usize| {
@@ -229,7 +229,7 @@ fn places_of_codes(profile: Profile) -> Vec<usize> {
         Profile::Dop14U8 => (4, 32),
         Profile::Dop6U8 => (4, 16),
         Profile::Dop6F16 => (8, 32),
-        Profile::Dop14U4 | Profile::Dop26U4 => (4, 0),
+        Profile::Dop26U4 => (4, 0),
         Profile::Dop26U8Wide => (4, 64),
         Profile::Dop14F32 => (16, 128),
     };

@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use bvh_format::Layout;
+use bvh_format::header::version_name;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, check_page, check_parent};
 use bvh_format::treelet::Child;
@@ -17,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Reads and checks the head of the file and the object table, and nothing else.
     let layout = Layout::read(&bytes)?;
-    println!("version {}.{}, {} bytes", layout.version.0, layout.version.1, bytes.len());
+    println!("version {}, {} bytes", version_name(layout.version), bytes.len());
     for section in &layout.sections {
         println!(
             "section {:10} {:8} bytes at {}",

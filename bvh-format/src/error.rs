@@ -64,10 +64,10 @@ mod tests {
         );
         assert!(text(b"").contains("found an empty file; this is not a .cbvh file"));
         let mut newer = [0; 4096];
-        newer[..10].copy_from_slice(b"\x89cbvh\r\n\x1a\x06\0");
+        newer[..10].copy_from_slice(b"\x89cbvh\r\n\x1a\x05\0");
         assert_eq!(
             text(&newer),
-            "byte 8: R02 (the major version is one that this reader knows): expected 5, found 6; \
+            "byte 8: R02 (the version is one that this reader knows): expected 1.0-rc1, found 5.0; \
              bake it again with this cbvh"
         );
     }

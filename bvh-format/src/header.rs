@@ -11,10 +11,10 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 /// The first eight bytes of a file. Transfers in text mode damage the high bit or the line ends, and so show.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
-/// The major version. Readers refuse any other.
-pub const MAJOR: u16 = 5;
-/// The minor version. Readers accept any minor version of their major version.
-pub const MINOR: u16 = 0;
+/// The major version. 0 stands for the release candidates of version 1.0.
+pub const MAJOR: u16 = 0;
+/// The minor version: the number of the release candidate. Readers refuse any other version.
+pub const MINOR: u16 = 1;
 /// The most entries that the section table can have.
 pub const MAX_SECTIONS: usize = 64;
 /// The most bytes that the header and the section table can take together.
@@ -23,6 +23,11 @@ pub(crate) const MAX_HEAD_BYTES: usize = head_bytes(MAX_SECTIONS);
 /// The number of bytes of the header and a section table together.
 pub const fn head_bytes(sections: usize) -> usize {
     size_of::<Header>() + sections * size_of::<SectionEntry>()
+}
+
+/// Returns the name of a version that a header states as a major and a minor number: `1.0-rc1` for 0 and 1.
+pub fn version_name((major, minor): (u16, u16)) -> String {
+    if major == 0 { format!("1.0-rc{minor}") } else { format!("{major}.{minor}") }
 }
 
 /// The first 64 bytes of a file.
@@ -65,7 +70,7 @@ pub struct SectionEntry {
 
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
 
-/// The sections of version 5. Later minor versions of the format may add kinds.
+/// The sections of version 1.0. Later minor versions of the format may add kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[repr(u32)]
@@ -191,7 +196,8 @@ pub(crate) fn read_header(bytes: &[u8], length: u64) -> Result<(Header, Vec<Sect
     let (header, rest) = Header::read_from_prefix(bytes).map_err(|_| {
         FormatError::new(Rule::HeaderSize, 0, format!("{} bytes or more", size_of::<Header>()), bytes.len())
     })?;
-    require(Rule::Version, 8, MAJOR, header.major.get())?;
+    let version = version_name((header.major.get(), header.minor.get()));
+    require(Rule::Version, 8, version_name((MAJOR, MINOR)), version)?;
     let count = header.sections.get() as usize;
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
     let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)

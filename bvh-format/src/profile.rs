@@ -28,27 +28,18 @@ pub enum Profile {
     Dop6U8 = 1,
     /// 6-DOP, f16 residuals, 4 children, 64 bytes.
     Dop6F16 = 2,
-    /// 14-DOP, 4-bit residuals, 8 children, 64 bytes.
-    Dop14U4 = 3,
+    /// 14-DOP, f32 slabs, 4 children, 256 bytes: the baseline that others are compared with.
+    Dop14F32 = 3,
     /// 26-DOP, 4-bit residuals, 4 children, 64 bytes.
     Dop26U4 = 4,
     /// 26-DOP, 8-bit residuals, turning slabs, 4 children, 128 bytes.
     Dop26U8Wide = 5,
-    /// 14-DOP, f32 slabs, 4 children, 256 bytes: the baseline that others are compared with.
-    Dop14F32 = 6,
 }
 
 impl Profile {
     /// All profiles in the order of their numbers on disk.
-    pub const ALL: [Profile; 7] = [
-        Self::Dop14U8,
-        Self::Dop6U8,
-        Self::Dop6F16,
-        Self::Dop14U4,
-        Self::Dop26U4,
-        Self::Dop26U8Wide,
-        Self::Dop14F32,
-    ];
+    pub const ALL: [Profile; 6] =
+        [Self::Dop14U8, Self::Dop6U8, Self::Dop6F16, Self::Dop14F32, Self::Dop26U4, Self::Dop26U8Wide];
 
     /// Returns the profile of a number on disk.
     pub(crate) fn from_number(number: u8) -> Option<Self> {
@@ -66,10 +57,9 @@ impl Profile {
             Self::Dop14U8 => "dop14-u8",
             Self::Dop6U8 => "dop6-u8",
             Self::Dop6F16 => "dop6-f16",
-            Self::Dop14U4 => "dop14-u4",
+            Self::Dop14F32 => "dop14-f32",
             Self::Dop26U4 => "dop26-u4",
             Self::Dop26U8Wide => "dop26-u8-wide",
-            Self::Dop14F32 => "dop14-f32",
         }
     }
 
@@ -78,21 +68,12 @@ impl Profile {
         Self::ALL.into_iter().find(|profile| profile.name() == name)
     }
 
-    /// Returns the profile to use instead of one that an earlier version of the format had.
-    pub fn successor(name: &str) -> Option<Self> {
-        match name {
-            "dop14-f16" | "dop26-u8" => Some(Self::Dop26U8Wide),
-            "dop14-f16-wide" => Some(Self::Dop26U4),
-            _ => None,
-        }
-    }
-
     /// The directions of its k-DOPs.
     #[inline]
     pub const fn directions(self) -> DirectionSet {
         match self {
             Self::Dop6U8 | Self::Dop6F16 => DirectionSet::Dop6,
-            Self::Dop14U8 | Self::Dop14U4 | Self::Dop14F32 => DirectionSet::Dop14,
+            Self::Dop14U8 | Self::Dop14F32 => DirectionSet::Dop14,
             Self::Dop26U4 | Self::Dop26U8Wide => DirectionSet::Dop26,
         }
     }
@@ -100,7 +81,7 @@ impl Profile {
     /// How slab ends are stored.
     pub const fn encoding(self) -> Encoding {
         match self {
-            Self::Dop14U4 | Self::Dop26U4 => Encoding::U4,
+            Self::Dop26U4 => Encoding::U4,
             Self::Dop14U8 | Self::Dop6U8 | Self::Dop26U8Wide => Encoding::U8,
             Self::Dop6F16 => Encoding::F16,
             Self::Dop14F32 => Encoding::F32,
@@ -116,7 +97,7 @@ impl Profile {
     /// The most children that a treelet can have: 4 or 8.
     #[inline]
     pub const fn width(self) -> usize {
-        const WIDTHS: [u8; 7] = [4, 8, 4, 8, 4, 4, 4];
+        const WIDTHS: [u8; 6] = [4, 8, 4, 4, 4, 4];
         WIDTHS[self as usize] as usize
     }
 
@@ -130,7 +111,7 @@ impl Profile {
     #[inline]
     pub const fn treelet_bytes(self) -> usize {
         // A table is faster than a match, and each node of a traversal asks.
-        const BYTES: [u16; 7] = [64, 64, 64, 64, 64, 128, 256];
+        const BYTES: [u16; 6] = [64, 64, 64, 256, 64, 128];
         BYTES[self as usize] as usize
     }
 
@@ -161,10 +142,7 @@ mod tests {
             assert_eq!(usize::from(profile.number()), number);
             assert_eq!(Profile::from_name(profile.name()), Some(profile));
         }
-        assert_eq!(Profile::from_number(7), None);
-        for name in ["dop14-f16", "dop26-u8", "dop14-f16-wide"] {
-            let successor = Profile::successor(name).unwrap();
-            assert_eq!((Profile::from_name(name), Profile::successor(successor.name())), (None, None));
-        }
+        assert_eq!(Profile::from_number(6), None);
+        assert_eq!(Profile::from_name("dop14-f16"), None);
     }
 }

@@ -24,7 +24,7 @@ macro_rules! rules {
 
 rules! {
     Magic = 1, "the file starts with the magic bytes";
-    Version = 2, "the major version is one that this reader knows";
+    Version = 2, "the version is one that this reader knows";
     HeaderSize = 3, "the file holds a whole header";
     HeaderChecksum = 4, "the checksum in the header is that of the header and the section table";
     FileLength = 5, "the file is as long as the header states";

@@ -6,7 +6,9 @@
 use bvh_format::Rule;
 use bvh_format::checksum::checksum;
 use bvh_format::decode::decode_child;
-use bvh_format::header::{Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind};
+use bvh_format::header::{
+    Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind, version_name,
+};
 use bvh_format::ids::{ID_ENTRY_BYTES, ID_GROUP, ID_GROUP_HEAD_BITS, WORD, decode_id};
 use bvh_format::instances::{Instance, InstanceRecord, MAX_RIGID_ERROR, MAX_WORLD, write_instances};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
@@ -244,7 +246,7 @@ fn lists() {
     let encodings = TriangleEncoding::ALL.map(|encoding| format!("{}|{}", encoding as u8, encoding.name()));
     assert_eq!(rows("triangle-encodings", 2), encodings);
 
-    assert_eq!(table("versions.md", "versions").pop().unwrap()[0], format!("{MAJOR}.{MINOR}"));
+    assert_eq!(table("versions.md", "versions").pop().unwrap()[0], version_name((MAJOR, MINOR)));
 }
 
 macro_rules! named {

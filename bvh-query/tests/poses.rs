@@ -153,7 +153,7 @@ fn poses_on_which_libraries_disagree() {
             let positions = mesh.objects.iter_mut().flat_map(|object| &mut object.positions);
             positions.for_each(|position| *position = position.map(six_decimals));
         }
-        let compressed = options(Profile::Dop14U4, TriangleEncoding::Packed);
+        let compressed = options(Profile::Dop6U8, TriangleEncoding::Packed);
         (name.to_owned(), [bake(&mesh, &Options::default()), bake(&mesh, &compressed)])
     };
     let files: HashMap<String, [Bvh; 2]> = ["bunny.obj", "fclenv.obj", "fclrob.obj"].map(load).into();

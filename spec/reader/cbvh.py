@@ -13,7 +13,7 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR = 5
+MAJOR, MINOR = 0, 1
 MAX_SECTIONS = 64
 SHORT_TREELET_BYTES = 32
 NO_PARENT = 0xFFFFFFFF
@@ -167,10 +167,9 @@ PROFILES = [
     Profile("dop14-u8", 7, "u8", 4, 64, 64, 1, 0, 4, 1, 32, 28, 60, short=Short(0, 28, 16, 28)),
     Profile("dop6-u8", 3, "u8", 8, 64, 32, 1, 32, 4, 1, 16, 28, 60, short=Short(16, 12, 32, 28)),
     Profile("dop6-f16", 3, "f16", 4, 64, 32, 2, 0, 8, 2, 32, 28, 60),
-    Profile("dop14-u4", 7, "u4", 8, 64, 64, 1, 32, 4, 1, 0, 28, 60),
+    Profile("dop14-f32", 7, "f32", 4, 256, 64, 4, 0, 16, 4, 128, 124, 252),
     Profile("dop26-u4", 13, "u4", 4, 64, 128, 1, 0, 4, 1, 0, 28, 60),
     Profile("dop26-u8-wide", 13, "u8", 4, 128, 128, 1, 0, 4, 1, 64, 60, 124, (28, 92, 56, 120)),
-    Profile("dop14-f32", 7, "f32", 4, 256, 64, 4, 0, 16, 4, 128, 124, 252),
 ]
 ENCODINGS = ["f32", "packed", "quantized"]
 

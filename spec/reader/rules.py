@@ -53,7 +53,8 @@ def open_file(data):
     file = cbvh.File(data)
     file.read_header()
     header = file.header
-    need(header.major == cbvh.MAJOR, 2, header.place("major"), cbvh.MAJOR, header.major)
+    stated = (header.major, header.minor)
+    need(stated == (cbvh.MAJOR, cbvh.MINOR), 2, header.place("major"), (cbvh.MAJOR, cbvh.MINOR), stated)
     most, whole = cbvh.MAX_SECTIONS, file.head_bytes()
     need(header.sections <= most, 6, header.place("sections"), f"at most {most}", header.sections)
     need(len(data) >= whole, 6, len(data), f"at least {whole} bytes", len(data))
@@ -136,7 +137,7 @@ def check_objects(file):
         need(one.pages >= 1, 13, one.place("pages"), "at least 1", 0)
         first_page += one.pages
         named = check_name(one, 11, head, named)
-        need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 6", one.profile)
+        need(one.profile < len(cbvh.PROFILES), 14, one.place("profile"), "0 to 5", one.profile)
         need(
             one.triangle_encoding < len(cbvh.ENCODINGS),
             14,

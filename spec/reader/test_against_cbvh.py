@@ -594,7 +594,7 @@ class AgainstCbvh(unittest.TestCase):
                 self.assertLessEqual({4, 5, 7, 8, 9} if only == "offsets" else {2, 4, 5, 6, 7, 8, 9}, set(broken))
 
     def test_short_files(self):
-        for name in ("ok-plain", "ok-everything", "bad-R02-version-4"):
+        for name in ("ok-plain", "ok-everything", "bad-R02-major-5"):
             with open(os.path.join(TESTDATA, f"{name}.cbvh"), "rb") as stream:
                 data = stream.read()
             for length in (*range(0, 64 + 32 * 8, 7), 63, 64, 159, 160, 255, 256):
@@ -652,7 +652,7 @@ class AgainstCbvh(unittest.TestCase):
 
     def test_damaged_files_without_short_treelets(self):
         """Damages counts and links of files in which no treelet is short, or can be."""
-        layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop14-u4", "f32")
+        layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop26-u4", "f32")
         meshes = [self.bake(ROOM, *layout) for layout in layouts]
         for only, expected in (("short counts", {17, 18, 25}), ("links", {0, 21, 22, 24})):
             count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 4

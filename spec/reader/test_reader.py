@@ -137,7 +137,8 @@ def file_of(sections):
         end = start + len(content)
     length = cbvh.aligned(end, cbvh.LINE)
     header = np.zeros((), cbvh.HEADER)
-    header["magic"], header["major"] = np.frombuffer(cbvh.MAGIC, "u1"), cbvh.MAJOR
+    header["magic"] = np.frombuffer(cbvh.MAGIC, "u1")
+    header["major"], header["minor"] = cbvh.MAJOR, cbvh.MINOR
     header["sections"], header["file_length"] = len(sections), length
     head = header.tobytes() + np.array(table, cbvh.SECTION_ENTRY).tobytes()
     data = bytearray((head + body).ljust(length, b"\0"))
@@ -207,7 +208,7 @@ class Tables(unittest.TestCase):
         self.assertEqual(rules.MAX_COORDINATE, 2.0 ** stated.pop("LOG2_MAX_COORDINATE"))
         self.assertEqual(rules.MAX_WORLD, 2.0 ** stated["LOG2_MAX_WORLD"])
         self.assertEqual(rules.MAX_RIGID_ERROR, 2.0 ** -stated["RIGID_BITS"])
-        self.assertEqual((stated.pop("MINOR"), stated.pop("PAGE_HEADER_BYTES")), (0, cbvh.PAGE_HEADER.itemsize))
+        self.assertEqual(stated.pop("PAGE_HEADER_BYTES"), cbvh.PAGE_HEADER.itemsize)
         self.assertEqual(stated.pop("PATTERNS"), len(cbvh.PATTERNS))
         for name, parts in (("STEP_U8", 255), ("STEP_U4", 15)):
             self.assertEqual(getattr(cbvh, name).view(np.uint32), stated.pop(name))
@@ -512,7 +513,7 @@ class Treelets(unittest.TestCase):
         self.assertEqual(Tree(0, ([3, 3], [7]), 1).verdict(), 22)
         self.assertEqual(Tree(0, ([3, 7], [7], [7]), 2).verdict(), 22)
         self.assertEqual(Tree(0, ([3, 1], [7], [7]), 1).verdict(), 0)
-        for profile in range(7):  # a page without short treelets
+        for profile in range(6):  # a page without short treelets
             self.assertEqual(Tree(profile, ([3, 7],)).verdict(), 22, profile)
 
     def test_numbering(self):
@@ -602,7 +603,7 @@ class Treelets(unittest.TestCase):
         """In dop6, two anchors share a line, and anchors and links do, too."""
         for profile, roots, remotes, line in (
             *((profile, *row) for profile in (1, 2) for row in ((1, 0, 2), (1, 8, 2), (1, 9, 3), (2, 0, 2), (2, 1, 3))),
-            *((profile, *row) for profile in (0, 3, 6) for row in ((1, 0, 2), (1, 1, 3), (2, 16, 4), (2, 17, 5))),
+            *((profile, *row) for profile in (0, 3) for row in ((1, 0, 2), (1, 1, 3), (2, 16, 4), (2, 17, 5))),
             *((profile, *row) for profile in (4, 5) for row in ((1, 0, 3), (1, 16, 4), (2, 17, 7))),
         ):
             for stated in range(line - 2, line + 3):
@@ -935,7 +936,8 @@ class Head(unittest.TestCase):
         """A file of sections that are given by kind, `required`, offset and length, and hold zeros."""
         header = np.zeros((), cbvh.HEADER)
         head = cbvh.head_bytes(len(sections))
-        header["magic"], header["major"] = np.frombuffer(cbvh.MAGIC, "u1"), cbvh.MAJOR
+        header["magic"] = np.frombuffer(cbvh.MAGIC, "u1")
+        header["major"], header["minor"] = cbvh.MAJOR, cbvh.MINOR
         header["sections"], header["file_length"] = len(sections), head if length is None else length
         table = np.array([(*section, 0) for section in sections], cbvh.SECTION_ENTRY).tobytes()
         data = bytearray((header.tobytes() + table).ljust(int(header["file_length"]), b"\0"))
@@ -979,7 +981,7 @@ class Head(unittest.TestCase):
         for at in range(head):
             data = bytearray(self.plain)
             data[at] ^= 1
-            early = dict.fromkeys(range(8), 1) | dict.fromkeys((8, 9), 2) | dict.fromkeys((13, 14, 15), 6)
+            early = dict.fromkeys(range(8), 1) | dict.fromkeys((8, 9, 10, 11), 2) | dict.fromkeys((13, 14, 15), 6)
             self.assertEqual(mutate.verdict(data), early.get(at, 4), at)
         data[head - 1] ^= 1
         for at in range(head, self.file.entries[0].offset):
@@ -1077,14 +1079,14 @@ class Instances(unittest.TestCase):
     def test_what_is_in_a_scene(self):
         turn, names = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], ["Tür", "", "x", "", "tür", "x "]
         changes = [{"text": name.encode()} for name in names]
-        changes[1] |= {"object": 6, "member": 1, "meets": 1 << 31, "rotation": turn, "translation": [1.5, -2, 3]}
-        changes[2] |= {"object": 6, "member": 0, "meets": 0}
+        changes[1] |= {"object": 5, "member": 1, "meets": 1 << 31, "rotation": turn, "translation": [1.5, -2, 3]}
+        changes[2] |= {"object": 5, "member": 0, "meets": 0}
         file = rules.validate(with_section(self.profiles, instances(*changes)))
         rules.verify(file)
         self.assertEqual(list(musts.violations(file)), [])
         self.assertEqual([one.name for one in file.instances], names)
         self.assertEqual([one.number for one in file.instances], list(range(6)))
-        self.assertEqual([one.object for one in file.instances], [0, 6, 6, 0, 0, 0])
+        self.assertEqual([one.object for one in file.instances], [0, 5, 5, 0, 0, 0])
         first, second = file.instances[:2]
         self.assertEqual((first.member, first.meets), (0xFFFFFFFF, 0xFFFFFFFF))
         self.assertEqual((first.rows(), first.translation.tolist()), (np.eye(3).tolist(), [0, 0, 0]))
@@ -1167,7 +1169,7 @@ class Instances(unittest.TestCase):
         self.assertEqual(self.verdict({}, {"object": 0, "translation": [0, 0, 0]}), 0)  # the same in all but number
 
     def test_objects(self):
-        for data, count in ((self.everything, 1), (self.profiles, 7)):
+        for data, count in ((self.everything, 1), (self.profiles, 6)):
             self.assertEqual(self.verdict({"object": count - 1}, data=data), 0)
             for number in (count, (1 << 32) - 1):
                 self.assertEqual(self.verdict({"object": number}, data=data), 41, number)

@@ -281,7 +281,7 @@ mod tests {
     use crate::tree::binary::{Content, NodeIndex};
     use crate::triangles::Corners;
 
-    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, passes: &[] };
+    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, reinsert: false };
 
     fn small(at: [f32; 3], size: f32) -> Corners {
         let [x, y, z] = at;

@@ -28,7 +28,6 @@ pub(crate) use boxes::Aabb;
 use boxes::Reference;
 use bricks::Division;
 pub(crate) use bricks::{BrickIndex, Grid};
-use reinsert::Pass;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -194,31 +193,27 @@ struct Builder {
     brick: usize,
     /// Nodes of at most this many triangles are swept (`swept`).
     sweep: usize,
-    /// The passes that move subtrees once a brick's tree is built.
-    passes: &'static [Pass],
+    /// Whether subtrees move once a brick's tree is built.
+    reinsert: bool,
 }
 
 impl Builder {
     fn new(width: usize, effort: Effort) -> Self {
-        let (sweep, passes): (_, &[_]) = match effort {
-            Effort::Fast => (16, &[]),
-            Effort::Default => (swept::MAX_SWEPT, &[Pass { one_in: 10 }]),
-            Effort::High => (swept::MAX_SWEPT, &[Pass { one_in: 1 }; 3]),
+        let (sweep, reinsert) = match effort {
+            Effort::Fast => (16, false),
+            Effort::Default => (swept::MAX_SWEPT, true),
         };
-        Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, passes }
+        Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, reinsert }
     }
 
     /// Builds the tree of a brick.
     fn tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
-        let mut passes = self.passes;
-        loop {
-            let mut tree = self.split_tree(triangles);
-            match reinsert::optimise(&mut tree, passes) {
-                Ok(()) => return tree,
-                // A copy of the tree before each pass would cost every bake time, and hardly any bake needs it.
-                Err(reinsert::TooDeep { pass }) => passes = &passes[..pass],
-            }
+        let tree = self.split_tree(triangles);
+        if !self.reinsert {
+            return tree;
         }
+        // A copy of the tree would cost every bake time. Hardly any bake needs it, so that it is built again instead.
+        reinsert::optimised(tree).unwrap_or_else(|| self.split_tree(triangles))
     }
 
     /// Builds the tree by splits, before any subtree is moved.

@@ -18,40 +18,20 @@ use super::boxes::Aabb;
 /// The most nodes that a search visits; hardly any search visits so many. It bounds the time for meshes in which every
 /// part overlaps every other.
 const MAX_VISITS: usize = 1024;
-/// The most levels of a tree. A pass that makes a deeper tree is left out.
+/// The largest subtrees are moved, one of every so many.
+const ONE_IN: usize = 10;
+/// The most levels of a tree. A deeper one cannot be used, because later stages recurse.
 const MAX_DEPTH: usize = 256;
 /// The least gain that is worth a move, as a fraction of the size of the subtree's parent.
 const MIN_GAIN: f64 = 1e-4;
 
-/// One pass over the tree.
-#[derive(Clone, Copy)]
-pub(super) struct Pass {
-    /// The pass tries the largest subtrees, one of every `one_in`.
-    pub(super) one_in: usize,
-}
-
-/// A pass made the tree too deep, so that the tree cannot be used.
-pub(super) struct TooDeep {
-    /// The number of the pass, from 0.
-    pub(super) pass: usize,
-}
-
-/// Runs the passes on the tree of a brick.
-///
-/// # Errors
-/// `TooDeep` names the first pass that makes the tree too deep for the later stages, which recurse.
-pub(super) fn optimise(tree: &mut Tree<PacketTriangles>, passes: &[Pass]) -> Result<(), TooDeep> {
+/// Moves the largest subtrees of the tree of a brick. Returns `None` if the tree has become too deep to be used.
+pub(super) fn optimised(mut tree: Tree<PacketTriangles>) -> Option<Tree<PacketTriangles>> {
     // With fewer leaves there is nothing to move.
-    if tree.leaves() < 4 {
-        return Ok(());
+    if tree.leaves() >= 4 {
+        tree.run(ONE_IN);
     }
-    for (pass, &of) in passes.iter().enumerate() {
-        tree.run(of);
-        if tree.depth() > MAX_DEPTH {
-            return Err(TooDeep { pass });
-        }
-    }
-    Ok(())
+    (tree.depth() <= MAX_DEPTH).then_some(tree)
 }
 
 impl Tree<PacketTriangles> {
@@ -72,10 +52,11 @@ impl Tree<PacketTriangles> {
         depth
     }
 
-    fn run(&mut self, pass: Pass) {
+    /// Moves the largest subtrees, one of every `one_in`.
+    fn run(&mut self, one_in: usize) {
         let mut order: Vec<(f64, NodeIndex)> =
             self.nodes.iter().zip(0..).map(|(node, index)| (node.size(), index)).collect();
-        let count = order.len().div_ceil(pass.one_in);
+        let count = order.len().div_ceil(one_in);
         let larger = |a: &(f64, NodeIndex), b: &(f64, NodeIndex)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
         if count < order.len() {
             order.select_nth_unstable_by(count, larger);
@@ -234,7 +215,7 @@ mod tests {
             let kept = packets(&tree);
             for one_in in [10, 1, 1] {
                 let before = cost(&tree);
-                tree.run(Pass { one_in });
+                tree.run(one_in);
                 assert_eq!(check(&tree, tree.root, NONE), tree.nodes.len());
                 assert!(cost(&tree) <= before, "{} > {before}", cost(&tree));
                 assert_eq!(packets(&tree), kept);

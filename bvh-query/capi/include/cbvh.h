@@ -65,7 +65,7 @@ extern "C" {
 
 /* The version of the library that this header belongs to. */
 #define CBVH_VERSION_MAJOR 0
-#define CBVH_VERSION_MINOR 1
+#define CBVH_VERSION_MINOR 9
 #define CBVH_VERSION_PATCH 0
 
 /* The version of the binary interface: the number in the name of the shared library. A library with the same number
@@ -215,7 +215,7 @@ typedef struct cbvh_bake_options {
     const char *profile;
     /* The encoding of triangles, "f32", "packed" or "quantized"; NULL lets the baker choose one without loss. */
     const char *triangles;
-    /* The time spent on the tree: "fast", "default" or "high"; NULL for the default. */
+    /* The time spent on the tree: "fast" or "default"; NULL for the default. */
     const char *effort;
     /* The folder for scratch files; NULL for that of the output. Files only. */
     const char *scratch;

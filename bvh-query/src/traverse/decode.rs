@@ -86,12 +86,6 @@ pub(crate) fn decode_group<I: Isa>(
                 (isa.codes_f16(fixed(t, 64 * q)), isa.codes_f16(fixed(t, 32 + 64 * q)))
             });
         }
-        Profile::Dop14U4 => {
-            let t: &[u8; 32] = fixed(treelet, 32 * part);
-            quads!(isa, parent, column, out, 2, u4_step, |q| {
-                (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)))
-            });
-        }
         Profile::Dop26U4 => {
             let t: &[u8; 64] = fixed(treelet, 0);
             quads!(isa, parent, column, out, 4, u4_step, |q| {

@@ -4,6 +4,7 @@ use super::stages::{self, StageLine};
 use crate::console::{hex, length, plural};
 use crate::process::resident;
 use bvh_bake::{BakeReport, Options, Outcome};
+use bvh_format::header::version_name;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -71,13 +72,12 @@ impl Report {
             Outcome::Baked(report) => (&report.file, Some(report)),
             Outcome::UpToDate(file) => (file, None),
         };
-        let (major, minor) = file.version;
         let traffic = baked.map(|baked| baked.traffic);
         let warning = baked.and_then(|baked| warning(&input, options, baked));
         Self {
             input,
             output,
-            format_version: format!("{major}.{minor}"),
+            format_version: version_name(file.version),
             profile: file.profile.name(),
             triangle_encoding: file.triangle_encoding.name(),
             reason: baked.map_or("the output was up to date".into(), |baked| baked.reason.clone()),

@@ -48,7 +48,7 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
             let valid = Valid {
                 file,
                 valid: true,
-                format_version: format!("{}.{}", layout.version.0, layout.version.1),
+                format_version: bvh_format::header::version_name(layout.version),
                 objects: layout.objects.len() as u64,
                 pages: layout.page_count(),
                 treelets: records().map(|record| record.treelets.get()).sum(),

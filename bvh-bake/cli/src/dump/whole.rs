@@ -128,7 +128,7 @@ impl FileDump {
         let per_triangle = |bytes: u64| bytes as f64 / triangles as f64;
         Ok(Self {
             file,
-            format_version: format!("{}.{}", layout.version.0, layout.version.1),
+            format_version: bvh_format::header::version_name(layout.version),
             file_bytes: total,
             content_xxh3: hex(layout.content_checksum),
             sections: layout

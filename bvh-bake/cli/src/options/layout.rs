@@ -8,7 +8,7 @@ use clap::Args;
 /// How nodes and triangles are stored.
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArguments {
-    /// Bounding volumes: auto, dop14-u8, dop6-u8, dop6-f16, dop14-u4, dop26-u4, dop26-u8-wide or dop14-f32
+    /// Bounding volumes: auto, dop14-u8, dop6-u8, dop6-f16, dop14-f32, dop26-u4 or dop26-u8-wide
     #[arg(long, value_name = "P", default_value = "auto", value_parser = profile)]
     pub(crate) profile: Choice<Profile>,
     /// Triangles: auto, f32 (the fastest), packed (the same values in fewer bytes) or quantized (vertices move a little)
@@ -49,9 +49,6 @@ impl<T: Copy> Choice<T> {
 pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
     if name == "auto" {
         return Ok(Choice::Auto);
-    }
-    if let Some(successor) = Profile::successor(name) {
-        return Err(format!("this profile was dropped: choose {} instead", successor.name()));
     }
     let names: Vec<_> = Profile::ALL.into_iter().map(Profile::name).collect();
     Profile::from_name(name).map(Choice::Named).ok_or_else(|| format!("expected auto, {}", names.join(", ")))
