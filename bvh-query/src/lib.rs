@@ -95,8 +95,8 @@ pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceId, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance, SceneError,
-    SceneMotion, ScenePair, SceneRayHit, SceneShape,
+    Groups, InstanceId, InstanceLabel, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance,
+    SceneError, SceneMotion, ScenePair, SceneRayHit, SceneShape,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

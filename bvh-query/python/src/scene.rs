@@ -10,7 +10,9 @@ use crate::asking::{detached, on_pool};
 use crate::errors::{FormatError, open_error, query_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
-use bvh_query::{Bvh, Groups, InstanceId, OwnedShape, Pose, SceneError, ScenePair, SceneShape};
+use bvh_query::{
+    Bvh, Groups, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair, SceneShape,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -81,11 +83,10 @@ impl State {
     }
 
     /// Names an instance that an error of the scene names: by its name or, without one, by its number.
-    fn called(&self, instance: &str) -> String {
-        let unnamed = |id: &InstanceId| id.to_string() == instance && self.scene.name(*id) == Ok(None);
-        match self.scene.instances().find(unnamed) {
-            Some(id) => self.number(id).to_string(),
-            None => format!("{instance:?}"),
+    fn called(&self, instance: &InstanceLabel) -> String {
+        match &instance.name {
+            Some(name) => format!("{name:?}"),
+            None => self.number(instance.id).to_string(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::scene::instance::InstanceId;
+use std::fmt;
 use std::path::PathBuf;
 
 /// Why a scene file cannot be opened.
@@ -21,6 +22,24 @@ pub enum OpenSceneError {
     },
 }
 
+/// The instance that an error is about. It is shown by its name or, without one, by its identifier.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InstanceLabel {
+    /// The identifier; for an instance that was refused, the one that it would have had.
+    pub id: InstanceId,
+    /// The name, if the instance has one.
+    pub name: Option<Box<str>>,
+}
+
+impl fmt::Display for InstanceLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.name {
+            Some(name) => f.write_str(name),
+            None => self.id.fmt(f),
+        }
+    }
+}
+
 /// Why a scene refuses an instance, or a question has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -35,8 +54,8 @@ pub enum SceneError {
     /// orthonormalises a rounded rotation.
     #[error("instance {instance}: expected {what}, found {found:e}")]
     Pose {
-        /// The name or the identifier of the instance.
-        instance: String,
+        /// The instance.
+        instance: InstanceLabel,
         /// What was expected.
         what: &'static str,
         /// The entry of `R R^T - I`, or the translation.
@@ -50,18 +69,18 @@ pub enum SceneError {
     /// The question about a pair has no answer.
     #[error("instances {a} and {b}: {source}")]
     Pair {
-        /// The name or the identifier of A.
-        a: String,
-        /// The name or the identifier of B.
-        b: String,
+        /// The instance A.
+        a: InstanceLabel,
+        /// The instance B.
+        b: InstanceLabel,
         /// Why.
         source: QueryError,
     },
     /// The question about an instance has no answer.
     #[error("instance {instance}: {source}")]
     Instance {
-        /// The name or the identifier of the instance.
-        instance: String,
+        /// The instance.
+        instance: InstanceLabel,
         /// Why.
         source: QueryError,
     },

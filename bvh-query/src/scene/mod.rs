@@ -17,7 +17,7 @@ mod trackers;
 mod workers;
 mod world_box;
 
-pub use error::{OpenSceneError, SceneError};
+pub use error::{InstanceLabel, OpenSceneError, SceneError};
 pub use groups::Groups;
 pub use instance::{InstanceId, SceneShape};
 pub use motion::SceneMotion;
@@ -234,7 +234,7 @@ impl Scene {
         let (place, generation) = self.free.last().copied().unwrap_or((self.instances.len() as u32, 0));
         let id = InstanceId { place, generation };
         check_world(&world).map_err(|(what, found)| SceneError::Pose {
-            instance: name.clone().unwrap_or_else(|| id.to_string()),
+            instance: InstanceLabel { id, name: name.as_deref().map(Box::from) },
             what,
             found,
         })?;
@@ -301,7 +301,7 @@ impl Scene {
         for &(id, ref world) in &poses {
             self.place(id)?;
             check_world(world).map_err(|(what, found)| SceneError::Pose {
-                instance: self.describe(id),
+                instance: self.label(id),
                 what,
                 found,
             })?;
@@ -436,11 +436,11 @@ impl Scene {
         self.instance(id).map(|_| id.place as usize)
     }
 
-    /// Names an instance for a person.
-    fn describe(&self, id: InstanceId) -> String {
-        match self.instance(id) {
-            Ok(Instance { name: Some(name), .. }) => name.clone(),
-            _ => id.to_string(),
+    /// Names an instance for an error.
+    fn label(&self, id: InstanceId) -> InstanceLabel {
+        InstanceLabel {
+            id,
+            name: self.instance(id).ok().and_then(|instance| instance.name.as_deref().map(Box::from)),
         }
     }
 

@@ -177,7 +177,7 @@ impl Scene {
             self.place(id)?;
             for world in [path.pose(0.0), path.pose(1.0)] {
                 check_world(&world).map_err(|(what, found)| SceneError::Pose {
-                    instance: self.describe(id),
+                    instance: self.label(id),
                     what,
                     found,
                 })?;

@@ -259,7 +259,7 @@ impl Asked<'_> {
                 Ok(ControlFlow::Continue(())) => {}
                 Ok(ControlFlow::Break(())) => break,
                 Err(source) => {
-                    return Err(SceneError::Instance { instance: scene.describe(id), source });
+                    return Err(SceneError::Instance { instance: scene.label(id), source });
                 }
             }
         }

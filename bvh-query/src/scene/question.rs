@@ -504,7 +504,7 @@ impl Scene {
 
     /// Names the pair whose question has no answer.
     pub(super) fn pair_error(&self, pair: ScenePair, source: QueryError) -> SceneError {
-        SceneError::Pair { a: self.describe(pair.a), b: self.describe(pair.b), source }
+        SceneError::Pair { a: self.label(pair.a), b: self.label(pair.b), source }
     }
 
     /// Returns both instances of a candidate.

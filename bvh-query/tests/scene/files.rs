@@ -2,7 +2,7 @@
 
 use super::common::shapes::sphere;
 use super::{Random, ask, place, shape, shapes};
-use bvh_query::{Bvh, Files, Groups, OwnedShape, Pose, Scene};
+use bvh_query::{Bvh, Files, Groups, OwnedShape, Pose, Scene, SceneError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -96,13 +96,19 @@ fn a_file_that_vanishes_or_changes_is_named() {
     assert!(stored[0].object(0).is_some() && stored[0].object(1).is_none());
     let mut scene = Scene::new().unwrap();
     let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
-    scene.add_named("first", stored[0].clone(), at(0.0)).unwrap();
+    let first = scene.add_named("first", stored[0].clone(), at(0.0)).unwrap();
     let second = scene.add_named("second", stored[1].clone(), at(9.0)).unwrap();
     std::fs::remove_file(&paths[1]).unwrap();
     // Far apart, nobody needs it.
     assert_eq!(scene.pairs_in_contact().unwrap(), []);
     scene.set_pose(second, at(0.5)).unwrap();
-    let said = scene.pairs_in_contact().unwrap_err().to_string();
+    let error = scene.pairs_in_contact().unwrap_err();
+    let SceneError::Pair { a, b, .. } = &error else { panic!("{error:?}") };
+    assert_eq!(
+        (a.id, a.name.as_deref(), b.id, b.name.as_deref()),
+        (first, Some("first"), second, Some("second"))
+    );
+    let said = error.to_string();
     assert!(said.starts_with("instances first and second: ") && said.contains("1.cbvh: expected"), "{said}");
     assert!(said.contains("No such file") && !said.contains('\n'), "{said}");
     std::fs::write(&paths[1], both[0].bvh().bytes()).unwrap();
