@@ -2,7 +2,8 @@
 
 use crate::answers::table;
 use crate::asking::detached;
-use crate::errors::{FormatError, open_error};
+use crate::errors::{FormatError, bake_error, open_error};
+use bvh_bake::write_atomically;
 use bvh_query::{Bvh, Object, OwnedShape};
 use numpy::PyArray2;
 use pyo3::exceptions::PyIndexError;
@@ -81,6 +82,11 @@ impl Mesh {
     /// The bytes of the file.
     fn bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, self.shape.bvh().bytes())
+    }
+
+    /// Writes the bytes to a file that appears complete or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        detached(py, || write_atomically(&path, self.shape.bvh().bytes())).map_err(bake_error)
     }
 
     /// The number of bytes of the file.

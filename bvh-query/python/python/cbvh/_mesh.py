@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 import os
-import secrets
 from typing import Any, Iterable
 
 import numpy as np
@@ -114,15 +113,7 @@ class Mesh:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file. A file of that name is replaced when all is written."""
-        temporary = f"{os.fsdecode(path)}.{secrets.token_hex(8)}.tmp"
-        with _open_file(temporary, "xb") as file:
-            try:
-                file.write(self.tobytes())
-                file.close()
-                os.replace(temporary, path)
-            except BaseException:
-                os.remove(temporary)
-                raise
+        self._mesh.save(os.fsdecode(path))
 
     def collide(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do the surfaces touch? Exact: bool, or an array of bool of shape (N,).
@@ -297,9 +288,6 @@ class Mesh:
         ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
         """
         return _cbvh.meet_segments(self._mesh, starts, ends, pose, parallel)
-
-
-_open_file = open
 
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
