@@ -12,4 +12,3 @@ pub mod poses;
 pub mod rounds;
 pub mod spread;
 pub mod table;
-pub mod turns;

@@ -29,7 +29,7 @@ type Error = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Rows of panels below a title and a legend.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Figure {
     /// Its title.
     pub title: String,
@@ -40,7 +40,7 @@ pub struct Figure {
 }
 
 /// One plot.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Panel {
     /// Its title.
     pub title: String,
@@ -57,7 +57,7 @@ pub struct Panel {
 }
 
 /// A line through points.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Line {
     /// The points, from left to right.
     pub points: Vec<(f64, f64)>,
@@ -66,7 +66,7 @@ pub struct Line {
 }
 
 /// A point.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Mark {
     /// The figures.
     pub at: (f64, f64),

@@ -1,9 +1,17 @@
 //! Asks questions about poses of several subjects in rounds and times each query alone.
 //!
-//! Within a round the subjects take turns at each question.
+//! A turn is a few untimed questions and then all items in their order. Caches hold what the previous questions left there,
+//! which is called warm. Within a round all subjects take their turn at each question, and the next round starts with
+//! another subject, so that drift (clock, temperature, neighbours) affects all of them alike.
 
-use crate::turns;
 use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, QueryError, QueryStats};
+use std::time::Instant;
+
+/// Untimed questions before each turn.
+const WARM_UP_QUESTIONS: usize = 3;
+/// The number of subjects by which the start moves on from round to round. It shares no factor with usual numbers of
+/// subjects, so that the order of turns differs from round to round.
+const STRIDE: usize = 17;
 
 /// A question about two meshes in a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,32 +137,49 @@ pub fn rounds(
     let mut queriers: Vec<Querier> = subjects.iter().map(|_| Querier::with_backend(backend)).collect();
     for round in 0..rounds {
         for (number, &question) in questions.iter().enumerate() {
-            for subject in turns::order(round, subjects.len()) {
-                take_turn(question, &mut queriers[subject], &subjects[subject], &mut all[subject][number])?;
+            for subject in order(round, subjects.len()) {
+                let (querier, &Subject { a, b, poses }) = (&mut queriers[subject], &subjects[subject]);
+                let answers = take_turn(poses, |pose| {
+                    let answer = question.ask(querier, a, b, pose)?;
+                    Ok((answer, querier.stats()))
+                })?;
+                let asked = &mut all[subject][number];
+                if asked.rounds.is_empty() {
+                    for &((answer, stats), _) in &answers {
+                        asked.answers.push(answer);
+                        add(&mut asked.stats, stats);
+                    }
+                }
+                asked.rounds.push(answers.into_iter().map(|(_, nanoseconds)| nanoseconds).collect());
             }
         }
     }
     Ok(all)
 }
 
-/// Asks in all poses.
-fn take_turn(
-    question: Question,
-    querier: &mut Querier,
-    subject: &Subject<'_>,
-    asked: &mut Asked,
-) -> Result<(), QueryError> {
-    let &Subject { a, b, poses } = subject;
-    let answers = turns::take_turn(poses, |pose| {
-        let answer = question.ask(querier, a, b, pose)?;
-        Ok((answer, querier.stats()))
-    })?;
-    if asked.rounds.is_empty() {
-        for &((answer, stats), _) in &answers {
-            asked.answers.push(answer);
-            add(&mut asked.stats, stats);
-        }
+/// Returns the order in which so many subjects take turns in a round.
+pub fn order(round: usize, subjects: usize) -> impl Iterator<Item = usize> {
+    (0..subjects).map(move |turn| (turn + STRIDE * round) % subjects)
+}
+
+/// Asks about all items, and returns the answers with their nanoseconds.
+///
+/// # Errors
+/// Returns the first error of a question.
+#[inline]
+pub fn take_turn<T, A>(
+    items: &[T],
+    mut ask: impl FnMut(&T) -> Result<A, QueryError>,
+) -> Result<Vec<(A, u64)>, QueryError> {
+    for item in items.iter().rev().take(WARM_UP_QUESTIONS) {
+        ask(item)?;
     }
-    asked.rounds.push(answers.into_iter().map(|(_, nanoseconds)| nanoseconds).collect());
-    Ok(())
+    let mut answers = Vec::with_capacity(items.len());
+    for item in items {
+        let before = Instant::now();
+        let answer = ask(item)?;
+        let nanoseconds = before.elapsed().as_nanos() as u64;
+        answers.push((answer, nanoseconds));
+    }
+    Ok(answers)
 }

@@ -13,6 +13,13 @@ pub trait Cells {
     fn cells(&self) -> Vec<(&'static str, Cell)>;
 }
 
+/// A list of named cells is a row by itself.
+impl Cells for Vec<(&'static str, Cell)> {
+    fn cells(&self) -> Vec<(&'static str, Cell)> {
+        self.clone()
+    }
+}
+
 /// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {

@@ -1,49 +1,310 @@
 //! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
 //!
-//! `layouts/` and `motions/` are the two kinds of report. They share what comes before and after the measurement: the list
+//! `layouts` and `motions` are the two kinds of report. They share what comes before and after the measurement: the list
 //! of pairs, the meshes, and four files that hold the same figures: a table, JSON, a drawing and a page for people.
 
-mod arguments;
-mod baked;
-mod document;
-mod files;
-mod inputs;
-mod kind;
 mod layouts;
+mod meshes;
 mod motions;
 mod page;
-mod source;
 
-pub(crate) use arguments::ReportArguments;
+use crate::asking::{self, files};
+use crate::console::{self, Failure, plural, spinner};
+use bvh_bake::mesh::Mesh;
+use bvh_query::{Backend, Bvh};
+use cbvh_measure::origin::Origin;
+use cbvh_measure::pairs::{self, Pair};
+use cbvh_measure::pin::Pinned;
+use cbvh_measure::plot::{self, Figure};
+use cbvh_measure::poses::diagonal;
+use cbvh_measure::table::{self, Cell};
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
 
-use crate::asking;
-use crate::console::{Failure, spinner};
-use document::{Report, Settings};
-use kind::{Kind, Subject};
-use layouts::Layouts;
-use motions::Motions;
+const REPORT_HELP: &str = "\
+Examples:
+  cbvh report pairs.txt --out report
+  cbvh report pairs.txt --meshes meshes --poses poses/%s_d1.txt,poses/%s_d5.txt --out report
+  cbvh report pairs.txt --motions --out report
+  cbvh report pairs.txt --motions=edges/%s.txt --out report
+  cbvh report pairs.txt --quick --out report
+
+PAIRS is a text file with one pair of meshes per line: NAME A B [FILE[,FILE...]]; # starts a comment. Meshes are in any \
+format that bake reads, or .cbvh files, whose triangles are baked again. FILEs have poses or, with --motions, motions, as \
+query and motion read them. File names are relative to the list. For a pair without poses, 60 are made, always the same \
+ones: overlapping, and with gaps of 1e-6, 0.5 %, 1 % and 5 % of A's diagonal. For a pair without motions, 60 are made, \
+too: long ways, short ways, slides and turns on the spot.
+
+The command writes report.html for people, report.svg with its plots, and report.csv and report.json with the same \
+figures. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
+
+Without --motions, it bakes each pair in every profile with every encoding of triangles, and asks for contact and for \
+distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compared with those of dop14-f32.
+
+With --motions, it bakes each pair as bake does without options, and asks about each motion in 16 ways: by 10, 30, 100, \
+300, 1000, 3000 and 10000 equally spaced poses until one touches, in the order of time and in an order that is spread from \
+the start, and by certified answers, for the first contact and for any. It tells how many of the certified contacts samples \
+miss, how late they are with the others, and how long each way takes. A sample that touches where the motion is certified \
+free is a wrong answer. Each way asks about all motions of a pair once, and again for as many of the rounds as fit into 10 seconds; \
+report.csv has their number. A pair takes some minutes at most, unless one round of 10000 samples takes longer.
+
+Queries run on one thread that is bound to one processor. On a machine that does other work the times include the \
+effects of that work.";
+
+/// What `report` takes.
+#[derive(Debug, Args)]
+#[command(after_help = REPORT_HELP)]
+pub(crate) struct ReportArguments {
+    /// The list of the pairs of meshes to report on
+    pub(crate) pairs: PathBuf,
+    /// The folder to write to; made if it does not exist
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The folder of the meshes [default: that of PAIRS]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) meshes: Option<PathBuf>,
+    /// Files of poses for each pair, besides those in PAIRS; %s stands for the pair's name
+    #[arg(long, value_name = "FILE[,FILE...]")]
+    pub(crate) poses: Option<String>,
+    /// Report on motions instead of layouts. FILEs are files of motions for each pair, besides those in PAIRS; %s stands for
+    /// the pair's name
+    #[arg(long, value_name = "FILE[,FILE...]", num_args = 0..=1, require_equals = true, conflicts_with = "poses")]
+    pub(crate) motions: Option<Option<String>>,
+    /// The largest number of poses or motions per pair, spread evenly over all; 0 asks all
+    #[arg(long, value_name = "N", default_value = "100")]
+    pub(crate) limit: usize,
+    /// Rounds in which all layouts, or all ways to ask, take turns
+    #[arg(long, value_name = "N", default_value = "7", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(crate) rounds: u16,
+    /// Backend: auto, scalar, avx2 or avx512; auto is the fastest one of this CPU, unless CBVH_ISA names one
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    pub(crate) isa: String,
+    /// Ask only about ten poses or motions in two rounds: good for trying the command, too few to quote
+    #[arg(long, conflicts_with_all = ["limit", "rounds"])]
+    pub(crate) quick: bool,
+}
+
+/// Rounds and items of `--quick`.
+const QUICK: (usize, usize) = (2, 10);
+
+/// What one kind of report has that the other does not. Its items are poses or motions.
+struct Kind<T> {
+    words: page::Words,
+    /// Says how many items per pair are asked about at most.
+    limit: fn(usize) -> Limit,
+    /// Reads a file of items.
+    read: fn(&Path) -> Result<Vec<T>, Failure>,
+    /// Measures a pair with the given items, or with items that are made if there are none.
+    measure: fn(&Subject<'_>, Vec<T>) -> Result<Measured, Failure>,
+}
+
+/// A pair to measure.
+struct Subject<'a> {
+    pair: &'a Pair,
+    meshes: &'a [Mesh; 2],
+    settings: &'a Settings,
+    backend: Backend,
+    tell: &'a (dyn Fn(&str) + Sync),
+}
+
+/// A row of `report.csv`: its figures with their names. JSON and the tables of the page take them from here.
+type Cells = Vec<(&'static str, Cell)>;
+
+/// The results of a pair.
+struct Measured {
+    record: PairRecord,
+    rows: Vec<Cells>,
+    /// Wrong answers, one line each.
+    wrong: Vec<String>,
+}
+
+/// The largest number of items per pair, 0 for all.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Limit {
+    Poses(usize),
+    Motions(usize),
+}
+
+/// How much is measured.
+#[derive(Debug, Serialize)]
+struct Settings {
+    quick: bool,
+    rounds: usize,
+    #[serde(flatten)]
+    limit: Limit,
+    isa: &'static str,
+}
+
+impl Settings {
+    /// Returns at most as many items as the settings allow, spread evenly over all.
+    fn some_of<T: Clone>(&self, all: &[T]) -> Vec<T> {
+        let (Limit::Poses(limit) | Limit::Motions(limit)) = self.limit;
+        pairs::spread_evenly(all, limit)
+    }
+}
+
+/// One mesh of a pair.
+#[derive(Debug, Serialize)]
+struct SideRecord {
+    mesh: String,
+    triangles: u64,
+    /// The diagonal of its box, mesh units.
+    diagonal: f64,
+    /// The layout that `cbvh bake` chooses by itself.
+    chosen_layout: String,
+}
+
+impl SideRecord {
+    fn new(path: &Path, bvh: &Bvh, chosen_layout: String) -> Self {
+        let mesh = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Self { mesh, triangles: bvh.all().triangles(), diagonal: diagonal(bvh), chosen_layout }
+    }
+}
+
+/// A pair, what it was asked about, and its section of the page.
+#[derive(Debug, Serialize)]
+struct PairRecord {
+    name: String,
+    a: SideRecord,
+    b: SideRecord,
+    /// How many items there are, and the names of their files or how they were made.
+    #[serde(flatten)]
+    items: serde_json::Value,
+    /// The processor that the measuring thread was bound to.
+    pinned: Option<Pinned>,
+    #[serde(skip)]
+    section: Section,
+}
+
+/// The section of a pair on the page.
+#[derive(Debug)]
+struct Section {
+    /// What was asked about, in a phrase.
+    items: String,
+    /// What is found, the most important sentence first.
+    sentences: Vec<String>,
+    figure: Figure,
+    /// The tables, as HTML.
+    tables: String,
+}
+
+/// The whole report: where and how it was measured, the pairs, and the rows.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    origin: Origin,
+    settings: Settings,
+    pairs: Vec<PairRecord>,
+    /// Answers that are not what they must be, one line each.
+    wrong: Vec<String>,
+    #[serde(serialize_with = "table::objects")]
+    rows: Vec<Cells>,
+}
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
     match &arguments.motions {
-        None => run_kind::<Layouts>(arguments, arguments.poses.as_deref()),
-        Some(files) => run_kind::<Motions>(arguments, files.as_deref()),
+        None => run_kind(arguments, layouts::KIND, arguments.poses.as_deref()),
+        Some(files) => run_kind(arguments, motions::KIND, files.as_deref()),
     }
 }
 
 /// Measures one pair after another. `files` are further files of items for all pairs.
-fn run_kind<K: Kind>(arguments: &ReportArguments, files: Option<&str>) -> Result<(), Failure> {
+fn run_kind<T>(arguments: &ReportArguments, kind: Kind<T>, files: Option<&str>) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.isa)?;
-    let inputs = inputs::read::<K>(arguments, files)?;
-    files::make_folder(&arguments.out)?;
+    // All inputs are read before the first pair is measured, so that an error in the last one shows at once.
+    let inputs = read(arguments, &kind, files)?;
+    let out = &arguments.out;
+    std::fs::create_dir_all(out).map_err(|error| {
+        Failure::System(format!("{}: expected a folder to write to, found {error}", out.display()))
+    })?;
+    let asked = (usize::from(arguments.rounds), arguments.limit);
+    let (rounds, limit) = if arguments.quick { QUICK } else { asked };
+    let settings =
+        Settings { quick: arguments.quick, rounds, limit: (kind.limit)(limit), isa: backend.name() };
+    let origin = Origin::of("cbvh report");
+    let mut report = Report { origin, settings, pairs: Vec::new(), wrong: Vec::new(), rows: Vec::new() };
     let spinner = spinner(false);
-    let mut report = Report::<K>::new(Settings::new::<K>(arguments, backend));
-    for input in inputs {
-        let tell = |what: &str| spinner.set_message(format!("{}: {what}", input.pair.name));
+    for (pair, given, meshes) in inputs {
+        let tell = |what: &str| spinner.set_message(format!("{}: {what}", pair.name));
         let settings = &report.settings;
-        let subject = Subject { pair: &input.pair, meshes: &input.meshes, settings, backend, tell: &tell };
-        let measured = K::measure(&subject, input.given)?;
-        report.add(measured);
+        let subject = Subject { pair: &pair, meshes: &meshes, settings, backend, tell: &tell };
+        let Measured { record, rows, wrong } = (kind.measure)(&subject, given)?;
+        report.pairs.push(record);
+        report.rows.extend(rows);
+        report.wrong.extend(wrong);
     }
     spinner.finish_and_clear();
-    files::write(&report, &arguments.out)
+    write(&report, &kind.words, out)
+}
+
+/// Reads the list, and what it names: the pairs with their items, of which there may be none, and their meshes.
+fn read<T>(
+    arguments: &ReportArguments,
+    kind: &Kind<T>,
+    files: Option<&str>,
+) -> Result<Vec<(Pair, Vec<T>, [Mesh; 2])>, Failure> {
+    let list: &Path = &arguments.pairs;
+    let bytes = std::fs::read(list).map_err(|error| Failure::from_input(list, &error))?;
+    let pairs = pairs::parse(&bytes, list, arguments.meshes.as_deref(), files)
+        .map_err(|error| Failure::invalid(list, error))?;
+    let items = |pair: &Pair| -> Result<Vec<T>, Failure> {
+        let mut items = Vec::new();
+        for file in &pair.files {
+            files::require_regular(file)?;
+            items.extend((kind.read)(file)?);
+        }
+        Ok(items)
+    };
+    // Files of items are small, so that they come before the meshes of all pairs.
+    let given = pairs.iter().map(items).collect::<Result<Vec<_>, _>>()?;
+    let with_meshes = pairs.into_iter().zip(given).map(|(pair, given)| {
+        files::require_regular(&pair.a)?;
+        files::require_regular(&pair.b)?;
+        let meshes = [meshes::read(&pair.a)?, meshes::read(&pair.b)?];
+        Ok((pair, given, meshes))
+    });
+    with_meshes.collect()
+}
+
+/// Returns the names of a pair's files.
+fn files_of(pair: &Pair) -> String {
+    pair.files.iter().map(|file| files::stem(file)).collect::<Vec<_>>().join(", ")
+}
+
+/// Writes the four files, and prints a summary. Wrong answers are a failure, of which the files tell.
+fn write(report: &Report, words: &page::Words, out: &Path) -> Result<(), Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::System(format!("{}: {error}", out.display()));
+    let figures: Vec<Figure> = report.pairs.iter().map(|pair| pair.section.figure.clone()).collect();
+    for (name, text) in [
+        ("report.csv", table::csv(&report.rows)),
+        ("report.json", table::json(report).map_err(|error| failed(&error))?),
+        ("report.svg", plot::svg(&figures).map_err(|error| failed(&error))?),
+        ("report.html", page::page(report, words).map_err(|error| failed(&error))?),
+    ] {
+        bvh_bake::write_atomically(&out.join(name), text.as_bytes())
+            .map_err(|error| Failure::System(error.to_string()))?;
+    }
+    let counted = |count: usize, word| format!("{count} {}", plural(count as u64, word));
+    let mut text = format!(
+        "{}: {}, {}, {}\n",
+        out.join("report.html").display(),
+        counted(report.pairs.len(), "pair"),
+        counted(report.rows.len(), "row"),
+        counted(report.wrong.len(), "wrong answer")
+    );
+    for pair in &report.pairs {
+        for line in &pair.section.sentences {
+            text += &format!("  {}: {line}\n", pair.name);
+        }
+    }
+    console::text(&text)?;
+    match report.wrong.first() {
+        None => Ok(()),
+        Some(first) => Err(Failure::invalid(
+            &out.join("report.json"),
+            format!("expected right answers, found {} wrong; the first: {first}", report.wrong.len()),
+        )),
+    }
 }

@@ -5,9 +5,7 @@
 //! these are compared with the reference for the same moved triangles, and their difference from the answers for the
 //! mesh itself is an error that is reported.
 
-use super::layout::Layout;
-use super::row::Errors;
-use super::{EXACT_DISTANCE, QUESTIONS};
+use super::{EXACT_DISTANCE, Layout, QUESTIONS};
 use bvh_format::leaf::TriangleEncoding;
 use cbvh_measure::rounds::{Asked, Question};
 use cbvh_measure::spread::median;
@@ -15,6 +13,16 @@ use cbvh_measure::spread::median;
 /// The factor that allows for rounding in the product of a distance and 1 + an allowed error: two roundings of 2^-53
 /// each are needed, and the factor allows eight.
 const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
+
+/// How far distances are from the exact ones.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Errors {
+    /// Relative errors, over the poses in which the meshes are apart.
+    pub(super) median: Option<f64>,
+    pub(super) max: Option<f64>,
+    /// The largest error over all poses, mesh units.
+    pub(super) max_length: Option<f64>,
+}
 
 /// Returns the wrong answers, one line each, and the errors of each layout's answers, by question.
 pub(super) fn judge(pair: &str, layouts: &[Layout], asked: &[Vec<Asked>]) -> (Vec<String>, Vec<Vec<Errors>>) {
