@@ -1,7 +1,9 @@
 //! Draws plots as SVG with the library plotters: panels with two logarithmic axes, lines, marks and labels.
 //!
-//! Labels are in a column to the right of their panel and are moved apart where they would overlap. A thin line leads
-//! from each label to its mark. Text is never measured, so no fonts are needed; the reader's program chooses them.
+//! Panels stand below each other, so that their text can still be read when a page 400 pixels wide shows them. Labels are
+//! numbers in a column to the right of their panel, moved apart where they would overlap; the names are below the panel. A
+//! thin line leads from each number to its mark. Text is never measured, so no fonts are needed; the reader's program chooses
+//! them.
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
@@ -14,28 +16,32 @@ const COLOURS: [RGBColor; 4] =
 const INK: RGBColor = RGBColor(40, 40, 40);
 const FAINT: RGBColor = RGBColor(200, 200, 200);
 
-/// Width and height of a panel in pixels.
-const PANEL: (u32, u32) = (560, 360);
-/// Height of the title and the legend of a figure, in pixels.
-const HEAD: u32 = 54;
-/// Width of the room at the right of a panel for its labels, in pixels.
-const LABELS: u32 = 170;
-/// Height of a line of labels, in pixels.
-const LINE: f64 = 15.0;
+/// Width of a figure and height of a panel without its names, in pixels.
+const PANEL: (u32, u32) = (500, 360);
+/// Height of the title of a figure, in pixels.
+const TITLE: u32 = 36;
+/// Width of the room at the right of a panel for its numbers, in pixels.
+const NUMBERS: u32 = 44;
+/// Height of a line of the legend or of names, in pixels.
+const LINE: u32 = 18;
+/// Size of all text but titles, in pixels.
+const TEXT: u32 = 14;
+/// The least distance between two numbers of the column, in pixels.
+const STEP: f64 = 15.0;
 /// The part of an axis that is left of its least figure and holds those that are 0, as a fraction of the rest.
 const ZERO: f64 = 0.1;
 
 type Error = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Rows of panels below a title and a legend.
+/// Panels below a title and a legend.
 #[derive(Debug, Clone)]
 pub struct Figure {
     /// Its title.
     pub title: String,
     /// The legend: what each colour and shape means.
     pub legend: Vec<(Look, String)>,
-    /// The panels, row by row.
+    /// The panels in groups, all below each other.
     pub rows: Vec<Vec<Panel>>,
 }
 
@@ -88,19 +94,14 @@ pub struct Look {
 /// # Errors
 /// Returns the error of the drawing library.
 pub fn svg(figures: &[Figure]) -> Result<String, Error> {
-    let size = |figure: &Figure| {
-        let columns = figure.rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
-        (columns * PANEL.0, HEAD + figure.rows.len() as u32 * PANEL.1)
-    };
-    let width = figures.iter().map(|figure| size(figure).0).max().unwrap_or(0);
-    let height = figures.iter().map(|figure| size(figure).1).sum();
+    let height = figures.iter().map(Figure::height).sum();
     let mut text = String::new();
     {
-        let mut rest = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+        let mut rest = SVGBackend::with_string(&mut text, (PANEL.0, height)).into_drawing_area();
         rest.fill(&WHITE)?;
         for figure in figures {
-            let (area, below) = rest.split_vertically(size(figure).1);
-            figure.draw(&area)?;
+            let (area, below) = rest.split_vertically(figure.height());
+            figure.draw(area)?;
             rest = below;
         }
         rest.present()?;
@@ -109,23 +110,23 @@ pub fn svg(figures: &[Figure]) -> Result<String, Error> {
 }
 
 impl Figure {
-    fn draw(&self, area: &Area<'_>) -> Result<(), Error> {
-        let (head, mut rest) = area.split_vertically(HEAD);
-        head.draw(&Text::new(printable(&self.title), (12, 18), text_style(16)))?;
-        let mut x = 16;
+    fn height(&self) -> u32 {
+        let panels = self.rows.iter().flatten().map(Panel::height).sum::<u32>();
+        TITLE + LINE * self.legend.len() as u32 + panels
+    }
+
+    fn draw(&self, area: Area<'_>) -> Result<(), Error> {
+        area.draw(&Text::new(printable(&self.title), (12, 18), text_style(18)))?;
+        let (_, mut rest) = area.split_vertically(TITLE);
         for (look, name) in &self.legend {
-            look.draw(&head, (x, 42))?;
-            head.draw(&Text::new(name.clone(), (x + 10, 42), text_style(13)))?;
-            x += 34 + 7 * name.chars().count() as i32;
+            let (line, below) = rest.split_vertically(LINE);
+            look.draw(&line, (16, 9))?;
+            line.draw(&Text::new(name.clone(), (28, 9), text_style(TEXT)))?;
+            rest = below;
         }
-        for row in &self.rows {
-            let (panels, below) = rest.split_vertically(PANEL.1);
-            let mut right = panels;
-            for panel in row {
-                let (area, others) = right.split_horizontally(PANEL.0);
-                panel.draw(&area)?;
-                right = others;
-            }
+        for panel in self.rows.iter().flatten() {
+            let (area, below) = rest.split_vertically(panel.height());
+            panel.draw(area)?;
             rest = below;
         }
         Ok(())
@@ -133,17 +134,22 @@ impl Figure {
 }
 
 impl Panel {
-    fn draw(&self, area: &Area<'_>) -> Result<(), Error> {
+    fn height(&self) -> u32 {
+        PANEL.1 + LINE * self.labels.len() as u32
+    }
+
+    fn draw(&self, area: Area<'_>) -> Result<(), Error> {
+        let (area, names) = area.split_vertically(PANEL.1);
         let points = || {
             let lines = self.lines.iter().flat_map(|line| line.points.iter().copied());
             lines.chain(self.marks.iter().map(|mark| mark.at))
         };
         let (x, y) =
             (Axis::around(points().map(|point| point.0)), Axis::around(points().map(|point| point.1)));
-        let mut chart = ChartBuilder::on(area)
+        let mut chart = ChartBuilder::on(&area)
             .margin(10)
-            .margin_right(LABELS)
-            .caption(printable(&self.title), text_style(14))
+            .margin_right(NUMBERS)
+            .caption(printable(&self.title), text_style(16))
             .x_label_area_size(46)
             .y_label_area_size(62)
             .build_cartesian_2d(x, y)?;
@@ -152,8 +158,8 @@ impl Panel {
             .light_line_style(TRANSPARENT)
             .bold_line_style(FAINT.mix(0.6))
             .axis_style(FAINT)
-            .label_style(text_style(12))
-            .axis_desc_style(text_style(13))
+            .label_style(text_style(TEXT))
+            .axis_desc_style(text_style(TEXT))
             .x_desc(self.x)
             .y_desc(self.y)
             .draw()?;
@@ -172,21 +178,24 @@ impl Panel {
             (x - left, y - top)
         };
         for mark in &self.marks {
-            mark.look.draw(area, pixel(mark.at))?;
+            mark.look.draw(&area, pixel(mark.at))?;
         }
-        label(area, self.labels.iter().map(|(at, name)| (pixel(*at), name.as_str())).collect())
+        label([&area, &names], self.labels.iter().map(|(at, name)| (pixel(*at), name.as_str())).collect())
     }
 }
 
-/// Puts names into the column at the right of a panel, each with a line to its point.
-fn label(area: &Area<'_>, mut named: Vec<((i32, i32), &str)>) -> Result<(), Error> {
+/// Puts numbers into the column at the right of a panel, each with a line to its point, and their names below.
+fn label([area, names]: [&Area<'_>; 2], mut named: Vec<((i32, i32), &str)>) -> Result<(), Error> {
     named.sort_by_key(|&((x, y), _)| (y, x));
     let heights: Vec<f64> = named.iter().map(|&((_, y), _)| f64::from(y)).collect();
-    let column = (PANEL.0 - LABELS + 2) as i32;
-    for (&((x, y), name), height) in named.iter().zip(moved_apart(&heights, f64::from(PANEL.1 - 56))) {
+    let column = (PANEL.0 - NUMBERS + 2) as i32;
+    let heights = moved_apart(&heights, f64::from(PANEL.1 - 56));
+    for (number, (&((x, y), name), height)) in (1..).zip(named.iter().zip(heights)) {
         let height = height as i32;
         area.draw(&PathElement::new([(x + 7, y), (column, y), (column + 12, height)], INK.mix(0.25)))?;
-        area.draw(&Text::new(printable(name), (column + 15, height), text_style(12)))?;
+        area.draw(&Text::new(number.to_string(), (column + 15, height), text_style(TEXT)))?;
+        let line = (number - 1) * LINE as i32 + 9;
+        names.draw(&Text::new(format!("{number}  {}", printable(name)), (16, line), text_style(TEXT)))?;
     }
     Ok(())
 }
@@ -196,8 +205,8 @@ fn moved_apart(heights: &[f64], bottom: f64) -> Vec<f64> {
     let count = heights.len();
     let mut above = f64::NEG_INFINITY;
     let place = |(number, &height): (usize, &f64)| {
-        let lowest = bottom - LINE * (count - 1 - number) as f64;
-        above = height.max(above + LINE).min(lowest);
+        let lowest = bottom - STEP * (count - 1 - number) as f64;
+        above = height.max(above + STEP).min(lowest);
         above
     };
     heights.iter().enumerate().map(place).collect()
@@ -211,20 +220,7 @@ impl Look {
     /// Draws a mark around a pixel.
     fn draw(self, area: &Area<'_>, (x, y): (i32, i32)) -> Result<(), Error> {
         let corners: &[(i32, i32)] = match self.kind % 3 {
-            0 => &[
-                (5, 0),
-                (4, 3),
-                (3, 4),
-                (0, 5),
-                (-3, 4),
-                (-4, 3),
-                (-5, 0),
-                (-4, -3),
-                (-3, -4),
-                (0, -5),
-                (3, -4),
-                (4, -3),
-            ],
+            0 => &[(5, 2), (2, 5), (-2, 5), (-5, 2), (-5, -2), (-2, -5), (2, -5), (5, -2)],
             1 => &[(-4, -4), (4, -4), (4, 4), (-4, 4)],
             _ => &[(0, -6), (5, 4), (-5, 4)],
         };
