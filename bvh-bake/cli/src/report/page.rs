@@ -122,84 +122,74 @@ pub(super) fn escape(text: &str) -> String {
     text.chars().map(escaped).collect()
 }
 
-/// The heads of columns, below a common one.
-pub(super) struct Heads {
+/// A column of a table.
+pub(super) struct Column {
     pub(super) head: &'static str,
-    pub(super) columns: Vec<&'static str>,
+    /// Which of a line's rows has its figures, and the attributes that tell that row from the others.
+    pub(super) row: usize,
+    pub(super) of: String,
+    /// The name of its cells, and how their figures are shown.
+    pub(super) field: &'static str,
+    pub(super) show: fn(f64) -> String,
 }
+
+/// Columns below a common head.
+pub(super) type Group = (&'static str, Vec<Column>);
 
 /// A line of a table.
 pub(super) struct Line {
-    /// The attributes that tell the rows of its figures.
+    /// The attributes that tell its rows.
     pub(super) of: String,
     /// The first cell, as HTML.
     pub(super) name: String,
-    /// The other cells.
-    pub(super) figures: Vec<Option<Figure>>,
+    pub(super) rows: Vec<Cells>,
 }
 
-/// A figure.
-pub(super) struct Figure {
-    /// The attributes that tell its row, beside those of the line.
-    pub(super) of: String,
-    /// The name of its cell.
-    pub(super) field: &'static str,
-    pub(super) value: f64,
-    pub(super) shown: String,
-}
-
-/// Returns the number in a cell of a row.
-pub(super) fn value(row: &Cells, field: &str) -> Option<f64> {
-    match row.iter().find(|(name, _)| *name == field)?.1 {
-        Cell::Number(value) => Some(value),
-        Cell::Count(count) => Some(count as f64),
-        _ => None,
+impl Line {
+    /// Returns the number in the cell of a column.
+    fn value(&self, column: &Column) -> Option<f64> {
+        match self.rows.get(column.row)?.iter().find(|(name, _)| *name == column.field)?.1 {
+            Cell::Number(value) => Some(value),
+            Cell::Count(count) => Some(count as f64),
+            _ => None,
+        }
     }
 }
 
 /// Returns a table whose first column has the head `first`.
-pub(super) fn table(first: &str, groups: &[Heads], lines: &[Line]) -> String {
+pub(super) fn table(first: &str, groups: &[Group], lines: &[Line]) -> String {
     let mut text =
         String::from("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr class=\"groups\"><th></th>");
-    for Heads { head, columns } in groups {
+    for (head, columns) in groups {
         let _ = write!(text, "<th class=\"first\" colspan=\"{}\">{head}</th>", columns.len());
     }
     let _ = write!(text, "</tr>\n<tr><th>{first}</th>");
-    let columns = || groups.iter().flat_map(|heads| heads.columns.iter().enumerate());
-    for (place, head) in columns() {
-        let _ = write!(text, "<th{}>{head}</th>", class(place));
+    // If all figures of a column are equal, none is the best.
+    let least = |column: &Column| {
+        let figures = || lines.iter().filter_map(|line| line.value(column));
+        figures().reduce(f64::min).filter(|&least| figures().any(|figure| figure > least))
+    };
+    let mut columns = Vec::new();
+    for (place, column) in groups.iter().flat_map(|(_, columns)| columns.iter().enumerate()) {
+        let class = if place == 0 { " class=\"first\"" } else { "" };
+        let _ = write!(text, "<th{class}>{}</th>", column.head);
+        columns.push((class, column, least(column)));
     }
     text += "</tr></thead>\n<tbody>\n";
-    let least: Vec<Option<f64>> = (0..columns().count()).map(|column| least(lines, column)).collect();
     for line in lines {
         let _ = write!(text, "<tr {}><td>{}</td>", line.of, line.name);
-        for (((place, _), least), figure) in columns().zip(&least).zip(&line.figures) {
-            text += &cell(place, figure.as_ref(), *least);
+        for &(class, column, least) in &columns {
+            let value = line.value(column);
+            let shown = value.map_or("\u{2013}".to_owned(), column.show);
+            let shown = if value.is_some() && value == least { format!("<b>{shown}</b>") } else { shown };
+            let data = value.map_or(String::new(), |value| {
+                format!("{} data-field=\"{}\" data-value=\"{value:?}\"", column.of, column.field)
+            });
+            let _ = write!(text, "<td{class}{data}>{shown}</td>");
         }
         text += "</tr>\n";
     }
     text + "</tbody></table></div>\n"
-}
-
-/// Returns the least figure of a column. If all are equal, none is the best.
-fn least(lines: &[Line], column: usize) -> Option<f64> {
-    let figures = || lines.iter().filter_map(|line| Some(line.figures.get(column)?.as_ref()?.value));
-    figures().reduce(f64::min).filter(|&least| figures().any(|figure| figure > least))
-}
-
-fn cell(place: usize, figure: Option<&Figure>, least: Option<f64>) -> String {
-    let class = class(place);
-    let Some(Figure { of, field, value, shown }) = figure else {
-        return format!("<td{class}>\u{2013}</td>");
-    };
-    let shown = if Some(*value) == least { format!("<b>{shown}</b>") } else { shown.clone() };
-    let space = if of.is_empty() { "" } else { " " };
-    format!("<td{class}{space}{of} data-field=\"{field}\" data-value=\"{value:?}\">{shown}</td>")
-}
-
-/// The class of the first column of a group.
-fn class(place: usize) -> &'static str {
-    if place == 0 { " class=\"first\"" } else { "" }
 }
 
 /// Writes a fraction in percent, with two digits.

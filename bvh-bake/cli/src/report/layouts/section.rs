@@ -1,10 +1,10 @@
 //! A pair's section on the page about layouts: sentences that answer "which layout?", plots, and tables with the fastest
 //! layout first. The words around the sections are here, too.
 
-use super::{Cells, Row};
+use super::{EXACT_DISTANCE, QUESTIONS, Row};
 use crate::console::plural;
 use crate::report::Section;
-use crate::report::page::{self, Heads, Line as TableLine, Words, escape, percent, table, value};
+use crate::report::page::{Column, Group, Line as TableLine, Words, escape, percent, table};
 use bvh_format::leaf::TriangleEncoding;
 use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
 use cbvh_measure::rounds::Question;
@@ -185,39 +185,29 @@ fn look(triangles: TriangleEncoding, is_filled: bool) -> Look {
     Look { kind: triangles as usize, is_filled }
 }
 
-/// A column: its head, the question and the field of its figures, and how they are shown.
-struct Column {
-    head: &'static str,
-    question: Question,
-    field: &'static str,
-    show: fn(f64) -> String,
-}
+/// The indices of the exact questions in `QUESTIONS`.
+const CONTACT: usize = 0;
+const DISTANCE: usize = EXACT_DISTANCE;
 
-/// Columns below a common head.
-type Columns = (&'static str, Vec<Column>);
-
-const CONTACT: Question = Question::Collide;
-const DISTANCE: Question = Question::Distance(0.0);
-
-fn column(head: &'static str, question: Question, field: &'static str, show: fn(f64) -> String) -> Column {
-    Column { head, question, field, show }
+fn column(head: &'static str, row: usize, field: &'static str, show: fn(f64) -> String) -> Column {
+    let (name, rel_err) = (QUESTIONS[row].name(), QUESTIONS[row].rel_err().unwrap_or(0.0));
+    let of = format!(" data-question=\"{name}\" data-rel-err=\"{rel_err:?}\"");
+    Column { head, row, of, field, show }
 }
 
 /// Median and 90 % time of a question.
-fn times(question: Question) -> Vec<Column> {
-    vec![column("median", question, "ns_median", micro), column("90 %", question, "ns_p90", micro)]
+fn times(row: usize) -> Vec<Column> {
+    vec![column("median", row, "ns_median", micro), column("90 %", row, "ns_p90", micro)]
 }
 
 /// Time and error of a distance with an allowed error.
-fn allowed(head: &'static str, rel_err: f64) -> Columns {
-    let question = Question::Distance(rel_err);
-    let error = column("largest error", question, "distance_error_max", percent);
-    (head, vec![column("\u{b5}s", question, "ns_median", micro), error])
+fn allowed(head: &'static str, row: usize) -> Group {
+    let error = column("largest error", row, "distance_error_max", percent);
+    (head, vec![column("\u{b5}s", row, "ns_median", micro), error])
 }
 
 /// Returns all tables of a pair.
 fn tables(pair: &str, all: &[Row]) -> String {
-    let rows: Vec<(&Row, Cells)> = all.iter().map(|row| (row, row.cells(pair))).collect();
     let (lossless, lossy) = (ranked(all, false), ranked(all, true));
     let bytes = |field, head| column(head, CONTACT, field, tenths);
     let file = || ("bytes per triangle", vec![bytes("file_bytes_per_tri", "file")]);
@@ -230,9 +220,9 @@ fn tables(pair: &str, all: &[Row]) -> String {
         ]
     };
     let mut text = String::new();
-    let mut add = |title: &str, caption: &str, candidates: &[Candidate<'_>], columns: &[Columns]| {
+    let mut add = |title: &str, caption: &str, candidates: &[Candidate<'_>], columns: &[Group]| {
         let _ = writeln!(text, "<h3>{title}</h3>\n<p>{caption}</p>");
-        text += &table_of(pair, &rows, candidates, columns);
+        text += &table_of(pair, all, candidates, columns);
     };
     add(
         "Layouts without loss",
@@ -261,7 +251,7 @@ fn tables(pair: &str, all: &[Row]) -> String {
         "Median microseconds per query and the largest relative error found, for layouts without loss, in the order of \
          the first table. An answer may exceed the exact distance by the allowed error.",
         &lossless,
-        &[allowed("exact", 0.0), allowed("0.1 %", 1e-3), allowed("1 %", 1e-2), allowed("10 %", 1e-1)],
+        &[allowed("exact", 1), allowed("0.1 %", 2), allowed("1 %", 3), allowed("10 %", 4)],
     );
     add(
         "Where bytes and time go",
@@ -291,34 +281,21 @@ fn tables(pair: &str, all: &[Row]) -> String {
     text
 }
 
-/// Returns the table of some layouts.
-fn table_of(pair: &str, rows: &[(&Row, Cells)], candidates: &[Candidate<'_>], groups: &[Columns]) -> String {
-    let heads: Vec<Heads> = groups
-        .iter()
-        .map(|(head, columns)| Heads { head, columns: columns.iter().map(|column| column.head).collect() })
-        .collect();
-    let figure = |candidate: &Candidate<'_>, column: &Column| {
-        let is_it = |(row, _): &&(&Row, Cells)| {
-            row.layout == candidate.collide.layout && row.question == column.question
-        };
-        let value = value(&rows.iter().find(is_it)?.1, column.field)?;
-        let (question, rel_err) = (column.question.name(), column.question.rel_err().unwrap_or(0.0));
-        let of = format!("data-question=\"{question}\" data-rel-err=\"{rel_err:?}\"");
-        Some(page::Figure { of, field: column.field, value, shown: (column.show)(value) })
-    };
+/// Returns the table of some layouts. The rows of a layout follow each other in the order of `QUESTIONS`.
+fn table_of(pair: &str, rows: &[Row], candidates: &[Candidate<'_>], groups: &[Group]) -> String {
     let line = |candidate: &Candidate<'_>| {
         let name = escape(&candidate.name());
         let is_on_front =
             [candidate.collide, candidate.distance].iter().any(|row| row.pareto_bytes == Some(true));
         let dot = if is_on_front { " \u{2022}" } else { "" };
-        let columns = groups.iter().flat_map(|(_, columns)| columns);
+        let rows = rows.iter().filter(|row| row.layout == candidate.collide.layout);
         TableLine {
             of: format!("data-pair=\"{}\" data-layout=\"{name}\"", escape(pair)),
             name: format!("{name}{dot}"),
-            figures: columns.map(|column| figure(candidate, column)).collect(),
+            rows: rows.map(|row| row.cells(pair)).collect(),
         }
     };
-    table("layout", &heads, &candidates.iter().map(line).collect::<Vec<_>>())
+    table("layout", groups, &candidates.iter().map(line).collect::<Vec<_>>())
 }
 
 fn tenths(value: f64) -> String {

@@ -5,7 +5,7 @@ use super::method::{Method, SAMPLES};
 use super::{MAX_SECONDS, Row};
 use crate::console::plural;
 use crate::report::Section;
-use crate::report::page::{self, Heads, Line as TableLine, Words, escape, percent, table, value};
+use crate::report::page::{Column, Line as TableLine, Words, escape, percent, table};
 use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
 use cbvh_measure::table::{micro, whole};
 
@@ -180,11 +180,11 @@ fn look(kind: usize) -> Look {
     Look { kind, is_filled: true }
 }
 
-/// A column: its head, the field of its figures, and how they are shown.
-type Column = (&'static str, &'static str, fn(f64) -> String);
+/// The head of a column, the field of its figures, and how they are shown.
+type Figures = (&'static str, &'static str, fn(f64) -> String);
 
 /// The columns below their common heads.
-const COLUMNS: [(&str, &[Column]); 4] = [
+const COLUMNS: [(&str, &[Figures]); 4] = [
     ("contacts missed", &[("number", "missed", whole), ("share", "missed_share", percent)]),
     ("late, of the way", &[("median", "late_median", percent), ("largest", "late_max", percent)]),
     ("motions", &[("undecided", "undecided", whole)]),
@@ -196,16 +196,14 @@ const COLUMNS: [(&str, &[Column]); 4] = [
 
 /// Returns the table of a pair with its heading.
 fn tables(pair: &str, rows: &[Row]) -> String {
-    let heads = COLUMNS.map(|(head, columns)| {
-        let columns = columns.iter().map(|&(head, ..)| head).collect();
-        Heads { head, columns }
-    });
+    let column = |&(head, field, show): &Figures| Column { head, row: 0, of: String::new(), field, show };
+    let groups = COLUMNS.map(|(head, columns)| (head, columns.iter().map(column).collect()));
     let lines: Vec<TableLine> = rows.iter().map(|row| line(pair, row)).collect();
     let hits = rows.first().map_or(0, |row| row.hits);
     format!(
         "<h3>Errors and times</h3>\n<p>What each way to ask misses of {hits} certified contacts, how late it is with the \
          others, and how long it takes. The best figure of each column is bold.</p>\n{}",
-        table("way to ask", &heads, &lines)
+        table("way to ask", &groups, &lines)
     )
 }
 
@@ -217,16 +215,11 @@ fn line(pair: &str, row: &Row) -> TableLine {
         Method::IsFree => "certified: any contact".to_owned(),
     };
     let samples = row.method.samples().map_or(String::new(), |samples| samples.to_string());
-    let cells = row.cells(pair);
-    let (pair, method) = (escape(pair), row.method.name());
-    let figure = |&(_, field, show): &Column| {
-        let value = value(&cells, field)?;
-        Some(page::Figure { of: String::new(), field, value, shown: show(value) })
-    };
+    let (pair_name, method) = (escape(pair), row.method.name());
     TableLine {
-        of: format!("data-pair=\"{pair}\" data-method=\"{method}\" data-samples=\"{samples}\""),
+        of: format!("data-pair=\"{pair_name}\" data-method=\"{method}\" data-samples=\"{samples}\""),
         name,
-        figures: COLUMNS.iter().flat_map(|(_, columns)| columns.iter().map(figure)).collect(),
+        rows: vec![row.cells(pair)],
     }
 }
 
