@@ -239,12 +239,15 @@ fn run_kind<T>(arguments: &ReportArguments, kind: Kind<T>, files: Option<&str>) 
     write(&report, &kind.words, out)
 }
 
-/// Reads the list, and what it names: the pairs with their items, of which there may be none, and their meshes.
+/// A pair with its items, of which there may be none, and its meshes.
+type Input<T> = (Pair, Vec<T>, [Mesh; 2]);
+
+/// Reads the list, and what it names.
 fn read<T>(
     arguments: &ReportArguments,
     kind: &Kind<T>,
     files: Option<&str>,
-) -> Result<Vec<(Pair, Vec<T>, [Mesh; 2])>, Failure> {
+) -> Result<Vec<Input<T>>, Failure> {
     let list: &Path = &arguments.pairs;
     let bytes = std::fs::read(list).map_err(|error| Failure::from_input(list, &error))?;
     let pairs = pairs::parse(&bytes, list, arguments.meshes.as_deref(), files)
