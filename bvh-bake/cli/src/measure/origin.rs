@@ -1,5 +1,6 @@
 //! The origin of a report: the program, the date, and what the system reports about the machine.
 
+use bvh_format::header::{MAJOR, MINOR, version_name};
 use serde::Serialize;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -26,7 +27,7 @@ impl Origin {
         Self {
             tool,
             version: env!("CARGO_PKG_VERSION"),
-            format_version: format!("{}.{}", bvh_format::header::MAJOR, bvh_format::header::MINOR),
+            format_version: version_name((MAJOR, MINOR)),
             unoptimised: cfg!(debug_assertions),
             date: today(),
             machine: Machine::here(),
