@@ -50,9 +50,11 @@ fn wrong_usage_is_1() {
         &["dump", "cube.cbvh", "--max-memory", "lots"],
         &["validate", "cube.cbvh", "--max-memory", "-1"],
         &["verify", "cube.cbvh", "cube.obj", "--max-memory", "lots"],
-        &["query", "cube.obj", "cube.obj"],
+        &["query", "cube.obj", "cube.obj", "--bench"],
+        &["query", "cube.obj", "cube.obj", "--out", "raw.txt"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--pose", pose],
-        &["query", "cube.obj", "cube.obj", "--pose", pose, "--json"],
+        &["query", "cube.obj", "cube.obj", "--pose", pose, "--bench"],
+        &["query", "cube.obj", "cube.obj", "p.txt", "--bench", "--json"],
         &["query", "cube.obj", "cube.obj", "--pose", pose, "--jobs", "2"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--jobs", "-1"],
         &["query", "cube.obj", "cube.obj", "p.txt", "--budget", "nan"],
@@ -73,7 +75,7 @@ fn wrong_usage_is_1() {
         &["probe", "cube.obj"],
         &["probe", "cube.obj", "p.txt", "--mode", "touch"],
         &["probe", "cube.obj", "p.txt", "--probe", "0 0 0"],
-        &["probe", "cube.obj", "--probe", "0 0 0", "--json"],
+        &["probe", "cube.obj", "--probe", "0 0 0", "--bench"],
         &["probe", "cube.obj", "--probe", "0 0 0", "--jobs", "2"],
         &["probe", "cube.obj", "--probe", "0 0 0", "--object", "sphere"],
         &["probe", "cube.obj", "p.txt", "--isa", "neon"],
@@ -220,14 +222,22 @@ fn an_old_output_survives_a_failure() {
 fn a_closed_pipe_is_no_panic() {
     let folder = with_cube();
     cbvh_in(folder.path(), &["bake", "cube.obj", "-o", "o.cbvh"]).done();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_cbvh"))
-        .args(["dump", "o.cbvh"])
-        .current_dir(folder.path())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    drop(child.stdout.take());
-    let ended = child.wait_with_output().unwrap();
-    assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
+    // More answers than a pipe and all buffers hold.
+    fs::write(folder.path().join("p.txt"), "0.5 0.25 9\n".repeat(100_000)).unwrap();
+    for arguments in [
+        &["dump", "o.cbvh"][..],
+        &["probe", "o.cbvh", "p.txt", "--mode", "closest"],
+        &["probe", "o.cbvh", "p.txt", "--mode", "side", "--json"],
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_cbvh"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0), "{arguments:?}");
+    }
 }

@@ -33,7 +33,7 @@ fn motion(directory: &Path, more: &[&str]) -> common::Ended {
 fn lines_and_fields_are_those_of_the_contract() {
     let folder = world();
     let directory = folder.path();
-    let json = motion(directory, &["m.txt", "--json", "--out", "raw_%s.txt"]).done().json();
+    let json = motion(directory, &["m.txt", "--bench", "--out", "raw_%s.txt"]).done().json();
     assert_eq!(
         (&json["peer"], &json["mode"], &json["poses"]),
         (&"cbvh".into(), &"motion".into(), &"m".into())
@@ -52,11 +52,23 @@ fn lines_and_fields_are_those_of_the_contract() {
         }
     }
     assert_eq!(lines[1][0], "free");
-    let near = motion(directory, &["m.txt", "--json", "--clearance", "18"]).done().json();
+    let printed: String = lines.iter().map(|words| words[..words.len() - 1].join(" ") + "\n").collect();
+    assert_eq!(motion(directory, &["m.txt"]).done().out, printed);
+    let records = motion(directory, &["m.txt", "--json"]).done().json_lines();
+    assert_eq!(records.len(), 3);
+    for (number, (record, words)) in records.iter().zip(&lines).enumerate() {
+        assert_eq!((&record["motion"], &record["answer"]), (&number.into(), &words[0].into()), "{record}");
+        if words[0] == "hit" {
+            let times = ["free_until", "touching_at"].map(|name| record[name].as_f64());
+            assert_eq!(times, [words[1], words[2]].map(|word| word.parse().ok()), "{record}");
+            assert!(record["distance"] == 0.0 && record["point_a"].is_array(), "{record}");
+        }
+    }
+    let near = motion(directory, &["m.txt", "--bench", "--clearance", "18"]).done().json();
     assert_eq!(near["hits"], 3);
     for isa in backends(directory) {
         for jobs in ["1", "2"] {
-            let arguments = ["motion", "torus.obj", "cube.obj", "m.txt", "--json", "--jobs", jobs];
+            let arguments = ["motion", "torus.obj", "cube.obj", "m.txt", "--bench", "--jobs", jobs];
             let other = cbvh_with_isa(directory, isa, &arguments).done().json();
             assert_eq!((&other["answers_xxh3"], &other["isa"]), (&json["answers_xxh3"], &isa.into()));
         }
@@ -72,6 +84,8 @@ fn one_motion_is_answered_for_a_person() {
     assert!(said.starts_with("free until 0.") && said.contains(", hit at 0."), "{said}");
     assert!(said.contains("distance 0.0 (the meshes touch)"), "{said}");
     assert!(fs::read_to_string(directory.join("w.obj")).unwrap().contains("o segment"));
+    let hit = motion(directory, &["--motion", through, "--json"]).done().json();
+    assert!(hit["answer"] == "hit" && hit["motion"] == 0 && hit["distance"] == 0.0, "{hit}");
     let away = "1 0 0 90 0 1 0 0 0 0 1 0  1 0 0 99 0 1 0 0 0 0 1 0";
     assert_eq!(motion(directory, &["--motion", away]).done().out, "free\n");
 }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{cbvh_in, cube, poses, torus};
+use common::{cbvh_in, torus};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -45,72 +45,28 @@ fn bake(directory: &Path, side: u32) {
 }
 
 fn query(directory: &Path, mode: &str, more: &[&str]) -> Value {
-    let arguments = [&["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--mode", mode], more].concat();
+    let arguments =
+        [&["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--bench", "--mode", mode], more].concat();
     cbvh_in(directory, &arguments).done().json()
 }
 
 #[test]
-fn cold_queries_have_the_same_answers_and_say_what_they_read() {
+fn answers_do_not_depend_on_read_ahead() {
     let folder = folder_on_disk();
     let directory = folder.path();
     bake(directory, 400);
-    let both = ["sheet.cbvh", "torus.cbvh"];
-    let length: u64 = both.iter().map(|name| fs::metadata(directory.join(name)).unwrap().len()).sum();
     for mode in ["collide", "distance", "contacts"] {
-        let warm = query(directory, mode, &[]);
-        assert!(warm.get("cold").is_none(), "{warm}");
-        assert!((1..6).contains(&warm["positives"].as_u64().unwrap()), "{warm}");
+        let usual = query(directory, mode, &[]);
+        assert!((1..6).contains(&usual["positives"].as_u64().unwrap()), "{usual}");
         for how in ["usual", "sparse", "whole"] {
-            let read_ahead = query(directory, mode, &["--read-ahead", how]);
-            let cold = query(directory, mode, &["--cold", "--read-ahead", how]);
-            for other in [&read_ahead, &cold] {
-                for field in ["answers_xxh3", "sum", "positives", "node_tests", "triangle_tests"] {
-                    assert_eq!(other[field], warm[field], "{mode} {how} {field}");
-                }
-            }
-            assert_eq!(cold["cold"], true);
-            let mean = |field: &str| cold[field].as_f64();
-            assert!(mean("open_ns_mean") < mean("ns_mean"), "{cold}");
-            let (Some(read), Some(resident), Some(touched)) =
-                (mean("read_bytes_mean"), mean("resident_bytes_mean"), mean("touched_bytes_mean"))
-            else {
-                println!("not all figures: this system does not report them: {cold}");
-                continue;
-            };
-            assert!(resident <= length as f64 + 8192.0, "{cold}");
-            if read == 0.0 {
-                println!("no bytes: this system does not evict files from the page cache: {cold}");
-            } else if how == "sparse" {
-                // Each page is read by itself or with its block, and none is read in vain. All other bytes read
-                // belong to the file system, and to pages of the program that were not loaded yet.
-                const OTHERS: f64 = 262144.0;
-                assert!(resident <= read + OTHERS && read <= resident + OTHERS, "{cold}");
-                // Pages that a query touches again are among those that it touched first.
-                assert!(touched <= resident, "{cold}");
-                if touched == 0.0 {
-                    println!("no marks: this system does not report which pages are touched: {cold}");
-                }
-                assert!(resident < 0.1 * length as f64, "{cold}");
+            let other = query(directory, mode, &["--read-ahead", how]);
+            for field in ["answers_xxh3", "sum", "positives", "node_tests", "triangle_tests"] {
+                assert_eq!(other[field], usual[field], "{mode} {how} {field}");
             }
         }
     }
-}
-
-#[test]
-fn cold_is_about_files() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("poses.txt"), poses(3, 0.0, 1.0)).unwrap();
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh", "-q"]).done();
-    let ask =
-        |a, b, more: &[&str]| cbvh_in(directory, &[&["query", a, b, "poses.txt", "--cold"], more].concat());
-    ask("cube.cbvh", "cube.obj", &[]).failed(1, &["--cold", "expected .cbvh files", "cube.obj"]);
-    ask("cube.cbvh", "none.cbvh", &[]).failed(2, &["none.cbvh"]);
-    ask("cube.cbvh", "cube.cbvh", &["--jobs", "2"]).failed(1, &["--cold", "--jobs"]);
-    ask("cube.cbvh", "cube.cbvh", &["--read-ahead", "all"]).failed(1, &["usual", "sparse", "whole"]);
-    let same = ask("cube.cbvh", "cube.cbvh", &["--budget", "0"]).done().json();
-    assert_eq!((&same["queries"], &same["requested"]), (&1.into(), &3.into()));
+    cbvh_in(directory, &["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--read-ahead", "all"])
+        .failed(1, &["usual", "sparse", "whole"]);
 }
 
 /// A group of processes with a common limit on memory, which includes cached pages of files.
@@ -182,10 +138,12 @@ fn a_file_larger_than_memory_is_queried_rightly() {
     };
     for mode in ["collide", "distance", "contacts"] {
         let free = query(directory, mode, &[]);
-        // Pages that other processes have read count as theirs. The first command evicts them from the page cache.
-        for more in [&["--cold", "--read-ahead", "sparse"][..], &["--cold"], &["--read-ahead", "sparse"], &[]]
-        {
-            let asked = ["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--mode", mode];
+        for more in [&["--read-ahead", "sparse"][..], &[]] {
+            // Pages that other processes have read count as theirs, so they are evicted from the page cache first.
+            let evict =
+                ["of=sheet.cbvh", "oflag=nocache", "conv=notrunc,fdatasync", "count=0", "status=none"];
+            assert!(Command::new("dd").args(evict).current_dir(directory).status().unwrap().success());
+            let asked = ["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--bench", "--mode", mode];
             let held = limited.cbvh_in(directory, &[&asked, more].concat());
             for field in ["answers_xxh3", "sum", "positives", "queries"] {
                 assert_eq!(held[field], free[field], "{mode} {more:?} {field}");

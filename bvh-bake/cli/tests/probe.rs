@@ -85,7 +85,23 @@ fn lines_and_fields_are_those_of_the_contract() {
         let expected: Vec<&str> = asked.iter().map(|(_, value)| *value).collect();
         for mesh in ["cube.cbvh", "cube.obj"] {
             let file = format!("{mode}.txt");
-            let probe = ["probe", mesh, &file, "--mode", mode, "--out", "raw_%s.txt"];
+            let probe = ["probe", mesh, &file, "--mode", mode];
+            let printed: String = expected.iter().map(|value| format!("{value}\n")).collect();
+            assert_eq!(cbvh_in(directory, &probe).done().out, printed);
+            let records = cbvh_in(directory, &[&probe[..], &["--json"]].concat()).done().json_lines();
+            assert_eq!(records.len(), expected.len());
+            for (number, (record, value)) in records.iter().zip(&expected).enumerate() {
+                let found = match mode {
+                    "closest" => record["distance"].as_f64(),
+                    "ray" => record["t"].as_f64().or(Some(-1.0)),
+                    "segment" => record["meets"].as_bool().map(|meets| f64::from(u8::from(meets))),
+                    _ => record["side"].as_f64(),
+                };
+                assert!(record["probe"] == number && found == value.parse().ok(), "{mode}: {record}");
+                let has_point = mode == "closest" || record["hit"] == true;
+                assert_eq!(record["point"].is_array() && record["triangle"].is_u64(), has_point, "{record}");
+            }
+            let probe = [&probe[..], &["--out", "raw_%s.txt", "--bench"]].concat();
             let json = cbvh_in(directory, &probe).done().json();
             assert_eq!(values(&directory.join(format!("raw_{mode}.txt"))), expected);
             for (field, value) in [("peer", "cbvh"), ("mode", mode), ("poses", mode)] {
@@ -142,7 +158,7 @@ fn answers_do_not_depend_on_how_they_are_found() {
     for mode in ["closest", "side", "ray", "segment"] {
         let file = if ["closest", "side"].contains(&mode) { "points.txt" } else { "lines.txt" };
         let ask = |mesh: &str, more: &[&str]| {
-            let probe = ["probe", mesh, file, "--mode", mode, "--json"];
+            let probe = ["probe", mesh, file, "--mode", mode, "--bench"];
             cbvh_in(directory, &[&probe[..], more].concat()).done().json()["answers_xxh3"].clone()
         };
         let expected = ask("torus.cbvh", &["--out", "raw.txt"]);
@@ -163,7 +179,9 @@ fn answers_do_not_depend_on_how_they_are_found() {
         for isa in &backends {
             assert_eq!(ask("torus.cbvh", &["--isa", isa]), expected, "{isa}");
             let forced =
-                cbvh_with_isa(directory, isa, &["probe", "torus.cbvh", file, "--mode", mode]).done().json();
+                cbvh_with_isa(directory, isa, &["probe", "torus.cbvh", file, "--mode", mode, "--bench"])
+                    .done()
+                    .json();
             assert_eq!((&forced["isa"], &forced["answers_xxh3"]), (&(*isa).into(), &expected));
         }
     }
@@ -174,7 +192,7 @@ fn limits_and_budgets_cut_runs_short() {
     let folder = world();
     let directory = folder.path();
     let ask = |more: &[&str]| {
-        let probe = ["probe", "cube.cbvh", "side.txt", "--mode", "side", "--out", "raw.txt"];
+        let probe = ["probe", "cube.cbvh", "side.txt", "--mode", "side", "--out", "raw.txt", "--bench"];
         cbvh_in(directory, &[&probe[..], more].concat()).done().json()
     };
     let limited = ask(&["--limit", "2"]);
@@ -191,7 +209,7 @@ fn several_files_are_read_before_the_first_question() {
     fs::write(directory.join("more.txt"), "0 0 0\n").unwrap();
     fs::write(directory.join("bad.txt"), "0 0 0\n0 0\n").unwrap();
     let probe = |files: &str| {
-        cbvh_in(directory, &["probe", "cube.obj", files, "--mode", "side", "--out", "raw_%s.txt"])
+        cbvh_in(directory, &["probe", "cube.obj", files, "--mode", "side", "--out", "raw_%s.txt", "--bench"])
     };
     probe("side.txt,bad.txt").failed(3, &["bad.txt: line 2: expected 3 numbers, a point, found 2"]);
     assert!(!directory.join("raw_side.txt").exists());
@@ -245,46 +263,6 @@ fn one_question_is_answered_for_a_person() {
             said.ends_with('\n') && said.lines().count() == if words.len() > 1 { 3 } else { 1 },
             "{said}"
         );
-    }
-}
-
-/// Runs the command in `script`, which is a terminal for it.
-#[cfg(target_os = "linux")]
-#[test]
-fn on_a_terminal_each_question_has_a_line_and_the_timing_follows() {
-    let folder = world();
-    let directory = folder.path();
-    for (mode, first, last, counts) in [
-        (
-            "closest",
-            "point 1: 0.75 mesh units from the mesh",
-            "point 3: on the mesh",
-            "5 of 5 points, 1 on the mesh;",
-        ),
-        (
-            "side",
-            "point 1: inside the mesh",
-            "point 2: outside the mesh",
-            "4 of 4 points, 2 inside the mesh;",
-        ),
-        (
-            "ray",
-            "ray 1: hits the mesh at 2.0 times the direction",
-            "ray 3: does not hit",
-            "5 of 5 rays, 3 that hit",
-        ),
-        ("segment", "segment 1: meets the mesh", "segment 2: does not meet", "5 of 5 segments, 3 that meet"),
-    ] {
-        let command = format!("{} probe cube.cbvh {mode}.txt --mode {mode}", env!("CARGO_BIN_EXE_cbvh"));
-        let script = ["-qec", &command, "/dev/null"];
-        let ended = std::process::Command::new("script").args(script).current_dir(directory).output();
-        let Ok(ended) = ended else { return skip("the command `script` is missing") };
-        let shown = String::from_utf8(ended.stdout).unwrap();
-        assert!(
-            ended.status.success() && [first, last, counts].iter().all(|words| shown.contains(words)),
-            "{shown}"
-        );
-        assert!(shown.lines().last().unwrap().starts_with(&format!("{mode}: answered ")), "{shown}");
     }
 }
 
@@ -366,7 +344,7 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
         let probe = ["probe", "open.obj", "--mode", "side", "--probe", point];
         assert_eq!(cbvh_in(directory, &probe).done().out, words);
     }
-    let probe = ["probe", "open.obj", "side.txt", "--mode", "side", "--out", "raw.txt"];
+    let probe = ["probe", "open.obj", "side.txt", "--mode", "side", "--out", "raw.txt", "--bench"];
     assert_eq!(cbvh_in(directory, &probe).done().json()["positives"], 0);
     assert_eq!(values(&directory.join("raw.txt")), ["2", "2", "2", "2"]);
     fs::write(directory.join("tiny.obj"), "o tiny\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n").unwrap();
@@ -429,6 +407,7 @@ fn answers_are_those_of_the_labels() {
                 "raw.txt",
                 "--jobs",
                 "2",
+                "--bench",
             ];
             assert_eq!(cbvh_in(directory, &probe).done().json()["poses"], format!("{name}_{kind}"));
             let text = fs::read_to_string(&file).unwrap();

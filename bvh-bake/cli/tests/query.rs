@@ -23,7 +23,7 @@ fn world() -> tempfile::TempDir {
 
 fn ask(directory: &Path, more: &[&str]) -> Vec<Value> {
     let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt,far.x.txt"];
-    cbvh_in(directory, &[&query[..], more].concat()).done().json_lines()
+    cbvh_in(directory, &[&query[..], &["--bench"], more].concat()).done().json_lines()
 }
 
 #[test]
@@ -115,14 +115,14 @@ fn a_relation_tells_what_is_inside() {
         ("room.obj", "two.obj", ["4", "4", "0", "0", "0", "1", "1"], 5),
         ("cube.obj", "cube.obj", ["0", "1", "1", "1", "1", "1", "1"], 1),
     ] {
-        let query = ["query", a, b, "poses.txt", "--mode", "relation", "--out", "raw_%s.txt"];
+        let query = ["query", a, b, "poses.txt", "--mode", "relation", "--out", "raw_%s.txt", "--bench"];
         let json = cbvh_in(directory, &query).done().json();
         let raw = fs::read_to_string(directory.join("raw_poses.txt")).unwrap();
         let found: Vec<&str> = raw.lines().map(|line| line.split_once(' ').unwrap().0).collect();
         assert_eq!(found, expected, "{a} {b}");
         assert!(json["mode"] == "relation" && json["positives"] == positives, "{json}");
         // Surfaces alone tell less.
-        let collide = cbvh_in(directory, &["query", a, b, "poses.txt"]).done().json();
+        let collide = cbvh_in(directory, &["query", a, b, "poses.txt", "--bench"]).done().json();
         assert_eq!(collide["positives"], expected.iter().filter(|number| **number == "0").count());
     }
     for (a, b, x, words) in [
@@ -154,14 +154,14 @@ fn answers_do_not_depend_on_how_they_are_found() {
         assert_eq!(hashes(&["--jobs", "7", "--warm", "0"]), expected);
         for isa in &backends {
             assert_eq!(hashes(&["--isa", isa]), expected, "{isa}");
-            let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt", "--mode", mode];
+            let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt", "--bench", "--mode", mode];
             let forced = cbvh_with_isa(directory, isa, &[&query[..], within].concat()).done().json();
             assert_eq!((&forced["isa"], &forced["answers_xxh3"]), (&(*isa).into(), &expected[0]));
         }
         // The meshes are baked in memory, with any profile that does not move vertices.
         for profile in ["auto", "dop6-u8", "dop26-u4"] {
             let query = ["query", "torus.obj", "cube.obj", "near.txt", "--mode", mode, "--profile", profile];
-            let baked = cbvh_in(directory, &[&query[..], within].concat()).done().json();
+            let baked = cbvh_in(directory, &[&query[..], &["--bench"], within].concat()).done().json();
             assert_eq!(baked["answers_xxh3"], expected[0], "{profile}");
         }
     }
@@ -206,7 +206,7 @@ fn an_object_can_be_named() {
     fs::write(directory.join("both.obj"), cube() + &shifted).unwrap();
     cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
     let ask = |a: &str, more: &[&str]| {
-        let query = ["query", a, "cube.cbvh", "near.txt", "--mode", "contacts"];
+        let query = ["query", a, "cube.cbvh", "near.txt", "--mode", "contacts", "--bench"];
         cbvh_in(directory, &[&query[..], more].concat()).done().json()
     };
     let torus = ask("torus.cbvh", &[]);
@@ -219,38 +219,91 @@ fn an_object_can_be_named() {
     assert_eq!(ask("both.cbvh", &["--object", "cube"])["tris_a"], 12);
 }
 
+/// The lines printed are the raw ones without times, whether they go to a file or to a terminal, and `--json` agrees.
+#[test]
+fn each_pose_has_a_line_and_a_record() {
+    let folder = world();
+    let directory = folder.path();
+    for mode in ["collide", "contacts", "distance", "within", "relation"] {
+        let within: &[&str] = if mode == "within" { &["--within", "0.5"] } else { &[] };
+        let ask = |more: &[&str]| {
+            let query = ["query", "torus.cbvh", "cube.cbvh", "near.txt,far.x.txt", "--mode", mode];
+            cbvh_in(directory, &[&query[..], within, more].concat()).done()
+        };
+        let printed = ask(&["--out", "raw_%s.txt"]).out;
+        let raw = ["near", "far.x"].map(|stem| {
+            let raw = fs::read_to_string(directory.join(format!("raw_{stem}.txt"))).unwrap();
+            raw.lines().map(|line| format!("{}\n", line.rsplit_once(' ').unwrap().0)).collect::<String>()
+        });
+        assert_eq!(printed, raw.concat(), "{mode}");
+        let records = ask(&["--json"]).json_lines();
+        assert_eq!(records.len(), 67);
+        for (number, (record, line)) in records.iter().zip(printed.lines()).enumerate() {
+            let (stem, pose) = if number < 60 { ("near", number) } else { ("far.x", number - 60) };
+            assert_eq!((&record["poses"], &record["pose"]), (&stem.into(), &pose.into()), "{record}");
+            match mode {
+                "collide" | "within" => assert_eq!(record[mode], Value::from(line == "1"), "{record}"),
+                _ => assert_eq!(record[mode].as_f64(), line.parse().ok(), "{record}"),
+            }
+            if mode == "contacts" {
+                let pairs = record["pairs"].as_array().unwrap();
+                assert_eq!(record["contacts"], pairs.len());
+                assert!(pairs.iter().all(|pair| pair["triangle_a"].as_u64() < Some(2304)), "{record}");
+            }
+            if mode == "distance" {
+                let at = |name: &str, axis: usize| record[name][axis].as_f64().unwrap();
+                let apart: f64 = (0..3)
+                    .map(|axis| (at("point_a", axis) - at("point_b", axis)).powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                let [lower, distance, upper] =
+                    ["lower", "distance", "upper"].map(|name| record[name].as_f64());
+                assert!(lower <= distance && distance <= upper, "{record}");
+                assert!(
+                    (apart - distance.unwrap()).abs() < 1e-12 && record["triangle_b"].as_u64() < Some(12)
+                );
+            }
+        }
+    }
+    let one = cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "far.x.txt", "--json", "--limit", "1"]);
+    assert_eq!(one.done().out, "{\"collide\":false,\"pose\":0}\n");
+}
+
 /// Runs the command in `script`, which is a terminal for it.
 #[cfg(target_os = "linux")]
 #[test]
-fn on_a_terminal_each_pose_has_a_line_and_the_timing_follows() {
+fn a_terminal_gets_the_lines_of_a_pipe() {
     let folder = world();
     let directory = folder.path();
-    fs::write(directory.join("two.txt"), "1 0 0 5 0 1 0 0 0 0 1 0\n1 0 0 2 0 1 0 0 0 0 1 0\n").unwrap();
-    let on_a_terminal = |more: &str| {
-        let command = format!("{} query cube.cbvh cube.cbvh two.txt {more}", env!("CARGO_BIN_EXE_cbvh"));
-        let script = ["-qec", &command, "/dev/null"];
-        let ended = std::process::Command::new("script").args(script).current_dir(directory).output().ok()?;
-        assert!(ended.status.success(), "{ended:?}");
-        Some(String::from_utf8(ended.stdout).unwrap())
-    };
-    for (mode, first, second) in [
-        ("collide", "not touching", "touching"),
-        ("contacts", "0 pairs of triangles in contact", "pairs of triangles in contact"),
-        ("distance", "3.0 mesh units apart", "0 mesh units apart, touching"),
-        ("within --within 3", "at most 3.0 mesh units apart", "at most 3.0 mesh units apart"),
-        ("relation", "apart", "touching"),
-    ] {
-        let Some(shown) = on_a_terminal(&format!("--mode {mode}")) else {
-            return common::skip("the command `script` is missing");
-        };
-        let lines: Vec<&str> = shown.lines().collect();
-        let [one, two, timing] = lines[..] else { panic!("{shown}") };
-        assert_eq!(one, format!("pose 1: {first}"));
-        assert!(two.starts_with("pose 2: ") && two.ends_with(second), "{two}");
-        assert!(timing.starts_with("two: answered 2 of 2 poses, ") && timing.contains("median"), "{timing}");
+    let command =
+        format!("{} query torus.cbvh cube.cbvh near.txt --mode distance", env!("CARGO_BIN_EXE_cbvh"));
+    let script = ["-qec", &command, "/dev/null"];
+    let shown = std::process::Command::new("script").args(script).current_dir(directory).output();
+    let Ok(shown) = shown else { return common::skip("the command `script` is missing") };
+    let piped = ["query", "torus.cbvh", "cube.cbvh", "near.txt", "--mode", "distance"];
+    let piped = cbvh_in(directory, &piped).done().out;
+    assert!(shown.status.success());
+    assert_eq!(String::from_utf8(shown.stdout).unwrap().replace("\r\n", "\n"), piped);
+}
+
+/// Files whose units differ are pointed out, and the answer stands.
+#[test]
+fn meshes_of_very_different_size_are_pointed_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    for (half_side, is_told) in [(999, false), (1001, true)] {
+        fs::write(directory.join("large.obj"), cube_at(half_side, 0)).unwrap();
+        for (a, b) in [("cube.obj", "large.obj"), ("large.obj", "cube.obj")] {
+            let ended = cbvh_in(directory, &["query", a, b, "--mode", "relation"]);
+            assert_eq!(ended.code, 0);
+            assert_eq!(ended.err.lines().count(), usize::from(is_told), "{}", ended.err);
+            let words =
+                ["cube.obj is about 2.000 mesh units across", "large.obj", "2002.000", "the same unit"];
+            assert!(!is_told || words[1..].iter().all(|word| ended.err.contains(word)), "{}", ended.err);
+            assert!(!is_told || a != "cube.obj" || ended.err.contains(words[0]), "{}", ended.err);
+        }
     }
-    let json: Value = serde_json::from_str(&on_a_terminal("--json").unwrap()).unwrap();
-    assert_eq!((&json["peer"], &json["queries"]), (&"cbvh".into(), &2.into()));
 }
 
 #[test]
@@ -265,6 +318,9 @@ fn one_pose_is_answered_for_a_person() {
     let touching = "1,0,0,2,0,1,0,0,0,0,1,0";
     assert_eq!(ask(apart, &[]), "the meshes do not touch\n");
     assert_eq!(ask(touching, &[]), "the meshes touch\n");
+    assert_eq!(ask(apart, &["--json"]), "{\"collide\":false,\"pose\":0}\n");
+    let identity = cbvh_in(directory, &["query", "cube.cbvh", "cube.obj", "--mode", "relation"]).done().out;
+    assert_eq!(identity, "touching\n");
     assert!(ask(touching, &["--mode", "contacts"]).contains("pairs of triangles in contact"));
     assert!(ask(apart, &["--mode", "within", "--within", "3"]).contains("at most 3"));
     assert!(ask(apart, &["--mode", "within", "--within", "2.9"]).contains("more than 2.9"));

@@ -84,7 +84,10 @@ fn answers_are_those_about_each_pair() {
                 _ => b.max(*c),
             })
             .collect();
-        let more = [&["--out", "scene.txt", "--json", "--mode"], mode].concat();
+        let more = [&["--mode"], mode].concat();
+        let printed = ask(directory, &more).done().out;
+        assert_eq!(values(&printed), expected, "{mode:?}");
+        let more = [&["--out", "scene.txt", "--bench", "--mode"], mode].concat();
         let json = ask(directory, &more).done().json();
         assert_eq!(values(&fs::read_to_string(directory.join("scene.txt")).unwrap()), expected, "{mode:?}");
         assert_eq!(
@@ -98,6 +101,24 @@ fn answers_are_those_about_each_pair() {
         // Of all three pairs, with names.
         let list = ask(directory, &[&["--list", "--mode"], mode].concat()).done().out;
         assert_eq!(list.lines().filter(|line| line.starts_with("frame ")).count(), 40, "{list}");
+        let records = ask(directory, &[&["--list", "--json", "--mode"], mode].concat()).done().json_lines();
+        assert_eq!(records.len(), 40);
+        for (number, (record, value)) in records.iter().zip(&expected).enumerate() {
+            let found = match mode[0] {
+                "collide" => record["collide"].as_bool().map(|flag| f64::from(u8::from(flag))),
+                "within" => record["pairs"].as_array().map(|pairs| pairs.len() as f64),
+                _ => record["distance"].as_f64(),
+            };
+            assert!(record["frame"] == number && found == Some(*value), "{record}");
+            if mode[0] == "distance" {
+                let apart = |axis: usize| {
+                    let [a, b] = ["point_a", "point_b"].map(|name| record[name][axis].as_f64().unwrap());
+                    (a - b).powi(2)
+                };
+                assert!(((0..3).map(apart).sum::<f64>().sqrt() - value).abs() < 1e-12, "{record}");
+                assert!(record["a"] == "a" && ["b", "c"].iter().any(|name| record["b"] == *name), "{record}");
+            }
+        }
         if mode[0] == "within" {
             assert_eq!(list.matches("  a b\n").count() as f64, of_b.iter().sum::<f64>(), "{list}");
             assert!(!list.contains("b c"), "{list}");
@@ -110,11 +131,11 @@ fn answers_are_those_about_each_pair() {
 fn answers_depend_neither_on_the_backend_nor_on_threads() {
     let folder = world();
     let directory = folder.path();
-    for mode in ["collide", "pairs", "distance"] {
+    for mode in ["collide", "pairs", "distance", "relation"] {
         let mut hashes = Vec::new();
         for isa in backends(directory) {
             for jobs in ["1", "2"] {
-                let arguments = ["scene", "s.scene", "f.txt", "--mode", mode, "--json", "--jobs", jobs];
+                let arguments = ["scene", "s.scene", "f.txt", "--mode", mode, "--bench", "--jobs", jobs];
                 let json = cbvh_with_isa(directory, isa, &arguments).done().json();
                 assert_eq!(json["isa"], isa);
                 hashes.push(json["answers_xxh3"].as_str().unwrap().to_owned());
@@ -122,9 +143,9 @@ fn answers_depend_neither_on_the_backend_nor_on_threads() {
         }
         assert!(hashes.iter().all(|hash| *hash == hashes[0] && hash.len() == 16), "{mode}: {hashes:?}");
     }
-    let cut = ask(directory, &["--budget", "0", "--json"]).done().json();
+    let cut = ask(directory, &["--budget", "0", "--bench"]).done().json();
     assert!(cut["answers_xxh3"].is_null() && cut["queries"] == 1 && cut["requested"] == 40, "{cut}");
-    let few = ask(directory, &["--limit", "7", "--warm", "0", "--json"]).done().json();
+    let few = ask(directory, &["--limit", "7", "--warm", "0", "--bench"]).done().json();
     assert_eq!((&few["queries"], &few["requested"]), (&7.into(), &7.into()));
 }
 
@@ -140,6 +161,48 @@ fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
     cbvh_in(directory, &["scene", "s.scene", "f.txt"]).failed(1, &["expected no FRAMES"]);
 }
 
+/// What is inside what, and instances placed by a position and a quaternion.
+#[test]
+fn relations_tell_what_is_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    fs::write(directory.join("room.obj"), common::cube_at(5, 0)).unwrap();
+    let scene = "\
+mesh m cube.obj
+mesh l room.obj
+instance inner m 1 0 0 0.5  0 1 0 0  0 0 1 0
+instance room l 0 0 0  0 0 0.70710678118654752 0.70710678118654752
+instance near m 6 0 0  0 0 0 1
+instance far m 20 0 0  0 0 0 1
+";
+    fs::write(directory.join("s.scene"), scene).unwrap();
+    let ask = |more: &[&str]| cbvh_in(directory, &[&["scene", "s.scene"], more].concat()).done();
+    assert_eq!(ask(&["--mode", "relation"]).out, "2\n");
+    assert_eq!(
+        ask(&["--mode", "relation", "--list"]).out,
+        "frame 1: 2 pairs touching or inside\n  inner inside room\n  room near touching\n"
+    );
+    let json = ask(&["--mode", "relation", "--json"]).json();
+    let pair = |a, b, relation| serde_json::json!({ "a": a, "b": b, "relation": relation });
+    assert_eq!(json["pairs"], serde_json::json!([pair("inner", "room", 2), pair("room", "near", 0)]));
+    fs::write(
+        directory.join("s.scene"),
+        scene
+            .lines()
+            .filter(|line| !line.contains("room"))
+            .map(|line| format!("{line}\n"))
+            .collect::<String>(),
+    )
+    .unwrap();
+    let json = ask(&["--mode", "distance", "--json"]).json();
+    assert!(json["distance"] == 3.5 && json["point_a"][0] == 1.5 && json["point_b"][0] == 5.0, "{json}");
+    cbvh_in(directory, &["scene", "cell.glb"]).failed(2, &["cell.glb"]);
+    fs::write(directory.join("cell.glb"), "glTF").unwrap();
+    cbvh_in(directory, &["scene", "cell.glb"])
+        .failed(3, &["cell.glb: expected a scene file, found glTF", "cbvh bake cell.glb --scene -o"]);
+}
+
 #[test]
 fn bad_files_are_named_with_line_and_remedy() {
     let folder = world();
@@ -152,7 +215,8 @@ fn bad_files_are_named_with_line_and_remedy() {
         (&format!("instance a ring {pose}"), 3, "found a second instance \"a\""),
         (&format!("instance d sphere {pose}"), 3, "expected a mesh of an earlier line, found \"sphere\""),
         ("instance d ring 1 2 3", 3, "line 8: expected 12 numbers"),
-        ("instance d ring", 3, "expected 12 numbers after the mesh, found none"),
+        ("instance d ring 9 0 0 0 0 0 2", 3, "line 8: expected a quaternion"),
+        ("instance d ring", 3, "expected 12 numbers, or 7, after the mesh, found none"),
         ("instance d ring 2 0 0 0 0 2 0 0 0 0 2 0", 3, "scaled by 2; bake the mesh at its size"),
         ("instance d ring 1 3e-7 0 0 0 1 0 0 0 0 1 0", 3, "instance d: expected a rotation within 2^-23"),
         ("moving b", 3, "expected each instance once, found \"b\" again"),
@@ -192,7 +256,7 @@ fn bad_files_are_named_with_line_and_remedy() {
         (&["--within", "1"], "--within requires --mode within"),
         (&["--mode", "within", "--within", "-1"], "--within"),
         (&["--jobs", "0"], "--jobs"),
-        (&["--list", "--json"], "--list"),
+        (&["--list", "--bench"], "--list"),
     ] {
         let ended = ask(directory, arguments);
         assert!(ended.code == 1 && ended.err.contains(words), "{arguments:?}: {}", ended.err);
@@ -273,7 +337,7 @@ fn baked_scenes_are_asked_like_text() {
     fs::write(directory.join("f.txt"), frames).unwrap();
     for mode in ["collide", "pairs", "distance"] {
         let ask = |scene: &str, jobs: &str| {
-            let arguments = ["scene", scene, "f.txt", "--mode", mode, "--json", "--jobs", jobs];
+            let arguments = ["scene", scene, "f.txt", "--mode", mode, "--bench", "--jobs", jobs];
             cbvh_in(directory, &arguments).done().json()
         };
         let (text, baked) = (ask("s.scene", "1"), ask("boxes.cbvh", "2"));

@@ -68,7 +68,7 @@ class Comparison:
     def command(self, *arguments):
         """The answers of the command: the fields of each line but the time."""
         raw = self.folder / "raw.txt"
-        run(COMMAND, *arguments, "--out", raw, "--json")
+        run(COMMAND, *arguments, "--out", raw)
         lines = [line.split() for line in raw.read_text().splitlines()]
         return [line[:-1] for line in lines if line and not line[0].startswith("#")]
 

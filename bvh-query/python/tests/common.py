@@ -75,6 +75,6 @@ def write_rows(path, rows):
 def ask_command(folder, *arguments):
     """Runs the command, and returns the fields of the answers that it writes to a file, line by line."""
     raw = folder / "raw.txt"
-    subprocess.run([COMMAND, *map(str, arguments), "--out", str(raw), "--json"], check=True, capture_output=True)
+    subprocess.run([COMMAND, *map(str, arguments), "--out", str(raw)], check=True, capture_output=True)
     lines = [line.split() for line in raw.read_text().splitlines()]
     return [line for line in lines if line and not line[0].startswith("#")]

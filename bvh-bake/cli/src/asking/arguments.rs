@@ -2,6 +2,7 @@
 
 use super::mesh::How;
 use super::runner::Limits;
+use crate::console::Failure;
 use crate::options::{LayoutArguments, not_negative, threads, whole};
 use clap::{Args, ValueEnum};
 
@@ -38,12 +39,23 @@ pub(crate) struct AskingArguments {
     /// How the system reads .cbvh files from the disk
     #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
     read_ahead: ReadAhead,
-    /// Print one JSON object per file, as always when standard output is not a terminal
-    #[arg(long, conflicts_with = "one")]
-    pub(super) json: bool,
+    /// Print one JSON object per question, with all that the answer has
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print one JSON object per file, with the times of its questions, and no answers
+    #[arg(long, conflicts_with_all = ["one", "json"])]
+    pub(super) bench: bool,
 }
 
 impl AskingArguments {
+    /// Refuses what only files of questions need.
+    pub(crate) fn require_no_files(&self) -> Result<(), Failure> {
+        if self.bench || self.out.is_some() {
+            return Err(Failure::Usage("--bench and --out require a file of questions (see --help)".into()));
+        }
+        Ok(())
+    }
+
     /// Returns how meshes are prepared.
     pub(crate) fn how(&self) -> How<'_> {
         let (layout, object) = (&self.layout, self.object.as_deref());

@@ -1,6 +1,6 @@
 //! The meshes of a question. Each is an opened file, or a mesh baked in memory.
 
-use crate::console::Failure;
+use crate::console::{Failure, tell_line};
 use crate::options::LayoutArguments;
 use bvh_bake::{BakeError, Options, input, to_bytes};
 use bvh_format::header::MAGIC;
@@ -8,6 +8,10 @@ use bvh_query::{Bvh, QueryError, ReadAhead, Shape};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// How many times larger one mesh may be than the other before the command points it out. Files in millimetres beside files in
+/// metres differ by 1000 times what the objects do.
+const MAX_RATIO: f64 = 1000.0;
 
 /// The options for preparing meshes.
 #[derive(Clone, Copy)]
@@ -69,6 +73,15 @@ impl LoadedMesh {
         self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all())
     }
 
+    /// Returns how large the mesh is, in mesh units: the longest side of the box of its largest object.
+    fn size(&self) -> f64 {
+        let sides = self.shape().objects().iter().flat_map(|object| {
+            let record = object.record();
+            [0, 1, 2].map(|axis| f64::from(record.box_hi[axis].get()) - f64::from(record.box_lo[axis].get()))
+        });
+        sides.fold(0.0, f64::max)
+    }
+
     /// Returns the number of triangles of the mesh, including exact duplicates.
     pub(crate) fn triangles(&self) -> u64 {
         let records = self.shape().objects().iter().map(|object| object.record());
@@ -87,6 +100,14 @@ impl LoadedMesh {
 pub(crate) fn load_both(a: &Path, b: &Path, how: &How) -> Result<[LoadedMesh; 2], Failure> {
     let meshes = [LoadedMesh::load(a, how)?, LoadedMesh::load(b, how)?];
     refuse_unknown_object(&meshes, how)?;
+    let [size_a, size_b] = meshes.each_ref().map(LoadedMesh::size);
+    let ratio = (size_a / size_b).max(size_b / size_a);
+    if ratio > MAX_RATIO && ratio.is_finite() {
+        let [a, b] = [a, b].map(Path::display);
+        tell_line(&format!(
+            "{a} is about {size_a:.3} mesh units across and {b} about {size_b:.3}; are both in the same unit?"
+        ));
+    }
     Ok(meshes)
 }
 

@@ -34,6 +34,17 @@ pub(crate) fn parse(text: &str) -> Result<Option<Pose>, String> {
     }
 }
 
+/// Parses the pose of an instance, which may also be 7 numbers: x, y and z of the position, and x, y, z and w of a unit
+/// quaternion. Returns `None` if the text is blank.
+pub(crate) fn parse_placed(text: &str) -> Result<Option<Pose>, String> {
+    match numbers(text)?[..] {
+        [x, y, z, i, j, k, w] => {
+            Pose::from_quaternion([i, j, k, w], [x, y, z]).map(Some).map_err(|error| error.to_string())
+        }
+        _ => parse(text),
+    }
+}
+
 /// Guesses what a line with a wrong number of numbers means, and says what to write instead.
 fn wrong_count(count: usize) -> String {
     let guess = match count {

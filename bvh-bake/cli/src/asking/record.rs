@@ -1,28 +1,27 @@
-//! The results of a run as data, which is the JSON line, and as lines for a person.
+//! The line that `--bench` prints: how many questions were asked of what, how long they took, and a hash of the answers.
 
 use super::Answer;
 use super::mesh::LoadedMesh;
 use super::runner::Run;
-use crate::console::{hex, plural, time};
+use crate::console::hex;
 use crate::process::resident;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, Object};
 use cbvh_measure::spread::quantile;
 use serde::Serialize;
-use std::fmt::Write;
 
 /// How many questions were asked, and how long they took.
 #[derive(Serialize)]
 pub(crate) struct Times {
-    pub(crate) queries: usize,
-    pub(crate) requested: usize,
+    queries: usize,
+    requested: usize,
     total_s: f64,
     query_sum_s: f64,
-    pub(crate) ns_median: u64,
+    ns_median: u64,
     ns_mean: f64,
     ns_p10: u64,
-    pub(crate) ns_p90: u64,
-    pub(crate) ns_max: u64,
+    ns_p90: u64,
+    ns_max: u64,
 }
 
 impl Times {
@@ -126,36 +125,6 @@ impl Record {
             file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
             jobs: run.jobs,
         }
-    }
-
-    /// Returns the answers for a person: one line per question, then the counts and times. A question is called `question`.
-    pub(crate) fn listing<A>(
-        &self,
-        run: &Run<A>,
-        question: &str,
-        counts: &str,
-        in_words: impl Fn(&A) -> String,
-    ) -> String {
-        let mut text = String::new();
-        for (number, (answer, _)) in (1..).zip(&run.answers) {
-            // Writing to text in memory cannot fail.
-            let _ = writeln!(text, "{question} {number}: {}", in_words(answer));
-        }
-        let Times { queries, requested, ns_median, ns_p90, ns_max, .. } = self.times;
-        let _ = writeln!(
-            text,
-            "{}: answered {queries} of {requested} {}, {counts}; per {question}: median {}, 90 % below {}, slowest {} ({}, {} \
-             {})",
-            self.poses,
-            plural(requested as u64, question),
-            time(ns_median),
-            time(ns_p90),
-            time(ns_max),
-            self.isa,
-            self.jobs,
-            plural(self.jobs as u64, "thread"),
-        );
-        text
     }
 }
 

@@ -8,6 +8,6 @@ mod words;
 
 pub(crate) use failure::{Failure, tell_json, tell_line};
 pub(crate) use number::significant;
-pub(crate) use output::{hex, json, text};
+pub(crate) use output::{hex, json, lines, text};
 pub(crate) use spinner::spinner;
-pub(crate) use words::{length, names, plural, time};
+pub(crate) use words::{length, names, plural};

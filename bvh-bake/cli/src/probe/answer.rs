@@ -1,11 +1,11 @@
 //! Answers about points, rays and segments.
 
-use super::arguments::Mode;
 use crate::asking;
 use crate::asking::mesh::LoadedMesh;
-use crate::asking::triangle;
+use crate::asking::witness;
 use bvh_format::checksum::Hasher;
 use bvh_query::{ClosestPoint, RayHit, Side};
+use serde_json::{Value, json};
 
 /// An answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +40,23 @@ impl asking::Answer for Answer {
         }
     }
 
+    fn json(&self) -> Value {
+        match self {
+            Self::Closest(None) => json!({ "distance": null }),
+            Self::Closest(Some(of)) => json!({
+                "distance": of.distance, "lower": of.lower, "upper": of.upper, "point": of.point, "object": of.object,
+                "triangle": of.triangle,
+            }),
+            Self::Side(side) => json!({ "side": *side as i8 }),
+            Self::Hit(None) => json!({ "hit": false }),
+            Self::Hit(Some(of)) => json!({
+                "hit": true, "t": of.t, "lower": of.lower, "upper": of.upper, "point": of.point, "object": of.object,
+                "triangle": of.triangle,
+            }),
+            Self::Meets(meets) => json!({ "meets": meets }),
+        }
+    }
+
     /// Hashes the bits of the value.
     fn hash(&self, hasher: &mut Hasher) {
         hasher.update(&self.value().to_bits().to_le_bytes());
@@ -48,7 +65,7 @@ impl asking::Answer for Answer {
 
 impl Answer {
     /// Returns the answer in words, with its unit.
-    pub(super) fn in_words(&self) -> String {
+    fn in_words(&self) -> String {
         let words = match self {
             Self::Closest(None) => "the mesh has no triangles",
             Self::Closest(Some(closest)) if closest.distance > 0.0 => {
@@ -78,18 +95,8 @@ impl Answer {
         format!(
             "{}\n  certainly {lower:?} to {upper:?}\n  at {}, {}\n",
             self.in_words(),
-            triangle::point(point),
-            triangle::name(mesh, object, triangle)
+            witness::point(point),
+            witness::name(mesh, object, triangle)
         )
-    }
-}
-
-/// Returns how a listing calls a question, and what is said of those that count as positive.
-pub(super) fn nouns(mode: Mode) -> (&'static str, &'static str) {
-    match mode {
-        Mode::Closest => ("point", "on the mesh"),
-        Mode::Side => ("point", "inside the mesh"),
-        Mode::Ray => ("ray", "that hit the mesh"),
-        Mode::Segment => ("segment", "that meet the mesh"),
     }
 }

@@ -1,7 +1,7 @@
 //! Questions about points, rays and segments: how they are read, and how they are asked.
 
+use super::Mode;
 use super::answer::Answer;
-use super::arguments::Mode;
 use crate::asking::files::{self, numbers, read_lines};
 use crate::console::Failure;
 use bvh_format::object::MAX_COORDINATE;

@@ -1,5 +1,4 @@
-//! This process and the system: memory, the page cache, signals.
+//! This process and the system: memory and signals.
 
-pub(crate) mod from_disk;
 pub(crate) mod resident;
 pub(crate) mod signals;

@@ -1,10 +1,10 @@
 //! Asks about each frame and times it: first the moving instances get their poses, then the question.
 
-use super::arguments::{Mode, SceneArguments};
 use super::file::LoadedScene;
 use super::frames::Frame;
+use super::{Mode, SceneArguments};
 use crate::console::Failure;
-use bvh_query::{Pose, QueryError, QueryStats, SceneError, ScenePair};
+use bvh_query::{Pose, QueryError, QueryStats, Relation, SceneDistance, SceneError, ScenePair};
 use cbvh_measure::rounds::add;
 use std::time::Instant;
 
@@ -23,8 +23,10 @@ pub(super) enum Answer {
     Flag(bool),
     /// The pairs that touch, or that are near enough.
     Pairs(Vec<ScenePair>),
-    /// The nearest pair and its distance; `None` if there are no pairs.
-    Nearest(Option<(ScenePair, f64)>),
+    /// The pairs that have anything in common, and how they lie.
+    Relations(Vec<(ScenePair, Relation)>),
+    /// The nearest pair and its distance, with points in the world; `None` if there are no pairs.
+    Nearest(Option<SceneDistance>),
 }
 
 impl Answer {
@@ -33,11 +35,12 @@ impl Answer {
         match self {
             Self::Flag(flag) => f64::from(u8::from(*flag)),
             Self::Pairs(pairs) => pairs.len() as f64,
-            Self::Nearest(nearest) => nearest.map_or(f64::INFINITY, |(_, distance)| distance),
+            Self::Relations(pairs) => pairs.len() as f64,
+            Self::Nearest(nearest) => nearest.map_or(f64::INFINITY, |of| of.distance.distance),
         }
     }
 
-    /// Returns true if a pair touches or is near enough.
+    /// Returns true if a pair touches, is near enough or has anything in common.
     pub(super) fn is_positive(&self) -> bool {
         match self {
             Self::Nearest(_) => self.value() <= 0.0,
@@ -67,8 +70,15 @@ impl Question {
             Mode::Collide => Answer::Flag(scene.collide()?),
             Mode::Pairs => Answer::Pairs(scene.pairs_in_contact()?),
             Mode::Within => Answer::Pairs(scene.pairs_within(self.within)?),
+            Mode::Relation => Answer::Relations(scene.relations()?),
             Mode::Distance => {
-                Answer::Nearest(scene.distance()?.map(|found| (found.pair, found.distance.distance)))
+                let mut found = scene.distance()?;
+                if let Some(SceneDistance { pair, distance, .. }) = &mut found {
+                    let world = scene.pose(pair.a)?;
+                    distance.point_a = world.place(distance.point_a);
+                    distance.point_b = world.place(distance.point_b);
+                }
+                Answer::Nearest(found)
             }
         })
     }

@@ -84,8 +84,8 @@ impl SceneText {
             }
             ["instance", name, mesh, ..] => {
                 let mesh = find(meshes, "a mesh", mesh)?;
-                let pose = poses::parse(&words[3..].join(" "))?;
-                let pose = pose.ok_or("expected 12 numbers after the mesh, found none")?;
+                let pose = poses::parse_placed(&words[3..].join(" "))?;
+                let pose = pose.ok_or("expected 12 numbers, or 7, after the mesh, found none")?;
                 if instances.insert(name, self.instances.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second instance {name:?}"));
                 }

@@ -1,25 +1,135 @@
-//! `cbvh scene`: asks a scene of many placed meshes about frames of moving ones, timing each frame.
+//! `cbvh scene`: asks a scene of many placed meshes about frames of moving ones.
 
-mod arguments;
 mod asked;
 mod file;
 mod frames;
 mod record;
 
-pub(crate) use arguments::SceneArguments;
-
 use crate::asking;
+use crate::asking::files::write_file;
 use crate::asking::mesh::is_baked;
-use crate::console::{self, Failure};
+use crate::console::{self, Failure, significant};
+use crate::options::{LayoutArguments, not_negative, threads, whole};
 use asked::{Question, Run};
+use clap::{Args, ValueEnum};
 use record::Record;
-use std::io::{IsTerminal, stdout};
+use std::path::PathBuf;
+
+const HELP: &str = "\
+Examples:
+  cbvh scene cell.scene frames.txt --mode collide
+  cbvh scene cell.scene frames.txt --mode pairs --list
+  cbvh scene cell.scene frames.txt --mode within --within 0.05 --jobs 4 --json > answers.jsonl
+  cbvh scene factory.cbvh --mode pairs --list
+
+SCENE is a file that cbvh bake --scene made, all of whose instances move, or, without FRAMES, stand where the file says. Or it is a text file, one item per line; # starts a comment. File names are relative to it:
+
+  mesh NAME FILE              a mesh file, which is baked in memory first, or a .cbvh file
+  instance NAME MESH POSE     a mesh in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: x y z \
+of the position, then x y z w of a unit quaternion
+  moving NAME...              the instances that frames move, in the order of their poses
+  allow NAME NAME             two instances that may touch, and are never asked about
+
+Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked \
+about, and of a baked scene all pairs whose groups meet. \
+In a scene without moving instances there is one frame, without FRAMES, and all pairs are asked about.
+
+One answer is printed per line, in the order of the frames: 0 or 1 (collide), the number of pairs (pairs, within, relation) \
+or the distance of the nearest pair (17 digits; inf if there are no pairs). --list prints for a person which pairs they are. \
+relation finds the pairs that touch or of which one is inside the other, wholly or in part.
+
+--json prints one object per frame: frame, its number in the file, from 0; collide (true or false), or pairs, each with the \
+names a and b (and relation, as cbvh query numbers it), or of the nearest pair a, b, distance, lower, upper, point_a and \
+point_b in the world, object_a, triangle_a, object_b and triangle_b; the distance is null if there are no pairs. --bench \
+prints one object: what was asked, the times of the frames, and answers_xxh3, which is the same for every --isa and --jobs; \
+it is null if --budget cut the run short. --out writes the lines, each with nanoseconds, which include moving the instances.";
+
+/// What `scene` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct SceneArguments {
+    /// The meshes, where they are, and what moves
+    scene: PathBuf,
+    /// The poses of the moving instances, one frame per line
+    frames: Option<PathBuf>,
+    /// The question
+    #[arg(long, value_enum, default_value = "collide")]
+    mode: Mode,
+    /// With --mode within: the distance to compare with, in mesh units
+    #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
+    within: Option<f64>,
+    /// The number of threads that share the pairs of a frame
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true)]
+    jobs: u16,
+    /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    isa: String,
+    #[command(flatten)]
+    layout: LayoutArguments,
+    /// Write raw answers and times to this file
+    #[arg(long, value_name = "raw.txt")]
+    out: Option<PathBuf>,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
+    budget: Option<f64>,
+    /// Untimed frames before the timed ones, taken from the end
+    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    warm: usize,
+    /// Ask only the first N frames; 0 asks all
+    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    limit: usize,
+    /// Print the pairs of each frame for a person, with their names
+    #[arg(long)]
+    list: bool,
+    /// Print one JSON object per frame, with all that the answer has; --list makes no difference to it
+    #[arg(long)]
+    json: bool,
+    /// Print one JSON object about all frames, with their times, and no answers
+    #[arg(long, conflicts_with_all = ["list", "json"])]
+    bench: bool,
+}
+
+/// A question about all pairs of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    /// Does any pair touch?
+    Collide,
+    /// Which pairs touch?
+    Pairs,
+    /// How far apart is the nearest pair?
+    Distance,
+    /// Which pairs are at most --within apart?
+    Within,
+    /// Which pairs touch, or have one inside the other?
+    Relation,
+}
+
+impl Mode {
+    /// Returns the name on the command line.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Collide => "collide",
+            Self::Pairs => "pairs",
+            Self::Distance => "distance",
+            Self::Within => "within",
+            Self::Relation => "relation",
+        }
+    }
+}
 
 /// Answers the question about each frame.
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.isa)?;
     let question = Question::new(arguments)?;
-    let (mut scene, mut frames) = if is_baked(&arguments.scene)? {
+    let extension = arguments.scene.extension().unwrap_or_default().to_ascii_lowercase();
+    let is_baked = is_baked(&arguments.scene)?;
+    if !is_baked && (extension == "glb" || extension == "gltf") {
+        let name = arguments.scene.display();
+        return Err(Failure::Invalid(format!(
+            "{name}: expected a scene file, found glTF; bake it first: cbvh bake {name} --scene -o scene.cbvh"
+        )));
+    }
+    let (mut scene, mut frames) = if is_baked {
         let mut scene = file::open(&arguments.scene, backend)?;
         let frames = if let Some(path) = &arguments.frames {
             frames::read(Some(path), &scene.names_of_moving())?
@@ -47,16 +157,19 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
         Run::new(&mut scene, &frames, &question, arguments)
     }?;
     if let Some(out) = &arguments.out {
-        let written = bvh_bake::write_atomically(out, record::raw(&run).as_bytes());
-        written.map_err(|error| Failure::from_bake(&out.display().to_string(), &error))?;
+        write_file(out, &record::raw(&run))?;
     }
-    if arguments.list {
-        return console::text(&record::list(&scene, &question, &run));
+    if arguments.bench {
+        return console::json(&Record::new(arguments, &scene, backend, &question, &run));
     }
-    let record = Record::new(arguments, &scene, backend, &question, &run);
-    if arguments.json || !stdout().is_terminal() {
-        console::json(&record)
+    let answers = run.answers.iter().map(|(answer, _)| answer);
+    if arguments.json {
+        console::lines((0..).zip(answers).map(|(number, answer)| record::json(&scene, number, answer)))
+    } else if arguments.list {
+        console::lines(
+            (1..).zip(answers).map(|(number, answer)| record::list(&scene, &question, number, answer)),
+        )
     } else {
-        console::text(&record.summary())
+        console::lines(answers.map(|answer| significant(answer.value())))
     }
 }

@@ -1,18 +1,18 @@
-//! The results of a run as data: the JSON line, the raw lines, the list of pairs and the hash of the answers.
+//! The results of a run: the line of `--bench` with the hash of the answers, the raw lines, records and lists of pairs.
 
-use super::arguments::{Mode, SceneArguments};
 use super::asked::{Answer, Question, Run};
 use super::file::LoadedScene;
-use crate::asking::Times;
+use super::{Mode, SceneArguments};
 use crate::asking::files::stem;
+use crate::asking::{Times, distance_json};
 use crate::console::{hex, plural, significant};
 use crate::process::resident;
 use bvh_format::checksum::Hasher;
-use bvh_query::{Backend, InstanceId};
+use bvh_query::{Backend, InstanceId, Relation, ScenePair};
 use serde::Serialize;
-use std::fmt::Write;
+use serde_json::{Value, json};
 
-/// The JSON line: the fields that programs of this protocol share, and further ones.
+/// The line of `--bench`: the fields that programs of this protocol share, and further ones.
 #[derive(Serialize)]
 pub(super) struct Record {
     peer: &'static str,
@@ -72,31 +72,6 @@ impl Record {
             jobs: arguments.jobs,
         }
     }
-
-    /// Returns a few lines for a person.
-    pub(super) fn summary(&self) -> String {
-        let micro = |nanoseconds: u64| format!("{:.1} \u{b5}s", nanoseconds as f64 / 1e3);
-        let what = if self.mode == Mode::Within.name() { "with a pair near enough" } else { "with contact" };
-        format!(
-            "{}: {} {}, {} of them moving; {}: answered {} of {} {}, {} {what}\nper frame, poses included: median {}, \
-             90 % below {}, slowest {} ({}, {} {})\n",
-            self.scene,
-            self.instances,
-            plural(self.instances as u64, "instance"),
-            self.moving,
-            self.mode,
-            self.times.queries,
-            self.times.requested,
-            plural(self.times.requested as u64, "frame"),
-            self.positives,
-            micro(self.times.ns_median),
-            micro(self.times.ns_p90),
-            micro(self.times.ns_max),
-            self.isa,
-            self.jobs,
-            plural(u64::from(self.jobs), "thread"),
-        )
-    }
 }
 
 /// Returns XXH3-64 of names and values in order, without times.
@@ -115,9 +90,14 @@ fn hash(scene: &LoadedScene, run: &Run) -> u64 {
                 pairs.iter().for_each(|of| pair(of.a, of.b));
                 hasher.update(&(pairs.len() as u64).to_le_bytes());
             }
+            Answer::Relations(pairs) => {
+                pairs.iter().for_each(|(of, _)| pair(of.a, of.b));
+                pairs.iter().for_each(|(_, relation)| hasher.update(&[*relation as u8]));
+                hasher.update(&(pairs.len() as u64).to_le_bytes());
+            }
             Answer::Nearest(nearest) => {
-                if let Some((of, _)) = nearest {
-                    pair(of.a, of.b);
+                if let Some(of) = nearest {
+                    pair(of.pair.a, of.pair.b);
                 }
                 hasher.update(&answer.value().to_bits().to_le_bytes());
             }
@@ -131,30 +111,63 @@ pub(super) fn raw(run: &Run) -> String {
     run.answers.iter().map(|(answer, ns)| format!("{} {ns}\n", significant(answer.value()))).collect()
 }
 
-/// Returns the pairs of each frame: one line per frame, one line per pair.
-pub(super) fn list(scene: &LoadedScene, question: &Question, run: &Run) -> String {
-    let mut text = String::new();
-    for (number, (answer, _)) in (1..).zip(&run.answers) {
-        // Writing to text in memory cannot fail.
-        let _ = match answer {
-            Answer::Flag(flag) => {
-                writeln!(text, "frame {number}: {}", if *flag { "touching" } else { "not touching" })
-            }
-            Answer::Pairs(pairs) => {
-                let count = pairs.len() as u64;
-                let what = if question.mode == Mode::Within { "near enough" } else { "touching" };
-                let _ = writeln!(text, "frame {number}: {count} {} {what}", plural(count, "pair"));
-                pairs.iter().try_for_each(|of| writeln!(text, "  {} {}", scene.name(of.a), scene.name(of.b)))
-            }
-            Answer::Nearest(None) => writeln!(text, "frame {number}: no pairs"),
-            Answer::Nearest(Some((of, distance))) => writeln!(
-                text,
-                "frame {number}: {} {} {} mesh units apart",
-                scene.name(of.a),
-                scene.name(of.b),
-                significant(*distance)
-            ),
-        };
-    }
-    text
+/// Returns all that the answer about a frame has, as a JSON object.
+pub(super) fn json(scene: &LoadedScene, frame: usize, answer: &Answer) -> Value {
+    let name = |id| scene.scene.name(id).ok().flatten().map_or_else(|| scene.name(id), str::to_owned);
+    let names = |of: &ScenePair| json!({ "a": name(of.a), "b": name(of.b) });
+    let related = |(of, relation): &(ScenePair, Relation)| {
+        let mut pair = names(of);
+        pair["relation"] = json!(*relation as u8);
+        pair
+    };
+    let mut record = match answer {
+        Answer::Flag(flag) => json!({ "collide": flag }),
+        Answer::Pairs(pairs) => json!({ "pairs": pairs.iter().map(names).collect::<Vec<_>>() }),
+        Answer::Relations(pairs) => json!({ "pairs": pairs.iter().map(related).collect::<Vec<_>>() }),
+        Answer::Nearest(None) => json!({ "distance": null }),
+        Answer::Nearest(Some(of)) => {
+            let mut record = distance_json(&of.distance);
+            record["a"] = json!(name(of.pair.a));
+            record["b"] = json!(name(of.pair.b));
+            record
+        }
+    };
+    record["frame"] = json!(frame);
+    record
+}
+
+/// Returns what `--list` prints about a frame: a line, and below it one line per pair.
+pub(super) fn list(scene: &LoadedScene, question: &Question, number: usize, answer: &Answer) -> String {
+    let names = |of: &ScenePair| format!("{} {}", scene.name(of.a), scene.name(of.b));
+    let counted = |pairs: Vec<String>, what: &str| {
+        let count = pairs.len() as u64;
+        let lines: String = pairs.iter().map(|pair| format!("\n  {pair}")).collect();
+        format!("{count} {} {what}{lines}", plural(count, "pair"))
+    };
+    let text = match answer {
+        Answer::Flag(true) => "touching".to_owned(),
+        Answer::Flag(false) => "not touching".to_owned(),
+        Answer::Pairs(pairs) => {
+            let what = if question.mode == Mode::Within { "near enough" } else { "touching" };
+            counted(pairs.iter().map(names).collect(), what)
+        }
+        Answer::Relations(pairs) => {
+            let in_words = |(of, relation): &(ScenePair, Relation)| {
+                let (a, b) = (scene.name(of.a), scene.name(of.b));
+                match relation {
+                    Relation::AInB => format!("{a} inside {b}"),
+                    Relation::BInA => format!("{b} inside {a}"),
+                    Relation::Mixed => format!("{a} {b} not touching, partly inside"),
+                    Relation::Undefined => format!("{a} {b} undefined, because one is not closed"),
+                    _ => format!("{a} {b} touching"),
+                }
+            };
+            counted(pairs.iter().map(in_words).collect(), "touching or inside")
+        }
+        Answer::Nearest(None) => "no pairs".to_owned(),
+        Answer::Nearest(Some(of)) => {
+            format!("{} {} mesh units apart", names(&of.pair), significant(of.distance.distance))
+        }
+    };
+    format!("frame {number}: {text}")
 }
