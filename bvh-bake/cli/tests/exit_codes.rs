@@ -46,6 +46,7 @@ fn wrong_usage_is_1() {
         &["bake", "cube.obj", "-o", "o.cbvh", "--jobs", "0"],
         &["bake", "cube.obj", "-o", "cube.obj"],
         &["bake", "cube.obj", "-o", "./cube.obj", "--force"],
+        &["bake", "cube.obj", "-o", "-"],
         &["dump", "cube.cbvh", "--page", "x"],
         &["dump", "cube.cbvh", "--max-memory", "lots"],
         &["validate", "cube.cbvh", "--max-memory", "-1"],

@@ -182,7 +182,8 @@ fn a_folder_is_baked_as_a_tree() {
     let text = cbvh_in(directory, &["bake", "in", "-o", "out"]).done().out;
     assert!(text.starts_with("3 assets: 0 baked, 3 up to date, 0 failed\n"), "{text}");
     fs::write(directory.join("in/a.ply"), "").unwrap();
-    cbvh_in(directory, &["bake", "in", "-o", "out"]).failed(3, &["out/a.cbvh", "asset 2", "that of asset 1"]);
+    cbvh_in(directory, &["bake", "in", "-o", "out"])
+        .failed(3, &["out/a.cbvh", "asset 2 (in/a", "that of asset 1 (in/a"]);
     cbvh_in(directory, &["bake", "in", "-o", "o.jsonl"]).failed(1, &["o.jsonl", "expected a folder"]);
     fs::create_dir(directory.join("empty")).unwrap();
     cbvh_in(directory, &["bake", "empty", "-o", "out"])

@@ -65,9 +65,12 @@ pub(super) fn refuse_shared_outputs(
             )));
         }
     }
+    let label = |asset: &Asset| format!("asset {} ({})", asset.line, shown(&asset.input));
     let taken_by = |asset: &Asset, whose: &str| {
         let output = shown(&asset.output);
-        let what = format!("expected an output of its own for asset {}, found that of {whose}", asset.line);
+        let first = assets.iter().find(|first| format!("asset {}", first.line) == whose);
+        let whose = first.map_or_else(|| whose.to_owned(), label);
+        let what = format!("expected an output of its own for {}, found that of {whose}", label(asset));
         Failure::Invalid(format!("{output}: {what}"))
     };
     for asset in assets {
