@@ -80,7 +80,7 @@ pub use progress::{Progress, Stage, Step, Traffic};
 pub use storage::atomic::{discard_unfinished, write_atomically};
 pub use storage::stored_file::{FileError, StoredFile};
 
-/// Compiles the example of the crate's README.
+/// Compiles the examples of the crate's README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
