@@ -469,7 +469,7 @@ typedef struct cbvh_motion_answer {
 /* Answers where the way along each path ends. */
 cbvh_status cbvh_motions(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_path *paths, size_t count,
                          const cbvh_motion_options *options, cbvh_motion_answer *answers);
-/* Answers whether each path is certainly free. It says no sooner than cbvh_motions does: this is what planners ask. */
+/* Answers whether each path is certainly free. Planners ask this: it needs less time than cbvh_motions to say no. */
 cbvh_status cbvh_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_path *paths, size_t count,
                           const cbvh_motion_options *options, bool *answers);
 /* Answer the same about the paths of cbvh_path_between from each start to its end: the edges of a planner. */

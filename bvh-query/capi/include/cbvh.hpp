@@ -1,10 +1,15 @@
-// cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. All of it is in this
-// header, and stands on cbvh.h, which documents what questions mean: shapes, units, costs, threads.
+// cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. This header wraps cbvh.h,
+// which documents the questions: shapes, units, costs and threads.
 //
 // Meshes and paths may be shared by threads; make a Querier and a Scene for each thread. Objects that were moved from
 // hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
+
+// MSVC keeps __cplusplus at 199711 unless told otherwise, and names its version in _MSVC_LANG.
+#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) < 201703L
+#error "cbvh.hpp requires C++17"
+#endif
 
 #include "cbvh.h"
 
