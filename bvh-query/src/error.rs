@@ -74,9 +74,7 @@ pub enum QueryError {
         found: String,
     },
     /// The file does not state which of its objects are closed.
-    #[error(
-        "expected a file that states which objects are closed, found none of it; bake it again without --no-topology"
-    )]
+    #[error("this file does not say which objects are closed; bake it again with topology")]
     NoTopology,
     /// The backend asked for is not available.
     #[error(transparent)]

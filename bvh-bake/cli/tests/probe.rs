@@ -361,7 +361,8 @@ fn a_file_without_topology_is_named() {
     let directory = folder.path();
     cbvh_in(directory, &["bake", "cube.obj", "-o", "bare.cbvh", "--no-topology", "-q"]).done();
     let refused = |arguments: &[&str]| {
-        cbvh_in(directory, arguments).failed(3, &["cbvh: bare.cbvh: expected", "--no-topology"]);
+        cbvh_in(directory, arguments)
+            .failed(3, &["cbvh: bare.cbvh: this file does not say", "bake it again with topology"]);
     };
     refused(&["probe", "bare.cbvh", "side.txt", "--mode", "side"]);
     refused(&["probe", "bare.cbvh", "--mode", "side", "--probe", "0 0 0"]);

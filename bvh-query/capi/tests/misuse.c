@@ -314,7 +314,7 @@ static void limits(void) {
     OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &options, &open));
     cbvh_mesh small = cube(0.25);
     FAILS(cbvh_relate(querier, open, small, &pose, 1, &relation), CBVH_INVALID_ARGUMENT,
-          "states which objects are closed");
+          "does not say which objects are closed");
     OK(cbvh_mesh_free(small));
     OK(cbvh_mesh_free(open));
 }

@@ -195,7 +195,7 @@ mod tests {
         let without = baked(&cells(3), &Options::default().topology(false));
         let error = without.is_closed(0).unwrap_err();
         assert_eq!(error, QueryError::NoTopology);
-        assert!(error.to_string().contains("bake it again without --no-topology"), "{error}");
+        assert!(error.to_string().contains("bake it again with topology"), "{error}");
         let with = baked(&cells(3), &Options::default());
         assert_eq!(with.is_closed(0), Ok(true));
         assert!(matches!(with.is_closed(1), Err(QueryError::Number { name: "object", .. })));

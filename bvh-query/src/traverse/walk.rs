@@ -228,8 +228,8 @@ fn walk<I: Isa, W: Visitor>(
     Ok(tests)
 }
 
-/// Opened nodes of A and B whose children meet. A node that was not opened takes part as the only
-/// child in question of its parent.
+/// Opened nodes of A and B whose children meet. If a node was not opened, its parent stands for it, and only this one child
+/// of the parent is tested.
 struct Sides {
     node_a: usize,
     only_a: Option<usize>,
@@ -475,7 +475,7 @@ fn rows_of(children: u16) -> u16 {
     15 * ((children | children << 3 | children << 6 | children << 9) & 0x1111)
 }
 
-/// Returns the groups of four children to test: all, or that of the only child in question.
+/// Returns the groups of four children to test: all groups, or the group of the only child to test.
 #[inline(always)]
 fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
     match only {
@@ -484,7 +484,7 @@ fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
     }
 }
 
-/// Returns the lanes whose child of A exists, or is the only one in question.
+/// Returns the lanes whose child of A exists, or is the only child to test.
 #[inline(always)]
 fn lanes_of_a(only: Option<usize>, count: usize, part: usize) -> u16 {
     match only {
@@ -493,7 +493,7 @@ fn lanes_of_a(only: Option<usize>, count: usize, part: usize) -> u16 {
     }
 }
 
-/// Returns the lanes whose child of B exists, or is the only one in question.
+/// Returns the lanes whose child of B exists, or is the only child to test.
 #[inline(always)]
 fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
     match only {

@@ -10,8 +10,8 @@
 //!     else halve it
 //! ```
 //!
-//! Descending is a guess, which costs little: what lies before the cell is not believed to be free, but set apart or looked
-//! at; what lies behind waits.
+//! Descending is a guess, and a wrong guess costs little. The search does not assume that the time before the cell is free: it
+//! sweeps that time or looks into it. The time after the cell waits.
 
 use crate::error::QueryError;
 use crate::pose::Pose;
@@ -34,14 +34,16 @@ const FIRST_PACKET_TESTS: u64 = 12;
 /// A stretch that ends within the clearance is swept when B moves by less than this fraction of the larger object's
 /// diagonal: few pairs of triangles are likely to be left.
 const FINE: f64 = 1.0 / 4096.0;
-/// Within a stretch in which B moves by less than this many times the tolerance, no time of contact is guessed: there are as
-/// few cells as a guess would take to find the right one.
+/// The search guesses no time of contact in a stretch in which B moves by less than this many times the tolerance. Guessing
+/// would take as many steps as the stretch has cells.
 const LEAST_GUESSED: f64 = 16.0;
-/// How many stretches may wait while any hit is looked for by long stretches first.
+/// The most stretches that may wait while a search for any hit takes long stretches first.
 const MOST_SPREAD: usize = 64;
 /// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
 const MAX_DEPTH: u32 = 45;
-/// Stretches are set apart together up to where B has still to move by this many times what their ends have to be apart.
+/// Bounds how close to a guessed contact several stretches are swept together. From the end of such a group to the contact, B
+/// must still move by at least this many times the gap that a sweep of the group needs. The value only divides the work; it
+/// affects no answer.
 const SAFE_REST: f64 = 4.0;
 
 /// What a search has found.
@@ -154,8 +156,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(undecided.map_or(Outcome::Free, |(free_until, at)| Outcome::Undecided { free_until, at }))
     }
 
-    /// Returns whether there is neither a hit nor a cell that is undecided. Long stretches come first, as long as they are
-    /// few: a hit is met sooner in poses that are spread over the way.
+    /// Returns whether there is neither a hit nor an undecided cell. Long stretches come first while there are few of them,
+    /// because poses that are spread over the path meet a hit earlier.
     pub(super) fn is_free(&mut self) -> Result<bool, QueryError> {
         let (whole, clearance) = (self.whole(), self.question.clearance);
         if self.is_within(&whole.stretch.poses[0], clearance)? {
@@ -224,7 +226,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         middle: &Middle,
         todo: &mut Vec<Interval>,
     ) -> Result<(), QueryError> {
-        // An interval that cannot be halved is not gone down: it would come back as it is.
+        // Do not descend into an interval that cannot be halved: it would come back unchanged.
         let can_halve = interval.depth < MAX_DEPTH;
         let ends_within = interval.pairs.is_none() && interval.ends_within == Some(true);
         if can_halve && ends_within && middle.reach > FINE * self.question.size {
@@ -316,7 +318,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Returns how many of some adjoining intervals are likely to be set apart together, and the stretch of them.
+    /// Returns how many of some adjoining intervals one sweep is likely to clear together, and their joint stretch.
     fn safe_stretch(&self, rest: &[Interval], contact: &Stretch) -> (usize, Stretch) {
         let start = &rest[0].stretch;
         let (time, pose) = (contact.times[0], contact.poses[0]);

@@ -22,9 +22,9 @@ impl Querier {
     /// triangles touch, each connected component of a mesh is on one side of the other mesh, and one point of each component
     /// tells which. Decided exactly; the answer has the same bits on all backends.
     ///
-    /// An object that is not closed contains nothing that is certainly apart from its box. About an object of the other mesh
-    /// whose box may meet that box, nothing is known, and that leaves the answer undefined where it matters: an open mesh
-    /// inside a closed one is inside it.
+    /// An object that is not closed contains nothing that is certainly apart from its box. If an object of the other mesh may
+    /// meet that box, it is unknown whether the open object contains it. The answer is then [`Relation::Undefined`], unless the
+    /// rest decides it: an open mesh inside a closed one is inside it.
     ///
     /// Cost: that of `collide`, and about a microsecond per connected component.
     ///
