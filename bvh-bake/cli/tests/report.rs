@@ -11,7 +11,7 @@ use std::process::Command;
 
 const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
-/// Runs the report, which may take longer than other commands because it bakes and measures 24 layouts.
+/// Runs the report, which may take longer than other commands because it bakes and measures 21 layouts.
 fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
     command.arg("report").args(arguments).current_dir(directory).env_remove("CBVH_ISA").output().unwrap()
@@ -36,8 +36,8 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();
-    // There are two pairs, 24 layouts and 5 questions.
-    assert_eq!(rows.len(), 2 * 24 * 5);
+    // There are two pairs, 21 layouts and 5 questions.
+    assert_eq!(rows.len(), 2 * 21 * 5);
     same_figures(&csv, rows);
     for row in rows {
         check(row);
@@ -71,10 +71,10 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let ranked = |at: &&(String, _)| at.0 == "tr";
     assert!(in_page.iter().filter(ranked).count() > 2 * 56);
     for document in [&in_page, &elements(&svg)] {
-        // A mark is a polygon. There are 24 layouts in two plots by bytes, and with 4 allowed errors in a plot by
+        // A mark is a polygon. There are 21 layouts in two plots by bytes, and with 4 allowed errors in a plot by
         // error.
         let marks = document.iter().filter(|(name, _)| name == "polygon").count();
-        assert!(marks >= 2 * (2 * 24 + 4 * 24), "{marks}");
+        assert!(marks >= 2 * (2 * 21 + 4 * 21), "{marks}");
     }
     fetches_nothing(&in_page);
     for pair in ["fcl", "tori"] {

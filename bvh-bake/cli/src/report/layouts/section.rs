@@ -334,7 +334,7 @@ fn methods(rounds: usize) -> String {
          the memory.</li>\n\
          <li>A median hides what single poses cost, and it depends on the mix of poses near contact and far \
          apart.</li>\n\
-         <li>Files that are not in memory yet take longer to answer first: see <code>cbvh query --cold</code>.</li>\n\
+         <li>Files that are not in memory yet take longer to answer first, because they are read from the disk.</li>\n\
          </ul>\n"
     )
 }
