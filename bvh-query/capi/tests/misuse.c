@@ -246,7 +246,7 @@ static void bakes(void) {
     } while (0)
     OPTION(profile, "dop7", "options.profile: expected NULL or one of dop14-u8");
     OPTION(triangles, "small", "options.triangles: expected NULL or one of f32, packed, quantized, found \"small\"");
-    OPTION(effort, "low", "options.effort: expected NULL or one of fast, default, high");
+    OPTION(effort, "low", "options.effort: expected NULL or one of fast, default");
     OPTION(effort, "\xFF", "options.effort: expected text in UTF-8");
     OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");
     OPTION(no_ids, 2, "options.no_ids: expected 0 or 1, found 2");
