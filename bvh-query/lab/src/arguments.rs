@@ -21,8 +21,6 @@ pub(crate) enum Experiment {
     Scaling(ScalingArguments),
     /// Measure layouts with cold caches, and count how many pairs of nodes their trees let through in vain
     Layouts(LayoutArguments),
-    /// Count what one more slab per child, along a direction of its own, would save, and where the bytes of files are
-    Slabs(SlabArguments),
     /// Search for wrong answers for hours: pairs near the boundary of contact, and forged files
     Search(SearchArguments),
 }
@@ -96,34 +94,6 @@ pub(crate) struct LayoutArguments {
     /// Backend: scalar, avx2 or avx512 [default: the fastest one of this CPU, unless CBVH_ISA names one]
     #[arg(long, value_name = "ISA", value_parser = backend)]
     pub(crate) isa: Option<Backend>,
-}
-
-/// Writes slabs.md, slabs.csv, slabs-shares.csv, slabs-census.csv and slabs.json. Both trees of each pair are walked in memory
-/// to the end with many variants of bounds, and tests are counted; nothing is timed. Poses are made with gaps of 1e-6, 1 %
-/// and 5 % of A's diagonal, unless files are named. Pose files that PAIRS names are not read.
-#[derive(Debug, Args)]
-pub(crate) struct SlabArguments {
-    /// The list of pairs, one per line: NAME A B, as `cbvh report` takes it
-    pub(crate) pairs: PathBuf,
-    /// The folder to write to; made if it does not exist
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// The folder of the meshes [default: that of PAIRS]
-    #[arg(long, value_name = "DIR")]
-    pub(crate) meshes: Option<PathBuf>,
-    /// Files of poses to ask about contact; %s stands for the pair's name
-    #[arg(long, value_name = "FILE[,FILE...]", value_delimiter = ',')]
-    pub(crate) contact: Vec<String>,
-    /// Files of poses to ask about distance; %s stands for the pair's name
-    #[arg(long, value_name = "FILE[,FILE...]", value_delimiter = ',')]
-    pub(crate) distance: Vec<String>,
-    /// Poses per set, spread evenly over all
-    #[arg(long, value_name = "N", default_value = "100", value_parser = clap::value_parser!(u16).range(1..=10_000))]
-    pub(crate) limit: u16,
-    /// Triangles of the largest ball; the others have a tenth and a hundredth
-    #[arg(long, value_name = "N", default_value = "1000000",
-          value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
-    pub(crate) largest: u64,
 }
 
 /// Goes on where the record ends, and saves it at least once a minute, so that it may be killed at any time. Everything in a

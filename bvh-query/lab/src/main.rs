@@ -11,7 +11,6 @@ mod output;
 mod placed;
 mod scaling;
 mod search;
-mod slabs;
 mod tree;
 mod walk;
 
@@ -27,7 +26,6 @@ fn main() -> ExitCode {
         Experiment::Hard(arguments) => hard::run(arguments),
         Experiment::Scaling(arguments) => scaling::run(arguments),
         Experiment::Layouts(arguments) => layouts::run(arguments),
-        Experiment::Slabs(arguments) => slabs::run(arguments),
         Experiment::Search(arguments) => search::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {

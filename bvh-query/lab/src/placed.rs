@@ -15,10 +15,6 @@ pub(crate) struct Placed {
     pub(crate) along_a: Frame,
     /// A along B's directions.
     pub(crate) along_b: Frame,
-    /// Turns a vector of B's frame into A's.
-    pub(crate) rotation: [[f64; 3]; 3],
-    /// From A's origin to B's, in A's frame, mesh units.
-    pub(crate) translation: [f64; 3],
 }
 
 impl Placed {
@@ -29,12 +25,7 @@ impl Placed {
         let inverse = [0, 1, 2].map(|i| [0, 1, 2].map(|j| r[j][i]));
         let back = inverse.map(|row| -(0..3).map(|axis| row[axis] * t[axis]).sum::<f64>());
         let [set_a, set_b] = sets;
-        Self {
-            along_a: Frame::new(r, t, set_a, set_b),
-            along_b: Frame::new(&inverse, back, set_b, set_a),
-            rotation: *r,
-            translation: t,
-        }
+        Self { along_a: Frame::new(r, t, set_a, set_b), along_b: Frame::new(&inverse, back, set_b, set_a) }
     }
 }
 
@@ -88,11 +79,6 @@ impl Frame {
     /// where they overlap along all directions of this side.
     pub(crate) fn gap(&self, own: &Kdop, other: &Aligned) -> f64 {
         (0..self.lengths.len()).map(|slab| self.along(slab, own, other)).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Returns the distance between the boxes around both nodes, along the axes of this side; 0 if they overlap.
-    pub(crate) fn box_gap(&self, own: &Kdop, other: &Aligned) -> f64 {
-        (0..3).map(|slab| self.along(slab, own, other).max(0.0).powi(2)).sum::<f64>().sqrt()
     }
 
     fn along(&self, slab: usize, own: &Kdop, other: &Aligned) -> f64 {

@@ -16,7 +16,6 @@ use cbvh_measure::pin::pinned;
 use cbvh_measure::{plot, table};
 use record::{Record, Settings};
 use row::Row;
-pub(crate) use sizes::GAPS;
 use sizes::Size;
 
 /// Batches and paths use the largest ball with at most about this many triangles.

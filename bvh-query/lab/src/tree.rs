@@ -1,4 +1,4 @@
-//! The tree of a file in memory: each node has the bound that a query decodes, the tight one, and its triangles.
+//! The tree of a file in memory: each node has the bound that a query decodes, the tight one, and its children.
 
 use bvh_format::decode::decode_child;
 use bvh_format::kdop::{DirectionSet, Kdop};
@@ -14,8 +14,6 @@ pub(crate) struct Tree {
     pub(crate) set: DirectionSet,
     /// The object's origin, mesh units.
     pub(crate) origin: [f64; 3],
-    /// The corners of all triangles around the origin. Those below one node follow each other.
-    corners: Vec<[[f32; 3]; 3]>,
 }
 
 /// A node: a treelet, or a leaf if it has triangles.
@@ -27,9 +25,6 @@ pub(crate) struct Node {
     pub(crate) children: Vec<u32>,
     /// Triangles of a leaf, 0 for a treelet.
     pub(crate) triangles: u32,
-    /// The triangles below: the place of the first one, and their number.
-    first: u32,
-    pub(crate) below: u32,
 }
 
 impl Tree {
@@ -41,26 +36,17 @@ impl Tree {
         let page = |number: u32| Some(Page::new(layout.page_bytes(bytes, number)?, profile));
         let first = object.record().first_page.get();
         let root = page(first)?.anchor_slabs(0);
-        let mut tree = Self {
-            nodes: Vec::new(),
-            set: profile.directions(),
-            origin: object.origin(),
-            corners: Vec::new(),
-        };
+        let mut tree = Self { nodes: Vec::new(), set: profile.directions(), origin: object.origin() };
         let inner = |slabs_of: &NodeSlabs| Node {
             bound: slabs_of.to_kdop(slabs),
             tight: Kdop::EMPTY,
             children: Vec::new(),
             triangles: 0,
-            first: 0,
-            below: 0,
         };
         tree.nodes.push(inner(&root));
-        // Treelets to read: node, page, slot, decoded slabs. A treelet's own leaves are read first, then one of its
-        // subtrees after the other; that keeps the triangles below a node together.
+        // Treelets to read: node, page, slot, decoded slabs.
         let mut stack = vec![(0, first, 0, root)];
         while let Some((node, number, slot, decoded)) = stack.pop() {
-            tree.nodes[node].first = tree.corners.len() as u32;
             let page_here = page(number)?;
             let treelet = page_here.treelet(slot);
             let links = page_here.links(slot);
@@ -83,10 +69,8 @@ impl Tree {
                     let block = layout.leaf_block(bytes, page_here.header());
                     let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                     let corners = (0..usize::from(triangles)).map(|lane| values.triangle(lane));
-                    found.tight = Kdop::of_points(corners.clone().flatten());
-                    (found.triangles, found.below) = (triangles.into(), triangles.into());
-                    found.first = tree.corners.len() as u32;
-                    tree.corners.extend(corners);
+                    found.tight = Kdop::of_points(corners.flatten());
+                    found.triangles = triangles.into();
                 }
                 tree.nodes.push(found);
                 tree.nodes[node].children.push(place as u32);
@@ -96,22 +80,15 @@ impl Tree {
         Some(tree)
     }
 
-    /// Returns the corners of the triangles below a node, around the origin.
-    pub(crate) fn corners_below(&self, node: &Node) -> &[[[f32; 3]; 3]] {
-        &self.corners[node.first as usize..][..node.below as usize]
-    }
-
-    /// Finds the tight bounds of treelets, and how many triangles are below, from those of leaves.
+    /// Finds the tight bounds of treelets from those of leaves.
     fn sum_up(&mut self) {
         let slabs = self.set.slabs();
         for number in (0..self.nodes.len()).rev() {
-            let Node { mut tight, mut below, .. } = self.nodes[number];
+            let mut tight = self.nodes[number].tight;
             for &child in &self.nodes[number].children {
-                let child = &self.nodes[child as usize];
-                tight.join(&child.tight, slabs);
-                below += child.below;
+                tight.join(&self.nodes[child as usize].tight, slabs);
             }
-            (self.nodes[number].tight, self.nodes[number].below) = (tight, below);
+            self.nodes[number].tight = tight;
         }
     }
 }

@@ -10,7 +10,7 @@ use bvh_format::kdop::Kdop;
 /// Nodes this many times larger than their partner are opened alone, as in a query.
 const MUCH_LARGER: f32 = 2.0;
 /// The number of node tests after which a walk is given up: some thousand times what good bounds need, half a second.
-pub(crate) const MAX_NODE_TESTS: u64 = 1 << 17;
+const MAX_NODE_TESTS: u64 = 1 << 17;
 
 /// What a walk counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
