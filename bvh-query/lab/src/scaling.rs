@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &ScalingArguments) -> Result<String, Failure> {
         record.rows.extend(part.rows);
         record.wrong.extend(part.wrong);
     }
-    let svg = plot::svg(&[figure::figure(&record.rows)]).map_err(|error| error.to_string())?;
+    let svg = plot::svg(&[figure::figure(&record.rows)]);
     let files = [
         ("scaling.csv", table::csv(&record.rows)),
         ("scaling.json", output::json(&record)?),

@@ -7,7 +7,7 @@ use crate::poses::{Approach, Random, diagonal, dot};
 use bvh_query::{Bvh, Motion, MotionError, Pose, Querier, QueryError};
 
 /// How the motions are made in turn, in a phrase.
-pub const MADE: &str = "a quarter each long ways, short ways, slides and turns on the spot";
+pub const MADE: &str = "made: a quarter each long ways, short ways, slides and turns on the spot";
 
 /// The gap at the start of a motion, as a fraction of A's diagonal: of long ways, short ways, slides and turns.
 const GAPS: [f64; 4] = [0.05, 0.01, 0.005, 0.01];

@@ -57,7 +57,7 @@ impl Cell {
     }
 
     /// Writes it as tables have it: numbers in the fewest digits that give them back.
-    fn field(&self) -> String {
+    pub fn field(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),

@@ -1,6 +1,5 @@
 //! The meshes of a pair: read from mesh files or taken out of `.cbvh` files, and baked in memory, ready to be timed.
 
-use super::Subject;
 use crate::asking::mesh::{is_baked, refuse_scene};
 use crate::console::Failure;
 use bvh_bake::mesh::Mesh;
@@ -10,6 +9,7 @@ use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
 use bvh_format::validate::{packets, validate};
 use bvh_query::Bvh;
+use cbvh_measure::pairs::Pair;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -59,8 +59,7 @@ fn unbaked(path: &Path) -> Result<Mesh, Failure> {
 pub(super) type Baked = (Arc<Bvh>, BakeReport);
 
 /// Bakes both meshes of a pair. If it is a mesh and itself, the second is the first.
-pub(super) fn bake_both(subject: &Subject<'_>, options: &Options) -> Result<[Baked; 2], Failure> {
-    let Subject { pair, meshes: [a, b], .. } = subject;
+pub(super) fn bake_both(pair: &Pair, [a, b]: &[Mesh; 2], options: &Options) -> Result<[Baked; 2], Failure> {
     let baked_a = bake(&pair.a, a, options)?;
     let baked_b = if pair.a == pair.b { baked_a.clone() } else { bake(&pair.b, b, options)? };
     Ok([baked_a, baked_b])

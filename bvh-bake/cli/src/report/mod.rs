@@ -1,7 +1,7 @@
 //! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
 //!
-//! `layouts` and `motions` are the two kinds of report. They share what comes before and after the measurement: the list
-//! of pairs, the meshes, and four files that hold the same figures: a table, JSON, a drawing and a page for people.
+//! `layouts` and `motions` are the two kinds of report. Both make rows of named figures, from which all else is written: a
+//! table, JSON, a drawing and a page for people.
 
 mod layouts;
 mod meshes;
@@ -10,8 +10,9 @@ mod page;
 
 use crate::asking::{self, files};
 use crate::console::{self, Failure, plural, spinner};
+use bvh_bake::Options;
 use bvh_bake::mesh::Mesh;
-use bvh_query::{Backend, Bvh};
+use bvh_query::{Backend, Bvh, Querier, QueryError};
 use cbvh_measure::origin::Origin;
 use cbvh_measure::pairs::{self, Pair};
 use cbvh_measure::pin::Pinned;
@@ -19,7 +20,9 @@ use cbvh_measure::plot::{self, Figure};
 use cbvh_measure::poses::diagonal;
 use cbvh_measure::table::{self, Cell};
 use clap::Args;
+use meshes::{Baked, bake_both};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 const REPORT_HELP: &str = "\
@@ -87,106 +90,68 @@ pub(crate) struct ReportArguments {
 
 /// Rounds and items of `--quick`.
 const QUICK: (usize, usize) = (2, 10);
+/// The number of items that are made for a pair without any.
+const MADE: usize = 60;
 
 /// What one kind of report has that the other does not. Its items are poses or motions.
 struct Kind<T> {
     words: page::Words,
-    /// Says how many items per pair are asked about at most.
-    limit: fn(usize) -> Limit,
+    /// What its items are called.
+    items: &'static str,
     /// Reads a file of items.
     read: fn(&Path) -> Result<Vec<T>, Failure>,
-    /// Measures a pair with the given items, or with items that are made if there are none.
-    measure: fn(&Subject<'_>, Vec<T>) -> Result<Measured, Failure>,
+    /// Makes so many items for two meshes, and says how.
+    make: fn(&mut Querier, &Bvh, &Bvh, usize) -> Result<Vec<T>, QueryError>,
+    made: &'static str,
+    /// Measures a pair.
+    measure: fn(&Subject<'_>, &[T]) -> Result<Measured, Failure>,
 }
 
-/// A pair to measure.
+/// A pair to measure, and how.
 struct Subject<'a> {
     pair: &'a Pair,
     meshes: &'a [Mesh; 2],
-    settings: &'a Settings,
+    /// Both meshes as `cbvh bake` bakes them without options.
+    baked: &'a [Baked; 2],
     backend: Backend,
-    tell: &'a (dyn Fn(&str) + Sync),
+    rounds: usize,
 }
 
-/// A row of `report.csv`: its figures with their names. JSON and the tables of the page take them from here.
+/// A row of `report.csv`: its figures with their names. All that is told of it is taken from here.
 type Cells = Vec<(&'static str, Cell)>;
+
+/// Returns a figure of a row, if it was taken.
+fn number(row: &Cells, name: &str) -> Option<f64> {
+    match row.iter().find(|(other, _)| *other == name)?.1 {
+        Cell::Number(value) => Some(value),
+        Cell::Count(count) => Some(count as f64),
+        Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
+        _ => None,
+    }
+}
 
 /// The results of a pair.
 struct Measured {
-    record: PairRecord,
     rows: Vec<Cells>,
     /// Wrong answers, one line each.
     wrong: Vec<String>,
-}
-
-/// The largest number of items per pair, 0 for all.
-#[derive(Debug, Clone, Copy, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Limit {
-    Poses(usize),
-    Motions(usize),
-}
-
-/// How much is measured.
-#[derive(Debug, Serialize)]
-struct Settings {
-    quick: bool,
-    rounds: usize,
-    #[serde(flatten)]
-    limit: Limit,
-    isa: &'static str,
-}
-
-impl Settings {
-    /// Returns at most as many items as the settings allow, spread evenly over all.
-    fn some_of<T: Clone>(&self, all: &[T]) -> Vec<T> {
-        let (Limit::Poses(limit) | Limit::Motions(limit)) = self.limit;
-        pairs::spread_evenly(all, limit)
-    }
-}
-
-/// One mesh of a pair.
-#[derive(Debug, Serialize)]
-struct SideRecord {
-    mesh: String,
-    triangles: u64,
-    /// The diagonal of its box, mesh units.
-    diagonal: f64,
-    /// The layout that `cbvh bake` chooses by itself.
-    chosen_layout: String,
-}
-
-impl SideRecord {
-    fn new(path: &Path, bvh: &Bvh, chosen_layout: String) -> Self {
-        let mesh = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        Self { mesh, triangles: bvh.all().triangles(), diagonal: diagonal(bvh), chosen_layout }
-    }
-}
-
-/// A pair, what it was asked about, and its section of the page.
-#[derive(Debug, Serialize)]
-struct PairRecord {
-    name: String,
-    a: SideRecord,
-    b: SideRecord,
-    /// How many items there are, and the names of their files or how they were made.
-    #[serde(flatten)]
-    items: serde_json::Value,
-    /// The processor that the measuring thread was bound to.
+    /// Further fields of the pair's record.
+    counts: Vec<(&'static str, usize)>,
     pinned: Option<Pinned>,
-    #[serde(skip)]
-    section: Section,
-}
-
-/// The section of a pair on the page.
-#[derive(Debug)]
-struct Section {
-    /// What was asked about, in a phrase.
-    items: String,
     /// What is found, the most important sentence first.
     sentences: Vec<String>,
     figure: Figure,
     /// The tables, as HTML.
+    tables: String,
+}
+
+/// A pair on the page.
+struct Section {
+    name: String,
+    /// The meshes and the items, in sentences.
+    about: String,
+    sentences: Vec<String>,
+    figure: Figure,
     tables: String,
 }
 
@@ -195,12 +160,14 @@ struct Section {
 struct Report {
     #[serde(flatten)]
     origin: Origin,
-    settings: Settings,
-    pairs: Vec<PairRecord>,
+    settings: Value,
+    pairs: Vec<Value>,
     /// Answers that are not what they must be, one line each.
     wrong: Vec<String>,
     #[serde(serialize_with = "table::objects")]
     rows: Vec<Cells>,
+    #[serde(skip)]
+    sections: Vec<Section>,
 }
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
@@ -211,7 +178,11 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
 }
 
 /// Measures one pair after another. `files` are further files of items for all pairs.
-fn run_kind<T>(arguments: &ReportArguments, kind: Kind<T>, files: Option<&str>) -> Result<(), Failure> {
+fn run_kind<T: Clone>(
+    arguments: &ReportArguments,
+    kind: Kind<T>,
+    files: Option<&str>,
+) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.isa)?;
     // All inputs are read before the first pair is measured, so that an error in the last one shows at once.
     let inputs = read(arguments, &kind, files)?;
@@ -219,24 +190,65 @@ fn run_kind<T>(arguments: &ReportArguments, kind: Kind<T>, files: Option<&str>) 
     std::fs::create_dir_all(out).map_err(|error| {
         Failure::System(format!("{}: expected a folder to write to, found {error}", out.display()))
     })?;
-    let asked = (usize::from(arguments.rounds), arguments.limit);
-    let (rounds, limit) = if arguments.quick { QUICK } else { asked };
-    let settings =
-        Settings { quick: arguments.quick, rounds, limit: (kind.limit)(limit), isa: backend.name() };
-    let origin = Origin::of("cbvh report");
-    let mut report = Report { origin, settings, pairs: Vec::new(), wrong: Vec::new(), rows: Vec::new() };
+    let quick = arguments.quick;
+    let (rounds, limit) = if quick { QUICK } else { (usize::from(arguments.rounds), arguments.limit) };
+    let mut report = Report {
+        origin: Origin::of("cbvh report"),
+        settings: json!({ "quick": quick, "rounds": rounds, kind.items: limit, "isa": backend.name() }),
+        pairs: Vec::new(),
+        wrong: Vec::new(),
+        rows: Vec::new(),
+        sections: Vec::new(),
+    };
     let spinner = spinner(false);
     for (pair, given, meshes) in inputs {
-        let tell = |what: &str| spinner.set_message(format!("{}: {what}", pair.name));
-        let settings = &report.settings;
-        let subject = Subject { pair: &pair, meshes: &meshes, settings, backend, tell: &tell };
-        let Measured { record, rows, wrong } = (kind.measure)(&subject, given)?;
-        report.pairs.push(record);
-        report.rows.extend(rows);
-        report.wrong.extend(wrong);
+        spinner.set_message(pair.name.clone());
+        let baked = bake_both(&pair, &meshes, &Options::default())?;
+        let [(a, _), (b, _)] = &baked;
+        let (from, all) = if given.is_empty() {
+            let made = (kind.make)(&mut Querier::with_backend(backend), a, b, MADE);
+            let made = made.map_err(|error| Failure::Invalid(format!("{}: {error}", pair.name)))?;
+            (kind.made.to_owned(), made)
+        } else {
+            (pair.files.iter().map(|file| files::stem(file)).collect::<Vec<_>>().join(", "), given)
+        };
+        let items = pairs::spread_evenly(&all, limit);
+        let subject = Subject { pair: &pair, meshes: &meshes, baked: &baked, backend, rounds };
+        let measured = (kind.measure)(&subject, &items)?;
+        report.add(&subject, measured, (kind.items, items.len(), &from));
     }
     spinner.finish_and_clear();
     write(&report, &kind.words, out)
+}
+
+impl Report {
+    /// Adds the results of a pair, which was asked about so many items of this name and origin.
+    fn add(&mut self, subject: &Subject<'_>, measured: Measured, (items, count, from): (&str, usize, &str)) {
+        let Subject { pair, baked, .. } = subject;
+        let side = |path: &Path, (bvh, report): &Baked| {
+            json!({
+                "mesh": path.file_name().unwrap_or_default().to_string_lossy(), "triangles": bvh.all().triangles(),
+                "diagonal": diagonal(bvh), "chosen_layout": meshes::layout_of(report),
+            })
+        };
+        let [a, b] = [side(&pair.a, &baked[0]), side(&pair.b, &baked[1])];
+        let in_words = |side: &Value| {
+            let (name, triangles) = (side["mesh"].as_str().unwrap_or_default(), &side["triangles"]);
+            let diagonal = side["diagonal"].as_f64().unwrap_or_default();
+            format!("{name}, {triangles} triangles, diagonal {diagonal:.4} mesh units")
+        };
+        let (name, about_a, about_b) = (pair.name.clone(), in_words(&a), in_words(&b));
+        let mut record = json!({
+            "name": name, "a": a, "b": b, items: count, format!("{items}_from"): from, "pinned": measured.pinned,
+        });
+        measured.counts.iter().for_each(|(key, count)| record[*key] = json!(count));
+        let about = format!("A: {about_a}. B: {about_b}. {count} {items} ({from}).");
+        let Measured { rows, wrong, sentences, figure, tables, .. } = measured;
+        self.pairs.push(record);
+        self.wrong.extend(wrong);
+        self.rows.extend(rows);
+        self.sections.push(Section { name, about, sentences, figure, tables });
+    }
 }
 
 /// A pair with its items, of which there may be none, and its meshes.
@@ -271,20 +283,14 @@ fn read<T>(
     with_meshes.collect()
 }
 
-/// Returns the names of a pair's files.
-fn files_of(pair: &Pair) -> String {
-    pair.files.iter().map(|file| files::stem(file)).collect::<Vec<_>>().join(", ")
-}
-
 /// Writes the four files, and prints a summary. Wrong answers are a failure, of which the files tell.
 fn write(report: &Report, words: &page::Words, out: &Path) -> Result<(), Failure> {
-    let failed = |error: &dyn std::fmt::Display| Failure::System(format!("{}: {error}", out.display()));
-    let figures: Vec<Figure> = report.pairs.iter().map(|pair| pair.section.figure.clone()).collect();
+    let figures: Vec<Figure> = report.sections.iter().map(|section| section.figure.clone()).collect();
     for (name, text) in [
         ("report.csv", table::csv(&report.rows)),
-        ("report.json", table::json(report).map_err(|error| failed(&error))?),
-        ("report.svg", plot::svg(&figures).map_err(|error| failed(&error))?),
-        ("report.html", page::page(report, words).map_err(|error| failed(&error))?),
+        ("report.json", table::json(report).map_err(|error| Failure::System(error.to_string()))?),
+        ("report.svg", plot::svg(&figures)),
+        ("report.html", page::page(report, words)),
     ] {
         bvh_bake::write_atomically(&out.join(name), text.as_bytes())
             .map_err(|error| Failure::System(error.to_string()))?;
@@ -297,9 +303,9 @@ fn write(report: &Report, words: &page::Words, out: &Path) -> Result<(), Failure
         counted(report.rows.len(), "row"),
         counted(report.wrong.len(), "wrong answer")
     );
-    for pair in &report.pairs {
-        for line in &pair.section.sentences {
-            text += &format!("  {}: {line}\n", pair.name);
+    for section in &report.sections {
+        for line in &section.sentences {
+            text += &format!("  {}: {line}\n", section.name);
         }
     }
     console::text(&text)?;

@@ -4,29 +4,51 @@
 //! The ways take turns in rounds. Ten thousand samples take thousands of times as long as a certified answer, so each way
 //! asks in the first round, and then in as many more as fit into its share of time.
 
-mod errors;
-mod method;
-mod section;
+mod ways;
 
-use super::meshes::{bake_both, layout_of};
-use super::{Cells, Kind, Limit, Measured, PairRecord, SideRecord, Subject, files_of};
+use super::page::{Column, Words, percent, table};
+use super::{Cells, Kind, Measured, Subject, number};
 use crate::asking::motions;
-use crate::console::Failure;
-use bvh_bake::Options;
+use crate::console::{Failure, plural};
 use bvh_query::{Backend, Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError};
 use cbvh_measure::motions::{MADE, mixed};
 use cbvh_measure::pin::pinned;
+use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
 use cbvh_measure::rounds::{order, take_turn};
 use cbvh_measure::spread::{Spread, mean_of_rounds};
-use cbvh_measure::table::{self, Cell};
-use errors::{Errors, is_hit, judge};
-use method::{Asker, Method, Said};
+use cbvh_measure::table::{self, Cell, micro, whole};
+use ways::{Asker, Method, SAMPLES, Said, is_hit, judge};
 
 pub(super) const KIND: Kind<Motion> =
-    Kind { words: section::WORDS, limit: Limit::Motions, read: motions::read, measure };
+    Kind { words: WORDS, items: "motions", read: motions::read, make: mixed, made: MADE, measure };
 
-/// The number of motions that are made for a pair without any.
-const MADE_MOTIONS: usize = 60;
+const ABOUT: &str = "\
+Whether the way of a moving mesh is free is often asked by samples: poses along the way, of which the first that touches \
+ends the question. Samples miss contacts between them, and find others late. cbvh certifies its answers for every moment \
+between start and end. This page tells for each pair of meshes what samples miss, how late they are, and how long they \
+take beside the certified answers.";
+
+/// What is known if no answer is wrong.
+const RIGHT: &str = "\
+No answer contradicts another: no sample touches where a motion is certified free, or before the time until which it is.";
+
+const METHODS: &str = "\
+<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches. A \
+spread order asks about both ends and then in van der Corput's order: halves, quarters, and so on. It finds some contact \
+sooner, but not the first one.</li>
+<li>Certified answers are those of <code>Querier::motion</code>, which finds the first contact, and of \
+<code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided that comes nearer than a millionth of \
+the larger mesh's diagonal without a contact.</li>
+<li>Missed is a certified contact where all samples are free. Late is the time between the moment until which the way is \
+certified free and the contact found, as a fraction of the way, over the contacts that are not missed.</li>
+<li>Times are those of single motions on one thread that is bound to one processor, with the poses of samples made on the \
+way. All ways to ask take turns in rounds, as many as fit into 10 seconds per pair, but at least one; \
+<code>report.csv</code> has their number. A median is taken over the motions of a round and then over the rounds.</li>
+<li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";
+
+const WORDS: Words =
+    Words { title: "How many samples for these motions?", about: ABOUT, right: RIGHT, methods: METHODS };
+
 /// For how long each way asks about the motions of a pair, in seconds, unless one round takes longer.
 const MAX_SECONDS: f64 = 10.0;
 
@@ -79,117 +101,170 @@ fn ask(
     Ok(all)
 }
 
-/// A row: one way to ask about the motions of one pair of meshes.
-#[derive(Debug, Clone)]
-struct Row {
-    method: Method,
-    motions: u64,
-    /// Certified hits.
-    hits: u64,
-    errors: Errors,
-    /// How many rounds fitted into the time.
-    rounds: u64,
-    time: Option<Spread>,
-    /// The mean time, in nanoseconds.
-    mean: Option<f64>,
-}
-
-impl Row {
-    /// The share of the certified hits that are missed; `None` if there are none.
-    fn missed_share(&self) -> Option<f64> {
-        (self.hits > 0).then(|| self.errors.missed as f64 / self.hits as f64)
-    }
-
-    /// The median time in nanoseconds.
-    fn nanoseconds(&self) -> Option<f64> {
-        self.time.map(|time| time.median)
-    }
-
-    fn cells(&self, pair: &str) -> Cells {
-        let mut cells = vec![
-            ("pair", Cell::text(pair)),
-            ("method", Cell::text(self.method.name())),
-            ("samples", Cell::count(self.method.samples().map(u64::from))),
-            ("motions", Cell::Count(self.motions)),
-            ("hits", Cell::Count(self.hits)),
-            ("missed", Cell::Count(self.errors.missed)),
-            ("missed_share", Cell::number(self.missed_share())),
-            ("late_median", Cell::number(self.errors.late_median)),
-            ("late_max", Cell::number(self.errors.late_max)),
-            ("undecided", Cell::count(self.errors.undecided)),
-            ("rounds", Cell::Count(self.rounds)),
-        ];
-        cells.extend(table::times(["ns_median", "ns_q1", "ns_q3", "ns_p90"], self.time));
-        cells.push(("ns_mean", Cell::number(self.mean)));
-        cells
-    }
-}
-
-/// Measures all ways to ask about the given motions, or about motions that are made.
-fn measure(subject: &Subject<'_>, given: Vec<Motion>) -> Result<Measured, Failure> {
-    let Subject { pair, settings, backend, tell, .. } = *subject;
-    let failed = |error: QueryError| Failure::Invalid(format!("{}: {error}", pair.name));
-    tell("baking");
-    let [(a, report_a), (b, report_b)] = bake_both(subject, &Options::default())?;
-    let (from, all) = if given.is_empty() {
-        tell("making motions");
-        let made = mixed(&mut Querier::with_backend(backend), &a, &b, MADE_MOTIONS).map_err(failed)?;
-        (format!("made: {MADE}"), made)
-    } else {
-        (files_of(pair), given)
-    };
-    let motions = settings.some_of(&all);
-    tell("measuring");
+/// Measures all ways to ask about the motions of a pair.
+fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failure> {
+    let Subject { pair, baked: [(a, _), (b, _)], backend, rounds, .. } = *subject;
     let methods: Vec<Method> = Method::all().collect();
     let (pinned, answers) = pinned(|| {
-        let certified = certified([&a, &b], &motions, backend)?;
-        Ok((certified, ask(&methods, [&a, &b], &motions, backend, settings.rounds)?))
+        let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
+        let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
+        let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>()?;
+        Ok((certified, ask(&methods, [a, b], motions, backend, rounds)?))
     });
+    let failed = |error: QueryError| Failure::Invalid(format!("{}: {error}", pair.name));
     let (certified, asked) = answers.map_err(failed)?;
     let (mut rows, mut wrong) = (Vec::new(), Vec::new());
     for (&method, asked) in methods.iter().zip(&asked) {
-        let (row, contradictions) = row(&pair.name, method, &certified, asked);
-        rows.push(row);
+        let (errors, contradictions) = judge(&pair.name, method, &certified, &asked.said);
         wrong.extend(contradictions);
+        let hits = certified.iter().filter(|answer| is_hit(answer)).count() as u64;
+        let mut cells = vec![
+            ("pair", Cell::text(&pair.name)),
+            ("method", Cell::text(method.name())),
+            ("samples", Cell::count(method.samples().map(u64::from))),
+            ("motions", Cell::Count(certified.len() as u64)),
+            ("hits", Cell::Count(hits)),
+            ("missed", Cell::Count(errors.missed)),
+            ("missed_share", Cell::number((hits > 0).then(|| errors.missed as f64 / hits as f64))),
+            ("late_median", Cell::number(errors.late_median)),
+            ("late_max", Cell::number(errors.late_max)),
+            ("undecided", Cell::count(errors.undecided)),
+            ("rounds", Cell::Count(asked.rounds.len() as u64)),
+        ];
+        let time = Spread::of_rounds(&asked.rounds);
+        cells.extend(table::times(["ns_median", "ns_q1", "ns_q3", "ns_p90"], time));
+        cells.push(("ns_mean", Cell::number(mean_of_rounds(&asked.rounds))));
+        rows.push(cells);
     }
     let count = |is: fn(&MotionAnswer) -> bool| certified.iter().filter(|answer| is(answer)).count();
     let free = count(|answer| matches!(answer, MotionAnswer::Free));
     let undecided = count(|answer| matches!(answer, MotionAnswer::Near { .. }));
-    let items = serde_json::json!({
-        "motions_from": from, "motions": motions.len(), "free": free, "hits": count(is_hit), "undecided": undecided,
-    });
-    let section = section::section(&pair.name, &rows, [free, undecided], &from);
-    let [a, b] = [(&pair.a, &a, &report_a), (&pair.b, &b, &report_b)]
-        .map(|(path, bvh, report)| SideRecord::new(path, bvh, layout_of(report)));
-    let record = PairRecord { name: pair.name.clone(), a, b, items, pinned, section };
-    Ok(Measured { record, rows: rows.iter().map(|row| row.cells(&pair.name)).collect(), wrong })
+    let named: Vec<(String, &Cells)> =
+        methods.iter().zip(&rows).map(|(method, row)| (method.in_words(), row)).collect();
+    let title = "Errors and times: what each way to ask misses, how late it is with other contacts, how long it takes";
+    Ok(Measured {
+        sentences: sentences(&methods, &rows, [free, undecided]),
+        figure: figure(&pair.name, &methods, &rows),
+        tables: table(title, &["pair", "method", "samples"], &named, &COLUMNS),
+        rows,
+        wrong,
+        counts: vec![("free", free), ("hits", count(is_hit)), ("undecided", undecided)],
+        pinned,
+    })
 }
 
-/// Returns the certified answers, which the others are compared with.
-fn certified(
-    [a, b]: [&Bvh; 2],
-    motions: &[Motion],
-    backend: Backend,
-) -> Result<Vec<MotionAnswer>, QueryError> {
-    let mut querier = Querier::with_backend(backend);
-    let options = MotionOptions::new();
-    motions.iter().map(|motion| querier.motion(a, b, motion, &options)).collect()
-}
+/// The number of samples that the sentences tell of first.
+const USUAL_SAMPLES: u32 = 100;
 
-/// Returns the row of one way to ask, and a line for each contradiction.
-fn row(pair: &str, method: Method, certified: &[MotionAnswer], asked: &Asked) -> (Row, Vec<String>) {
-    let (errors, contradictions) = judge(pair, method, certified, &asked.said);
-    let row = Row {
-        method,
-        motions: certified.len() as u64,
-        hits: certified.iter().filter(|answer| is_hit(answer)).count() as u64,
-        errors,
-        rounds: asked.rounds.len() as u64,
-        time: Spread::of_rounds(&asked.rounds),
-        mean: mean_of_rounds(&asked.rounds),
+/// Returns the sentences about a pair, the most important one first.
+fn sentences(methods: &[Method], rows: &[Cells], [free, undecided]: [usize; 2]) -> Vec<String> {
+    let row = |method: Method| methods.iter().position(|&other| other == method).map(|place| &rows[place]);
+    let time = |row: &Cells| number(row, "ns_median").unwrap_or_default();
+    let missed = |row: &Cells| number(row, "missed").unwrap_or_default();
+    // How many times as long as the other way, with two digits or more.
+    let ratio = |row: &Cells, other: &Cells| match time(row) / time(other) {
+        ratio @ 10.0.. => whole(ratio),
+        ratio @ 1.0.. => format!("{ratio:.1}"),
+        ratio => format!("{ratio:.2}"),
     };
-    (row, contradictions)
+    let (Some(motion), Some(is_free)) = (row(Method::Motion), row(Method::IsFree)) else { return Vec::new() };
+    let figure = |name| number(motion, name).unwrap_or_default() as u64;
+    let are = |count: usize| if count == 1 { "is" } else { "are" };
+    let (motions, hits) = (figure("motions"), figure("hits"));
+    let mut sentences = vec![format!(
+        "Of {motions} {}, {hits} {}, {free} {} free and {undecided} {} undecided. The median time is {} \u{b5}s for the \
+         certified first contact and {} \u{b5}s for the certified yes or no.",
+        plural(motions, "motion"),
+        if hits == 1 { "hits" } else { "hit" },
+        are(free),
+        are(undecided),
+        micro(time(motion)),
+        micro(time(is_free))
+    )];
+    if hits == 0 {
+        sentences.push("There is no contact to miss.".to_owned());
+        return sentences;
+    }
+    if let Some(usual) = row(Method::Ordered(USUAL_SAMPLES)) {
+        let late = match (number(usual, "late_median"), number(usual, "late_max")) {
+            (Some(median), Some(max)) => {
+                format!(
+                    ", find the others {} of the way late in the median and {} at worst,",
+                    percent(median),
+                    percent(max)
+                )
+            }
+            _ => String::new(),
+        };
+        sentences.push(format!(
+            "{USUAL_SAMPLES} samples in the order of time miss {} of {hits} contacts{late} and take {} \u{b5}s, {} times as \
+             long as the certified first contact.",
+            missed(usual),
+            micro(time(usual)),
+            ratio(usual, motion)
+        ));
+    }
+    // The number of samples from which on all miss none.
+    let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
+    let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
+    let samples = enough.unwrap_or(SAMPLES[SAMPLES.len() - 1]);
+    if let (Some(ordered), Some(spread)) = (row(Method::Ordered(samples)), row(Method::Spread(samples))) {
+        let number = whole(samples.into());
+        let lead = match enough {
+            Some(_) => format!("From {number} samples on, none is missed: {number} samples"),
+            None => format!("Even {number} samples miss {}: they", missed(ordered)),
+        };
+        sentences.push(format!(
+            "{lead} take {} \u{b5}s in the order of time, {} times as long as the certified first contact, and {} \u{b5}s \
+             in a spread order, {} times as long as the certified yes or no.",
+            micro(time(ordered)),
+            ratio(ordered, motion),
+            micro(time(spread)),
+            ratio(spread, is_free)
+        ));
+    }
+    sentences
 }
+
+/// Returns the plots of a pair: time against the share of contacts missed, and against how late the others are found.
+fn figure(pair: &str, methods: &[Method], rows: &[Cells]) -> Figure {
+    let panel = |title: String, x, field: &str| {
+        let y = "median time per motion, \u{b5}s";
+        let mut panel = Panel { title, x, y, lines: Vec::new(), marks: Vec::new(), labels: Vec::new() };
+        for kind in 0..Method::KINDS.len() {
+            let look = Look { kind, is_filled: true };
+            let mut points = Vec::new();
+            for (method, row) in methods.iter().zip(rows).filter(|(method, _)| method.kind() == kind) {
+                let (Some(error), Some(time)) = (number(row, field), number(row, "ns_median")) else {
+                    continue;
+                };
+                points.push((100.0 * error, time / 1000.0));
+                panel.labels.push(((100.0 * error, time / 1000.0), method.in_words()));
+            }
+            panel.marks.extend(points.iter().map(|&at| Mark { at, look }));
+            panel.lines.push(Line { points, look: Some(look) });
+        }
+        panel
+    };
+    let title = |what: &str| format!("{pair}: time against {what}");
+    let missed = panel(title("contacts missed"), "contacts missed, % of the certified ones", "missed_share");
+    let late = panel(title("how late contacts are found"), "late in the median, % of the way", "late_median");
+    let look = |kind| Look { kind, is_filled: true };
+    let legend = Method::KINDS.iter().enumerate().map(|(kind, name)| (look(kind), (*name).to_owned()));
+    Figure { title: pair.to_owned(), legend: legend.collect(), rows: vec![vec![missed, late]] }
+}
+
+/// The columns of the table.
+const COLUMNS: [Column; 8] = [
+    ("contacts missed", "missed", whole),
+    ("share missed", "missed_share", percent),
+    ("late, median", "late_median", percent),
+    ("late, largest", "late_max", percent),
+    ("undecided", "undecided", whole),
+    ("median, \u{b5}s", "ns_median", micro),
+    ("90 %, \u{b5}s", "ns_p90", micro),
+    ("mean, \u{b5}s", "ns_mean", micro),
+];
 
 #[cfg(test)]
 mod tests {

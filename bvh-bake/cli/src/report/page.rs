@@ -2,9 +2,8 @@
 //!
 //! Each figure of a table carries the value that `report.csv` has for it, and the best ones are bold.
 
-use super::{Cells, Report, SideRecord};
-use cbvh_measure::plot;
-use cbvh_measure::table::{Cell, whole};
+use super::{Cells, Report, number};
+use cbvh_measure::plot::{self, escape};
 use std::fmt::Write;
 
 const STYLE: &str = "\
@@ -16,7 +15,7 @@ a { color: #0059a8; } svg { display: block; max-width: 100%; height: auto; } p, 
 .scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: .85rem; \
 font-variant-numeric: tabular-nums; overflow-wrap: normal; }
 th, td { padding: .15rem .5rem; text-align: right; } td { white-space: nowrap; } th { vertical-align: bottom; \
-font-weight: 600; } tr.groups th { text-align: center; } th.first, td.first { border-left: 1px solid #ccc; }
+font-weight: 600; }
 td:first-child, th:first-child { text-align: left; position: sticky; left: 0; background: #fff; } \
 td:first-child { white-space: normal; min-width: 7rem; } tbody tr:nth-child(odd) td { background: #f3f5f8; }
 thead { border-bottom: 1px solid #1a1a1a; } .wrong { border: 2px solid #a00; \
@@ -31,12 +30,12 @@ pub(super) struct Words {
     pub(super) about: &'static str,
     /// What is known if no answer is wrong.
     pub(super) right: &'static str,
-    /// Says how it was measured in so many rounds and what the figures do not tell, as two lists with their headings.
-    pub(super) methods: fn(usize) -> String,
+    /// Says how it was measured and what the figures do not tell.
+    pub(super) methods: &'static str,
 }
 
 /// Returns the page.
-pub(super) fn page(report: &Report, words: &Words) -> Result<String, Box<dyn std::error::Error>> {
+pub(super) fn page(report: &Report, words: &Words) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: {0}</title>\n<style>{STYLE}</style>\n\
@@ -44,30 +43,27 @@ pub(super) fn page(report: &Report, words: &Words) -> Result<String, Box<dyn std
         words.title
     );
     page += &opening(report, words);
-    let side = |side: &SideRecord| {
-        let triangles = whole(side.triangles as f64);
-        format!("{}, {triangles} triangles, diagonal {:.4} mesh units", escape(&side.mesh), side.diagonal)
-    };
-    for pair in &report.pairs {
-        let section = &pair.section;
-        let _ = writeln!(page, "<h2 id=\"{0}\">{0}</h2>", escape(&pair.name));
-        let (a, b, items) = (side(&pair.a), side(&pair.b), escape(&section.items));
-        let _ = writeln!(page, "<p>A: {a}. B: {b}. {items}.</p>\n<ul>");
+    for section in &report.sections {
+        let (name, about) = (escape(&section.name), escape(&section.about));
+        let _ = writeln!(page, "<h2 id=\"{name}\">{name}</h2>\n<p>{about}</p>\n<ul>");
         for sentence in &section.sentences {
             let _ = writeln!(page, "<li>{}</li>", escape(sentence));
         }
         page += "</ul>\n";
-        page += &plot::svg(std::slice::from_ref(&section.figure))?;
+        page += &plot::svg(std::slice::from_ref(&section.figure));
         page += &section.tables;
     }
-    page += &(words.methods)(report.settings.rounds);
-    Ok(page + "</body>\n</html>\n")
+    format!(
+        "{page}<h2 id=\"methods\">How it was measured, and what the figures do not tell</h2>\n<ul>\n{}\n</ul>\n\
+         </body>\n</html>\n",
+        words.methods
+    )
 }
 
 /// Says what the page is about, and whether the answers were right.
 fn opening(report: &Report, words: &Words) -> String {
     let names: Vec<String> =
-        report.pairs.iter().map(|pair| format!("<a href=\"#{0}\">{0}</a>", escape(&pair.name))).collect();
+        report.sections.iter().map(|of| format!("<a href=\"#{0}\">{0}</a>", escape(&of.name))).collect();
     let mut text = format!(
         "<p>{} Pairs: {}.</p>\n\
          <p>Measured on {} with cbvh {} (format {}), backend {}, one thread, on {}.</p>\n",
@@ -76,7 +72,7 @@ fn opening(report: &Report, words: &Words) -> String {
         report.origin.date,
         report.origin.version,
         report.origin.format_version,
-        report.settings.isa,
+        report.settings["isa"].as_str().unwrap_or_default(),
         escape(&report.origin.machine.text())
     );
     if report.wrong.is_empty() {
@@ -92,12 +88,12 @@ fn opening(report: &Report, words: &Words) -> String {
     }
     for (holds, warning) in [
         (
-            report.settings.quick,
+            report.settings["quick"] == true,
             "This was a quick run that asked little in two rounds. Do not quote its figures.",
         ),
         (report.origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
         (
-            report.pairs.iter().any(|pair| pair.pinned.is_none()),
+            report.pairs.iter().any(|pair| pair["pinned"].is_null()),
             "The system did not bind the measuring thread to a processor, so times scatter more.",
         ),
     ] {
@@ -108,84 +104,37 @@ fn opening(report: &Report, words: &Words) -> String {
     text
 }
 
-/// Escapes text for an element or an attribute.
-pub(super) fn escape(text: &str) -> String {
-    let escaped = |c: char| match c {
-        '&' => "&amp;".to_owned(),
-        '<' => "&lt;".to_owned(),
-        '>' => "&gt;".to_owned(),
-        '"' => "&quot;".to_owned(),
-        // XML has no way to write most of these.
-        c if c.is_control() => "\u{fffd}".to_owned(),
-        c => c.to_string(),
-    };
-    text.chars().map(escaped).collect()
-}
+/// A column of a table: its head, the name of its figures, and how they are shown.
+pub(super) type Column = (&'static str, &'static str, fn(f64) -> String);
 
-/// A column of a table.
-pub(super) struct Column {
-    pub(super) head: &'static str,
-    /// Which of a line's rows has its figures, and the attributes that tell that row from the others.
-    pub(super) row: usize,
-    pub(super) of: String,
-    /// The name of its cells, and how their figures are shown.
-    pub(super) field: &'static str,
-    pub(super) show: fn(f64) -> String,
-}
-
-/// Columns below a common head.
-pub(super) type Group = (&'static str, Vec<Column>);
-
-/// A line of a table.
-pub(super) struct Line {
-    /// The attributes that tell its rows.
-    pub(super) of: String,
-    /// The first cell, as HTML.
-    pub(super) name: String,
-    pub(super) rows: Vec<Cells>,
-}
-
-impl Line {
-    /// Returns the number in the cell of a column.
-    fn value(&self, column: &Column) -> Option<f64> {
-        match self.rows.get(column.row)?.iter().find(|(name, _)| *name == column.field)?.1 {
-            Cell::Number(value) => Some(value),
-            Cell::Count(count) => Some(count as f64),
-            _ => None,
-        }
-    }
-}
-
-/// Returns a table whose first column has the head `first`.
-pub(super) fn table(first: &str, groups: &[Group], lines: &[Line]) -> String {
-    let mut text =
-        String::from("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr class=\"groups\"><th></th>");
-    for (head, columns) in groups {
-        let _ = write!(text, "<th class=\"first\" colspan=\"{}\">{head}</th>", columns.len());
-    }
-    let _ = write!(text, "</tr>\n<tr><th>{first}</th>");
+/// Returns a table of rows, each with the text of its first cell. The attributes of a row are its cells named `keys`. Columns
+/// without figures are left out.
+pub(super) fn table(title: &str, keys: &[&str], rows: &[(String, &Cells)], columns: &[Column]) -> String {
+    let figures = |field| rows.iter().filter_map(move |(_, row)| number(row, field));
+    let columns: Vec<&Column> =
+        columns.iter().filter(|(_, field, _)| figures(field).next().is_some()).collect();
     // If all figures of a column are equal, none is the best.
-    let least = |column: &Column| {
-        let figures = || lines.iter().filter_map(|line| line.value(column));
-        figures().reduce(f64::min).filter(|&least| figures().any(|figure| figure > least))
-    };
-    let mut columns = Vec::new();
-    for (place, column) in groups.iter().flat_map(|(_, columns)| columns.iter().enumerate()) {
-        let class = if place == 0 { " class=\"first\"" } else { "" };
-        let _ = write!(text, "<th{class}>{}</th>", column.head);
-        columns.push((class, column, least(column)));
-    }
-    text += "</tr></thead>\n<tbody>\n";
-    for line in lines {
-        let _ = write!(text, "<tr {}><td>{}</td>", line.of, line.name);
-        for &(class, column, least) in &columns {
-            let value = line.value(column);
-            let shown = value.map_or("\u{2013}".to_owned(), column.show);
-            let shown = if value.is_some() && value == least { format!("<b>{shown}</b>") } else { shown };
-            let data = value.map_or(String::new(), |value| {
-                format!("{} data-field=\"{}\" data-value=\"{value:?}\"", column.of, column.field)
-            });
-            let _ = write!(text, "<td{class}{data}>{shown}</td>");
+    let best =
+        |field| figures(field).reduce(f64::min).filter(|&least| figures(field).any(|figure| figure > least));
+    let heads: String = columns.iter().map(|(head, ..)| format!("<th>{head}</th>")).collect();
+    let mut text = format!(
+        "<h3>{title}</h3>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th></th>{heads}</tr></thead>\n<tbody>\n"
+    );
+    for (name, row) in rows {
+        text += "<tr";
+        for (key, cell) in row.iter().filter(|(key, _)| keys.contains(key)) {
+            let _ = write!(text, " data-{}=\"{}\"", key.replace('_', "-"), escape(&cell.field()));
+        }
+        let _ = write!(text, "><td>{}</td>", escape(name));
+        for &&(_, field, show) in &columns {
+            let Some(value) = number(row, field) else {
+                text += "<td>\u{2013}</td>";
+                continue;
+            };
+            let (left, right) = if best(field) == Some(value) { ("<b>", "</b>") } else { ("", "") };
+            let shown = show(value);
+            let _ =
+                write!(text, "<td data-field=\"{field}\" data-value=\"{value:?}\">{left}{shown}{right}</td>");
         }
         text += "</tr>\n";
     }
