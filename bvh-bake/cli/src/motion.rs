@@ -1,14 +1,13 @@
 //! `cbvh motion`: asks whether the way between two poses is free, and where it ends.
 
-use crate::asking::files::{read_all, write_file};
-use crate::asking::mesh::{LoadedMesh, blame, load_both};
-use crate::asking::{self, Answer, AskingArguments, Record, Run, motions, witness};
-use crate::console::{self, Failure, significant};
+use crate::asking::files::{self, read_all, read_motions, write_file};
+use crate::asking::mesh::{self, LoadedMesh, blame, load_both};
+use crate::asking::{self, Answer, AskingArguments, Run};
+use crate::console::{self, Failure, record, significant};
 use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, Motion, MotionAnswer, MotionOptions, Path as _, Querier};
 use clap::Args;
-use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -58,15 +57,6 @@ pub(crate) struct MotionArguments {
     witness: Option<PathBuf>,
 }
 
-/// The line of `--bench`: that of a query, and how many motions end how.
-#[derive(Serialize)]
-struct MotionRecord {
-    #[serde(flatten)]
-    record: Record,
-    hits: u64,
-    near: u64,
-}
-
 /// Answers the question about files of motions or about one motion.
 pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.asking.isa)?;
@@ -77,20 +67,21 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
     let meshes = || load_both(&arguments.a, &arguments.b, &arguments.asking.how());
     if let Some(motion) = &arguments.motion {
-        let motion = motions::parse_one(motion)?;
+        let motion = files::one_motion(motion)?;
         let [a, b] = &meshes()?;
         return once([a, b], &motion, &options, backend, arguments);
     }
     let files = arguments.motions.as_deref();
-    let files = read_all(files, "files of motions", &arguments.asking, motions::read)?;
+    let files = read_all(files, "files of motions", &arguments.asking, read_motions)?;
     let [mut a, mut b] = meshes()?;
     a.check()?;
     b.check()?;
     let ask = |querier: &mut Querier, motion: &Motion| querier.motion(a.shape(), b.shape(), motion, &options);
     let bench = |stem: &str, run: &Run<MotionAnswer>| {
         let near = run.answers.iter().filter(|(answer, _)| matches!(answer, MotionAnswer::Near { .. }));
-        let record = Record::new(&a, Some(&b), "motion", backend, stem, run);
-        MotionRecord { hits: record.positives, near: near.count() as u64, record }
+        let hits = run.answers.iter().filter(|(answer, _)| answer.is_positive());
+        let record = asking::bench(&a, Some(&b), "motion", backend, stem, run, true);
+        record.with(record! { hits: hits.count(), near: near.count() })
     };
     asking::ask_files(
         &arguments.asking,
@@ -127,9 +118,9 @@ fn once(
     };
     match (end, &arguments.witness) {
         (Some((at, distance)), witness_file) => {
-            text.push_str(&witness::describe([a, b], distance));
+            text.push_str(&mesh::describe([a, b], distance));
             if let Some(path) = witness_file {
-                write_file(path, &witness::obj([a, b], &motion.pose(at), distance)?)?;
+                write_file(path, &mesh::obj([a, b], &motion.pose(at), distance)?)?;
             }
         }
         (None, Some(_)) => text.push_str("no witness, because the way is free\n"),

@@ -1,7 +1,8 @@
-//! Files of questions, one per line, and the files that answers are written to.
+//! Files of questions, one per line: poses, motions and others; and the files that answers are written to.
 
-use super::arguments::AskingArguments;
+use super::AskingArguments;
 use crate::console::Failure;
+use bvh_query::{Motion, Pose};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -67,7 +68,7 @@ pub(crate) fn read_lines<T>(
 }
 
 /// Parses the question of an option. Commas may separate the numbers.
-pub(crate) fn parse_one<T>(
+pub(crate) fn parse_option<T>(
     option: &str,
     text: &str,
     expected: &str,
@@ -96,4 +97,114 @@ pub(crate) fn stem(path: &Path) -> String {
 pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     let written = bvh_bake::write_atomically(path, text.as_bytes());
     written.map_err(|error| Failure::from_bake(&path.display().to_string(), &error))
+}
+
+/// The number of numbers of a pose: the entries of a 3 by 4 matrix.
+pub(crate) const POSE_NUMBERS: usize = 12;
+/// The forms of a pose and of a motion, as messages state them.
+const A_POSE: &str = "expected 12 numbers, the rows of the 3 by 4 matrix [R | t]";
+const A_MOTION: &str = "expected 24 numbers, two poses of 12 numbers each";
+
+/// Reads a file of poses. Each line has the 12 numbers of a 3 by 4 matrix, row by row.
+pub(crate) fn read_poses(path: &Path) -> Result<Vec<Pose>, Failure> {
+    let none =
+        "expected at least one line of 12 numbers, the rows of the 3 by 4 matrix [R | t], found no pose";
+    read_lines(path, none, parse_pose)
+}
+
+/// Reads a file of motions. Each line has the 24 numbers of two poses.
+pub(crate) fn read_motions(path: &Path) -> Result<Vec<Motion>, Failure> {
+    read_lines(path, &format!("{A_MOTION}, in at least one line, found none"), parse_motion)
+}
+
+/// Parses the pose of `--pose`.
+pub(crate) fn one_pose(text: &str) -> Result<Pose, Failure> {
+    parse_option("--pose", text, A_POSE, parse_pose)
+}
+
+/// Parses the motion of `--motion`.
+pub(crate) fn one_motion(text: &str) -> Result<Motion, Failure> {
+    parse_option("--motion", text, A_MOTION, parse_motion)
+}
+
+/// Parses a pose. Returns `None` if the text is blank.
+pub(crate) fn parse_pose(text: &str) -> Result<Option<Pose>, String> {
+    let numbers = numbers(text)?;
+    match <&[f64; POSE_NUMBERS]>::try_from(&numbers[..]) {
+        Ok(rows) => Pose::from_rows(rows).map(Some).map_err(|error| error.to_string()),
+        Err(_) if numbers.is_empty() => Ok(None),
+        // Guesses what the numbers mean, and says what to write instead.
+        Err(_) => {
+            let guess = match numbers.len() {
+                7 => {
+                    "; a quaternion and a translation? write the quaternion as a 3 by 3 matrix, and each number of the \
+                     translation after a row of it"
+                }
+                9 => "; a rotation alone? write a 0 after each row of it",
+                16 => "; a 4 by 4 matrix? write its first three rows only, row by row",
+                _ => "",
+            };
+            Err(format!("{A_POSE}, found {}{guess}", numbers.len()))
+        }
+    }
+}
+
+/// Parses the pose of an instance, which may also be 7 numbers: x, y and z of the position, and x, y, z and w of a unit
+/// quaternion. Returns `None` if the text is blank.
+pub(crate) fn parse_placed(text: &str) -> Result<Option<Pose>, String> {
+    match numbers(text)?[..] {
+        [x, y, z, i, j, k, w] => {
+            Pose::from_quaternion([i, j, k, w], [x, y, z]).map(Some).map_err(|error| error.to_string())
+        }
+        _ => parse_pose(text),
+    }
+}
+
+/// Parses a motion. Returns `None` if the text is blank.
+fn parse_motion(text: &str) -> Result<Option<Motion>, String> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    if words.is_empty() {
+        return Ok(None);
+    }
+    if words.len() != 2 * POSE_NUMBERS {
+        return Err(format!("{A_MOTION}, found {}", words.len()));
+    }
+    let pose = |words: &[&str], which: &str| {
+        let pose = parse_pose(&words.join(" ")).map_err(|text| format!("{which}: {text}"))?;
+        pose.ok_or_else(|| format!("{which}: {A_MOTION}, found none"))
+    };
+    let (start, end) = (pose(&words[..POSE_NUMBERS], "start")?, pose(&words[POSE_NUMBERS..], "end")?);
+    Motion::between(&start, &end).map(Some).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_pose_may_have_commas() {
+        let pose = one_pose("1,0,0,2, 0,1,0,-3e1, 0 0 1 .5").unwrap();
+        assert_eq!(pose.translation(), [2.0, -30.0, 0.5]);
+        for wrong in ["", "1 2 3", "1 0 0 0 0 1 0 0 0 0 1 0 7", "1 0 0 0 0 1 0 0 0 0 2 0", "a"] {
+            assert!(matches!(one_pose(wrong), Err(Failure::Invalid(_))), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn messages_say_what_to_write_instead() {
+        for (text, words) in [
+            ("0 0 0 1 1 2 3", "a quaternion"),
+            ("1 0 0 0 1 0 0 0 1", "a rotation alone"),
+            ("1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1", "a 4 by 4 matrix"),
+            ("2 0 0 5 0 2 0 0 0 0 2 0", "scaled by 2; bake the mesh at its size"),
+            ("0 -0.001 0 5 0.001 0 0 0 0 0 0.001 0", "scaled by 0.001;"),
+            ("1 0 0 5 0 2 0 0 0 0 1 0", "orthonormal"),
+            ("1 0 0 5 0 1 0 0 0 0 -1 0", "reflection"),
+            ("0 0 0 0 0 0 0 0 0 0 0 0", "orthonormal"),
+        ] {
+            let said = parse_pose(text).unwrap_err();
+            assert!(said.starts_with("expected") && said.contains(words), "{text}: {said}");
+        }
+        assert_eq!(parse_pose("  "), Ok(None));
+    }
 }

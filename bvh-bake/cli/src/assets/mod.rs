@@ -3,27 +3,22 @@
 //! Each thread takes the next asset in turn, waits for its share of the memory, and bakes it on the thread pool that all
 //! share. If an asset fails, the failure is told and noted, and the next asset follows.
 
-mod asset;
-mod folder;
 mod journal;
 mod list;
 mod shares;
-mod summary;
 
 use crate::asking::files::regular_file;
 use crate::bake::{self, BakeArguments, FileOptions, Report};
-use crate::console::{self, Failure, spinner};
-use crate::process::signals;
-use asset::Asset;
+use crate::console::{self, Failure, record, spinner};
+use crate::process;
 use bvh_bake::{BakeError, Progress, ReadError};
 use indicatif::ProgressBar;
-use journal::Journal;
-use serde::Serialize;
+use journal::{Journal, Summary};
+use list::Asset;
 use shares::Shares;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-use summary::Summary;
 
 /// Returns whether the command line is about many assets: a manifest, or one folder.
 pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
@@ -35,12 +30,14 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let (options, file_options) = bake::prepare(arguments)?;
     let start = Instant::now();
     let mut assets = match (&arguments.manifest, &arguments.inputs[..], &arguments.output) {
-        (Some(manifest), ..) => list::read(manifest, &options, file_options.max_memory)?,
-        (None, [folder], Some(output)) => folder::read(folder, output, &options, file_options.max_memory)?,
+        (Some(manifest), ..) => list::read_manifest(manifest, &options, file_options.max_memory)?,
+        (None, [folder], Some(output)) => {
+            list::read_folder(folder, output, &options, file_options.max_memory)?
+        }
         _ => return Err(Failure::Usage("expected a manifest or one folder (see --help)".into())),
     };
     let results = arguments.out_manifest.as_deref();
-    asset::refuse_shared_outputs(&assets, arguments.manifest.as_deref(), results)?;
+    list::refuse_shared_outputs(&assets, arguments.manifest.as_deref(), results)?;
     let known = assets.iter().map(Asset::bytes).sum();
     if let Some(shard) = arguments.shard {
         let mut number = 0..;
@@ -49,7 +46,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let jobs = rayon::current_num_threads();
     let shares = file_options.max_memory.map(|budget| Shares::new(budget.saturating_sub(known), jobs));
     let spinner = spinner(arguments.quiet);
-    signals::remove_unfinished_files(&spinner)?;
+    process::remove_unfinished_files(&spinner)?;
     let done = Done {
         journal: results.map(Journal::open).transpose()?,
         summary: Summary::new(arguments.shard, assets.len()),
@@ -103,25 +100,6 @@ struct Done {
     summary: Summary,
     /// Why no more assets are started.
     stopped: Option<Failure>,
-}
-
-/// The line of results of an asset that was baked.
-#[derive(Serialize)]
-struct DoneLine<'a> {
-    line: u64,
-    exit_code: u8,
-    #[serde(flatten)]
-    report: &'a Report,
-}
-
-/// The line of results of an asset that failed.
-#[derive(Serialize)]
-struct FailedLine<'a> {
-    line: u64,
-    exit_code: u8,
-    input: &'a str,
-    output: &'a str,
-    error: &'a str,
 }
 
 impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
@@ -179,16 +157,14 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
                 Err(failure.line().unwrap_or_else(|| (2, error.to_string())))
             }
         };
-        let text = match &baked {
-            Ok(report) => serde_json::to_string(&DoneLine { line: asset.line, exit_code: 0, report }),
-            Err((code, error)) => serde_json::to_string(&FailedLine {
-                line: asset.line,
-                exit_code: *code,
-                input: &asset.named_input,
-                output: &asset.named_output,
-                error,
-            }),
+        let (line, named) = (asset.line, (&asset.named_input, &asset.named_output));
+        let record = match &baked {
+            Ok(report) => record! { line: line, exit_code: 0 }.with(report.json()),
+            Err((exit_code, error)) => {
+                record! { line: line, exit_code: exit_code, input: named.0, output: named.1, error: error }
+            }
         };
+        let text = serde_json::to_string(&record);
         let text = text.map_err(|error| Failure::System(format!("JSON: {error}")))?;
         let mut done = lock(&self.done);
         match &baked {

@@ -1,20 +1,16 @@
 //! `cbvh bake`: bakes meshes into one file.
 
-mod arguments;
 mod report;
 mod screen;
-mod shard;
-mod stages;
-
-pub(crate) use arguments::{BakeArguments, effort};
-pub(crate) use report::Report;
-pub(crate) use shard::Shard;
 
 use crate::console::{self, Failure, names};
-use crate::process::{resident, signals};
-use bvh_bake::{BakeError, FileBake, Options, Outcome, Progress, Step};
+use crate::options::{LayoutArguments, positive, size, threads};
+use crate::process;
+use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome, Progress, Step};
+use clap::Args;
+pub(crate) use report::Report;
+use report::{StageLine, Stages};
 use screen::Screen;
-use stages::{StageLine, Stages};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -32,7 +28,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let progress = Progress::default();
     let screen = Screen::new(&progress, arguments.quiet);
     let tells_stages = arguments.json && !arguments.quiet;
-    signals::remove_unfinished_files(screen.spinner())?;
+    process::remove_unfinished_files(screen.spinner())?;
     let baked =
         bake(&arguments.inputs, output, &options, &file_options, &progress, &mut |event| match event {
             Event::Begins(step) => screen.begin(step, &progress),
@@ -47,7 +43,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         _ => {}
     }
     if arguments.json {
-        console::json(&report)
+        console::json(&report.json())
     } else if arguments.quiet {
         Ok(())
     } else {
@@ -88,7 +84,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         pool.map_err(|error| Failure::System(format!("--jobs {jobs}: cannot start threads: {error}")))?;
     }
     if arguments.max_memory.is_some() {
-        resident::give_back();
+        process::give_back();
     }
     let options = arguments
         .layout
@@ -140,5 +136,174 @@ pub(crate) fn bake(
         Outcome::UpToDate(_) => Vec::new(),
     };
     let seconds = start.elapsed().as_secs_f64();
-    Ok(Report::new(names(inputs), output.display().to_string(), options, &outcome, stages, seconds))
+    Ok(Report::new(inputs, output, options, outcome, stages, seconds))
+}
+
+const HELP: &str = "\
+Examples:
+  cbvh bake rock.obj -o rock.cbvh
+  cbvh bake part.stl -o part.cbvh --triangles quantized --max-error 0.01
+  cbvh bake arm.obj hand.ply -o robot.cbvh --split-objects --json
+  cbvh bake factory.glb -o factory.cbvh --scene
+
+Several inputs are baked as one mesh, and triangle ids run on from file to file. With --split-objects each object keeps \
+its own name; an object that its file does not name is called after the file, without the extension.
+
+The output appears whole or not at all. It is left alone if it is up to date, that is, if it is undamaged and was baked \
+from the same inputs with the same options by the same version; --force bakes it anyway.
+
+With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF file with a mesh becomes an instance; nodes share their mesh, of which there is one object for each scale. Every object of the other files becomes an instance where it stands. An instance is named after its node, and .2, .3 and so on follow a name that occurs again. cbvh scene asks about such a file.
+
+--triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
+hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
+
+A glTF file may name buffers in files. Such a file must be in the folder of the glTF file or below it; what a symbolic \
+link leads to counts. --allow-outside allows buffers elsewhere: then whoever made the glTF file chooses which files are \
+read.
+
+--max-memory SIZE keeps the whole process within SIZE, however large the mesh is. Files are read piece by piece, and up to 200 bytes per triangle go to scratch files, which have no names and vanish however the process \
+ends. The output has the same bytes. Pipes and \
+the JSON of glTF files are held in memory as a whole, data URIs included. A SIZE that is too small for the mesh exits \
+with code 4.
+
+On a terminal, a line on standard error shows the stage, the share of it that is done, triangles per second, the bytes \
+spilled to scratch files, the elapsed time and the estimated time left.
+
+--json prints one JSON object on standard output. Unless -q is given, it also prints one JSON object per stage on \
+standard error when the stage ends: read, prepare, build, assemble, prove, write. Each has the fields stage, seconds, \
+triangles, triangles_per_second, bytes_read, bytes_written, spilled_bytes (written to scratch files), resident_bytes \
+and peak_rss_bytes. Their seconds and bytes add up to stage_seconds, bytes_read, bytes_written and \
+scratch_written_bytes of the object on standard output. There are no stages if the output is up to date, or for many \
+assets.
+
+Many assets:
+  cbvh bake meshes -o baked --jobs 8
+  cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
+
+Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
+profile, triangles, max_error, effort, split_objects, scene, ids and topology; the options on the command line are their \
+defaults. Paths are relative to the manifest and may lead anywhere, but an input is a regular file: a manifest or a folder \
+never makes the command wait for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
+and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
+input: the number of its line, exit_code, and either the fields of --json or an error. Until all assets are done, the \
+lines of finished assets are in out.jsonl.part. --json prints one object with counts and sums, which add up over \
+shards.
+
+With many assets, the exit code is 3 if any input is invalid, else 4 if any limit was reached, else 2 if the system \
+refused anything, else 1 if the options do not fit an asset, else 0. A manifest with an invalid line, or with two assets \
+that have the same output, exits with code 3 before anything is baked.";
+
+/// What `bake` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct BakeArguments {
+    /// Meshes: OBJ, STL, PLY or glTF files; or one folder, each of whose meshes is baked to a file of its own
+    #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "IN")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The file to write; for a folder of meshes, the folder to write to
+    #[arg(
+        short,
+        long,
+        value_name = "OUT.cbvh",
+        required_unless_present = "manifest",
+        conflicts_with = "manifest"
+    )]
+    pub(crate) output: Option<PathBuf>,
+    /// Bake many assets: a file with one JSON object per line, with "input", "output" and options
+    #[arg(long, value_name = "IN.jsonl", requires = "out_manifest")]
+    pub(crate) manifest: Option<PathBuf>,
+    /// With --manifest or a folder: write the result of each asset here, one JSON object per line
+    #[arg(long, value_name = "OUT.jsonl")]
+    pub(crate) out_manifest: Option<PathBuf>,
+    /// With --manifest or a folder: bake only every N-th asset, starting with the I-th; I is from 1 to N
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
+    pub(crate) shard: Option<Shard>,
+    #[command(flatten)]
+    pub(crate) layout: LayoutArguments,
+    /// Time spent on a better tree: fast or default. Answers are the same
+    #[arg(long, value_name = "E", default_value = "default", value_parser = effort)]
+    pub(crate) effort: Effort,
+    /// With --triangles quantized: how far a vertex may move, in mesh units [default: 1e-5 of the diagonal]
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) max_error: Option<f64>,
+    /// Stay within this much memory, such as 512MiB or 2GB; the rest goes to scratch files
+    #[arg(long, value_name = "SIZE", value_parser = size, allow_negative_numbers = true)]
+    pub(crate) max_memory: Option<u64>,
+    /// With --max-memory: the folder for scratch files [default: the folder of the output]
+    #[arg(long, value_name = "DIR", requires = "max_memory")]
+    pub(crate) scratch: Option<PathBuf>,
+    /// Let glTF files name buffers outside their own folders, which is otherwise refused
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// The number of threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    pub(crate) jobs: Option<u16>,
+    /// Build one tree per object of the input, so that queries can name an object
+    #[arg(long)]
+    pub(crate) split_objects: bool,
+    /// Bake a scene: the nodes of glTF files become instances that share their meshes; one tree per object
+    #[arg(long)]
+    pub(crate) scene: bool,
+    /// Leave out the original triangle numbers
+    #[arg(long)]
+    pub(crate) no_ids: bool,
+    /// Leave out turning slabs, which dop26-u8-wide has; answers and sizes stay the same
+    #[arg(long)]
+    pub(crate) no_turning_slabs: bool,
+    /// Leave out which objects are closed; questions about what is inside a mesh need it
+    #[arg(long)]
+    pub(crate) no_topology: bool,
+    /// Bake even if the output is up to date
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Print one JSON object, and one per stage on standard error
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors, warnings, and what --json asks for
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// Parses the name of an effort.
+pub(crate) fn effort(name: &str) -> Result<Effort, String> {
+    Effort::from_name(name).ok_or_else(|| "expected fast or default".to_owned())
+}
+
+/// Every `count`-th asset, starting with number `index`, which is from 1 to `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shard {
+    pub(crate) index: u64,
+    pub(crate) count: u64,
+}
+
+impl Shard {
+    /// Returns whether the asset with this number, counted from 0, belongs to the shard.
+    pub(crate) fn has(self, number: u64) -> bool {
+        number % self.count == self.index - 1
+    }
+
+    /// Parses `I/N`.
+    fn parse(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once('/').and_then(|(index, count)| {
+            let shard = Self { index: index.parse().ok()?, count: count.parse().ok()? };
+            (1..=shard.count).contains(&shard.index).then_some(shard)
+        });
+        parsed.ok_or_else(|| "expected I/N with I from 1 to N, such as 1/4".to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_numbered_from_one() {
+        assert_eq!(Shard::parse("3/16"), Ok(Shard { index: 3, count: 16 }));
+        for wrong in ["", "1", "0/4", "5/4", "1/0", "-1/4", "1/4/2", "a/b", "1/99999999999999999999"] {
+            assert!(Shard::parse(wrong).is_err(), "{wrong}");
+        }
+        let of = |index| (0..10).filter(move |&number| Shard { index, count: 3 }.has(number));
+        assert_eq!(of(1).collect::<Vec<_>>(), [0, 3, 6, 9]);
+        assert_eq!((1..=3).map(|index| of(index).count()).sum::<usize>(), 10);
+    }
 }

@@ -1,86 +1,70 @@
 //! What a bake prints when it has ended: a summary for people, or one JSON object.
 
-use super::stages::{self, StageLine};
-use crate::console::{hex, length, plural};
-use crate::process::resident;
-use bvh_bake::{BakeReport, Options, Outcome};
+use crate::console::{Record, hex, length, names, plural, record};
+use crate::process;
+use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, Traffic};
 use bvh_format::header::version_name;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
-/// What `--json` prints. Fields that are unknown because the bake was skipped are null.
-#[derive(Serialize)]
+/// What a bake has done.
 pub(crate) struct Report {
     pub(crate) input: String,
     pub(crate) output: String,
-    format_version: String,
-    profile: &'static str,
-    triangle_encoding: &'static str,
-    reason: String,
-    pub(crate) triangles_in: u64,
-    pub(crate) triangles: u64,
-    pub(crate) degenerate: u64,
-    pub(crate) duplicates: u64,
-    vertices: Option<u64>,
-    objects: u64,
-    instances: u64,
-    /// The number of closed objects, or null if the file does not state which are.
-    closed: Option<u64>,
-    pub(crate) file_bytes: u64,
-    node_bytes: u64,
-    triangle_bytes: u64,
-    id_bytes: u64,
-    bytes_per_tri: f64,
-    max_vertex_rounding: f64,
-    max_quantization_error: f64,
-    width_inflation: Option<f64>,
-    volume_inflation: Option<f64>,
-    mean_children: Option<f64>,
-    bake_seconds: Option<f64>,
+    outcome: Outcome,
+    stages: Vec<StageLine>,
     pub(crate) seconds: f64,
     /// What may be wrong with the output, although the bake succeeded.
     pub(crate) warning: Option<String>,
-    stage_seconds: Option<BTreeMap<&'static str, f64>>,
-    #[serde(skip)]
-    stages: Vec<StageLine>,
-    /// Bytes read from all files: the sum of the next three fields.
-    bytes_read: Option<u64>,
-    input_read_bytes: Option<u64>,
-    scratch_read_bytes: Option<u64>,
-    output_read_bytes: Option<u64>,
-    /// Bytes written to all files: the sum of the next two fields.
-    bytes_written: Option<u64>,
-    scratch_written_bytes: Option<u64>,
-    output_written_bytes: Option<u64>,
-    /// The most bytes in scratch files at any time.
-    scratch_bytes: Option<u64>,
-    peak_rss_bytes: Option<u64>,
-    content_xxh3: String,
-    pub(crate) skipped: bool,
 }
 
 impl Report {
     pub(super) fn new(
-        input: String,
-        output: String,
+        inputs: &[PathBuf],
+        output: &Path,
         options: &Options,
-        outcome: &Outcome,
+        outcome: Outcome,
         stages: Vec<StageLine>,
         seconds: f64,
     ) -> Self {
-        let (file, baked) = match outcome {
-            Outcome::Baked(report) => (&report.file, Some(report)),
-            Outcome::UpToDate(file) => (file, None),
+        let input = names(inputs);
+        let warning = match &outcome {
+            Outcome::Baked(report) => warning(&input, options, report),
+            Outcome::UpToDate(_) => None,
         };
+        Self { input, output: output.display().to_string(), outcome, stages, seconds, warning }
+    }
+
+    /// Returns the facts about the file.
+    pub(crate) fn file(&self) -> &FileSummary {
+        match &self.outcome {
+            Outcome::Baked(report) => &report.file,
+            Outcome::UpToDate(file) => file,
+        }
+    }
+
+    /// Returns the facts about the bake; `None` if it was skipped.
+    pub(crate) fn baked(&self) -> Option<&BakeReport> {
+        match &self.outcome {
+            Outcome::Baked(report) => Some(report),
+            Outcome::UpToDate(_) => None,
+        }
+    }
+
+    /// Returns what `--json` prints. Fields that are unknown because the bake was skipped are null.
+    pub(crate) fn json(&self) -> Record {
+        let (file, baked) = (self.file(), self.baked());
         let traffic = baked.map(|baked| baked.traffic);
-        let warning = baked.and_then(|baked| warning(&input, options, baked));
-        Self {
-            input,
-            output,
+        let stages = self.stages.iter().map(|line| (line.stage, line.seconds));
+        record! {
+            input: self.input,
+            output: self.output,
             format_version: version_name(file.version),
             profile: file.profile.name(),
             triangle_encoding: file.triangle_encoding.name(),
-            reason: baked.map_or("the output was up to date".into(), |baked| baked.reason.clone()),
+            reason: baked.map_or("the output was up to date", |baked| &baked.reason),
             triangles_in: file.triangles_in,
             triangles: file.triangles,
             degenerate: file.degenerate,
@@ -88,6 +72,7 @@ impl Report {
             vertices: baked.map(|baked| baked.vertices),
             objects: file.objects,
             instances: file.instances,
+            // The number of closed objects, or null if the file does not state which are.
             closed: file.closed,
             file_bytes: file.file_bytes,
             node_bytes: file.node_bytes,
@@ -100,19 +85,21 @@ impl Report {
             volume_inflation: baked.map(|baked| baked.volume_inflation),
             mean_children: baked.map(|baked| baked.mean_children),
             bake_seconds: baked.map(|baked| baked.seconds),
-            seconds,
-            warning,
-            stage_seconds: baked.map(|_| stages::seconds(&stages)),
-            stages,
+            seconds: self.seconds,
+            warning: self.warning,
+            stage_seconds: baked.map(|_| stages.collect::<BTreeMap<_, _>>()),
+            // Bytes read from all files: the sum of the next three fields.
             bytes_read: traffic.map(|traffic| traffic.read()),
             input_read_bytes: traffic.map(|traffic| traffic.input_read),
             scratch_read_bytes: traffic.map(|traffic| traffic.scratch_read),
             output_read_bytes: traffic.map(|traffic| traffic.output_read),
+            // Bytes written to all files: the sum of the next two fields.
             bytes_written: traffic.map(|traffic| traffic.written()),
             scratch_written_bytes: traffic.map(|traffic| traffic.scratch_written),
             output_written_bytes: traffic.map(|traffic| traffic.output_written),
+            // The most bytes in scratch files at any time.
             scratch_bytes: traffic.map(|traffic| traffic.scratch_most),
-            peak_rss_bytes: resident::peak_bytes(),
+            peak_rss_bytes: process::peak_bytes(),
             content_xxh3: hex(file.content_xxh3),
             skipped: baked.is_none(),
         }
@@ -120,68 +107,72 @@ impl Report {
 
     /// Returns the summary for people.
     pub(super) fn to_text(&self) -> String {
-        if self.skipped {
-            return format!("{}: up to date, content {}\n", self.output, self.content_xxh3);
-        }
+        let file = self.file();
+        let content = hex(file.content_xxh3);
+        let Some(baked) = self.baked() else {
+            return format!("{}: up to date, content {content}\n", self.output);
+        };
         let mut text = format!("{} -> {}\n", self.input, self.output);
         let mut line = |label: &str, value: String| text.push_str(&format!("  {label:<12} {value}\n"));
-        let vertices = self.vertices.unwrap_or(0);
-        let left_out = match self.duplicates {
+        let left_out = match file.duplicates {
             0 => String::new(),
             count => format!(" ({count} exact {} left out)", plural(count, "duplicate")),
         };
-        line("triangles", format!("{}{left_out}, {} of zero area", self.triangles, self.degenerate));
-        line("vertices", format!("{vertices} in {} {}", self.objects, plural(self.objects, "object")));
-        if self.instances > 0 {
-            line("instances", self.instances.to_string());
+        line("triangles", format!("{}{left_out}, {} of zero area", file.triangles, file.degenerate));
+        let objects = plural(file.objects, "object");
+        line("vertices", format!("{} in {} {objects}", baked.vertices, file.objects));
+        if file.instances > 0 {
+            line("instances", file.instances.to_string());
         }
-        match (self.closed, self.objects) {
+        match (file.closed, file.objects) {
             (None, _) => {}
             (Some(closed), 1) => line("surface", if closed == 1 { "closed" } else { "open" }.to_owned()),
             (Some(closed), objects) => {
-                line("surfaces", format!("{closed} closed, {} open", objects - closed))
+                line("surfaces", format!("{closed} closed, {} open", objects - closed));
             }
         }
-        let because = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
-        line("layout", format!("{}, triangles {}{because}", self.profile, self.triangle_encoding));
-        let per_triangle = |bytes: u64| bytes as f64 / self.triangles as f64;
+        let because = if baked.reason.is_empty() { String::new() } else { format!(": {}", baked.reason) };
+        line(
+            "layout",
+            format!("{}, triangles {}{because}", file.profile.name(), file.triangle_encoding.name()),
+        );
+        let per_triangle = |bytes: u64| bytes as f64 / file.triangles as f64;
         line(
             "bytes",
             format!(
                 "{}, {:.2} per triangle: nodes {:.2}, triangles {:.2}, ids {:.2}",
-                self.file_bytes,
-                self.bytes_per_tri,
-                per_triangle(self.node_bytes),
-                per_triangle(self.triangle_bytes),
-                per_triangle(self.id_bytes)
+                file.file_bytes,
+                file.bytes_per_tri(),
+                per_triangle(file.node_bytes),
+                per_triangle(file.triangle_bytes),
+                per_triangle(file.id_bytes)
             ),
         );
-        let moved = length(self.max_vertex_rounding);
-        line("rounding", format!("vertices moved by at most {moved}"));
-        if self.max_quantization_error > 0.0 {
-            let moved = length(self.max_quantization_error);
-            line("quantisation", format!("vertices moved by at most {moved}"));
+        line("rounding", format!("vertices moved by at most {}", length(file.max_vertex_rounding)));
+        if file.max_quantization_error > 0.0 {
+            line(
+                "quantisation",
+                format!("vertices moved by at most {}", length(file.max_quantization_error)),
+            );
         }
-        if let (Some(width), Some(volume)) = (self.width_inflation, self.volume_inflation) {
-            line("bounds", format!("{width:.4} times the width of tight ones, {volume:.4} times the volume"));
+        let (width, volume) = (baked.width_inflation, baked.volume_inflation);
+        line("bounds", format!("{width:.4} times the width of tight ones, {volume:.4} times the volume"));
+        line("content", content);
+        let mebibytes = |bytes: u64| format!("{:.1}", bytes as f64 / 1048576.0);
+        let traffic = &baked.traffic;
+        let [inputs, scratch, output, all] =
+            [traffic.input_read, traffic.scratch_read, traffic.output_read, traffic.read()].map(mebibytes);
+        line("read", format!("{all} MiB: inputs {inputs}, scratch {scratch}, output {output}"));
+        let [scratch, output, all] =
+            [traffic.scratch_written, traffic.output_written, traffic.written()].map(mebibytes);
+        line("written", format!("{all} MiB: scratch {scratch}, output {output}"));
+        if traffic.scratch_most > 0 {
+            line("scratch", format!("{} MiB at most", mebibytes(traffic.scratch_most)));
         }
-        line("content", self.content_xxh3.clone());
-        let memory = match self.peak_rss_bytes {
-            Some(bytes) => format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0),
-            None => String::new(),
-        };
-        let mebibytes = |bytes: Option<u64>| bytes.unwrap_or(0) as f64 / 1048576.0;
-        let [inputs, scratch, output] =
-            [self.input_read_bytes, self.scratch_read_bytes, self.output_read_bytes].map(mebibytes);
-        let all = mebibytes(self.bytes_read);
-        line("read", format!("{all:.1} MiB: inputs {inputs:.1}, scratch {scratch:.1}, output {output:.1}"));
-        let [scratch, output] = [self.scratch_written_bytes, self.output_written_bytes].map(mebibytes);
-        let all = mebibytes(self.bytes_written);
-        line("written", format!("{all:.1} MiB: scratch {scratch:.1}, output {output:.1}"));
-        if let Some(most @ 1..) = self.scratch_bytes {
-            line("scratch", format!("{:.1} MiB at most", mebibytes(Some(most))));
-        }
-        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages::to_text(&self.stages)));
+        let memory = process::memory_in_words();
+        let stages: Vec<String> =
+            self.stages.iter().map(|line| format!("{} {:.2}", line.stage, line.seconds)).collect();
+        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages.join(", ")));
         text
     }
 }
@@ -195,4 +186,112 @@ fn warning(input: &str, options: &Options, report: &BakeReport) -> Option<String
          others; a max error of at most {advised:.1e} keeps nearly all of them",
         file.triangles_in, file.degenerate, file.duplicates
     ))
+}
+
+/// One stage as `--json` prints it. Seconds and bytes add up over the stages of a bake.
+#[derive(Serialize, Debug, Clone, PartialEq)]
+pub(crate) struct StageLine {
+    stage: &'static str,
+    pub(crate) seconds: f64,
+    /// Triangles of the input up to `prepare`, and stored triangles from `build` on.
+    triangles: u64,
+    triangles_per_second: f64,
+    /// Bytes read from all files.
+    bytes_read: u64,
+    /// Bytes written to all files.
+    bytes_written: u64,
+    /// The part of `bytes_written` that went to scratch files.
+    spilled_bytes: u64,
+    /// Resident memory when the stage ended.
+    resident_bytes: Option<u64>,
+    /// The largest resident memory since the process began.
+    peak_rss_bytes: Option<u64>,
+}
+
+/// Returns the name of a stage, which scripts rely on.
+pub(crate) fn key(step: Step) -> &'static str {
+    match step {
+        Step::Read => "read",
+        Step::Bake(Stage::Prepare) => "prepare",
+        Step::Bake(Stage::Build) => "build",
+        Step::Bake(Stage::Encode) => "assemble",
+        Step::Bake(Stage::Prove) => "prove",
+        Step::Write => "write",
+    }
+}
+
+/// Measures the stages of a bake. The figures of several objects add up.
+pub(crate) struct Stages {
+    progress: Progress,
+    /// Indexed by the number of the step.
+    taken: [Taken; Step::ALL.len()],
+    open: Option<(Step, Instant, Traffic)>,
+    /// The number of stages that have been reported.
+    told: usize,
+}
+
+#[derive(Default)]
+struct Taken {
+    time: Duration,
+    read: u64,
+    written: u64,
+    spilled: u64,
+    resident: Option<u64>,
+    peak: Option<u64>,
+}
+
+impl Stages {
+    pub(crate) fn new(progress: &Progress) -> Self {
+        Self { progress: progress.clone(), taken: Default::default(), open: None, told: 0 }
+    }
+
+    /// Notes that a step begins. Tells the stages that have ended for all objects.
+    pub(crate) fn begin(&mut self, step: Step, tell: &mut dyn FnMut(&StageLine)) {
+        self.close();
+        self.open = Some((step, Instant::now(), self.progress.traffic()));
+        let has_ended = |before: Step| before < step && self.progress.share(before) == Some(1.0);
+        while let Some(&before) = Step::ALL.get(self.told).filter(|&&before| has_ended(before)) {
+            tell(&self.line(before));
+            self.told += 1;
+        }
+    }
+
+    /// Notes that all steps have ended. Tells the remaining stages and returns all of them.
+    pub(crate) fn finish(mut self, tell: &mut dyn FnMut(&StageLine)) -> Vec<StageLine> {
+        self.close();
+        let lines: Vec<StageLine> = Step::ALL.iter().map(|&step| self.line(step)).collect();
+        lines[self.told..].iter().for_each(tell);
+        lines
+    }
+
+    fn close(&mut self) {
+        let Some((step, since, before)) = self.open.take() else { return };
+        let traffic = self.progress.traffic();
+        let taken = &mut self.taken[number(step)];
+        taken.time += since.elapsed();
+        taken.read += traffic.read() - before.read();
+        taken.written += traffic.written() - before.written();
+        taken.spilled += traffic.scratch_written - before.scratch_written;
+        (taken.resident, taken.peak) = (process::current_bytes(), process::peak_bytes());
+    }
+
+    fn line(&self, step: Step) -> StageLine {
+        let taken = &self.taken[number(step)];
+        let (seconds, triangles) = (taken.time.as_secs_f64(), self.progress.triangles(step));
+        StageLine {
+            stage: key(step),
+            seconds,
+            triangles,
+            triangles_per_second: if seconds > 0.0 { triangles as f64 / seconds } else { 0.0 },
+            bytes_read: taken.read,
+            bytes_written: taken.written,
+            spilled_bytes: taken.spilled,
+            resident_bytes: taken.resident,
+            peak_rss_bytes: taken.peak,
+        }
+    }
+}
+
+fn number(step: Step) -> usize {
+    Step::ALL.iter().position(|&other| other == step).unwrap_or(0)
 }

@@ -1,20 +1,18 @@
 //! `cbvh dump`: shows what a file contains: all of it, one page, or one treelet.
 
-mod arguments;
-mod levels;
 mod page;
 mod statistics;
 mod whole;
 
-pub(crate) use arguments::DumpArguments;
-
-use crate::console::{self, Failure};
+use crate::console::{self, Failure, Record};
+use crate::options::{size, whole};
 use bvh_bake::{FileError, StoredFile};
 use bvh_format::Layout;
 use bvh_format::object::Object;
 use bvh_format::page::check_page;
 use bvh_format::source::PageBytes;
-use serde::Serialize;
+use clap::Args;
+use std::path::PathBuf;
 
 /// Prints the file, page or treelet that the arguments name.
 pub(crate) fn run(arguments: &DumpArguments) -> Result<(), Failure> {
@@ -23,37 +21,33 @@ pub(crate) fn run(arguments: &DumpArguments) -> Result<(), Failure> {
     let file = StoredFile::open(path, arguments.max_memory).map_err(failed)?;
     let layout = Layout::read_from(&file).map_err(failed)?;
     let contents = Contents { file, layout };
-    if let Some(number) = arguments.page {
+    let shown = if let Some(number) = arguments.page {
         let pages = contents.layout.page_count();
         if number >= pages {
             let text = format!("--page: expected a page below {pages}, found {number}");
             return Err(Failure::Usage(text));
         }
-        let dump = page::PageDump::new(&contents, number).map_err(failed)?;
-        return print(arguments, &dump, page::PageDump::to_text);
-    }
-    if let Some(number) = arguments.treelet {
+        page::page(&contents, number, arguments.json)
+    } else if let Some(number) = arguments.treelet {
         // The counts are as the file states them, and those of a forged file may overflow.
         let treelets = contents.layout.objects.iter().map(|object| object.record().treelets.get());
         let treelets = treelets.fold(0, u64::saturating_add);
-        return match page::TreeletDump::find(&contents, number).map_err(failed)? {
-            Some(dump) => print(arguments, &dump, page::TreeletDump::to_text),
-            None => {
-                let text = format!("--treelet: expected a treelet below {treelets}, found {number}");
-                Err(Failure::Usage(text))
-            }
-        };
+        let shown = page::treelet(&contents, number, arguments.json).map_err(failed)?;
+        let outside = || format!("--treelet: expected a treelet below {treelets}, found {number}");
+        Ok(shown.ok_or_else(|| Failure::Usage(outside()))?)
+    } else {
+        whole::file(&path.display().to_string(), &contents, arguments.json)
+    };
+    match shown.map_err(failed)? {
+        Shown::Json(record) => console::json(&record),
+        Shown::Text(text) => console::text(&text),
     }
-    let name = path.display().to_string();
-    print(arguments, &whole::FileDump::new(name, &contents).map_err(failed)?, whole::FileDump::to_text)
 }
 
-fn print<T: Serialize>(
-    arguments: &DumpArguments,
-    dump: &T,
-    to_text: impl Fn(&T) -> String,
-) -> Result<(), Failure> {
-    if arguments.json { console::json(dump) } else { console::text(&to_text(dump)) }
+/// What is printed.
+enum Shown {
+    Json(Record),
+    Text(String),
 }
 
 /// A file that is read piece by piece, and its layout.
@@ -74,4 +68,35 @@ impl Contents {
         check_page(bytes.page(object).bytes(), number, object, self.layout.page_offset(number))?;
         Ok(bytes)
     }
+}
+
+const HELP: &str = "\
+Examples:
+  cbvh dump rock.cbvh
+  cbvh dump rock.cbvh --page 3
+  cbvh dump rock.cbvh --treelet 0 --json
+
+Treelets are numbered through the whole file, in the order of pages and of the slots in each page.
+
+The file is read piece by piece. That takes about 10 MiB of memory, and one byte per ten thousand bytes of the file. \
+--max-memory SIZE keeps the process within SIZE; a SIZE that is too small exits with code 4.";
+
+/// What `dump` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct DumpArguments {
+    /// The .cbvh file
+    pub(crate) file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Decode this treelet: the links and slabs of its children
+    #[arg(long, value_name = "N", conflicts_with = "page", value_parser = whole::<u64>, allow_negative_numbers = true)]
+    pub(crate) treelet: Option<u64>,
+    /// Decode this page: its anchors, its links to other pages, its treelets
+    #[arg(long, value_name = "N", value_parser = whole::<u32>, allow_negative_numbers = true)]
+    pub(crate) page: Option<u32>,
+    /// Stay within this much memory, such as 64MiB
+    #[arg(long, value_name = "SIZE", value_parser = size, allow_negative_numbers = true)]
+    pub(crate) max_memory: Option<u64>,
 }

@@ -1,7 +1,7 @@
 //! One decoded page, with its anchors, links and treelets; and one decoded treelet, with its links and slabs.
 
-use super::Contents;
-use crate::console::hex;
+use super::{Contents, Shown};
+use crate::console::{Record, hex, record};
 use bvh_bake::FileError;
 use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
@@ -10,127 +10,38 @@ use bvh_format::page::{NO_PARENT, Page};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::Child;
 use bvh_format::turning::decode_turning;
-use bvh_format::{FormatError, Layout, Rule};
-use serde::Serialize;
+use bvh_format::{FormatError, Rule};
 
-/// The object that `dump FILE --page N --json` prints.
-#[derive(Serialize)]
-pub(super) struct PageDump {
-    page: u32,
-    offset: u64,
-    object: usize,
-    profile: &'static str,
-    checksum: String,
-    leaf_checksum: String,
-    id_checksum: String,
-    leaf_line: u64,
-    leaf_lines: u32,
-    id_word: u64,
-    id_words: u32,
-    first_packet: u32,
-    packets: u16,
-    short_treelets: u8,
-    treelet_line: u8,
-    /// The 64-byte lines in use, of 64.
-    lines: usize,
-    anchors: Vec<AnchorDump>,
-    remotes: Vec<RootDump>,
-    treelets: Vec<SlotDump>,
-}
-
-/// A subtree root.
-#[derive(Serialize)]
-struct AnchorDump {
-    slot: u8,
-    /// The page and the remote link that lead here; `None` for the root of the object.
-    parent_page: Option<u32>,
-    parent_link: Option<u8>,
-    slabs: Vec<[f32; 2]>,
-}
-
-/// A remote link and its target.
-#[derive(Serialize)]
-struct RootDump {
-    link: u8,
-    page: u32,
-    root: u8,
-}
-
-#[derive(Serialize)]
-struct SlotDump {
-    slot: u8,
-    children: Vec<ChildDump>,
-}
-
-/// A child of a treelet.
-#[derive(Serialize)]
-struct ChildDump {
-    /// `treelet`, `remote` or `leaf`.
-    kind: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    slot: Option<u8>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    page: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    root: Option<u8>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    packet: Option<u16>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    triangles: Option<u8>,
-    /// Empty unless slabs are asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    slabs: Vec<[f32; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    turning: Option<TurningDump>,
-}
-
-/// The turning slab of a child.
-#[derive(Serialize)]
-struct TurningDump {
-    direction: [f32; 3],
-    slab: [f32; 2],
-}
-
-impl ChildDump {
-    fn new(page: &Page, child: Child) -> Option<Self> {
-        let none = |kind| Self {
-            kind,
-            slot: None,
-            page: None,
-            root: None,
-            packet: None,
-            triangles: None,
-            slabs: Vec::new(),
-            turning: None,
-        };
-        match child {
-            Child::Empty => None,
-            Child::Treelet(slot) => Some(Self { slot: Some(slot), ..none("treelet") }),
-            Child::Remote(link) => {
-                let to = page.remote(link);
-                Some(Self { page: Some(to.page()), root: Some(to.root()), ..none("remote") })
-            }
-            Child::Leaf { packet, triangles } => {
-                Some(Self { packet: Some(packet), triangles: Some(triangles), ..none("leaf") })
-            }
-        }
-    }
-
-    fn to_text(&self) -> String {
-        match *self {
-            Self { slot: Some(slot), .. } => format!("slot {slot}"),
-            Self { page: Some(page), root: Some(root), .. } => format!("page {page} root {root}"),
-            Self { packet: Some(packet), triangles: Some(triangles), .. } => {
-                format!("packet {packet} of {triangles}")
-            }
-            _ => "nothing".to_owned(),
-        }
-    }
-}
-
-fn children(page: &Page, slot: u8) -> Vec<ChildDump> {
+/// Returns the children of a treelet, without empty places.
+fn children(page: &Page, slot: u8) -> Vec<Child> {
     let links = page.links(slot);
-    (0..links.children()).filter_map(|child| ChildDump::new(page, links.child(child))).collect()
+    let children = (0..links.children()).map(|child| links.child(child));
+    children.filter(|child| !matches!(child, Child::Empty)).collect()
+}
+
+/// Returns what a link leads to: `treelet`, `remote` or `leaf`.
+fn child_json(page: &Page, child: Child) -> Record {
+    match child {
+        Child::Empty => record! {},
+        Child::Treelet(slot) => record! { kind: "treelet", slot: slot },
+        Child::Remote(link) => {
+            let to = page.remote(link);
+            record! { kind: "remote", page: to.page(), root: to.root() }
+        }
+        Child::Leaf { packet, triangles } => record! { kind: "leaf", packet: packet, triangles: triangles },
+    }
+}
+
+fn child_text(page: &Page, child: Child) -> String {
+    match child {
+        Child::Empty => "nothing".to_owned(),
+        Child::Treelet(slot) => format!("slot {slot}"),
+        Child::Remote(link) => {
+            let to = page.remote(link);
+            format!("page {} root {}", to.page(), to.root())
+        }
+        Child::Leaf { packet, triangles } => format!("packet {packet} of {triangles}"),
+    }
 }
 
 fn slabs_of(kdop: &Kdop, slabs: usize) -> Vec<[f32; 2]> {
@@ -142,168 +53,153 @@ fn slabs_text(slabs: &[[f32; 2]]) -> String {
     texts.join(" ")
 }
 
-impl PageDump {
-    pub(super) fn new(contents: &Contents, number: u32) -> Result<Self, FileError> {
-        let at = contents.layout.page_offset(number);
-        let (index, object) = contents
-            .object_of(number)
-            .ok_or_else(|| FormatError::new(Rule::ObjectPages, at, "an object's page", "none"))?;
-        let bytes = contents.checked(object, number)?;
-        let page = bytes.page(object);
-        let header = page.header();
-        let slabs = object.profile().directions().slabs();
-        let anchor = |slot| {
-            let anchor = page.anchor(slot);
-            let top = anchor.parent_page == NO_PARENT;
-            AnchorDump {
-                slot,
-                parent_page: (!top).then_some(anchor.parent_page),
-                parent_link: (!top).then_some(anchor.parent_link),
-                slabs: slabs_of(&anchor.slabs.to_kdop(slabs), slabs),
-            }
-        };
-        let remote = |link| {
-            let to = page.remote(link);
-            RootDump { link, page: to.page(), root: to.root() }
-        };
-        Ok(Self {
+/// Shows the page of this number.
+pub(super) fn page(contents: &Contents, number: u32, as_json: bool) -> Result<Shown, FileError> {
+    let offset = contents.layout.page_offset(number);
+    let (index, object) = contents
+        .object_of(number)
+        .ok_or_else(|| FormatError::new(Rule::ObjectPages, offset, "an object's page", "none"))?;
+    let bytes = contents.checked(object, number)?;
+    let page = bytes.page(object);
+    let (header, profile) = (page.header(), object.profile().name());
+    // The 64-byte lines in use, of 64.
+    let lines = header.shape().lines(object.profile());
+    let (checksum, packets, first_packet) =
+        (hex(header.checksum.get()), header.packets.get(), header.first_packet.get());
+    let (leaf_line, leaf_lines) = (header.leaf_line.get(), header.leaf_lines.get());
+    let (id_word, id_words) = (header.id_word.get(), header.id_words.get());
+    let slabs = object.profile().directions().slabs();
+    // Each subtree root, with the page and the remote link that lead to it; none to the root of the object.
+    let anchors = (0..header.roots).map(|slot| {
+        let anchor = page.anchor(slot);
+        let parent = (anchor.parent_page != NO_PARENT).then_some((anchor.parent_page, anchor.parent_link));
+        (slot, parent, slabs_of(&anchor.slabs.to_kdop(slabs), slabs))
+    });
+    let remotes = (0..header.remotes).map(|link| (link, page.remote(link)));
+    let treelets = (0..header.treelets).map(|slot| (slot, children(&page, slot)));
+    if as_json {
+        let anchors = anchors.map(|(slot, parent, slabs)| {
+            let (page, link) = parent.unzip();
+            record! { slot: slot, parent_page: page, parent_link: link, slabs: slabs }
+        });
+        let remotes = remotes.map(|(link, to)| record! { link: link, page: to.page(), root: to.root() });
+        let treelets = treelets.map(|(slot, children)| {
+            let children = children.into_iter().map(|child| child_json(&page, child));
+            record! { slot: slot, children: children.collect::<Vec<_>>() }
+        });
+        return Ok(Shown::Json(record! {
             page: number,
-            offset: at,
+            offset: offset,
             object: index,
-            profile: object.profile().name(),
-            checksum: hex(header.checksum.get()),
+            profile: profile,
+            checksum: checksum,
             leaf_checksum: hex(header.leaf_checksum.get()),
             id_checksum: hex(header.id_checksum.get()),
-            leaf_line: header.leaf_line.get(),
-            leaf_lines: header.leaf_lines.get(),
-            id_word: header.id_word.get(),
-            id_words: header.id_words.get(),
-            first_packet: header.first_packet.get(),
-            packets: header.packets.get(),
-            treelet_line: header.treelet_line,
-            lines: header.shape().lines(object.profile()),
+            leaf_line: leaf_line,
+            leaf_lines: leaf_lines,
+            id_word: id_word,
+            id_words: id_words,
+            first_packet: first_packet,
+            packets: packets,
             short_treelets: header.short,
-            anchors: (0..header.roots).map(anchor).collect(),
-            remotes: (0..header.remotes).map(remote).collect(),
-            treelets: (0..header.treelets)
-                .map(|slot| SlotDump { slot, children: children(&page, slot) })
-                .collect(),
-        })
+            treelet_line: header.treelet_line,
+            lines: lines,
+            anchors: anchors.collect::<Vec<_>>(),
+            remotes: remotes.collect::<Vec<_>>(),
+            treelets: treelets.collect::<Vec<_>>(),
+        }));
     }
-
-    pub(super) fn to_text(&self) -> String {
-        let mut text = format!(
-            "page {} at byte {}, object {}, {}, checksum {}\n",
-            self.page, self.offset, self.object, self.profile, self.checksum
-        );
-        text += &format!(
-            "  {} of 64 lines in use: {} anchors, {} remote links, {} treelets, {} of them short, from line {}\n",
-            self.lines,
-            self.anchors.len(),
-            self.remotes.len(),
-            self.treelets.len(),
-            self.short_treelets,
-            self.treelet_line
-        );
-        text += &format!(
-            "  {} packets from {}; leaf lines {} from {}; id words {} from {}\n",
-            self.packets, self.first_packet, self.leaf_lines, self.leaf_line, self.id_words, self.id_word
-        );
-        for anchor in &self.anchors {
-            let parent = match (anchor.parent_page, anchor.parent_link) {
-                (Some(page), Some(link)) => format!("page {page} link {link}"),
-                _ => "none".to_owned(),
-            };
-            text += &format!("  root {} parent {parent}: {}\n", anchor.slot, slabs_text(&anchor.slabs));
-        }
-        for RootDump { link, page, root } in &self.remotes {
-            text += &format!("  link {link} to page {page} root {root}\n");
-        }
-        for treelet in &self.treelets {
-            let children: Vec<_> = treelet.children.iter().map(ChildDump::to_text).collect();
-            text += &format!("  slot {}: {}\n", treelet.slot, children.join(", "));
-        }
-        text
+    let mut text =
+        format!("page {number} at byte {offset}, object {index}, {profile}, checksum {checksum}\n");
+    text += &format!(
+        "  {lines} of 64 lines in use: {} anchors, {} remote links, {} treelets, {} of them short, from line {}\n",
+        header.roots, header.remotes, header.treelets, header.short, header.treelet_line
+    );
+    text += &format!(
+        "  {packets} packets from {first_packet}; leaf lines {leaf_lines} from {leaf_line}; id words {id_words} from \
+         {id_word}\n"
+    );
+    for (slot, parent, slabs) in anchors {
+        let parent = parent.map_or("none".to_owned(), |(page, link)| format!("page {page} link {link}"));
+        text += &format!("  root {slot} parent {parent}: {}\n", slabs_text(&slabs));
     }
+    for (link, to) in remotes {
+        text += &format!("  link {link} to page {} root {}\n", to.page(), to.root());
+    }
+    for (slot, children) in treelets {
+        let children: Vec<_> = children.into_iter().map(|child| child_text(&page, child)).collect();
+        text += &format!("  slot {slot}: {}\n", children.join(", "));
+    }
+    Ok(Shown::Text(text))
 }
 
-/// The object that `dump FILE --treelet N --json` prints.
-#[derive(Serialize)]
-pub(super) struct TreeletDump {
-    treelet: u64,
-    object: usize,
-    profile: &'static str,
-    page: u32,
-    slot: u8,
-    offset: u64,
-    /// The slabs of the treelet itself, decoded from its anchor down.
-    slabs: Vec<[f32; 2]>,
-    children: Vec<ChildDump>,
-}
-
-impl TreeletDump {
-    /// Returns the treelet with this number in the file, or `None` after the last one.
-    pub(super) fn find(contents: &Contents, number: u64) -> Result<Option<Self>, FileError> {
-        let mut before = 0;
-        for (index, object) in contents.layout.objects.iter().enumerate() {
-            for page_number in object.pages() {
-                let bytes = contents.checked(object, page_number)?;
-                let page = bytes.page(object);
-                let treelets = u64::from(page.header().treelets);
-                if number < before + treelets {
-                    let slot = (number - before) as u8;
-                    return Ok(Some(Self::new(&contents.layout, index, object, &page, number, slot)));
-                }
-                before += treelets;
+/// Shows the treelet with this number in the file. Returns `None` after the last one.
+pub(super) fn treelet(contents: &Contents, number: u64, as_json: bool) -> Result<Option<Shown>, FileError> {
+    let mut before = 0;
+    for (index, object) in contents.layout.objects.iter().enumerate() {
+        for page_number in object.pages() {
+            let bytes = contents.checked(object, page_number)?;
+            let page = bytes.page(object);
+            let treelets = u64::from(page.header().treelets);
+            if number < before + treelets {
+                let slot = (number - before) as u8;
+                let offset = contents.layout.page_offset(page_number) + page.treelet_at(slot) as u64;
+                return Ok(Some(treelet_of(object, &page, slot, (number, index, offset), as_json)));
             }
+            before += treelets;
         }
-        Ok(None)
     }
+    Ok(None)
+}
 
-    fn new(layout: &Layout, index: usize, object: &Object, page: &Page, number: u64, slot: u8) -> Self {
-        let slabs = object.profile().directions().slabs();
-        let own = decoded_slots(object, page)[usize::from(slot)];
-        let mut children = children(page, slot);
-        for (child, dump) in children.iter_mut().enumerate() {
-            let node = decode_child(object.profile(), object.f16_scale(), page.treelet(slot), child, &own);
-            dump.slabs = slabs_of(&node.to_kdop(slabs), slabs);
-            let turning = decode_turning(object.profile(), page.treelet(slot), child, &node);
-            dump.turning = turning
-                .map(|slab| TurningDump { direction: slab.direction.vector(), slab: [slab.lo, slab.hi] });
-        }
-        let page_number = page.header().page_number.get();
-        Self {
+/// Shows the treelet in a slot of a page, of which the number, the number of its object and the place are given.
+fn treelet_of(
+    object: &Object,
+    page: &Page,
+    slot: u8,
+    (number, index, offset): (u64, usize, u64),
+    as_json: bool,
+) -> Shown {
+    let (profile, page_number) = (object.profile(), page.header().page_number.get());
+    let slabs = profile.directions().slabs();
+    // Decoded from its anchor down.
+    let own = decoded_slots(object, page)[usize::from(slot)];
+    let children = children(page, slot).into_iter().enumerate().map(|(place, child)| {
+        let node = decode_child(profile, object.f16_scale(), page.treelet(slot), place, &own);
+        let turning = decode_turning(profile, page.treelet(slot), place, &node);
+        let turning = turning.map(|slab| (slab.direction.vector(), [slab.lo, slab.hi]));
+        (child, slabs_of(&node.to_kdop(slabs), slabs), turning)
+    });
+    let own_slabs = slabs_of(&own.to_kdop(slabs), slabs);
+    if as_json {
+        let children = children.map(|(child, slabs, turning)| {
+            let turning = turning.map(|(direction, slab)| record! { direction: direction, slab: slab });
+            let turning = turning.map(|turning| record! { turning: turning });
+            child_json(page, child).with(record! { slabs: slabs }).with(turning)
+        });
+        return Shown::Json(record! {
             treelet: number,
             object: index,
-            profile: object.profile().name(),
+            profile: profile.name(),
             page: page_number,
-            slot,
-            offset: layout.page_offset(page_number) + page.treelet_at(slot) as u64,
-            slabs: slabs_of(&own.to_kdop(slabs), slabs),
-            children,
+            slot: slot,
+            offset: offset,
+            slabs: own_slabs,
+            children: children.collect::<Vec<_>>(),
+        });
+    }
+    let mut text = format!(
+        "treelet {number}: page {page_number}, slot {slot}, at byte {offset}, object {index}, {}\n  own    {}\n",
+        profile.name(),
+        slabs_text(&own_slabs)
+    );
+    for (place, (child, slabs, turning)) in children.enumerate() {
+        text += &format!("  child {place}: {}\n         {}\n", child_text(page, child), slabs_text(&slabs));
+        if let Some((direction, slab)) = turning {
+            text += &format!("         turning {} along {direction:?}\n", slabs_text(&[slab]));
         }
     }
-
-    pub(super) fn to_text(&self) -> String {
-        let mut text = format!(
-            "treelet {}: page {}, slot {}, at byte {}, object {}, {}\n  own    {}\n",
-            self.treelet,
-            self.page,
-            self.slot,
-            self.offset,
-            self.object,
-            self.profile,
-            slabs_text(&self.slabs)
-        );
-        for (number, child) in self.children.iter().enumerate() {
-            text +=
-                &format!("  child {number}: {}\n         {}\n", child.to_text(), slabs_text(&child.slabs));
-            if let Some(TurningDump { direction, slab }) = &child.turning {
-                text += &format!("         turning {} along {direction:?}\n", slabs_text(&[*slab]));
-            }
-        }
-        text
-    }
+    Shown::Text(text)
 }
 
 /// Decodes the slabs of every slot of a page.

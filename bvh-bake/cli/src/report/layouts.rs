@@ -9,7 +9,7 @@
 use super::meshes::{bake_both, layout_of};
 use super::page::{Column, Words, percent, table};
 use super::{Cells, Kind, Measured, Subject, number};
-use crate::asking::poses;
+use crate::asking::files::read_poses;
 use crate::console::Failure;
 use bvh_bake::{BakeReport, Options};
 use bvh_format::leaf::TriangleEncoding;
@@ -24,7 +24,7 @@ use cbvh_measure::table::{self, Cell, micro};
 use std::sync::Arc;
 
 pub(super) const KIND: Kind<Pose> =
-    Kind { words: WORDS, items: "poses", read: poses::read, make: mixed, made: MADE, measure };
+    Kind { words: WORDS, items: "poses", read: read_poses, make: mixed, made: MADE, measure };
 
 const ABOUT: &str = "\
 A layout is how a <code>.cbvh</code> file stores bounding volumes (its profile) and triangles (their encoding). This page \

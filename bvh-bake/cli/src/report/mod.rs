@@ -93,6 +93,9 @@ const QUICK: (usize, usize) = (2, 10);
 /// The number of items that are made for a pair without any.
 const MADE: usize = 60;
 
+/// Makes so many items for two meshes.
+type Make<T> = fn(&mut Querier, &Bvh, &Bvh, usize) -> Result<Vec<T>, QueryError>;
+
 /// What one kind of report has that the other does not. Its items are poses or motions.
 struct Kind<T> {
     words: page::Words,
@@ -100,8 +103,8 @@ struct Kind<T> {
     items: &'static str,
     /// Reads a file of items.
     read: fn(&Path) -> Result<Vec<T>, Failure>,
-    /// Makes so many items for two meshes, and says how.
-    make: fn(&mut Querier, &Bvh, &Bvh, usize) -> Result<Vec<T>, QueryError>,
+    /// Makes items for a pair without any; and how.
+    make: Make<T>,
     made: &'static str,
     /// Measures a pair.
     measure: fn(&Subject<'_>, &[T]) -> Result<Measured, Failure>,

@@ -8,7 +8,7 @@ mod ways;
 
 use super::page::{Column, Words, percent, table};
 use super::{Cells, Kind, Measured, Subject, number};
-use crate::asking::motions;
+use crate::asking::files::read_motions;
 use crate::console::{Failure, plural};
 use bvh_query::{Backend, Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError};
 use cbvh_measure::motions::{MADE, mixed};
@@ -20,7 +20,7 @@ use cbvh_measure::table::{self, Cell, micro, whole};
 use ways::{Asker, Method, SAMPLES, Said, is_hit, judge};
 
 pub(super) const KIND: Kind<Motion> =
-    Kind { words: WORDS, items: "motions", read: motions::read, make: mixed, made: MADE, measure };
+    Kind { words: WORDS, items: "motions", read: read_motions, make: mixed, made: MADE, measure };
 
 const ABOUT: &str = "\
 Whether the way of a moving mesh is free is often asked by samples: poses along the way, of which the first that touches \

@@ -1,77 +1,49 @@
 //! The results of a run: the line of `--bench` with the hash of the answers, the raw lines, records and lists of pairs.
 
-use super::asked::{Answer, Question, Run};
 use super::file::LoadedScene;
-use super::{Mode, SceneArguments};
+use super::{Answer, Mode, Question, Run, SceneArguments};
 use crate::asking::files::stem;
-use crate::asking::{Times, distance_json};
-use crate::console::{hex, plural, significant};
-use crate::process::resident;
+use crate::asking::{distance_json, mode_name, peak_rss_mb, times};
+use crate::console::{Record, hex, plural, record, significant};
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, InstanceId, Relation, ScenePair};
-use serde::Serialize;
 use serde_json::{Value, json};
 
-/// The line of `--bench`: the fields that programs of this protocol share, and further ones.
-#[derive(Serialize)]
-pub(super) struct Record {
-    peer: &'static str,
-    version: &'static str,
-    mode: &'static str,
-    scene: String,
-    frames: String,
-    instances: usize,
-    moving: usize,
-    triangles: u64,
-    build_s: f64,
-    #[serde(flatten)]
-    times: Times,
-    positives: u64,
-    sum: f64,
-    mesh_pair_tests: u64,
-    peak_rss_mb: Option<f64>,
-    isa: &'static str,
-    answers_xxh3: Option<String>,
-    node_tests: u64,
-    triangle_tests: u64,
-    exact_tests: u64,
-    jobs: u16,
-}
-
-impl Record {
-    pub(super) fn new(
-        arguments: &SceneArguments,
-        scene: &LoadedScene,
-        backend: Backend,
-        question: &Question,
-        run: &Run,
-    ) -> Self {
-        let complete = run.answers.len() == run.requested;
-        // Without pairs there is no distance to add.
-        let values = run.answers.iter().map(|(answer, _)| answer.value()).filter(|value| value.is_finite());
-        Self {
-            peer: "cbvh",
-            version: env!("CARGO_PKG_VERSION"),
-            mode: question.mode.name(),
-            scene: stem(&arguments.scene),
-            frames: arguments.frames.as_deref().map_or(String::new(), stem),
-            instances: scene.scene.len(),
-            moving: scene.moving.len(),
-            triangles: scene.triangles,
-            build_s: scene.build_seconds,
-            times: Times::new(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds),
-            positives: run.answers.iter().filter(|(answer, _)| answer.is_positive()).count() as u64,
-            sum: values.sum(),
-            mesh_pair_tests: run.pairs_asked,
-            peak_rss_mb: resident::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),
-            isa: backend.name(),
-            answers_xxh3: complete.then(|| hex(hash(scene, run))),
-            node_tests: run.stats.node_tests,
-            triangle_tests: run.stats.packet_tests,
-            exact_tests: run.stats.exact_tests,
-            jobs: arguments.jobs,
-        }
+/// Returns the line of `--bench`: the fields that programs of this protocol share, and further ones.
+pub(super) fn bench(
+    arguments: &SceneArguments,
+    scene: &LoadedScene,
+    backend: Backend,
+    question: &Question,
+    run: &Run,
+) -> Record {
+    let complete = run.answers.len() == run.requested;
+    // Without pairs there is no distance to add.
+    let values = run.answers.iter().map(|(answer, _)| answer.value()).filter(|value| value.is_finite());
+    record! {
+        peer: "cbvh",
+        version: env!("CARGO_PKG_VERSION"),
+        mode: mode_name(&question.mode),
+        scene: stem(&arguments.scene),
+        frames: arguments.frames.as_deref().map_or(String::new(), stem),
+        instances: scene.scene.len(),
+        moving: scene.moving.len(),
+        triangles: scene.triangles,
+        build_s: scene.build_seconds,
     }
+    .with(times(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds))
+    .with(record! {
+        positives: run.answers.iter().filter(|(answer, _)| answer.is_positive()).count(),
+        sum: values.sum::<f64>(),
+        mesh_pair_tests: run.pairs_asked,
+        peak_rss_mb: peak_rss_mb(),
+        isa: backend.name(),
+        answers_xxh3: complete.then(|| hex(hash(scene, run))),
+        node_tests: run.stats.node_tests,
+        triangle_tests: run.stats.packet_tests,
+        exact_tests: run.stats.exact_tests,
+        jobs: arguments.jobs,
+    })
 }
 
 /// Returns XXH3-64 of names and values in order, without times.

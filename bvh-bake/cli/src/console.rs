@@ -1,13 +1,16 @@
-//! Why a command stops: one line on standard error, and an exit code.
+//! What every command prints, and how it ends: standard output and error, records in JSON, and exit codes.
 
 use bvh_bake::input::ReadError;
 use bvh_bake::{BakeError, FileError, VerifyError};
 use bvh_query::{BackendError, OpenError};
-use serde::Serialize;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::{Serialize, Serializer};
+use serde_json::value::{RawValue, to_raw_value};
 use std::fmt::Display;
-use std::io::{self, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Why a command stops. Each text is one line and names the file.
 #[derive(Debug)]
@@ -172,4 +175,154 @@ pub(crate) fn tell_json(value: &impl Serialize) {
 fn one_line(text: &str) -> String {
     let escape = |c: char| if c.is_control() { c.escape_debug().collect() } else { vec![c] };
     text.chars().flat_map(escape).collect()
+}
+
+/// Prints text as it is.
+pub(crate) fn text(text: &str) -> Result<(), Failure> {
+    let mut stdout = io::stdout().lock();
+    let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+    written.map_err(|error| Failure::from_output(&error))
+}
+
+/// Prints many lines through a buffer.
+pub(crate) fn lines(lines: impl IntoIterator<Item = impl Display>) -> Result<(), Failure> {
+    let mut stdout = BufWriter::new(io::stdout().lock());
+    let written = lines.into_iter().try_for_each(|line| writeln!(stdout, "{line}"));
+    written.and_then(|()| stdout.flush()).map_err(|error| Failure::from_output(&error))
+}
+
+/// Prints one JSON object and a line feed.
+pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
+    // Serialisation fails only for maps whose keys are not strings, and there are none.
+    let line = serde_json::to_string(value).map_err(|error| Failure::System(format!("JSON: {error}")))?;
+    text(&format!("{line}\n"))
+}
+
+/// A JSON object whose fields stay in the order in which they are written; [`record!`] makes one.
+pub(crate) struct Record(Vec<(&'static str, Box<RawValue>)>);
+
+impl Record {
+    /// Makes a field. The values of this program can all be written as JSON.
+    pub(crate) fn field(name: &'static str, value: &impl Serialize) -> (&'static str, Box<RawValue>) {
+        (name, to_raw_value(value).unwrap_or_default())
+    }
+
+    /// Makes a record of these fields.
+    pub(crate) fn new(fields: Vec<(&'static str, Box<RawValue>)>) -> Self {
+        Self(fields)
+    }
+
+    /// Adds the fields of another record, if there is one.
+    pub(crate) fn with(mut self, other: impl Into<Option<Self>>) -> Self {
+        self.0.extend(other.into().into_iter().flat_map(|other| other.0));
+        self
+    }
+}
+
+impl Serialize for Record {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}
+
+/// Makes a [`Record`] of named values.
+macro_rules! record {
+    ($($name:ident: $value:expr),* $(,)?) => {
+        $crate::console::Record::new(vec![$($crate::console::Record::field(stringify!($name), &$value)),*])
+    };
+}
+pub(crate) use record;
+
+/// Returns a checksum in the form that scripts compare.
+pub(crate) fn hex(sum: u64) -> String {
+    format!("{sum:016x}")
+}
+
+/// Formats a number. Infinities become `inf` and `-inf`, and NaN becomes `nan`.
+pub(crate) fn significant(value: f64) -> String {
+    if value.is_nan() {
+        return "nan".to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "inf" } else { "-inf" }.to_owned();
+    }
+    let scientific = format!("{value:.16e}");
+    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if !(-4..17).contains(&exponent) {
+        let sign = if exponent < 0 { '-' } else { '+' };
+        return format!("{}e{sign}{:02}", trimmed(mantissa), exponent.abs());
+    }
+    let decimals = (16 - exponent).max(0) as usize;
+    let plain = format!("{value:.decimals$}");
+    trimmed(&plain).to_owned()
+}
+
+/// Removes trailing zeros of a fraction.
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
+/// Returns `word` with an s, unless the count is one.
+pub(crate) fn plural(count: u64, word: &str) -> String {
+    if count == 1 { word.to_owned() } else { format!("{word}s") }
+}
+
+/// Returns a length in mesh units as an exponent, and zero as a plain 0.
+pub(crate) fn length(length: f64) -> String {
+    if length == 0.0 { "0".to_owned() } else { format!("{length:e}") }
+}
+
+/// Returns paths separated by commas.
+pub(crate) fn names(paths: &[PathBuf]) -> String {
+    let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// The time between two drawings of the line.
+const TICK: Duration = Duration::from_millis(100);
+
+/// Returns a line with a message and the elapsed time. It stays hidden if standard error is not a terminal, or if the
+/// command is quiet.
+pub(crate) fn spinner(quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let spinner = ProgressBar::with_draw_target(None, target);
+    if !spinner.is_hidden() {
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            spinner.set_style(style);
+        }
+        spinner.enable_steady_tick(TICK);
+    }
+    spinner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_formatted_as_in_c() {
+        // From printf("%.17g").
+        let cases = [
+            (0.0, "0"),
+            (-0.0, "-0"),
+            (1.0, "1"),
+            (0.1, "0.10000000000000001"),
+            (100.0, "100"),
+            (1e16, "10000000000000000"),
+            (1e17, "1e+17"),
+            (123456789.125, "123456789.125"),
+            (0.0001, "0.0001"),
+            (0.00001, "1.0000000000000001e-05"),
+            (2.5e-7, "2.4999999999999999e-07"),
+            (1e-100, "1e-100"),
+            (9.999999999999999e22, "9.9999999999999992e+22"),
+            (5e-324, "4.9406564584124654e-324"),
+            (1.0 / 3.0, "0.33333333333333331"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(significant(value), expected);
+            assert_eq!(expected.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
+        }
+    }
 }

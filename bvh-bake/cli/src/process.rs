@@ -1,0 +1,76 @@
+//! This process and the system: its resident memory, how to keep it small, and signals.
+
+use crate::console::{Failure, tell_line};
+use indicatif::ProgressBar;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The largest size returned so far. The system counts roughly, and its peak may shrink again by a few pages.
+static PEAK: AtomicU64 = AtomicU64::new(0);
+
+/// Returns the largest resident size so far in bytes, or `None` if the system does not tell it in `/proc`.
+pub(crate) fn peak_bytes() -> Option<u64> {
+    let peak = status_bytes("VmHWM:")?;
+    Some(PEAK.fetch_max(peak, Ordering::Relaxed).max(peak))
+}
+
+/// Returns the current resident size in bytes, or `None` if the system does not tell it in `/proc`.
+pub(crate) fn current_bytes() -> Option<u64> {
+    let current = status_bytes("VmRSS:")?;
+    PEAK.fetch_max(current, Ordering::Relaxed);
+    Some(current)
+}
+
+fn status_bytes(label: &str) -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(label))?;
+    let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kibibytes * 1024)
+}
+
+/// Returns the largest resident size so far as the end of a sentence; nothing if it is unknown.
+pub(crate) fn memory_in_words() -> String {
+    peak_bytes().map_or(String::new(), |bytes| format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0))
+}
+
+/// Makes the allocator return large freed blocks to the system at once. The GNU C library would otherwise keep more and
+/// more of them, which adds half as much memory to a bake.
+pub(crate) fn give_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    #[allow(unsafe_code, reason = "no safe function limits what the C library keeps")]
+    {
+        /// The size in bytes from which the allocator takes a block from the system and returns it at once.
+        const LARGE_BYTES: i32 = 1 << 20;
+        // SAFETY: `mallopt` takes two integers by value and may be called at any time. A value out of range makes it
+        // return 0 and change nothing.
+        let _ = unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE_BYTES) };
+    }
+}
+
+/// Starts a thread that waits for an interrupt or a request to terminate. It removes unfinished files, prints one line,
+/// and then lets the signal end the process as usual, so that its parent sees which signal it was.
+#[cfg(unix)]
+pub(crate) fn remove_unfinished_files(spinner: &ProgressBar) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::low_level::{emulate_default_handler, signal_name};
+    let failed = |error| Failure::System(format!("cannot wait for signals: {error}"));
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).map_err(failed)?;
+    let spinner = spinner.clone();
+    let wait = move || {
+        if let Some(signal) = signals.forever().next() {
+            bvh_bake::discard_unfinished();
+            spinner.finish_and_clear();
+            let name = signal_name(signal).unwrap_or("a signal");
+            tell_line(&format!("stopped by {name}; no unfinished file was left behind"));
+            // Reached only if the process survives: then nothing can be done about it.
+            let _ = emulate_default_handler(signal);
+        }
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(wait).map_err(failed)?;
+    Ok(())
+}
+
+/// Does nothing on other systems: the next bake of the same output removes what is left.
+#[cfg(not(unix))]
+pub(crate) fn remove_unfinished_files(_: &ProgressBar) -> Result<(), Failure> {
+    Ok(())
+}

@@ -1,0 +1,314 @@
+//! `cbvh query`: asks two meshes about files of poses, or about one pose.
+
+use crate::asking::files::{self, read_all, read_poses, write_file};
+use crate::asking::mesh::{self, LoadedMesh, blame, load_both};
+use crate::asking::{self, Answer as _, AskingArguments, Run};
+use crate::console::{self, Failure, plural};
+use crate::options::not_negative;
+use bvh_format::checksum::Hasher;
+use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation};
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+const HELP: &str = "\
+Examples:
+  cbvh query a.cbvh b.cbvh poses.txt --mode collide > answers.txt
+  cbvh query a.obj b.obj near.txt,far.txt --mode distance --json
+  cbvh query bin.cbvh part.cbvh poses.txt --mode relation
+  cbvh query a.cbvh b.cbvh --mode distance --pose \"1 0 0 2  0 1 0 0  0 0 1 0\" --witness w.obj
+
+Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that places B in the frame of A. The first three \
+numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
+
+One answer is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
+triangles, distance the distance in mesh units (17 digits), relation a number. About one pose, the answer is printed for a \
+person.
+
+collide is about surfaces: a mesh that is inside another without touching it does not collide. relation tells: 0 touching, \
+1 apart, 2 A inside B, 3 B inside A, 4 mixed (some parts of a mesh are inside the other and some are not, or some of each \
+mesh are), 5 undefined, because a mesh that is not closed would have to contain something.
+
+--json prints one object per pose: pose, its number in the file, from 0; poses, the name of the file, if there are several; \
+and collide, within (true or false), relation, contacts and pairs (the triangles), or distance, lower, upper, point_a, \
+point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
+frame of A.
+
+--bench prints one object per file: what was asked, the times of the queries, positives (all answers of relation but 1 and 5) \
+and answers_xxh3, which is the same for every --isa and --jobs. It is null if --budget cut the run short, or if --rel-err or \
+--abs-err leave a choice of answers. --out writes the lines, each with its nanoseconds; %s stands for the name of the file.";
+
+/// What `query` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct QueryArguments {
+    /// The first mesh: a .cbvh file, or a mesh file that is baked in memory first
+    a: PathBuf,
+    /// The second mesh, which the poses place
+    b: PathBuf,
+    /// Pose files, separated by commas. Without them, B is where its file says
+    #[arg(value_name = "POSES[,POSES...]", conflicts_with = "one")]
+    poses: Option<String>,
+    /// The question
+    #[arg(long, value_enum, default_value = "collide")]
+    mode: Mode,
+    /// With --mode within: the distance to compare with, in mesh units
+    #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
+    within: Option<f64>,
+    /// With --mode distance: the answer may exceed the least distance by this fraction of it
+    #[arg(long, value_name = "R", value_parser = not_negative, allow_negative_numbers = true)]
+    rel_err: Option<f64>,
+    /// With --mode distance: the answer may exceed the least distance by this length, in mesh units
+    #[arg(long, value_name = "E", value_parser = not_negative, allow_negative_numbers = true)]
+    abs_err: Option<f64>,
+    #[command(flatten)]
+    asking: AskingArguments,
+    /// Ask about one pose, given as 12 numbers, and print the answer for a person
+    #[arg(id = "one", long = "pose", value_name = "12 NUMBERS", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// With --mode distance about one pose: write both closest triangles and the segment between them as OBJ
+    #[arg(long, value_name = "OBJ")]
+    witness: Option<PathBuf>,
+}
+
+/// A question about two meshes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    /// Do they touch? This is about surfaces: a mesh inside another does not touch it, and relation tells
+    Collide,
+    /// How many pairs of triangles touch?
+    Contacts,
+    /// How far apart are they?
+    Distance,
+    /// Are they at most --within apart?
+    Within,
+    /// Do they touch and, if not, is one inside the other?
+    Relation,
+}
+
+/// Answers the question about pose files or about one pose.
+pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
+    let backend = asking::backend(&arguments.asking.isa)?;
+    let question = Question::new(arguments)?;
+    let Some(files) = &arguments.poses else {
+        arguments.asking.require_no_files()?;
+        let pose = arguments.pose.as_deref().map_or(Ok(Pose::IDENTITY), files::one_pose)?;
+        return once(arguments, &question, &pose, Querier::with_backend(backend));
+    };
+    let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;
+    let [mut a, mut b] = load_both(&arguments.a, &arguments.b, &arguments.asking.how())?;
+    a.check()?;
+    b.check()?;
+    let ask = |querier: &mut Querier, pose: &Pose| question.ask(querier, [&a, &b], pose);
+    let bench = |stem: &str, run: &Run<Answer>| {
+        asking::bench(
+            &a,
+            Some(&b),
+            &asking::mode_name(&question.mode),
+            backend,
+            stem,
+            run,
+            question.is_exact(),
+        )
+    };
+    asking::ask_files(
+        &arguments.asking,
+        backend,
+        "pose",
+        &files,
+        ask,
+        |error| blame(&a, Some(&b), error),
+        bench,
+    )
+}
+
+/// Asks about one pose, prints the answer, and writes the witness of a distance as OBJ.
+fn once(
+    arguments: &QueryArguments,
+    question: &Question,
+    pose: &Pose,
+    mut querier: Querier,
+) -> Result<(), Failure> {
+    let [a, b] = &load_both(&arguments.a, &arguments.b, &arguments.asking.how())?;
+    let answer = question.ask(&mut querier, [a, b], pose).map_err(|error| blame(a, Some(b), error))?;
+    if let (Some(path), Answer::Distance(distance)) = (&arguments.witness, &answer) {
+        write_file(path, &mesh::obj([a, b], pose, distance)?)?;
+    }
+    if arguments.asking.json {
+        let mut record = answer.json();
+        record["pose"] = 0.into();
+        return console::json(&record);
+    }
+    console::text(&question.describe([a, b], &answer))
+}
+
+/// The most contacts that are listed for a person; the others are only counted.
+const MAX_LISTED: usize = 10;
+
+/// A question with its parameters.
+#[derive(Debug, Clone, Copy)]
+struct Question {
+    mode: Mode,
+    /// The distance of `Mode::Within`, in mesh units.
+    within: f64,
+    errors: DistanceOptions,
+    /// Whether contacts are listed, not only counted.
+    list: bool,
+}
+
+/// An answer.
+#[derive(Debug, Clone, PartialEq)]
+enum Answer {
+    /// Whether the meshes touch.
+    Collide(bool),
+    /// Whether they are near enough.
+    Within(bool),
+    /// The number of pairs of triangles in contact, and the pairs if they are to be listed.
+    Contacts(u64, Vec<Contact>),
+    /// How far apart they are.
+    Distance(Distance),
+    /// How they lie.
+    Relation(Relation),
+}
+
+impl Question {
+    /// Takes the question from the command line, and refuses options that do not belong to its mode.
+    fn new(arguments: &QueryArguments) -> Result<Self, Failure> {
+        let mode = arguments.mode;
+        let wrong = |text: &str| Err(Failure::Usage(format!("{text} (see --help)")));
+        if mode == Mode::Within && arguments.within.is_none() {
+            return wrong("--mode within requires --within D");
+        }
+        if mode != Mode::Within && arguments.within.is_some() {
+            return wrong("--within requires --mode within");
+        }
+        if (arguments.rel_err.is_some() || arguments.abs_err.is_some()) && mode != Mode::Distance {
+            return wrong("--rel-err and --abs-err require --mode distance");
+        }
+        if arguments.witness.is_some() && (arguments.poses.is_some() || mode != Mode::Distance) {
+            return wrong("--witness requires --mode distance and one pose, --pose instead of files");
+        }
+        let errors = DistanceOptions::new()
+            .rel_err(arguments.rel_err.unwrap_or(0.0))
+            .abs_err(arguments.abs_err.unwrap_or(0.0));
+        let list = arguments.asking.json || arguments.poses.is_none();
+        Ok(Self { mode, within: arguments.within.unwrap_or(0.0), errors, list })
+    }
+
+    /// Returns whether the answer is the same on every backend and with every number of threads.
+    fn is_exact(&self) -> bool {
+        self.errors == DistanceOptions::default()
+    }
+
+    /// Asks the question about one pose.
+    #[inline]
+    fn ask(
+        &self,
+        querier: &mut Querier,
+        meshes: [&LoadedMesh; 2],
+        pose: &Pose,
+    ) -> Result<Answer, QueryError> {
+        let [a, b] = meshes.map(LoadedMesh::shape);
+        Ok(match self.mode {
+            Mode::Collide => Answer::Collide(querier.collide(a, b, pose)?),
+            Mode::Contacts if self.list => {
+                let contacts = querier.contacts(a, b, pose)?;
+                Answer::Contacts(contacts.len() as u64, contacts)
+            }
+            Mode::Contacts => {
+                let count = querier.visit_contacts(a, b, pose, |_| ControlFlow::Continue(()))?;
+                Answer::Contacts(count, Vec::new())
+            }
+            Mode::Distance => Answer::Distance(querier.distance_with(a, b, pose, &self.errors)?),
+            Mode::Within => Answer::Within(querier.within(a, b, pose, self.within)?),
+            Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
+        })
+    }
+
+    /// Returns an answer for a person, with the closest points and triangles or with the first contacts.
+    fn describe(&self, [mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Answer) -> String {
+        match answer {
+            Answer::Collide(true) => "the meshes touch\n".to_owned(),
+            Answer::Collide(false) => "the meshes do not touch\n".to_owned(),
+            Answer::Within(within) => {
+                let how = if *within { "at most" } else { "more than" };
+                format!("the meshes are {how} {:?} apart\n", self.within)
+            }
+            Answer::Contacts(count, contacts) => {
+                let mut text = format!("{count} {} of triangles in contact\n", plural(*count, "pair"));
+                for contact in contacts.iter().take(MAX_LISTED) {
+                    let a = mesh::name(mesh_a, contact.object_a, contact.triangle_a);
+                    let b = mesh::name(mesh_b, contact.object_b, contact.triangle_b);
+                    text.push_str(&format!("  A: {a}  B: {b}\n"));
+                }
+                if contacts.len() > MAX_LISTED {
+                    text.push_str(&format!("  and {} more\n", contacts.len() - MAX_LISTED));
+                }
+                text
+            }
+            Answer::Distance(distance) => mesh::describe([mesh_a, mesh_b], distance),
+            Answer::Relation(relation) => format!("{}\n", in_words(*relation)),
+        }
+    }
+}
+
+impl asking::Answer for Answer {
+    /// Returns true for contact, for a yes to `within`, and if any part of a mesh is inside the other.
+    fn is_positive(&self) -> bool {
+        match self {
+            Self::Distance(of) => of.distance <= 0.0,
+            Self::Relation(relation) => !matches!(relation, Relation::Apart | Relation::Undefined),
+            _ => self.value() > 0.0,
+        }
+    }
+
+    fn value(&self) -> f64 {
+        match self {
+            Self::Collide(flag) | Self::Within(flag) => f64::from(u8::from(*flag)),
+            Self::Contacts(count, _) => *count as f64,
+            Self::Distance(of) => of.distance,
+            Self::Relation(relation) => f64::from(*relation as u8),
+        }
+    }
+
+    fn json(&self) -> Value {
+        match self {
+            Self::Collide(flag) => json!({ "collide": flag }),
+            Self::Within(flag) => json!({ "within": flag }),
+            Self::Contacts(count, contacts) => {
+                let pair = |of: &Contact| {
+                    json!({
+                        "object_a": of.object_a, "triangle_a": of.triangle_a, "object_b": of.object_b,
+                        "triangle_b": of.triangle_b,
+                    })
+                };
+                json!({ "contacts": count, "pairs": contacts.iter().map(pair).collect::<Vec<_>>() })
+            }
+            Self::Distance(distance) => asking::distance_json(distance),
+            Self::Relation(relation) => json!({ "relation": *relation as u8 }),
+        }
+    }
+
+    /// Hashes a byte for yes or no and for a relation, a `u64` for a count, the bits of a distance.
+    fn hash(&self, hasher: &mut Hasher) {
+        match self {
+            Self::Collide(flag) | Self::Within(flag) => hasher.update(&[u8::from(*flag)]),
+            Self::Contacts(count, _) => hasher.update(&count.to_le_bytes()),
+            Self::Distance(of) => hasher.update(&of.distance.to_bits().to_le_bytes()),
+            Self::Relation(relation) => hasher.update(&[*relation as u8]),
+        }
+    }
+}
+
+/// Returns a relation in words.
+fn in_words(relation: Relation) -> &'static str {
+    match relation {
+        Relation::Touching => "touching",
+        Relation::Apart => "apart",
+        Relation::AInB => "A inside B",
+        Relation::BInA => "B inside A",
+        Relation::Mixed => "not touching, some parts inside the other mesh and some not",
+        Relation::Undefined => "not touching, undefined because a mesh is not closed",
+    }
+}
