@@ -1,12 +1,12 @@
 //! `cbvh motion`: asks whether the way between two poses is free, and where it ends.
 
 use crate::asking::files::{self, read_all, read_motions, write_file};
-use crate::asking::mesh::{self, LoadedMesh, blame, load_both};
-use crate::asking::{self, Answer, AskingArguments, Run};
-use crate::console::{self, Failure, record, significant};
+use crate::asking::mesh;
+use crate::asking::{self, Answer, AskingArguments, Session};
+use crate::console::{Failure, Record, record, significant};
 use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
-use bvh_query::{Backend, Motion, MotionAnswer, MotionOptions, Path as _, Querier};
+use bvh_query::{Motion, MotionAnswer, MotionOptions, Path as _, Querier, Shape};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ pub(crate) struct MotionArguments {
     #[command(flatten)]
     asking: AskingArguments,
     /// Ask about one motion, given as 24 numbers, and print the answer for a person
-    #[arg(id = "one", long = "motion", value_name = "24 NUMBERS", allow_hyphen_values = true)]
+    #[arg(id = "one", long = "motion", value_name = "24 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     motion: Option<String>,
     /// With --motion: write the closest triangles at a hit and the segment between them as OBJ
     #[arg(long, value_name = "OBJ")]
@@ -59,51 +59,25 @@ pub(crate) struct MotionArguments {
 
 /// Answers the question about files of motions or about one motion.
 pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
-    let backend = asking::backend(&arguments.asking.isa)?;
     // Clap cannot check this: where files exclude --motion, it also waives what requires --motion.
     if arguments.witness.is_some() && arguments.motion.is_none() {
         return Err(Failure::Usage("--witness requires --motion (see --help)".into()));
     }
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
-    let meshes = || load_both(&arguments.a, &arguments.b, &arguments.asking.how());
-    if let Some(motion) = &arguments.motion {
-        let motion = files::one_motion(motion)?;
-        let [a, b] = &meshes()?;
-        return once([a, b], &motion, &options, backend, arguments);
-    }
-    let files = arguments.motions.as_deref();
-    let files = read_all(files, "files of motions", &arguments.asking, read_motions)?;
-    let [mut a, mut b] = meshes()?;
-    a.check()?;
-    b.check()?;
-    let ask = |querier: &mut Querier, motion: &Motion| querier.motion(a.shape(), b.shape(), motion, &options);
-    let bench = |stem: &str, run: &Run<MotionAnswer>| {
-        let near = run.answers.iter().filter(|(answer, _)| matches!(answer, MotionAnswer::Near { .. }));
-        let hits = run.answers.iter().filter(|(answer, _)| answer.is_positive());
-        let record = asking::bench(&a, Some(&b), "motion", backend, stem, run, true);
-        record.with(record! { hits: hits.count(), near: near.count() })
+    let what = ("motion", "motion".to_owned(), true);
+    let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
+    let ask = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], motion: &Motion| {
+        querier.motion(a, b, motion, &options)
     };
-    asking::ask_files(
-        &arguments.asking,
-        backend,
-        "motion",
-        &files,
-        ask,
-        |error| blame(&a, Some(&b), error),
-        bench,
-    )
-}
-
-/// Asks about one motion, prints the answer, and writes its witness as OBJ.
-fn once(
-    [a, b]: [&LoadedMesh; 2],
-    motion: &Motion,
-    options: &MotionOptions,
-    backend: Backend,
-    arguments: &MotionArguments,
-) -> Result<(), Failure> {
-    let answer = Querier::with_backend(backend).motion(a.shape(), b.shape(), motion, options);
-    let answer = answer.map_err(|error| blame(a, Some(b), error))?;
+    let Some(motion) = &arguments.motion else {
+        let files = arguments.motions.as_deref();
+        let files = read_all(files, "files of motions", &arguments.asking, read_motions)?;
+        let session = session()?;
+        return session.ask_files(&files, |querier, motion| ask(querier, session.shapes(), motion));
+    };
+    let motion = files::one_motion(motion)?;
+    let session = session()?;
+    let answer = session.ask(|querier| ask(querier, session.shapes(), &motion))?;
     let (mut text, end) = match &answer {
         MotionAnswer::Free => ("free\n".to_owned(), None),
         MotionAnswer::Hit { free_until, touching_at, contact } => {
@@ -116,22 +90,15 @@ fn once(
             (text, Some((*at, distance)))
         }
     };
-    match (end, &arguments.witness) {
-        (Some((at, distance)), witness_file) => {
-            text.push_str(&mesh::describe([a, b], distance));
-            if let Some(path) = witness_file {
-                write_file(path, &mesh::obj([a, b], &motion.pose(at), distance)?)?;
-            }
+    if let Some((at, distance)) = end {
+        text.push_str(&mesh::describe(session.meshes(), distance));
+        if let Some(path) = &arguments.witness {
+            write_file(path, &mesh::obj(session.meshes(), &motion.pose(at), distance)?)?;
         }
-        (None, Some(_)) => text.push_str("no witness, because the way is free\n"),
-        (None, None) => {}
+    } else if arguments.witness.is_some() {
+        text.push_str("no witness, because the way is free\n");
     }
-    if arguments.asking.json {
-        let mut record = answer.json();
-        record["motion"] = 0.into();
-        return console::json(&record);
-    }
-    console::text(&text)
+    session.tell_one(&answer, &text)
 }
 
 impl Answer for MotionAnswer {
@@ -180,5 +147,14 @@ impl Answer for MotionAnswer {
         };
         hasher.update(&[kind]);
         times.iter().for_each(|time| hasher.update(&time.to_bits().to_le_bytes()));
+    }
+
+    fn counts<'a>(answers: impl Iterator<Item = &'a Self>) -> Option<Record> {
+        let (mut hits, mut near) = (0, 0);
+        for answer in answers {
+            hits += u64::from(matches!(answer, Self::Hit { .. }));
+            near += u64::from(matches!(answer, Self::Near { .. }));
+        }
+        Some(record! { hits: hits, near: near })
     }
 }

@@ -1,9 +1,9 @@
 //! `cbvh probe`: asks a mesh about files of points, rays or segments, or about one.
 
 use crate::asking::files::{self, numbers, read_all, read_lines};
-use crate::asking::mesh::{self, LoadedMesh, blame, load_one};
-use crate::asking::{self, Answer as _, AskingArguments, Run};
-use crate::console::{self, Failure};
+use crate::asking::mesh::{self, LoadedMesh};
+use crate::asking::{self, AskingArguments, Session};
+use crate::console::Failure;
 use bvh_format::checksum::Hasher;
 use bvh_format::object::MAX_COORDINATE;
 use bvh_query::{ClosestPoint, Querier, QueryError, Ray, RayHit, Shape, Side};
@@ -50,7 +50,7 @@ pub(crate) struct ProbeArguments {
     #[command(flatten)]
     asking: AskingArguments,
     /// Ask about one point, ray or segment, given as 3 or 6 numbers, and print the answer for a person
-    #[arg(id = "one", long = "probe", value_name = "3 OR 6 NUMBERS", allow_hyphen_values = true)]
+    #[arg(id = "one", long = "probe", value_name = "3 OR 6 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     probe: Option<String>,
 }
 
@@ -70,29 +70,18 @@ enum Mode {
 /// Answers the question about files of points, rays or segments, or about one.
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<(), Failure> {
     let (mode, options) = (arguments.mode, &arguments.asking);
-    let backend = asking::backend(&options.isa)?;
-    let load = || load_one(&arguments.a, &options.how());
+    let what = ("probe", asking::mode_name(&mode), true);
+    let session = || Session::load(options, what, &arguments.a, None);
     if let Some(probe) = &arguments.probe {
         let question = parse_one(probe, mode)?;
-        let mesh = load()?;
-        let answer = question.ask(&mut Querier::with_backend(backend), mesh.shape());
-        let answer = answer.map_err(|error| blame(&mesh, None, error))?;
-        if options.json {
-            let mut record = answer.json();
-            record["probe"] = 0.into();
-            return console::json(&record);
-        }
-        return console::text(&answer.describe(&mesh));
+        let session = session()?;
+        let answer = session.ask(|querier| question.ask(querier, session.shapes()[0]))?;
+        return session.tell_one(&answer, &answer.describe(session.meshes()[0]));
     }
     let (files, read) = (arguments.files.as_deref(), |file: &Path| read(file, mode));
     let files = read_all(files, "files of points, rays or segments", options, read)?;
-    let mut mesh = load()?;
-    mesh.check()?;
-    let ask = |querier: &mut Querier, question: &Question| question.ask(querier, mesh.shape());
-    let bench = |stem: &str, run: &Run<Answer>| {
-        asking::bench(&mesh, None, &asking::mode_name(&mode), backend, stem, run, true)
-    };
-    asking::ask_files(options, backend, "probe", &files, ask, |error| blame(&mesh, None, error), bench)
+    let session = session()?;
+    session.ask_files(&files, |querier, question: &Question| question.ask(querier, session.shapes()[0]))
 }
 
 /// The magnitudes that the largest component of a direction may have, as [`Ray`] defines them: 2^-500 to 2^500.

@@ -1,12 +1,12 @@
 //! `cbvh query`: asks two meshes about files of poses, or about one pose.
 
 use crate::asking::files::{self, read_all, read_poses, write_file};
-use crate::asking::mesh::{self, LoadedMesh, blame, load_both};
-use crate::asking::{self, Answer as _, AskingArguments, Run};
-use crate::console::{self, Failure, plural};
+use crate::asking::mesh::{self, LoadedMesh};
+use crate::asking::{self, AskingArguments, Session};
+use crate::console::{Failure, plural};
 use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
-use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation};
+use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation, Shape};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
@@ -65,7 +65,7 @@ pub(crate) struct QueryArguments {
     #[command(flatten)]
     asking: AskingArguments,
     /// Ask about one pose, given as 12 numbers, and print the answer for a person
-    #[arg(id = "one", long = "pose", value_name = "12 NUMBERS", allow_hyphen_values = true)]
+    #[arg(id = "one", long = "pose", value_name = "12 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     pose: Option<String>,
     /// With --mode distance about one pose: write both closest triangles and the segment between them as OBJ
     #[arg(long, value_name = "OBJ")]
@@ -89,58 +89,22 @@ enum Mode {
 
 /// Answers the question about pose files or about one pose.
 pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
-    let backend = asking::backend(&arguments.asking.isa)?;
     let question = Question::new(arguments)?;
-    let Some(files) = &arguments.poses else {
-        arguments.asking.require_no_files()?;
-        let pose = arguments.pose.as_deref().map_or(Ok(Pose::IDENTITY), files::one_pose)?;
-        return once(arguments, &question, &pose, Querier::with_backend(backend));
-    };
-    let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;
-    let [mut a, mut b] = load_both(&arguments.a, &arguments.b, &arguments.asking.how())?;
-    a.check()?;
-    b.check()?;
-    let ask = |querier: &mut Querier, pose: &Pose| question.ask(querier, [&a, &b], pose);
-    let bench = |stem: &str, run: &Run<Answer>| {
-        asking::bench(
-            &a,
-            Some(&b),
-            &asking::mode_name(&question.mode),
-            backend,
-            stem,
-            run,
-            question.is_exact(),
-        )
-    };
-    asking::ask_files(
-        &arguments.asking,
-        backend,
-        "pose",
-        &files,
-        ask,
-        |error| blame(&a, Some(&b), error),
-        bench,
-    )
-}
-
-/// Asks about one pose, prints the answer, and writes the witness of a distance as OBJ.
-fn once(
-    arguments: &QueryArguments,
-    question: &Question,
-    pose: &Pose,
-    mut querier: Querier,
-) -> Result<(), Failure> {
-    let [a, b] = &load_both(&arguments.a, &arguments.b, &arguments.asking.how())?;
-    let answer = question.ask(&mut querier, [a, b], pose).map_err(|error| blame(a, Some(b), error))?;
+    let what = ("pose", asking::mode_name(&question.mode), question.is_exact());
+    let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
+    if let Some(files) = &arguments.poses {
+        let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;
+        let session = session()?;
+        return session.ask_files(&files, |querier, pose| question.ask(querier, session.shapes(), pose));
+    }
+    arguments.asking.require_no_files()?;
+    let pose = arguments.pose.as_deref().map_or(Ok(Pose::IDENTITY), files::one_pose)?;
+    let session = session()?;
+    let answer = session.ask(|querier| question.ask(querier, session.shapes(), &pose))?;
     if let (Some(path), Answer::Distance(distance)) = (&arguments.witness, &answer) {
-        write_file(path, &mesh::obj([a, b], pose, distance)?)?;
+        write_file(path, &mesh::obj(session.meshes(), &pose, distance)?)?;
     }
-    if arguments.asking.json {
-        let mut record = answer.json();
-        record["pose"] = 0.into();
-        return console::json(&record);
-    }
-    console::text(&question.describe([a, b], &answer))
+    session.tell_one(&answer, &question.describe(session.meshes(), &answer))
 }
 
 /// The most contacts that are listed for a person; the others are only counted.
@@ -192,7 +156,7 @@ impl Question {
         let errors = DistanceOptions::new()
             .rel_err(arguments.rel_err.unwrap_or(0.0))
             .abs_err(arguments.abs_err.unwrap_or(0.0));
-        let list = arguments.asking.json || arguments.poses.is_none();
+        let list = arguments.asking.run.json || arguments.poses.is_none();
         Ok(Self { mode, within: arguments.within.unwrap_or(0.0), errors, list })
     }
 
@@ -203,13 +167,7 @@ impl Question {
 
     /// Asks the question about one pose.
     #[inline]
-    fn ask(
-        &self,
-        querier: &mut Querier,
-        meshes: [&LoadedMesh; 2],
-        pose: &Pose,
-    ) -> Result<Answer, QueryError> {
-        let [a, b] = meshes.map(LoadedMesh::shape);
+    fn ask(&self, querier: &mut Querier, [a, b]: [Shape<'_>; 2], pose: &Pose) -> Result<Answer, QueryError> {
         Ok(match self.mode {
             Mode::Collide => Answer::Collide(querier.collide(a, b, pose)?),
             Mode::Contacts if self.list => {

@@ -26,8 +26,8 @@ pub(crate) fn read_all<T>(
     }
     let read = |file: PathBuf| {
         let mut questions = read(&file)?;
-        if arguments.limit > 0 {
-            questions.truncate(arguments.limit);
+        if arguments.run.limit > 0 {
+            questions.truncate(arguments.run.limit);
         }
         Ok((stem(&file), questions))
     };

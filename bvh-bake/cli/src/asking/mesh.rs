@@ -8,9 +8,10 @@ use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
 use bvh_format::page::Page;
 use bvh_format::validate::packets;
-use bvh_query::{Bvh, Distance, Pose, QueryError, ReadAhead, Shape};
+use bvh_query::{Bvh, Distance, Object, Pose, QueryError, ReadAhead, Shape};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// How many times larger one mesh may be than the other before the command points it out. Files in millimetres beside files in
@@ -33,8 +34,9 @@ pub(crate) struct LoadedMesh {
     pub(crate) bvh: Bvh,
     /// The object that `--object` names, if this mesh has it.
     pub(crate) object: Option<usize>,
-    /// The seconds of baking the mesh, or of opening the file.
-    pub(crate) build_seconds: f64,
+    /// The seconds of baking the mesh, or of opening the file; and of checking it.
+    build_seconds: f64,
+    check_seconds: OnceLock<f64>,
 }
 
 impl LoadedMesh {
@@ -60,16 +62,21 @@ impl LoadedMesh {
 
     fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {
         let object = how.object.and_then(|name| bvh.find(name));
-        Self { path: path.to_owned(), bvh, object, build_seconds }
+        Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() }
     }
 
     /// Checks all pages before queries are timed, and counts that as building: otherwise the first query that touches a
     /// page would pay for its check.
-    pub(crate) fn check(&mut self) -> Result<(), Failure> {
+    pub(crate) fn check(&self) -> Result<(), Failure> {
         let start = Instant::now();
         self.bvh.check_all().map_err(|error| Failure::invalid(&self.path, error))?;
-        self.build_seconds += start.elapsed().as_secs_f64();
+        let _ = self.check_seconds.set(start.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    /// Returns the seconds until the mesh was ready.
+    pub(crate) fn build_seconds(&self) -> f64 {
+        self.build_seconds + self.check_seconds.get().unwrap_or(&0.0)
     }
 
     /// Returns what is queried.
@@ -100,34 +107,29 @@ impl LoadedMesh {
     }
 }
 
-/// Loads the two meshes of a question.
-pub(crate) fn load_both(a: &Path, b: &Path, how: &How) -> Result<[LoadedMesh; 2], Failure> {
-    let meshes = [LoadedMesh::load(a, how)?, LoadedMesh::load(b, how)?];
-    refuse_unknown_object(&meshes, how)?;
-    let [size_a, size_b] = meshes.each_ref().map(LoadedMesh::size);
+/// Points out meshes of which one is so much larger that they may be in different units.
+pub(crate) fn point_out_units(meshes: [&LoadedMesh; 2]) {
+    let [size_a, size_b] = meshes.map(LoadedMesh::size);
     let ratio = (size_a / size_b).max(size_b / size_a);
     if ratio > MAX_RATIO && ratio.is_finite() {
-        let [a, b] = [a, b].map(Path::display);
+        let [a, b] = meshes.map(|mesh| mesh.path.display());
         tell_line(&format!(
             "{a} is about {size_a:.3} mesh units across and {b} about {size_b:.3}; are both in the same unit?"
         ));
     }
-    Ok(meshes)
-}
-
-/// Loads the mesh of a question about one mesh.
-pub(crate) fn load_one(path: &Path, how: &How) -> Result<LoadedMesh, Failure> {
-    let mesh = LoadedMesh::load(path, how)?;
-    refuse_unknown_object(std::slice::from_ref(&mesh), how)?;
-    Ok(mesh)
 }
 
 /// Refuses the name of an object that none of the meshes has.
-fn refuse_unknown_object(meshes: &[LoadedMesh], how: &How) -> Result<(), Failure> {
-    let Some(name) = how.object.filter(|_| meshes.iter().all(|mesh| mesh.object.is_none())) else {
+pub(crate) fn refuse_unknown_object(
+    a: &LoadedMesh,
+    b: Option<&LoadedMesh>,
+    how: &How,
+) -> Result<(), Failure> {
+    let meshes = || std::iter::once(a).chain(b);
+    let Some(name) = how.object.filter(|_| meshes().all(|mesh| mesh.object.is_none())) else {
         return Ok(());
     };
-    let paths: Vec<String> = meshes.iter().map(|mesh| mesh.path.display().to_string()).collect();
+    let paths: Vec<String> = meshes().map(|mesh| mesh.path.display().to_string()).collect();
     Err(Failure::Usage(format!(
         "--object: expected an object of this name in {}, found none named {name:?}; cbvh dump lists the objects of a file",
         paths.join(" or ")
@@ -247,36 +249,41 @@ pub(crate) fn name(mesh: &LoadedMesh, object: u32, triangle: u32) -> String {
     }
 }
 
-/// Finds the corners of a triangle by its number, in the frame of its file. Searches all pages of the object, which is
-/// fast enough for one answer.
+/// Finds the corners of a triangle by its number, in the frame of its file.
 fn corners(mesh: &LoadedMesh, object: u32, triangle: u32) -> Result<[[f64; 3]; 3], Failure> {
-    let (layout, bytes) = (mesh.bvh.layout(), mesh.bvh.bytes());
-    let lost =
-        || Failure::Invalid(format!("{}: expected triangle {triangle}, found none", mesh.path.display()));
-    let object = mesh.bvh.objects().get(object as usize).ok_or_else(lost)?;
-    let first = object.record().first_page.get();
-    for number in first..first + object.record().pages.get() {
-        let Some(page) = layout.page_bytes(bytes, number) else { continue };
+    let object = mesh.bvh.objects().get(object as usize);
+    // Searches all pages of the object, which is fast enough for one answer.
+    let found = object.and_then(|object| triangles(&mesh.bvh, object).find(|&(id, _)| id == triangle));
+    found.map(|(_, corners)| corners).ok_or_else(|| {
+        Failure::Invalid(format!("{}: expected triangle {triangle}, found none", mesh.path.display()))
+    })
+}
+
+/// Returns the triangles of an object with their numbers, in the order of the file and in its frame. Without ids, they are
+/// numbered in that order.
+pub(crate) fn triangles<'a>(
+    bvh: &'a Bvh,
+    object: &'a Object,
+) -> impl Iterator<Item = (u32, [[f64; 3]; 3])> + 'a {
+    let (layout, bytes) = (bvh.layout(), bvh.bytes());
+    let pages = object.pages().filter_map(move |number| layout.page_bytes(bytes, number));
+    pages.flat_map(move |page| {
         let page = Page::new(page, object.profile());
-        let header = page.header();
-        let ids = layout.id_block(bytes, header);
-        for (packet, count) in packets(&page) {
-            for lane in 0..count {
+        let header = *page.header();
+        let (block, ids) = (layout.leaf_block(bytes, &header), layout.id_block(bytes, &header));
+        let packets: Vec<(u16, usize)> = packets(&page).collect();
+        packets.into_iter().flat_map(move |(packet, count)| {
+            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
+            (0..count).map(move |lane| {
                 let id = if layout.has_ids() {
                     decode_id(ids, usize::from(packet), lane)
                 } else {
                     let packet = header.first_packet.get().wrapping_add(u32::from(packet));
                     packet.wrapping_mul(4).wrapping_add(lane as u32)
                 };
-                if id == triangle {
-                    let block = layout.leaf_block(bytes, header);
-                    let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-                    let place = |axis: usize, v: f32| object.origin()[axis] + f64::from(v);
-                    let corners = values.triangle(lane);
-                    return Ok(corners.map(|v| [0, 1, 2].map(|axis| place(axis, v[axis]))));
-                }
-            }
-        }
-    }
-    Err(lost())
+                let place = |corner: [f32; 3]| [0, 1, 2].map(|a| object.origin()[a] + f64::from(corner[a]));
+                (id, values.triangle(lane).map(place))
+            })
+        })
+    })
 }

@@ -8,13 +8,12 @@ use crate::console::{self, Failure, Record, hex, record, significant};
 use crate::options::{LayoutArguments, not_negative, threads, whole};
 use crate::process;
 use bvh_format::checksum::Hasher;
-use bvh_query::{Backend, Distance, Object, Querier, QueryError};
+use bvh_query::{Backend, Distance, Object, Querier, QueryError, Shape};
 use cbvh_measure::spread::quantile;
 use clap::{Args, ValueEnum};
 use files::write_file;
 use mesh::{How, LoadedMesh};
-use runner::Limits;
-pub(crate) use runner::Run;
+use runner::Run;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -36,6 +35,14 @@ pub(crate) trait Answer {
 
     /// Hashes what the line tells.
     fn hash(&self, hasher: &mut Hasher);
+
+    /// Returns further fields of `--bench`.
+    fn counts<'a>(_: impl Iterator<Item = &'a Self>) -> Option<Record>
+    where
+        Self: 'a,
+    {
+        None
+    }
 }
 
 /// Returns the backend of `--isa`. `auto` leaves the choice to `CBVH_ISA` or to the CPU.
@@ -48,42 +55,146 @@ pub(crate) fn mode_name(mode: &impl ValueEnum) -> String {
     mode.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-/// Asks about all files of questions and tells the answers as the arguments say. A question is called `noun`, `blame` names
-/// the file that an error is about, and `bench` makes the line of `--bench` for a file of this stem.
-pub(crate) fn ask_files<T: Sync, A: Answer + Clone + Send>(
-    arguments: &AskingArguments,
+/// One mesh or two that are asked about, and how.
+pub(crate) struct Session<'a> {
+    arguments: &'a AskingArguments,
     backend: Backend,
-    noun: &str,
-    files: &[(String, Vec<T>)],
-    ask: impl Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
-    blame: impl Fn(QueryError) -> Failure,
-    bench: impl Fn(&str, &Run<A>) -> Record,
-) -> Result<(), Failure> {
-    for (stem, questions) in files {
-        let run = runner::run(questions, &ask, backend, &arguments.limits()).map_err(&blame)?;
-        if let Some(out) = &arguments.out {
-            let lines =
-                run.answers.iter().map(|(answer, nanoseconds)| format!("{} {nanoseconds}\n", answer.line()));
-            write_file(Path::new(&out.replacen("%s", stem, 1)), &lines.collect::<String>())?;
+    /// What a question is called.
+    noun: &'static str,
+    mode: String,
+    /// Whether answers are the same on every backend and with every number of threads.
+    is_exact: bool,
+    a: LoadedMesh,
+    b: Option<LoadedMesh>,
+}
+
+impl<'a> Session<'a> {
+    /// Loads the meshes. `what` has the name of a question and the mode.
+    pub(crate) fn load(
+        arguments: &'a AskingArguments,
+        (noun, mode, is_exact): (&'static str, String, bool),
+        a: &Path,
+        b: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        let backend = backend(&arguments.run.isa)?;
+        let how = arguments.how();
+        let a = LoadedMesh::load(a, &how)?;
+        let b = b.map(|path| LoadedMesh::load(path, &how)).transpose()?;
+        mesh::refuse_unknown_object(&a, b.as_ref(), &how)?;
+        if let Some(b) = &b {
+            mesh::point_out_units([&a, b]);
         }
-        let answers = || run.answers.iter().map(|(answer, _)| answer);
-        if arguments.bench {
-            console::json(&bench(stem, &run))?;
-        } else if arguments.json {
-            let file = (files.len() > 1).then_some((noun, &**stem));
-            console::lines((0..).zip(answers()).map(|(number, answer)| {
-                let mut record = answer.json();
-                record[noun] = json!(number);
-                if let Some((noun, stem)) = file {
-                    record[format!("{noun}s")] = json!(stem);
-                }
-                record
-            }))?;
-        } else {
-            console::lines(answers().map(Answer::line))?;
-        }
+        Ok(Self { arguments, backend, noun, mode, is_exact, a, b })
     }
-    Ok(())
+
+    /// Returns the meshes; the second is the first if there is only one.
+    pub(crate) fn meshes(&self) -> [&LoadedMesh; 2] {
+        [&self.a, self.b.as_ref().unwrap_or(&self.a)]
+    }
+
+    /// Returns what is queried.
+    #[inline]
+    pub(crate) fn shapes(&self) -> [Shape<'_>; 2] {
+        self.meshes().map(LoadedMesh::shape)
+    }
+
+    /// Asks one question.
+    pub(crate) fn ask<A>(&self, ask: impl Fn(&mut Querier) -> Result<A, QueryError>) -> Result<A, Failure> {
+        ask(&mut Querier::with_backend(self.backend))
+            .map_err(|error| mesh::blame(&self.a, self.b.as_ref(), error))
+    }
+
+    /// Tells one answer, which is `text` for a person.
+    pub(crate) fn tell_one(&self, answer: &impl Answer, text: &str) -> Result<(), Failure> {
+        if !self.arguments.run.json {
+            return console::text(text);
+        }
+        let mut record = answer.json();
+        record[self.noun] = json!(0);
+        console::json(&record)
+    }
+
+    /// Asks about all files of questions and tells the answers as the arguments say.
+    pub(crate) fn ask_files<T: Sync, A: Answer + Clone + Send>(
+        &self,
+        files: &[(String, Vec<T>)],
+        ask: impl Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
+    ) -> Result<(), Failure> {
+        for mesh in std::iter::once(&self.a).chain(&self.b) {
+            mesh.check()?;
+        }
+        for (stem, questions) in files {
+            let run = runner::run(questions, &ask, self.backend, &self.arguments.run);
+            let run = run.map_err(|error| mesh::blame(&self.a, self.b.as_ref(), error))?;
+            if let Some(out) = &self.arguments.out {
+                let line = |(answer, ns): &(A, u64)| format!("{} {ns}\n", answer.line());
+                let lines: String = run.answers.iter().map(line).collect();
+                write_file(Path::new(&out.replacen("%s", stem, 1)), &lines)?;
+            }
+            let answers = run.answers.iter().map(|(answer, _)| answer);
+            if self.arguments.bench {
+                console::json(&self.bench(stem, &run))?;
+            } else if self.arguments.run.json {
+                console::lines((0..).zip(answers).map(|(number, answer)| {
+                    let mut record = answer.json();
+                    record[self.noun] = json!(number);
+                    if files.len() > 1 {
+                        record[format!("{}s", self.noun)] = json!(stem);
+                    }
+                    record
+                }))?;
+            } else {
+                console::lines(answers.map(Answer::line))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the line of `--bench` for a file of questions, about one mesh or two: the fields that programs of this protocol
+    /// share, and further ones. The hash of the answers is null if there may be others.
+    fn bench<A: Answer>(&self, stem: &str, run: &Run<A>) -> Record {
+        let (mesh_a, mesh_b) = (&self.a, self.b.as_ref());
+        let answers = || run.answers.iter().map(|(answer, _)| answer);
+        let (bytes_a, stored_a) = mesh_a.bytes_and_stored();
+        let (bytes_b, stored_b) = mesh_b.map_or((0, 0), LoadedMesh::bytes_and_stored);
+        let mut hasher = Hasher::default();
+        answers().for_each(|answer| answer.hash(&mut hasher));
+        let is_complete = self.is_exact && run.answers.len() == run.requested;
+        record! {
+            peer: "cbvh",
+            version: env!("CARGO_PKG_VERSION"),
+            mode: self.mode,
+            poses: stem,
+            tris_a: mesh_a.triangles(),
+            build_a_s: mesh_a.build_seconds(),
+            api_bytes_per_tri_a: bytes_a as f64 / stored_a as f64,
+        }
+        .with(mesh_b.map(|mesh_b| {
+            record! {
+                tris_b: mesh_b.triangles(),
+                build_b_s: mesh_b.build_seconds(),
+                api_bytes_per_tri_b: bytes_b as f64 / stored_b as f64,
+            }
+        }))
+        .with(times(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds))
+        .with(record! {
+            positives: answers().filter(|answer| answer.is_positive()).count(),
+            sum: answers().map(Answer::value).sum::<f64>(),
+            peak_rss_mb: peak_rss_mb(),
+            // Not measured: a query needs the bytes of the files, which `api_bytes_per_tri_a` and `_b` give.
+            rss_bytes_per_tri: -1.0,
+            isa: self.backend.name(),
+            profile: of_both(mesh_a, mesh_b, |object| object.profile().name()),
+            triangle_encoding: of_both(mesh_a, mesh_b, |object| object.triangle_encoding().name()),
+            answers_xxh3: is_complete.then(|| hex(hasher.finish())),
+            node_tests: run.stats.node_tests,
+            triangle_tests: run.stats.packet_tests,
+            exact_tests: run.stats.exact_tests,
+            file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
+            jobs: run.jobs,
+        })
+        .with(A::counts(run.answers.iter().map(|(answer, _)| answer)))
+    }
 }
 
 /// Returns all that a distance has, as a JSON object.
@@ -94,45 +205,51 @@ pub(crate) fn distance_json(of: &Distance) -> Value {
     })
 }
 
-/// The options for asking. Each command has an argument `one`, which asks a single question and excludes what only files
-/// need.
+/// The options of a run of questions. A frame of a scene is one question.
 #[derive(Debug, Args)]
-pub(crate) struct AskingArguments {
+pub(crate) struct RunArguments {
     /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     pub(crate) isa: String,
-    /// The number of threads that share the questions
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true,
-          conflicts_with = "one")]
-    jobs: u16,
+    /// The number of threads that share the questions, or the pairs of a scene
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true)]
+    pub(crate) jobs: u16,
     #[command(flatten)]
-    layout: LayoutArguments,
+    pub(crate) layout: LayoutArguments,
+    /// Stop each file of questions after this many seconds
+    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) budget: Option<f64>,
+    /// Untimed questions before the timed ones, taken from the end of the file
+    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    pub(crate) warm: usize,
+    /// Ask only the first N questions of each file; 0 asks all
+    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    pub(crate) limit: usize,
+    /// Print one JSON object per question, with all that the answer has
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The options that only files of questions need. An argument that asks a single question excludes them.
+pub(crate) const OF_FILES: [&str; 6] = ["jobs", "out", "budget", "warm", "limit", "bench"];
+
+/// The options of commands that ask about one mesh or two.
+#[derive(Debug, Args)]
+pub(crate) struct AskingArguments {
+    #[command(flatten)]
+    pub(crate) run: RunArguments,
     /// Query only the object of this name, in each mesh that has one
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
     /// Write raw answers and times to this file; %s stands for the name of the file of questions
-    #[arg(long, value_name = "raw_%s.txt", conflicts_with = "one")]
+    #[arg(long, value_name = "raw_%s.txt")]
     pub(crate) out: Option<String>,
-    /// Stop each file after this many seconds
-    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "one")]
-    pub(crate) budget: Option<f64>,
-    /// Untimed questions before the timed ones, taken from the end of the file
-    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "one")]
-    warm: usize,
-    /// Ask only the first N questions of each file; 0 asks all
-    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true,
-          conflicts_with = "one")]
-    pub(crate) limit: usize,
     /// How the system reads .cbvh files from the disk
     #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
     read_ahead: ReadAhead,
-    /// Print one JSON object per question, with all that the answer has
-    #[arg(long)]
-    pub(crate) json: bool,
     /// Print one JSON object per file, with the times of its questions, and no answers
-    #[arg(long, conflicts_with_all = ["one", "json"])]
-    pub(crate) bench: bool,
+    #[arg(long, conflicts_with = "json")]
+    bench: bool,
 }
 
 impl AskingArguments {
@@ -146,13 +263,8 @@ impl AskingArguments {
 
     /// Returns how meshes are prepared.
     pub(crate) fn how(&self) -> How<'_> {
-        let (layout, object) = (&self.layout, self.object.as_deref());
+        let (layout, object) = (&self.run.layout, self.object.as_deref());
         How { layout, object, read_ahead: self.read_ahead.into() }
-    }
-
-    /// Returns the limits of a run.
-    pub(crate) fn limits(&self) -> Limits {
-        Limits { jobs: usize::from(self.jobs), warm: self.warm, budget: self.budget }
     }
 }
 
@@ -198,58 +310,6 @@ pub(crate) fn times(nanoseconds: impl Iterator<Item = u64>, requested: usize, to
 /// Returns the largest resident size so far in MiB.
 pub(crate) fn peak_rss_mb() -> Option<f64> {
     process::peak_bytes().map(|bytes| bytes as f64 / 1048576.0)
-}
-
-/// Returns the line of `--bench` for a file of questions, about one mesh or two: the fields that programs of this protocol
-/// share, and further ones. The hash of the answers is null if there may be others.
-pub(crate) fn bench<A: Answer>(
-    mesh_a: &LoadedMesh,
-    mesh_b: Option<&LoadedMesh>,
-    mode: &str,
-    backend: Backend,
-    stem: &str,
-    run: &Run<A>,
-    is_exact: bool,
-) -> Record {
-    let answers = || run.answers.iter().map(|(answer, _)| answer);
-    let (bytes_a, stored_a) = mesh_a.bytes_and_stored();
-    let (bytes_b, stored_b) = mesh_b.map_or((0, 0), LoadedMesh::bytes_and_stored);
-    let mut hasher = Hasher::default();
-    answers().for_each(|answer| answer.hash(&mut hasher));
-    let is_complete = is_exact && run.answers.len() == run.requested;
-    record! {
-        peer: "cbvh",
-        version: env!("CARGO_PKG_VERSION"),
-        mode: mode,
-        poses: stem,
-        tris_a: mesh_a.triangles(),
-        build_a_s: mesh_a.build_seconds,
-        api_bytes_per_tri_a: bytes_a as f64 / stored_a as f64,
-    }
-    .with(mesh_b.map(|mesh_b| {
-        record! {
-            tris_b: mesh_b.triangles(),
-            build_b_s: mesh_b.build_seconds,
-            api_bytes_per_tri_b: bytes_b as f64 / stored_b as f64,
-        }
-    }))
-    .with(times(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds))
-    .with(record! {
-        positives: answers().filter(|answer| answer.is_positive()).count(),
-        sum: answers().map(Answer::value).sum::<f64>(),
-        peak_rss_mb: peak_rss_mb(),
-        // Not measured: a query needs the bytes of the files, which `api_bytes_per_tri_a` and `_b` give.
-        rss_bytes_per_tri: -1.0,
-        isa: backend.name(),
-        profile: of_both(mesh_a, mesh_b, |object| object.profile().name()),
-        triangle_encoding: of_both(mesh_a, mesh_b, |object| object.triangle_encoding().name()),
-        answers_xxh3: is_complete.then(|| hex(hasher.finish())),
-        node_tests: run.stats.node_tests,
-        triangle_tests: run.stats.packet_tests,
-        exact_tests: run.stats.exact_tests,
-        file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
-        jobs: run.jobs,
-    })
 }
 
 /// Returns a word about the first object of a mesh, and after a plus sign that of the other mesh if it differs.

@@ -3,19 +3,12 @@
 //! First come `warm` untimed queries from the end of the file, then all items in order until the budget is spent. Each
 //! thread takes the next one. The answers are put back in order, so that a budget that ends early leaves the first ones.
 
+use super::RunArguments;
 use bvh_query::{Backend, Querier, QueryError, QueryStats};
 use cbvh_measure::rounds::add;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-
-/// The limits of a run.
-pub(crate) struct Limits {
-    pub(crate) jobs: usize,
-    pub(crate) warm: usize,
-    /// The budget in seconds; `None` for no limit.
-    pub(crate) budget: Option<f64>,
-}
 
 /// The results of a run.
 pub(crate) struct Run<A> {
@@ -34,9 +27,9 @@ pub(crate) fn run<T: Sync, A: Clone + Send>(
     items: &[T],
     ask: impl Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
     backend: Backend,
-    limits: &Limits,
+    limits: &RunArguments,
 ) -> Result<Run<A>, QueryError> {
-    let jobs = limits.jobs.min(items.len()).max(1);
+    let jobs = usize::from(limits.jobs).min(items.len()).max(1);
     let worker = Worker { items, ask, backend, limits, next: AtomicUsize::new(0), ready: Barrier::new(jobs) };
     let shares = if jobs == 1 { vec![worker.work()] } else { work_together(&worker, jobs) };
     let mut answers = vec![None; items.len()];
@@ -76,7 +69,7 @@ struct Worker<'a, T, F> {
     items: &'a [T],
     ask: F,
     backend: Backend,
-    limits: &'a Limits,
+    limits: &'a RunArguments,
     next: AtomicUsize,
     ready: Barrier,
 }

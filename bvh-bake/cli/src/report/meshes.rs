@@ -1,13 +1,10 @@
 //! The meshes of a pair: read from mesh files or taken out of `.cbvh` files, and baked in memory, ready to be timed.
 
-use crate::asking::mesh::{is_baked, refuse_scene};
+use crate::asking::mesh::{is_baked, refuse_scene, triangles};
 use crate::console::Failure;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, BakeReport, Options, input, to_bytes};
-use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
-use bvh_format::page::Page;
-use bvh_format::validate::{packets, validate};
+use bvh_format::validate::validate;
 use bvh_query::Bvh;
 use cbvh_measure::pairs::Pair;
 use std::path::Path;
@@ -29,27 +26,10 @@ fn unbaked(path: &Path) -> Result<Mesh, Failure> {
     let bvh = Bvh::open(path)?;
     refuse_scene(path, &bvh)?;
     validate(bvh.bytes()).map_err(|error| Failure::invalid(path, error))?;
-    let (layout, bytes) = (bvh.layout(), bvh.bytes());
-    let mut triangles = Vec::new();
-    for object in bvh.objects() {
-        let origin = object.origin();
-        for number in object.pages() {
-            let Some(page) = layout.page_bytes(bytes, number) else { continue };
-            let page = Page::new(page, object.profile());
-            let header = page.header();
-            let (block, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
-            for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-                for lane in 0..count {
-                    let place = triangles.len() as u32;
-                    let id = if layout.has_ids() { decode_id(ids, usize::from(packet), lane) } else { place };
-                    let corner = |corner: [f32; 3]| [0, 1, 2].map(|a| origin[a] + f64::from(corner[a]));
-                    triangles.push((id, values.triangle(lane).map(corner)));
-                }
-            }
-        }
+    let mut triangles: Vec<_> = bvh.objects().iter().flat_map(|object| triangles(&bvh, object)).collect();
+    if bvh.layout().has_ids() {
+        triangles.sort_by_key(|&(id, _)| id);
     }
-    triangles.sort_by_key(|&(id, _)| id);
     let positions: Vec<[f64; 3]> = triangles.iter().flat_map(|&(_, corners)| corners).collect();
     let numbers = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     Ok(Mesh::from_triangles(positions, numbers))

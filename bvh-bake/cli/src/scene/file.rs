@@ -173,10 +173,10 @@ pub(super) fn load(
     let mut shapes = Vec::new();
     for (_, _, file) in &text.meshes {
         require_regular(file)?;
-        let mut mesh = LoadedMesh::load(file, &how)?;
+        let mesh = LoadedMesh::load(file, &how)?;
         mesh.check()?;
         loaded.triangles = loaded.triangles.saturating_add(mesh.triangles());
-        loaded.build_seconds += mesh.build_seconds;
+        loaded.build_seconds += mesh.build_seconds();
         shapes.push(OwnedShape::from(mesh.bvh));
     }
     let mut ids = Vec::new();

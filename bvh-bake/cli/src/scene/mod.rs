@@ -3,11 +3,11 @@
 mod file;
 mod record;
 
-use crate::asking;
 use crate::asking::files::write_file;
 use crate::asking::mesh::is_baked;
+use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure, significant};
-use crate::options::{LayoutArguments, not_negative, threads, whole};
+use crate::options::not_negative;
 use bvh_query::{Pose, QueryError, QueryStats, Relation, SceneDistance, SceneError, ScenePair};
 use cbvh_measure::rounds::add;
 use clap::{Args, ValueEnum};
@@ -58,32 +58,14 @@ pub(crate) struct SceneArguments {
     /// With --mode within: the distance to compare with, in mesh units
     #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
     within: Option<f64>,
-    /// The number of threads that share the pairs of a frame
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true)]
-    jobs: u16,
-    /// The instruction set: auto, scalar, avx2 or avx512. auto is the fastest one of this CPU, unless CBVH_ISA names one
-    #[arg(long, value_name = "ISA", default_value = "auto")]
-    isa: String,
     #[command(flatten)]
-    layout: LayoutArguments,
+    run: RunArguments,
     /// Write raw answers and times to this file
     #[arg(long, value_name = "raw.txt")]
     out: Option<PathBuf>,
-    /// Stop after this many seconds
-    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
-    budget: Option<f64>,
-    /// Untimed frames before the timed ones, taken from the end
-    #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true)]
-    warm: usize,
-    /// Ask only the first N frames; 0 asks all
-    #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true)]
-    limit: usize,
     /// Print the pairs of each frame for a person, with their names
     #[arg(long)]
     list: bool,
-    /// Print one JSON object per frame, with all that the answer has; --list makes no difference to it
-    #[arg(long)]
-    json: bool,
     /// Print one JSON object about all frames, with their times, and no answers
     #[arg(long, conflicts_with_all = ["list", "json"])]
     bench: bool,
@@ -106,7 +88,7 @@ enum Mode {
 
 /// Answers the question about each frame.
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
-    let backend = asking::backend(&arguments.isa)?;
+    let backend = asking::backend(&arguments.run.isa)?;
     let question = Question::new(arguments)?;
     let extension = arguments.scene.extension().unwrap_or_default().to_ascii_lowercase();
     let is_baked = is_baked(&arguments.scene)?;
@@ -128,15 +110,15 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     } else {
         let text = file::read(&arguments.scene)?;
         let frames = file::read_frames(arguments.frames.as_deref(), &text.moving)?;
-        (file::load(&arguments.scene, &text, &arguments.layout, backend)?, frames)
+        (file::load(&arguments.scene, &text, &arguments.run.layout, backend)?, frames)
     };
-    if arguments.limit > 0 {
-        frames.truncate(arguments.limit);
+    if arguments.run.limit > 0 {
+        frames.truncate(arguments.run.limit);
     }
-    let run = if arguments.jobs > 1 {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(arguments.jobs)).build();
+    let run = if arguments.run.jobs > 1 {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(arguments.run.jobs)).build();
         let pool = pool.map_err(|error| {
-            Failure::System(format!("--jobs {}: cannot start threads: {error}", arguments.jobs))
+            Failure::System(format!("--jobs {}: cannot start threads: {error}", arguments.run.jobs))
         })?;
         scene.scene.set_parallel(true);
         pool.install(|| Run::new(&mut scene, &frames, &question, arguments))
@@ -150,7 +132,7 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
         return console::json(&record::bench(arguments, &scene, backend, &question, &run));
     }
     let answers = run.answers.iter().map(|(answer, _)| answer);
-    if arguments.json {
+    if arguments.run.json {
         console::lines((0..).zip(answers).map(|(number, answer)| record::json(&scene, number, answer)))
     } else if arguments.list {
         console::lines(
@@ -255,9 +237,9 @@ impl Run {
         question: &Question,
         arguments: &SceneArguments,
     ) -> Result<Self, Failure> {
-        let budget = arguments.budget.unwrap_or(f64::INFINITY);
+        let budget = arguments.run.budget.unwrap_or(f64::INFINITY);
         let start = Instant::now();
-        for frame in frames.iter().rev().take(arguments.warm) {
+        for frame in frames.iter().rev().take(arguments.run.warm) {
             if start.elapsed().as_secs_f64() >= budget / 4.0 {
                 break;
             }

@@ -42,7 +42,7 @@ pub(super) fn bench(
         node_tests: run.stats.node_tests,
         triangle_tests: run.stats.packet_tests,
         exact_tests: run.stats.exact_tests,
-        jobs: arguments.jobs,
+        jobs: arguments.run.jobs,
     })
 }
 
