@@ -26,7 +26,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let result = Arguments::of_process().and_then(|arguments| match arguments.command {
-        Command::Bake(arguments) if assets::are_many(&arguments) => assets::run(&arguments),
+        Command::Bake(arguments) if bake::are_many(&arguments) => assets::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Dump(arguments) => dump::run(&arguments),
         Command::Validate(arguments) => check::validate(&arguments),

@@ -59,12 +59,13 @@ pub(crate) struct MotionArguments {
 
 /// Answers the question about files of motions or about one motion.
 pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
+    let backend = asking::backend(&arguments.asking.run.isa)?;
     // Clap cannot check this: where files exclude --motion, it also waives what requires --motion.
     if arguments.witness.is_some() && arguments.motion.is_none() {
         return Err(Failure::Usage("--witness requires --motion (see --help)".into()));
     }
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
-    let what = ("motion", "motion".to_owned(), true);
+    let what = (backend, "motion", "motion".to_owned(), true);
     let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
     let ask = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], motion: &Motion| {
         querier.motion(a, b, motion, &options)

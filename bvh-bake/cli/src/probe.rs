@@ -70,7 +70,7 @@ enum Mode {
 /// Answers the question about files of points, rays or segments, or about one.
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<(), Failure> {
     let (mode, options) = (arguments.mode, &arguments.asking);
-    let what = ("probe", asking::mode_name(&mode), true);
+    let what = (asking::backend(&options.run.isa)?, "probe", asking::mode_name(&mode), true);
     let session = || Session::load(options, what, &arguments.a, None);
     if let Some(probe) = &arguments.probe {
         let question = parse_one(probe, mode)?;

@@ -89,8 +89,9 @@ enum Mode {
 
 /// Answers the question about pose files or about one pose.
 pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
+    let backend = asking::backend(&arguments.asking.run.isa)?;
     let question = Question::new(arguments)?;
-    let what = ("pose", asking::mode_name(&question.mode), question.is_exact());
+    let what = (backend, "pose", asking::mode_name(&question.mode), question.is_exact());
     let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
     if let Some(files) = &arguments.poses {
         let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;

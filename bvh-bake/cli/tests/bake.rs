@@ -291,3 +291,21 @@ fn damage_is_told_by_rule() {
     let json = told.failed(3, &["t.cbvh: triangles of the input: expected 12, found 3600"]).json();
     assert_eq!((&json["expected"], &json["found"]), (&"12".into(), &"3600".into()));
 }
+
+#[test]
+fn a_summary_has_the_size_and_a_folder_is_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("a.obj"), cube()).unwrap();
+    fs::write(directory.join("b.obj"), common::cube_at(3, 10)).unwrap();
+    fs::create_dir(directory.join("out")).unwrap();
+    for inputs in [&["a.obj"][..], &["a.obj", "b.obj"]] {
+        cbvh_in(directory, &[&["bake", "-o", "out"], inputs].concat())
+            .failed(2, &["out: expected a file, found a folder", "cbvh bake DIR -o out"]);
+    }
+    let said = cbvh_in(directory, &["bake", "a.obj", "b.obj", "-o", "c.cbvh", "--split-objects"]).done().out;
+    assert!(
+        said.contains("  size         14 by 6 by 6 mesh units\n") && !said.contains("MiB without ids"),
+        "{said}"
+    );
+}

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{backends, cbvh_in, cbvh_with_isa, cube, names, poses, torus};
+use common::{backends, cbvh_in, cbvh_with_isa, cube, cube_at, names, poses, torus};
 use std::fs;
 use std::path::Path;
 
@@ -157,7 +157,10 @@ fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
     fs::write(directory.join("s.scene"), scene).unwrap();
     let list = cbvh_in(directory, &["scene", "s.scene", "--mode", "distance", "--list"]).done().out;
     // The cube of side 2 at the middle of a ring reaches its inner side.
-    assert!(list.starts_with("frame 1: a b ") && list.lines().count() == 1, "{list}");
+    assert!(
+        list.starts_with("frame 1: a b ") && list.contains("\n  a c ") && list.lines().count() == 3,
+        "{list}"
+    );
     cbvh_in(directory, &["scene", "s.scene", "f.txt"]).failed(1, &["expected no FRAMES"]);
 }
 
@@ -167,7 +170,7 @@ fn relations_tell_what_is_inside() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path();
     fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("room.obj"), common::cube_at(5, 0)).unwrap();
+    fs::write(directory.join("room.obj"), cube_at(5, 0)).unwrap();
     let scene = "\
 mesh m cube.obj
 mesh l room.obj
@@ -361,4 +364,41 @@ fn baked_scenes_are_asked_like_text() {
     fs::write(directory.join("boxes.cbvh"), bytes).unwrap();
     cbvh_in(directory, &["scene", "boxes.cbvh"]).failed(3, &["boxes.cbvh: ", "R10"]);
     cbvh_in(directory, &["validate", "boxes.cbvh"]).failed(3, &["boxes.cbvh", "R10"]);
+}
+
+#[test]
+fn names_in_quotes_have_spaces_and_distances_of_all_pairs_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("my #1 cube.obj"), cube()).unwrap();
+    let at = |name: &str, x: i32| format!("instance {name} \"the box\" {x} 0 0 0 0 0 1\n");
+    let scene = "mesh \"the box\" \"my #1 cube.obj\" # a comment\n".to_owned()
+        + &at("\"left \\\"arm\\\"\"", 0)
+        + &at("mid", 3)
+        + &at("\"right arm\"", 10)
+        + "allow \"right arm\" mid\n";
+    fs::write(directory.join("s.scene"), &scene).unwrap();
+    let ask = |more: &[&str]| cbvh_in(directory, &[&["scene", "s.scene", "--mode"], more].concat());
+    let listed = ask(&["distance", "--list"]).done().out;
+    let expected = "frame 1: \"left \\\"arm\\\"\" mid 1 mesh units apart\n  \"left \\\"arm\\\"\" \"right arm\" 8 mesh units apart\n";
+    assert_eq!(listed, expected);
+    assert_eq!(ask(&["distance"]).done().out, "1\n");
+    let json = ask(&["distance", "--list", "--json"]).done().json();
+    assert_eq!((&json["a"], &json["b"]), (&"left \"arm\"".into(), &"mid".into()));
+    fs::write(directory.join("s.scene"), scene + "moving \"mid\n").unwrap();
+    ask(&["collide"]).failed(3, &["s.scene: line 6", "expected a quote at the end of a name"]);
+}
+
+#[test]
+fn meshes_of_very_different_size_are_pointed_out_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path();
+    fs::write(directory.join("small.obj"), cube()).unwrap();
+    fs::write(directory.join("large.obj"), cube_at(2000, 0)).unwrap();
+    let lines = ["a small", "b large", "c large"].map(|of| format!("instance {of} 0 0 0 0 0 0 1\n"));
+    let scene = format!("mesh small small.obj\nmesh large large.obj\n{}", lines.concat());
+    fs::write(directory.join("s.scene"), scene).unwrap();
+    let ended = cbvh_in(directory, &["scene", "s.scene"]);
+    assert_eq!((ended.code, ended.err.lines().count()), (0, 1), "{ended:?}");
+    assert!(ended.err.contains("small.obj is about 2.000") && ended.err.contains("same unit?"), "{ended:?}");
 }

@@ -91,18 +91,16 @@ pub(crate) fn choose(
     let mut reasons = Vec::new();
     let encoding = options.triangles.unwrap_or_else(|| {
         let bytes = count * PLAIN_BYTES_PER_TRIANGLE;
-        let (encoding, why) = if bytes > MAX_PLAIN_BYTES {
-            (TriangleEncoding::Packed, "more than")
-        } else {
-            (TriangleEncoding::F32, "less than")
-        };
-        let (size, large) = (bytes as f64 / 1048576.0, MAX_PLAIN_BYTES >> 20);
+        if bytes <= MAX_PLAIN_BYTES {
+            reasons.push("plain triangles are the fastest".to_owned());
+            return TriangleEncoding::F32;
+        }
+        let (size, limit) = (bytes >> 20, MAX_PLAIN_BYTES >> 20);
         reasons.push(format!(
-            "{} triangles, because nodes and plain triangles take about {size:.1} MiB without ids ({PLAIN_BYTES_PER_TRIANGLE} bytes \
-             per triangle), {why} the limit of {large} MiB",
-            encoding.name()
+            "packed triangles, because nodes and plain triangles take about {size} MiB without ids \
+             ({PLAIN_BYTES_PER_TRIANGLE} bytes per triangle), more than the limit of {limit} MiB"
         ));
-        encoding
+        TriangleEncoding::Packed
     });
     let profile = options.profile.unwrap_or_else(|| {
         // A caller who asks for packed triangles wants a small file, and one who asks for quantised triangles wants the

@@ -85,7 +85,7 @@ impl LoadedMesh {
     }
 
     /// Returns how large the mesh is, in mesh units: the longest side of the box of its largest object.
-    fn size(&self) -> f64 {
+    pub(crate) fn size(&self) -> f64 {
         let sides = self.shape().objects().iter().flat_map(|object| {
             let record = object.record();
             [0, 1, 2].map(|axis| f64::from(record.box_hi[axis].get()) - f64::from(record.box_lo[axis].get()))
@@ -107,12 +107,11 @@ impl LoadedMesh {
     }
 }
 
-/// Points out meshes of which one is so much larger that they may be in different units.
-pub(crate) fn point_out_units(meshes: [&LoadedMesh; 2]) {
-    let [size_a, size_b] = meshes.map(LoadedMesh::size);
+/// Points out two meshes, by size and file, of which one is so much larger that they may be in different units.
+pub(crate) fn point_out_units([(size_a, a), (size_b, b)]: [(f64, &Path); 2]) {
     let ratio = (size_a / size_b).max(size_b / size_a);
     if ratio > MAX_RATIO && ratio.is_finite() {
-        let [a, b] = meshes.map(|mesh| mesh.path.display());
+        let [a, b] = [a, b].map(Path::display);
         tell_line(&format!(
             "{a} is about {size_a:.3} mesh units across and {b} about {size_b:.3}; are both in the same unit?"
         ));

@@ -69,20 +69,19 @@ pub(crate) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Loads the meshes. `what` has the name of a question and the mode.
+    /// Loads the meshes. The tuple has the name of a question and of the mode, and whether answers are exact.
     pub(crate) fn load(
         arguments: &'a AskingArguments,
-        (noun, mode, is_exact): (&'static str, String, bool),
+        (backend, noun, mode, is_exact): (Backend, &'static str, String, bool),
         a: &Path,
         b: Option<&Path>,
     ) -> Result<Self, Failure> {
-        let backend = backend(&arguments.run.isa)?;
         let how = arguments.how();
         let a = LoadedMesh::load(a, &how)?;
         let b = b.map(|path| LoadedMesh::load(path, &how)).transpose()?;
         mesh::refuse_unknown_object(&a, b.as_ref(), &how)?;
         if let Some(b) = &b {
-            mesh::point_out_units([&a, b]);
+            mesh::point_out_units([&a, b].map(|mesh| (mesh.size(), &*mesh.path)));
         }
         Ok(Self { arguments, backend, noun, mode, is_exact, a, b })
     }

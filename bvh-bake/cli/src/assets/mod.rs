@@ -8,7 +8,7 @@ mod list;
 mod shares;
 
 use crate::asking::files::regular_file;
-use crate::bake::{self, BakeArguments, FileOptions, Report};
+use crate::bake::{self, BakeArguments, Report};
 use crate::console::{self, Failure, record, spinner};
 use crate::process;
 use bvh_bake::{BakeError, Progress, ReadError};
@@ -20,20 +20,13 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Returns whether the command line is about many assets: a manifest, or one folder.
-pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
-    arguments.manifest.is_some() || matches!(&arguments.inputs[..], [input] if input.is_dir())
-}
-
 /// Bakes all assets of a manifest or a folder.
 pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
-    let (options, file_options) = bake::prepare(arguments)?;
+    let options = bake::prepare(arguments)?;
     let start = Instant::now();
     let mut assets = match (&arguments.manifest, &arguments.inputs[..], &arguments.output) {
-        (Some(manifest), ..) => list::read_manifest(manifest, &options, file_options.max_memory)?,
-        (None, [folder], Some(output)) => {
-            list::read_folder(folder, output, &options, file_options.max_memory)?
-        }
+        (Some(manifest), ..) => list::read_manifest(manifest, &options, arguments.max_memory)?,
+        (None, [folder], Some(output)) => list::read_folder(folder, output, &options, arguments.max_memory)?,
         _ => return Err(Failure::Usage("expected a manifest or one folder (see --help)".into())),
     };
     let results = arguments.out_manifest.as_deref();
@@ -44,7 +37,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         assets.retain(|_| number.next().is_some_and(|number| shard.has(number)));
     }
     let jobs = rayon::current_num_threads();
-    let shares = file_options.max_memory.map(|budget| Shares::new(budget.saturating_sub(known), jobs));
+    let shares = arguments.max_memory.map(|budget| Shares::new(budget.saturating_sub(known), jobs));
     let spinner = spinner(arguments.quiet);
     process::remove_unfinished_files(&spinner)?;
     let done = Done {
@@ -57,7 +50,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
         done: Mutex::new(done),
         spinner,
         shares,
-        file_options: &file_options,
+        arguments,
     };
     std::thread::scope(|scope| {
         for _ in 1..jobs.min(assets.len()) {
@@ -91,7 +84,7 @@ struct Queue<'a, T> {
     spinner: ProgressBar,
     /// The memory; `None` without a budget.
     shares: Option<Shares>,
-    file_options: &'a FileOptions,
+    arguments: &'a BakeArguments,
 }
 
 /// The results so far.
@@ -138,10 +131,9 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
         }
         // The user has not seen these names, so that none of them may make the command wait.
         regular_file(&asset.input).map_err(|source| ReadError::Io { path: asset.input.clone(), source })?;
-        let file_options = FileOptions { max_memory, ..self.file_options.clone() };
         let inputs = std::slice::from_ref(&asset.input);
         let progress = Progress::default();
-        bake::bake(inputs, &asset.output, &asset.options, &file_options, &progress, &mut |_| ())
+        bake::bake(inputs, &asset.output, &asset.options, self.arguments, max_memory, &progress, &mut |_| ())
     }
 
     /// Counts an asset, writes its line of results, and tells what is wrong with it.

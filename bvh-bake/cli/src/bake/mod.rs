@@ -14,9 +14,14 @@ use screen::Screen;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// Returns whether the command line is about many assets: a manifest, or one folder.
+pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
+    arguments.manifest.is_some() || matches!(&arguments.inputs[..], [input] if input.is_dir())
+}
+
 /// Bakes the inputs into one output.
 pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
-    let (options, file_options) = prepare(arguments)?;
+    let options = prepare(arguments)?;
     let Some(output) = &arguments.output else {
         return Err(Failure::Usage("expected --output <OUT.cbvh>, found none (see --help)".into()));
     };
@@ -30,10 +35,12 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let tells_stages = arguments.json && !arguments.quiet;
     process::remove_unfinished_files(screen.spinner())?;
     let baked =
-        bake(&arguments.inputs, output, &options, &file_options, &progress, &mut |event| match event {
-            Event::Begins(step) => screen.begin(step, &progress),
-            Event::Ended(line) if tells_stages => screen.suspend(|| console::tell_json(line)),
-            Event::Ended(_) => {}
+        bake(&arguments.inputs, output, &options, arguments, arguments.max_memory, &progress, &mut |event| {
+            match event {
+                Event::Begins(step) => screen.begin(step, &progress),
+                Event::Ended(line) if tells_stages => screen.suspend(|| console::tell_json(line)),
+                Event::Ended(_) => {}
+            }
         });
     screen.clear();
     let report = baked.map_err(|error| Failure::from_bake(&names(&arguments.inputs), &error))?;
@@ -51,21 +58,8 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     }
 }
 
-/// How each bake of the command goes about files.
-#[derive(Clone)]
-pub(crate) struct FileOptions {
-    /// Whether to bake even if the output is up to date.
-    pub(crate) force: bool,
-    /// The budget of memory, in bytes.
-    pub(crate) max_memory: Option<u64>,
-    /// The folder for scratch files; `None` for that of the output.
-    pub(crate) scratch: Option<PathBuf>,
-    /// Whether glTF files may name buffers outside their own folders.
-    pub(crate) allow_outside: bool,
-}
-
 /// Turns the arguments into options, and applies those that concern the whole process: threads and memory.
-pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions), Failure> {
+pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     if arguments.max_error.is_some() && !arguments.layout.is_quantized() {
         return Err(Failure::Usage("--max-error requires --triangles quantized (see --help)".into()));
     }
@@ -75,6 +69,13 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
              ./- for a file of this name)"
                 .into(),
         ));
+    }
+    if let Some(folder) = arguments.output.as_deref().filter(|output| output.is_dir() && !are_many(arguments))
+    {
+        return Err(Failure::System(format!(
+            "{0}: expected a file, found a folder; name a file in it, or bake a folder of meshes into it: cbvh bake DIR -o {0}",
+            folder.display()
+        )));
     }
     if let Some(folder) = &arguments.scratch {
         std::fs::read_dir(folder).map_err(|error| Failure::from_folder(folder, &error))?;
@@ -96,13 +97,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<(Options, FileOptions
         .ids(!arguments.no_ids)
         .turning_slabs(!arguments.no_turning_slabs)
         .topology(!arguments.no_topology);
-    let file_options = FileOptions {
-        force: arguments.force,
-        max_memory: arguments.max_memory,
-        scratch: arguments.scratch.clone(),
-        allow_outside: arguments.allow_outside,
-    };
-    Ok((options, file_options))
+    Ok(options)
 }
 
 /// What can be observed of a bake while it runs.
@@ -113,23 +108,25 @@ pub(crate) enum Event<'a> {
     Ended(&'a StageLine),
 }
 
-/// Bakes meshes into one file and reports on it.
+/// Bakes meshes into one file within a budget of memory, and reports on it. How to go about files is in the arguments.
 pub(crate) fn bake(
     inputs: &[PathBuf],
     output: &Path,
     options: &Options,
-    file_options: &FileOptions,
+    arguments: &BakeArguments,
+    max_memory: Option<u64>,
     progress: &Progress,
     watch: &mut dyn FnMut(Event),
 ) -> Result<Report, BakeError> {
     let start = Instant::now();
     let mut stages = Stages::new(progress);
-    let FileOptions { force, max_memory, scratch, allow_outside } = file_options.clone();
-    let bake = FileBake::new(inputs, output).options(options.clone()).force(force).max_memory(max_memory);
-    let bake = bake.allow_outside(allow_outside).scratch(scratch).progress(progress).on_step(|step| {
-        watch(Event::Begins(step));
-        stages.begin(step, &mut |line| watch(Event::Ended(line)));
-    });
+    let BakeArguments { force, scratch, allow_outside, .. } = arguments;
+    let bake = FileBake::new(inputs, output).options(options.clone()).force(*force).max_memory(max_memory);
+    let bake =
+        bake.allow_outside(*allow_outside).scratch(scratch.clone()).progress(progress).on_step(|step| {
+            watch(Event::Begins(step));
+            stages.begin(step, &mut |line| watch(Event::Ended(line)));
+        });
     let outcome = bake.run()?;
     let stages = match outcome {
         Outcome::Baked(_) => stages.finish(&mut |line| watch(Event::Ended(line))),

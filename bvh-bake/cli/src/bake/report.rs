@@ -2,7 +2,8 @@
 
 use crate::console::{Record, hex, length, names, plural, record};
 use crate::process;
-use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, Traffic};
+use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, StoredFile, Traffic};
+use bvh_format::Layout;
 use bvh_format::header::version_name;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -123,6 +124,8 @@ impl Report {
         line("vertices", format!("{} in {} {objects}", baked.vertices, file.objects));
         if file.instances > 0 {
             line("instances", file.instances.to_string());
+        } else if let Some([x, y, z]) = sides(Path::new(&self.output)) {
+            line("size", format!("{x} by {y} by {z} mesh units"));
         }
         match (file.closed, file.objects) {
             (None, _) => {}
@@ -177,6 +180,21 @@ impl Report {
     }
 }
 
+/// Returns the sides of the box around all objects of a file, rounded; `None` if the file cannot be read any more.
+fn sides(path: &Path) -> Option<[f32; 3]> {
+    let layout = Layout::read_from(&StoredFile::open(path, None).ok()?).ok()?;
+    let records = || layout.objects.iter().map(|object| object.record());
+    Some([0, 1, 2].map(|axis| {
+        let end = |box_end: f32, origin: f64| origin + f64::from(box_end);
+        let ends = records().map(|of| {
+            let origin = of.origin[axis].get();
+            [end(of.box_lo[axis].get(), origin), end(of.box_hi[axis].get(), origin)]
+        });
+        let [lo, hi] = ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]).unwrap_or_default();
+        (hi - lo) as f32
+    }))
+}
+
 /// Returns a warning if quantisation may have collapsed triangles that matter.
 fn warning(input: &str, options: &Options, report: &BakeReport) -> Option<String> {
     let (advised, file) = (report.advised_max_error?, &report.file);
@@ -189,23 +207,15 @@ fn warning(input: &str, options: &Options, report: &BakeReport) -> Option<String
 }
 
 /// One stage as `--json` prints it. Seconds and bytes add up over the stages of a bake.
-#[derive(Serialize, Debug, Clone, PartialEq)]
+#[derive(Serialize)]
 pub(crate) struct StageLine {
     stage: &'static str,
-    pub(crate) seconds: f64,
+    seconds: f64,
     /// Triangles of the input up to `prepare`, and stored triangles from `build` on.
     triangles: u64,
     triangles_per_second: f64,
-    /// Bytes read from all files.
-    bytes_read: u64,
-    /// Bytes written to all files.
-    bytes_written: u64,
-    /// The part of `bytes_written` that went to scratch files.
-    spilled_bytes: u64,
-    /// Resident memory when the stage ended.
-    resident_bytes: Option<u64>,
-    /// The largest resident memory since the process began.
-    peak_rss_bytes: Option<u64>,
+    #[serde(flatten)]
+    taken: Taken,
 }
 
 /// Returns the name of a stage, which scripts rely on.
@@ -230,14 +240,19 @@ pub(crate) struct Stages {
     told: usize,
 }
 
-#[derive(Default)]
+/// What a stage takes of time, files and memory.
+#[derive(Default, Clone, Serialize)]
 struct Taken {
+    #[serde(skip)]
     time: Duration,
-    read: u64,
-    written: u64,
-    spilled: u64,
-    resident: Option<u64>,
-    peak: Option<u64>,
+    /// Bytes read from all files, and written to them.
+    bytes_read: u64,
+    bytes_written: u64,
+    /// The part of `bytes_written` that went to scratch files.
+    spilled_bytes: u64,
+    /// Resident memory when the stage ended, and the largest since the process began.
+    resident_bytes: Option<u64>,
+    peak_rss_bytes: Option<u64>,
 }
 
 impl Stages {
@@ -269,10 +284,10 @@ impl Stages {
         let traffic = self.progress.traffic();
         let taken = &mut self.taken[number(step)];
         taken.time += since.elapsed();
-        taken.read += traffic.read() - before.read();
-        taken.written += traffic.written() - before.written();
-        taken.spilled += traffic.scratch_written - before.scratch_written;
-        (taken.resident, taken.peak) = (process::current_bytes(), process::peak_bytes());
+        taken.bytes_read += traffic.read() - before.read();
+        taken.bytes_written += traffic.written() - before.written();
+        taken.spilled_bytes += traffic.scratch_written - before.scratch_written;
+        (taken.resident_bytes, taken.peak_rss_bytes) = (process::current_bytes(), process::peak_bytes());
     }
 
     fn line(&self, step: Step) -> StageLine {
@@ -283,11 +298,7 @@ impl Stages {
             seconds,
             triangles,
             triangles_per_second: if seconds > 0.0 { triangles as f64 / seconds } else { 0.0 },
-            bytes_read: taken.read,
-            bytes_written: taken.written,
-            spilled_bytes: taken.spilled,
-            resident_bytes: taken.resident,
-            peak_rss_bytes: taken.peak,
+            taken: taken.clone(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use bvh_format::header::{MAJOR, MINOR, version_name};
 use serde::Serialize;
+use std::fs::read_to_string;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The program, the date and the machine.
@@ -24,12 +25,13 @@ pub struct Origin {
 impl Origin {
     /// Describes a program that runs here and now.
     pub fn of(tool: &'static str) -> Self {
+        let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
         Self {
             tool,
             version: env!("CARGO_PKG_VERSION"),
             format_version: version_name((MAJOR, MINOR)),
             unoptimised: cfg!(debug_assertions),
-            date: today(),
+            date: date(seconds / 86400),
             machine: Machine::here(),
         }
     }
@@ -38,7 +40,7 @@ impl Origin {
 /// A machine, as far as its system describes it.
 #[derive(Debug, Serialize)]
 pub struct Machine {
-    /// The name of the processor.
+    /// The name of the processor, or of its architecture.
     pub processor: String,
     /// How many processors the program may use.
     pub processors: usize,
@@ -48,77 +50,6 @@ pub struct Machine {
     pub system: String,
     /// The data caches of the first processor, the nearest one first; empty if unknown.
     pub caches: Vec<Cache>,
-}
-
-impl Machine {
-    /// Describes this machine.
-    pub fn here() -> Self {
-        Self {
-            processor: processor(),
-            processors: std::thread::available_parallelism().map_or(1, usize::from),
-            is_virtual: is_virtual(),
-            system: system(),
-            caches: caches(),
-        }
-    }
-
-    /// Describes the machine in one phrase.
-    pub fn text(&self) -> String {
-        let plural = if self.processors == 1 { "" } else { "s" };
-        let kind = if self.is_virtual { " of a virtual machine" } else { "" };
-        let size = |bytes: u64| {
-            if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{} KiB", bytes >> 10) }
-        };
-        let caches: Vec<String> =
-            self.caches.iter().map(|cache| format!("L{} {}", cache.level, size(cache.bytes))).collect();
-        let caches = if caches.is_empty() { "unknown".to_owned() } else { caches.join(", ") };
-        format!(
-            "{} ({} processor{plural}{kind}), {}, data caches: {caches}",
-            self.processor, self.processors, self.system
-        )
-    }
-}
-
-/// Returns year, month and day, in UTC.
-fn today() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-    date(seconds / 86400)
-}
-
-/// Returns the date `days` days after 1970-01-01. The Gregorian calendar repeats every 400 years, or 146097 days.
-fn date(mut days: u64) -> String {
-    let is_leap =
-        |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    let mut year = 1970 + 400 * (days / 146097);
-    days %= 146097;
-    while days >= 365 + u64::from(is_leap(year)) {
-        days -= 365 + u64::from(is_leap(year));
-        year += 1;
-    }
-    let february = 28 + u64::from(is_leap(year));
-    let mut month = 1;
-    for length in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31] {
-        if days < length {
-            break;
-        }
-        days -= length;
-        month += 1;
-    }
-    format!("{year}-{month:02}-{:02}", days + 1)
-}
-
-/// Returns the name of the processor, or that of its architecture if the system does not tell.
-fn processor() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let field = |name: &str| {
-        let line = text.lines().find(|line| line.split(':').next().is_some_and(|key| key.trim() == name))?;
-        Some(line.split(':').nth(1)?.trim().to_owned())
-    };
-    let name = field("model name").unwrap_or_else(|| std::env::consts::ARCH.to_owned());
-    match (field("cpu family"), field("model")) {
-        (Some(family), Some(model)) => format!("{name}, family {family}, model {model}"),
-        _ => name,
-    }
 }
 
 /// A cache of the processor.
@@ -132,30 +63,71 @@ pub struct Cache {
     pub bytes: u64,
 }
 
-fn caches() -> Vec<Cache> {
-    let read = |index: usize, name: &str| {
-        let path = format!("/sys/devices/system/cpu/cpu0/cache/index{index}/{name}");
-        Some(std::fs::read_to_string(path).ok()?.trim().to_owned())
-    };
-    let cache = |index| {
-        let kind = read(index, "type")?;
-        let bytes = read(index, "size")?.strip_suffix('K')?.parse::<u64>().ok()? * 1024;
-        Some(Cache { level: read(index, "level")?.parse().ok()?, kind, bytes })
-    };
-    (0..8).map_while(cache).filter(|cache| cache.kind != "Instruction").collect()
-}
+impl Machine {
+    /// Describes this machine.
+    pub fn here() -> Self {
+        let cpu = read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let field = |name: &str| {
+            let mut fields = cpu.lines().filter_map(|line| line.split_once(':'));
+            fields.find(|(key, _)| key.trim() == name).map(|(_, value)| value.trim())
+        };
+        let name = field("model name").unwrap_or(std::env::consts::ARCH);
+        let processor = match (field("cpu family"), field("model")) {
+            (Some(family), Some(model)) => format!("{name}, family {family}, model {model}"),
+            _ => name.to_owned(),
+        };
+        let kernel = |name: &str| read_to_string(format!("/proc/sys/kernel/{name}")).ok();
+        let system = match (kernel("ostype"), kernel("osrelease")) {
+            (Some(name), Some(release)) => format!("{} {}", name.trim(), release.trim()),
+            _ => std::env::consts::OS.to_owned(),
+        };
+        Self {
+            processor,
+            processors: std::thread::available_parallelism().map_or(1, usize::from),
+            is_virtual: field("flags").is_some_and(|flags| flags.split(' ').any(|flag| flag == "hypervisor")),
+            system,
+            caches: (0..8).map_while(cache).filter(|cache| cache.kind != "Instruction").collect(),
+        }
+    }
 
-fn system() -> String {
-    let read = |name: &str| std::fs::read_to_string(format!("/proc/sys/kernel/{name}")).ok();
-    match (read("ostype"), read("osrelease")) {
-        (Some(name), Some(release)) => format!("{} {}", name.trim(), release.trim()),
-        _ => std::env::consts::OS.to_owned(),
+    /// Describes the machine in one phrase.
+    pub fn text(&self) -> String {
+        let plural = if self.processors == 1 { "" } else { "s" };
+        let kind = if self.is_virtual { " of a virtual machine" } else { "" };
+        let cache = |cache: &Cache| match cache.bytes {
+            bytes @ 0x10_0000.. => format!("L{} {} MiB", cache.level, bytes >> 20),
+            bytes => format!("L{} {} KiB", cache.level, bytes >> 10),
+        };
+        let caches: Vec<String> = self.caches.iter().map(cache).collect();
+        let caches = if caches.is_empty() { "unknown".to_owned() } else { caches.join(", ") };
+        let Self { processor, processors, system, .. } = self;
+        format!("{processor} ({processors} processor{plural}{kind}), {system}, data caches: {caches}")
     }
 }
 
-fn is_virtual() -> bool {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    text.lines().any(|line| line.starts_with("flags") && line.split_whitespace().any(|f| f == "hypervisor"))
+/// Returns the cache of this number of the first processor.
+fn cache(index: usize) -> Option<Cache> {
+    let read = |name: &str| {
+        let text = read_to_string(format!("/sys/devices/system/cpu/cpu0/cache/index{index}/{name}"));
+        Some(text.ok()?.trim().to_owned())
+    };
+    let bytes = read("size")?.strip_suffix('K')?.parse::<u64>().ok()? * 1024;
+    Some(Cache { level: read("level")?.parse().ok()?, kind: read("type")?, bytes })
+}
+
+/// Returns the date `days` days after 1970-01-01. The Gregorian calendar repeats every 400 years, or 146097 days, and a year
+/// that begins in March ends with its leap day.
+fn date(days: u64) -> String {
+    // Days since 0000-03-01.
+    let days = days + 719468;
+    let (era, day) = (days / 146097, days % 146097);
+    let year = (day - day / 1460 + day / 36524 - day / 146096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    // Months from March on have 153 days in five.
+    let month = (5 * day + 2) / 153;
+    let (day, is_next_year) = (day - (153 * month + 2) / 5 + 1, month >= 10);
+    let month = if is_next_year { month - 9 } else { month + 3 };
+    format!("{}-{month:02}-{day:02}", 400 * era + year + u64::from(is_next_year))
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ const STEP: f64 = 15.0;
 const ZERO: f64 = 0.1;
 
 /// Panels below a title and a legend.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// Its title.
     pub title: String,

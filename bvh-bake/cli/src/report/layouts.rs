@@ -133,8 +133,8 @@ fn measure(subject: &Subject<'_>, poses: &[Pose]) -> Result<Measured, Failure> {
         tables: tables(&rows),
         rows,
         wrong,
-        counts: Vec::new(),
         pinned,
+        ..Measured::default()
     })
 }
 

@@ -134,7 +134,11 @@ fn number(row: &Cells, name: &str) -> Option<f64> {
 }
 
 /// The results of a pair.
+#[derive(Default)]
 struct Measured {
+    name: String,
+    /// The meshes and the items, in sentences.
+    about: String,
     rows: Vec<Cells>,
     /// Wrong answers, one line each.
     wrong: Vec<String>,
@@ -145,16 +149,6 @@ struct Measured {
     sentences: Vec<String>,
     figure: Figure,
     /// The tables, as HTML.
-    tables: String,
-}
-
-/// A pair on the page.
-struct Section {
-    name: String,
-    /// The meshes and the items, in sentences.
-    about: String,
-    sentences: Vec<String>,
-    figure: Figure,
     tables: String,
 }
 
@@ -170,7 +164,7 @@ struct Report {
     #[serde(serialize_with = "table::objects")]
     rows: Vec<Cells>,
     #[serde(skip)]
-    sections: Vec<Section>,
+    sections: Vec<Measured>,
 }
 
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
@@ -226,31 +220,28 @@ fn run_kind<T: Clone>(
 
 impl Report {
     /// Adds the results of a pair, which was asked about so many items of this name and origin.
-    fn add(&mut self, subject: &Subject<'_>, measured: Measured, (items, count, from): (&str, usize, &str)) {
+    fn add(&mut self, subject: &Subject<'_>, mut of: Measured, (items, count, from): (&str, usize, &str)) {
         let Subject { pair, baked, .. } = subject;
         let side = |path: &Path, (bvh, report): &Baked| {
-            json!({
-                "mesh": path.file_name().unwrap_or_default().to_string_lossy(), "triangles": bvh.all().triangles(),
-                "diagonal": diagonal(bvh), "chosen_layout": meshes::layout_of(report),
-            })
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let (triangles, diagonal) = (bvh.all().triangles(), diagonal(bvh));
+            let layout = meshes::layout_of(report);
+            (
+                format!("{name}, {triangles} triangles, diagonal {diagonal:.4} mesh units"),
+                json!({ "mesh": name, "triangles": triangles, "diagonal": diagonal, "chosen_layout": layout }),
+            )
         };
-        let [a, b] = [side(&pair.a, &baked[0]), side(&pair.b, &baked[1])];
-        let in_words = |side: &Value| {
-            let (name, triangles) = (side["mesh"].as_str().unwrap_or_default(), &side["triangles"]);
-            let diagonal = side["diagonal"].as_f64().unwrap_or_default();
-            format!("{name}, {triangles} triangles, diagonal {diagonal:.4} mesh units")
-        };
-        let (name, about_a, about_b) = (pair.name.clone(), in_words(&a), in_words(&b));
+        let [(about_a, a), (about_b, b)] = [side(&pair.a, &baked[0]), side(&pair.b, &baked[1])];
         let mut record = json!({
-            "name": name, "a": a, "b": b, items: count, format!("{items}_from"): from, "pinned": measured.pinned,
+            "name": pair.name, "a": a, "b": b, items: count, format!("{items}_from"): from, "pinned": of.pinned,
         });
-        measured.counts.iter().for_each(|(key, count)| record[*key] = json!(count));
-        let about = format!("A: {about_a}. B: {about_b}. {count} {items} ({from}).");
-        let Measured { rows, wrong, sentences, figure, tables, .. } = measured;
+        of.counts.iter().for_each(|(key, count)| record[*key] = json!(count));
         self.pairs.push(record);
-        self.wrong.extend(wrong);
-        self.rows.extend(rows);
-        self.sections.push(Section { name, about, sentences, figure, tables });
+        self.wrong.append(&mut of.wrong);
+        self.rows.append(&mut of.rows);
+        of.name.clone_from(&pair.name);
+        of.about = format!("A: {about_a}. B: {about_b}. {count} {items} ({from}).");
+        self.sections.push(of);
     }
 }
 

@@ -150,6 +150,7 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
         wrong,
         counts: vec![("free", free), ("hits", count(is_hit)), ("undecided", undecided)],
         pinned,
+        ..Measured::default()
     })
 }
 

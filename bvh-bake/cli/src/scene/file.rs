@@ -1,7 +1,7 @@
 //! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
-use crate::asking::mesh::{How, LoadedMesh};
+use crate::asking::mesh::{How, LoadedMesh, point_out_units};
 use crate::console::Failure;
 use crate::options::LayoutArguments;
 use bvh_query::{Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
@@ -42,11 +42,11 @@ pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
     let mut scene = SceneText::default();
     let (mut meshes, mut instances) = (HashMap::new(), HashMap::new());
     for (number, line) in (1..).zip(text.lines()) {
-        let line = line.split('#').next().unwrap_or("");
-        let words: Vec<&str> = line.split_whitespace().collect();
-        scene
-            .add(number, &words, path, &mut meshes, &mut instances)
-            .map_err(|text| Failure::invalid(path, format_args!("line {number}: {text}")))?;
+        let added = words(line).and_then(|words| {
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            scene.add(number, &words, path, &mut meshes, &mut instances)
+        });
+        added.map_err(|text| Failure::invalid(path, format_args!("line {number}: {text}")))?;
     }
     if scene.instances.is_empty() {
         return Err(Failure::invalid(
@@ -57,16 +57,52 @@ pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
     Ok(scene)
 }
 
+/// Divides a line into words, up to a comment. A word in quotes may have spaces and `#`; a backslash before a quote or a
+/// backslash stands for that character.
+fn words(line: &str) -> Result<Vec<String>, String> {
+    let (mut words, mut chars) = (Vec::new(), line.chars().peekable());
+    loop {
+        while chars.next_if(|c| c.is_whitespace()).is_some() {}
+        match chars.peek() {
+            None | Some('#') => return Ok(words),
+            Some('"') => {
+                let mut word = String::new();
+                chars.next();
+                loop {
+                    match chars.next() {
+                        Some('"') => break,
+                        Some('\\') if matches!(chars.peek(), Some('"' | '\\')) => word.extend(chars.next()),
+                        Some(c) => word.push(c),
+                        None => {
+                            return Err(format!(
+                                "expected a quote at the end of a name, found none after {word:?}"
+                            ));
+                        }
+                    }
+                }
+                words.push(word);
+            }
+            Some(_) => {
+                let mut word = String::new();
+                while let Some(c) = chars.next_if(|&c| !c.is_whitespace() && c != '#') {
+                    word.push(c);
+                }
+                words.push(word);
+            }
+        }
+    }
+}
+
 impl SceneText {
-    fn add<'a>(
+    fn add(
         &mut self,
         number: usize,
-        words: &[&'a str],
+        words: &[&str],
         path: &Path,
-        meshes: &mut HashMap<&'a str, usize>,
-        instances: &mut HashMap<&'a str, usize>,
+        meshes: &mut HashMap<String, usize>,
+        instances: &mut HashMap<String, usize>,
     ) -> Result<(), String> {
-        let find = |names: &HashMap<&str, usize>, what: &str, name: &str| {
+        let find = |names: &HashMap<String, usize>, what: &str, name: &str| {
             names
                 .get(name)
                 .copied()
@@ -75,7 +111,7 @@ impl SceneText {
         match *words {
             [] => {}
             ["mesh", name, file] => {
-                if meshes.insert(name, self.meshes.len()).is_some() {
+                if meshes.insert(name.to_owned(), self.meshes.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second mesh {name:?}"));
                 }
                 let folder = path.parent().unwrap_or_else(|| Path::new(""));
@@ -85,7 +121,7 @@ impl SceneText {
                 let mesh = find(meshes, "a mesh", mesh)?;
                 let pose = files::parse_placed(&words[3..].join(" "))?;
                 let pose = pose.ok_or("expected 12 numbers, or 7, after the mesh, found none")?;
-                if instances.insert(name, self.instances.len()).is_some() {
+                if instances.insert(name.to_owned(), self.instances.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second instance {name:?}"));
                 }
                 self.instances.push((number, name.to_owned(), mesh, pose));
@@ -171,14 +207,20 @@ pub(super) fn load(
         build_seconds: 0.0,
     };
     let mut shapes = Vec::new();
+    // The smallest and the largest mesh.
+    let mut ends: Option<[(f64, &Path); 2]> = None;
     for (_, _, file) in &text.meshes {
         require_regular(file)?;
         let mesh = LoadedMesh::load(file, &how)?;
         mesh.check()?;
         loaded.triangles = loaded.triangles.saturating_add(mesh.triangles());
         loaded.build_seconds += mesh.build_seconds();
+        let this = (mesh.size(), file.as_path());
+        let [least, most] = ends.unwrap_or([this; 2]);
+        ends = Some([if this.0 < least.0 { this } else { least }, if this.0 > most.0 { this } else { most }]);
         shapes.push(OwnedShape::from(mesh.bvh));
     }
+    ends.into_iter().for_each(point_out_units);
     let mut ids = Vec::new();
     for (number, name, mesh, pose) in &text.instances {
         let id = loaded.scene.add_named(name.clone(), shapes[*mesh].clone(), *pose);

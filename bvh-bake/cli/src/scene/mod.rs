@@ -8,7 +8,10 @@ use crate::asking::mesh::is_baked;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure, significant};
 use crate::options::not_negative;
-use bvh_query::{Pose, QueryError, QueryStats, Relation, SceneDistance, SceneError, ScenePair};
+use bvh_query::{
+    Backend, Pose, Querier, QueryError, QueryStats, Relation, Scene, SceneDistance, SceneError, ScenePair,
+    SceneShape,
+};
 use cbvh_measure::rounds::add;
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
@@ -30,12 +33,14 @@ of the position, then x y z w of a unit quaternion
   moving NAME...              the instances that frames move, in the order of their poses
   allow NAME NAME             two instances that may touch, and are never asked about
 
+Names and files with spaces are written in quotes: \"left arm\".
+
 Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked \
 about, and of a baked scene all pairs whose groups meet. \
 In a scene without moving instances there is one frame, without FRAMES, and all pairs are asked about.
 
 One answer is printed per line, in the order of the frames: 0 or 1 (collide), the number of pairs (pairs, within, relation) \
-or the distance of the nearest pair (17 digits; inf if there are no pairs). --list prints for a person which pairs they are. \
+or the distance of the nearest pair (17 digits; inf if there are no pairs). --list prints for a person which pairs they are, and for distance the distances of all pairs, the nearest first. \
 relation finds the pairs that touch or of which one is inside the other, wholly or in part.
 
 --json prints one object per frame: frame, its number in the file, from 0; collide (true or false), or pairs, each with the \
@@ -89,7 +94,7 @@ enum Mode {
 /// Answers the question about each frame.
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.run.isa)?;
-    let question = Question::new(arguments)?;
+    let question = Question::new(arguments, backend)?;
     let extension = arguments.scene.extension().unwrap_or_default().to_ascii_lowercase();
     let is_baked = is_baked(&arguments.scene)?;
     if !is_baked && (extension == "glb" || extension == "gltf") {
@@ -149,6 +154,8 @@ struct Question {
     mode: Mode,
     /// The distance of `Mode::Within`, in mesh units.
     within: f64,
+    /// With which backend to ask for the distances of all pairs, if they are wanted.
+    all_distances: Option<Backend>,
 }
 
 /// An answer about a frame.
@@ -160,8 +167,9 @@ enum Answer {
     Pairs(Vec<ScenePair>),
     /// The pairs that have anything in common, and how they lie.
     Relations(Vec<(ScenePair, Relation)>),
-    /// The nearest pair and its distance, with points in the world; `None` if there are no pairs.
-    Nearest(Option<SceneDistance>),
+    /// The nearest pair and its distance, with points in the world, `None` if there are no pairs; and with `--list` the
+    /// distances of the other pairs, the nearest first.
+    Nearest(Option<SceneDistance>, Vec<(ScenePair, f64)>),
 }
 
 impl Answer {
@@ -171,14 +179,14 @@ impl Answer {
             Self::Flag(flag) => f64::from(u8::from(*flag)),
             Self::Pairs(pairs) => pairs.len() as f64,
             Self::Relations(pairs) => pairs.len() as f64,
-            Self::Nearest(nearest) => nearest.map_or(f64::INFINITY, |of| of.distance.distance),
+            Self::Nearest(nearest, _) => nearest.map_or(f64::INFINITY, |of| of.distance.distance),
         }
     }
 
     /// Returns true if a pair touches, is near enough or has anything in common.
     fn is_positive(&self) -> bool {
         match self {
-            Self::Nearest(_) => self.value() <= 0.0,
+            Self::Nearest(..) => self.value() <= 0.0,
             _ => self.value() > 0.0,
         }
     }
@@ -186,7 +194,7 @@ impl Answer {
 
 impl Question {
     /// Takes the question from the command line.
-    fn new(arguments: &SceneArguments) -> Result<Self, Failure> {
+    fn new(arguments: &SceneArguments, backend: Backend) -> Result<Self, Failure> {
         match (arguments.mode, arguments.within) {
             (Mode::Within, None) => {
                 Err(Failure::Usage("--mode within requires --within D (see --help)".into()))
@@ -194,7 +202,10 @@ impl Question {
             (mode, Some(_)) if mode != Mode::Within => {
                 Err(Failure::Usage("--within requires --mode within (see --help)".into()))
             }
-            (mode, within) => Ok(Self { mode, within: within.unwrap_or(0.0) }),
+            (mode, within) => {
+                let all_distances = (arguments.list && !arguments.run.json).then_some(backend);
+                Ok(Self { mode, within: within.unwrap_or(0.0), all_distances })
+            }
         }
     }
 
@@ -208,15 +219,40 @@ impl Question {
             Mode::Relation => Answer::Relations(scene.relations()?),
             Mode::Distance => {
                 let mut found = scene.distance()?;
+                let others = match self.all_distances {
+                    Some(backend) => others(scene, found.map(|of| of.pair), backend)?,
+                    None => Vec::new(),
+                };
                 if let Some(SceneDistance { pair, distance, .. }) = &mut found {
                     let world = scene.pose(pair.a)?;
                     distance.point_a = world.place(distance.point_a);
                     distance.point_b = world.place(distance.point_b);
                 }
-                Answer::Nearest(found)
+                Answer::Nearest(found, others)
             }
         })
     }
+}
+
+/// Returns the distances of all pairs but the nearest one, the nearest first.
+fn others(
+    scene: &mut Scene,
+    nearest: Option<ScenePair>,
+    backend: Backend,
+) -> Result<Vec<(ScenePair, f64)>, SceneError> {
+    let mut found = Vec::new();
+    let mut querier = Querier::with_backend(backend);
+    for pair in scene.pairs_within(f64::MAX)? {
+        let (SceneShape::Open(a), SceneShape::Open(b)) = (scene.shape(pair.a)?, scene.shape(pair.b)?) else {
+            continue;
+        };
+        let Ok(pose) = Pose::relative(scene.pose(pair.a)?, scene.pose(pair.b)?) else { continue };
+        if Some(pair) != nearest {
+            found.push((pair, querier.distance(a.shape(), b.shape(), &pose)?.distance));
+        }
+    }
+    found.sort_by(|(_, one), (_, other)| one.total_cmp(other));
+    Ok(found)
 }
 
 /// The results of a run.

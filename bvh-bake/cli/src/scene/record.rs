@@ -67,7 +67,7 @@ fn hash(scene: &LoadedScene, run: &Run) -> u64 {
                 pairs.iter().for_each(|(_, relation)| hasher.update(&[*relation as u8]));
                 hasher.update(&(pairs.len() as u64).to_le_bytes());
             }
-            Answer::Nearest(nearest) => {
+            Answer::Nearest(nearest, _) => {
                 if let Some(of) = nearest {
                     pair(of.pair.a, of.pair.b);
                 }
@@ -96,8 +96,8 @@ pub(super) fn json(scene: &LoadedScene, frame: usize, answer: &Answer) -> Value 
         Answer::Flag(flag) => json!({ "collide": flag }),
         Answer::Pairs(pairs) => json!({ "pairs": pairs.iter().map(names).collect::<Vec<_>>() }),
         Answer::Relations(pairs) => json!({ "pairs": pairs.iter().map(related).collect::<Vec<_>>() }),
-        Answer::Nearest(None) => json!({ "distance": null }),
-        Answer::Nearest(Some(of)) => {
+        Answer::Nearest(None, _) => json!({ "distance": null }),
+        Answer::Nearest(Some(of), _) => {
             let mut record = distance_json(&of.distance);
             record["a"] = json!(name(of.pair.a));
             record["b"] = json!(name(of.pair.b));
@@ -136,9 +136,11 @@ pub(super) fn list(scene: &LoadedScene, question: &Question, number: usize, answ
             };
             counted(pairs.iter().map(in_words).collect(), "touching or inside")
         }
-        Answer::Nearest(None) => "no pairs".to_owned(),
-        Answer::Nearest(Some(of)) => {
-            format!("{} {} mesh units apart", names(&of.pair), significant(of.distance.distance))
+        Answer::Nearest(None, _) => "no pairs".to_owned(),
+        Answer::Nearest(Some(of), others) => {
+            let line = |pair, distance| format!("{} {} mesh units apart", names(pair), significant(distance));
+            let others = others.iter().map(|(pair, distance)| format!("\n  {}", line(pair, *distance)));
+            line(&of.pair, of.distance.distance) + &others.collect::<String>()
         }
     };
     format!("frame {number}: {text}")
