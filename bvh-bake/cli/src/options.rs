@@ -47,20 +47,22 @@ impl<T: Copy> Choice<T> {
 
 /// Parses the name of a profile.
 pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
-    if name == "auto" {
-        return Ok(Choice::Auto);
-    }
-    let names: Vec<_> = Profile::ALL.into_iter().map(Profile::name).collect();
-    Profile::from_name(name).map(Choice::Named).ok_or_else(|| format!("expected auto, {}", names.join(", ")))
+    choice(name, &Profile::ALL, Profile::name)
 }
 
 /// Parses the name of a triangle encoding.
 pub(crate) fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
+    choice(name, &TriangleEncoding::ALL, TriangleEncoding::name)
+}
+
+/// Finds the choice of this name.
+fn choice<T: Copy>(name: &str, all: &[T], name_of: fn(T) -> &'static str) -> Result<Choice<T>, String> {
     if name == "auto" {
         return Ok(Choice::Auto);
     }
-    let encoding = TriangleEncoding::ALL.into_iter().find(|encoding| encoding.name() == name);
-    encoding.map(Choice::Named).ok_or_else(|| "expected auto, f32, packed or quantized".to_owned())
+    let names = || all.iter().map(|&one| name_of(one)).collect::<Vec<_>>().join(", ");
+    let found = all.iter().find(|&&one| name_of(one) == name);
+    found.map(|&one| Choice::Named(one)).ok_or_else(|| format!("expected auto, {}", names()))
 }
 
 /// The most threads that `--jobs` may ask for.

@@ -45,3 +45,12 @@ pub(crate) fn pinned(pinned: Option<Pinned>) -> String {
         format!("bound to processor {} of {} allowed", pinned.processor, pinned.allowed)
     })
 }
+
+/// Writes rows as a table in Markdown with these headings.
+pub(crate) fn markdown(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut text = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
+    for row in rows {
+        text += &format!("| {} |\n", row.join(" | "));
+    }
+    text
+}

@@ -60,11 +60,10 @@ pub(super) fn refuse_shared_outputs(
     manifest: Option<&Path>,
     results: Option<&Path>,
 ) -> Result<(), Failure> {
-    let mut folders = Folders::default();
     let mut taken: HashMap<PathBuf, String> = HashMap::new();
     for (path, what) in [(manifest, "the manifest"), (results, "the output manifest")] {
         let Some(path) = path else { continue };
-        if taken.insert(folders.place(path), what.to_owned()).is_some() {
+        if taken.insert(place(path), what.to_owned()).is_some() {
             return Err(Failure::Usage(format!(
                 "{}: expected an output manifest other than the manifest",
                 shown(path)
@@ -80,13 +79,12 @@ pub(super) fn refuse_shared_outputs(
         Failure::Invalid(format!("{output}: {what}"))
     };
     for asset in assets {
-        let place = folders.place(&asset.output);
-        if let Some(whose) = taken.insert(place, format!("asset {}", asset.line)) {
+        if let Some(whose) = taken.insert(place(&asset.output), format!("asset {}", asset.line)) {
             return Err(taken_by(asset, &whose));
         }
     }
     for asset in assets {
-        let Some(whose) = taken.get(&folders.place(&asset.input)) else { continue };
+        let Some(whose) = taken.get(&place(&asset.input)) else { continue };
         // The bake refuses an asset that is its own output, and the others go on.
         if whose.starts_with("asset ") && *whose != format!("asset {}", asset.line) {
             let input = shown(&asset.input);
@@ -97,24 +95,12 @@ pub(super) fn refuse_shared_outputs(
     Ok(())
 }
 
-/// Folders as the system resolves them. Each is resolved once.
-#[derive(Default)]
-struct Folders {
-    resolved: HashMap<PathBuf, PathBuf>,
-}
-
-impl Folders {
-    /// Returns the same path for a file however it is named, except through links to the file itself.
-    fn place(&mut self, path: &Path) -> PathBuf {
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return path };
-        if let Some(resolved) = self.resolved.get(folder) {
-            return resolved.join(name);
-        }
-        let resolved = resolve(folder);
-        let place = resolved.join(name);
-        self.resolved.insert(folder.to_owned(), resolved);
-        place
+/// Returns the same path for a file however it is named, except through links to the file itself.
+fn place(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    match (path.parent(), path.file_name()) {
+        (Some(folder), Some(name)) => resolve(folder).join(name),
+        _ => path,
     }
 }
 

@@ -30,26 +30,6 @@ pub fn mixed(querier: &mut Querier, a: &Bvh, b: &Bvh, count: usize) -> Result<Ve
     Ok(poses)
 }
 
-/// Returns `count` poses with this gap, a fraction of A's diagonal. Turns and directions are the same for all meshes and
-/// gaps.
-///
-/// # Errors
-/// Returns the first error of a query.
-pub fn apart(
-    querier: &mut Querier,
-    a: &Bvh,
-    b: &Bvh,
-    gap: f64,
-    count: usize,
-) -> Result<Vec<Pose>, QueryError> {
-    let mut random = Random::default();
-    let mut pose = || {
-        let approach = Approach::new(a, b, random.rotation(), random.direction());
-        Ok(approach.at(approach.reach(querier, gap)?))
-    };
-    (0..count).map(|_| pose()).collect()
-}
-
 /// A line along which B, turned, approaches A from outside.
 #[derive(Debug)]
 pub struct Approach<'a> {

@@ -133,15 +133,6 @@ pub fn line(fields: &[String]) -> String {
     quoted.join(",") + "\n"
 }
 
-/// Writes rows as a table in Markdown with these headings.
-pub fn markdown(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let mut text = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
-    for row in rows {
-        text += &format!("| {} |\n", row.join(" | "));
-    }
-    text
-}
-
 /// Writes a report as one JSON object, with a line feed at the end.
 ///
 /// # Errors

@@ -163,22 +163,23 @@ struct Question {
 enum Answer {
     /// Whether any pair touches.
     Flag(bool),
-    /// The pairs that touch, or that are near enough.
-    Pairs(Vec<ScenePair>),
-    /// The pairs that have anything in common, and how they lie.
-    Relations(Vec<(ScenePair, Relation)>),
+    /// The pairs that touch, or that are near enough, or that have anything in common; and these with how they lie.
+    Pairs(Vec<(ScenePair, Option<Relation>)>),
     /// The nearest pair and its distance, with points in the world, `None` if there are no pairs; and with `--list` the
     /// distances of the other pairs, the nearest first.
     Nearest(Option<SceneDistance>, Vec<(ScenePair, f64)>),
 }
 
 impl Answer {
+    fn of(pairs: Vec<ScenePair>) -> Self {
+        Self::Pairs(pairs.into_iter().map(|pair| (pair, None)).collect())
+    }
+
     /// Returns the answer as a number: the distance of no pairs is infinite.
     fn value(&self) -> f64 {
         match self {
             Self::Flag(flag) => f64::from(u8::from(*flag)),
             Self::Pairs(pairs) => pairs.len() as f64,
-            Self::Relations(pairs) => pairs.len() as f64,
             Self::Nearest(nearest, _) => nearest.map_or(f64::INFINITY, |of| of.distance.distance),
         }
     }
@@ -214,9 +215,12 @@ impl Question {
         scene.set_poses(moving.iter().copied().zip(frame.iter().copied()))?;
         Ok(match self.mode {
             Mode::Collide => Answer::Flag(scene.collide()?),
-            Mode::Pairs => Answer::Pairs(scene.pairs_in_contact()?),
-            Mode::Within => Answer::Pairs(scene.pairs_within(self.within)?),
-            Mode::Relation => Answer::Relations(scene.relations()?),
+            Mode::Pairs => Answer::of(scene.pairs_in_contact()?),
+            Mode::Within => Answer::of(scene.pairs_within(self.within)?),
+            Mode::Relation => {
+                let related = scene.relations()?.into_iter();
+                Answer::Pairs(related.map(|(pair, relation)| (pair, Some(relation))).collect())
+            }
             Mode::Distance => {
                 let mut found = scene.distance()?;
                 let others = match self.all_distances {

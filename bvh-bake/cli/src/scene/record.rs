@@ -59,12 +59,9 @@ fn hash(scene: &LoadedScene, run: &Run) -> u64 {
         match answer {
             Answer::Flag(flag) => hasher.update(&[u8::from(*flag)]),
             Answer::Pairs(pairs) => {
-                pairs.iter().for_each(|of| pair(of.a, of.b));
-                hasher.update(&(pairs.len() as u64).to_le_bytes());
-            }
-            Answer::Relations(pairs) => {
                 pairs.iter().for_each(|(of, _)| pair(of.a, of.b));
-                pairs.iter().for_each(|(_, relation)| hasher.update(&[*relation as u8]));
+                let relations = pairs.iter().filter_map(|(_, relation)| *relation);
+                relations.for_each(|relation| hasher.update(&[relation as u8]));
                 hasher.update(&(pairs.len() as u64).to_le_bytes());
             }
             Answer::Nearest(nearest, _) => {
@@ -87,15 +84,16 @@ pub(super) fn raw(run: &Run) -> String {
 pub(super) fn json(scene: &LoadedScene, frame: usize, answer: &Answer) -> Value {
     let name = |id| scene.scene.name(id).ok().flatten().map_or_else(|| scene.name(id), str::to_owned);
     let names = |of: &ScenePair| json!({ "a": name(of.a), "b": name(of.b) });
-    let related = |(of, relation): &(ScenePair, Relation)| {
+    let related = |(of, relation): &(ScenePair, Option<Relation>)| {
         let mut pair = names(of);
-        pair["relation"] = json!(*relation as u8);
+        if let Some(relation) = relation {
+            pair["relation"] = json!(*relation as u8);
+        }
         pair
     };
     let mut record = match answer {
         Answer::Flag(flag) => json!({ "collide": flag }),
-        Answer::Pairs(pairs) => json!({ "pairs": pairs.iter().map(names).collect::<Vec<_>>() }),
-        Answer::Relations(pairs) => json!({ "pairs": pairs.iter().map(related).collect::<Vec<_>>() }),
+        Answer::Pairs(pairs) => json!({ "pairs": pairs.iter().map(related).collect::<Vec<_>>() }),
         Answer::Nearest(None, _) => json!({ "distance": null }),
         Answer::Nearest(Some(of), _) => {
             let mut record = distance_json(&of.distance);
@@ -111,30 +109,29 @@ pub(super) fn json(scene: &LoadedScene, frame: usize, answer: &Answer) -> Value 
 /// Returns what `--list` prints about a frame: a line, and below it one line per pair.
 pub(super) fn list(scene: &LoadedScene, question: &Question, number: usize, answer: &Answer) -> String {
     let names = |of: &ScenePair| format!("{} {}", scene.name(of.a), scene.name(of.b));
-    let counted = |pairs: Vec<String>, what: &str| {
-        let count = pairs.len() as u64;
-        let lines: String = pairs.iter().map(|pair| format!("\n  {pair}")).collect();
-        format!("{count} {} {what}{lines}", plural(count, "pair"))
-    };
     let text = match answer {
         Answer::Flag(true) => "touching".to_owned(),
         Answer::Flag(false) => "not touching".to_owned(),
         Answer::Pairs(pairs) => {
-            let what = if question.mode == Mode::Within { "near enough" } else { "touching" };
-            counted(pairs.iter().map(names).collect(), what)
-        }
-        Answer::Relations(pairs) => {
-            let in_words = |(of, relation): &(ScenePair, Relation)| {
-                let (a, b) = (scene.name(of.a), scene.name(of.b));
-                match relation {
-                    Relation::AInB => format!("{a} inside {b}"),
-                    Relation::BInA => format!("{b} inside {a}"),
-                    Relation::Mixed => format!("{a} {b} not touching, partly inside"),
-                    Relation::Undefined => format!("{a} {b} undefined, because one is not closed"),
-                    _ => format!("{a} {b} touching"),
-                }
+            let what = match question.mode {
+                Mode::Within => "near enough",
+                Mode::Relation => "touching or inside",
+                _ => "touching",
             };
-            counted(pairs.iter().map(in_words).collect(), "touching or inside")
+            let line = |(of, relation): &(ScenePair, Option<Relation>)| {
+                let (a, b) = (scene.name(of.a), scene.name(of.b));
+                let words = match relation {
+                    None => names(of),
+                    Some(Relation::AInB) => format!("{a} inside {b}"),
+                    Some(Relation::BInA) => format!("{b} inside {a}"),
+                    Some(Relation::Mixed) => format!("{a} {b} not touching, partly inside"),
+                    Some(Relation::Undefined) => format!("{a} {b} undefined, because one is not closed"),
+                    Some(_) => format!("{a} {b} touching"),
+                };
+                format!("\n  {words}")
+            };
+            let (count, lines) = (pairs.len() as u64, pairs.iter().map(line).collect::<String>());
+            format!("{count} {} {what}{lines}", plural(count, "pair"))
         }
         Answer::Nearest(None, _) => "no pairs".to_owned(),
         Answer::Nearest(Some(of), others) => {

@@ -2,7 +2,8 @@
 
 use super::Report;
 use super::row::Row;
-use cbvh_measure::table::{markdown, micro};
+use crate::output::markdown;
+use cbvh_measure::table::micro;
 
 /// Returns the page.
 pub(super) fn page(report: &Report) -> String {

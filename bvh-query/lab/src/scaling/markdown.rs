@@ -3,7 +3,8 @@
 use super::record::Record;
 use super::row::{Part, gap_name};
 use crate::output;
-use cbvh_measure::table::{self, Cell, Cells, micro, whole};
+use crate::output::markdown;
+use cbvh_measure::table::{Cell, Cells, micro, whole};
 
 /// A column: its head, the cell of a row, and how that is shown.
 type Column = (&'static str, &'static str, fn(f64) -> String);
@@ -119,7 +120,7 @@ pub(super) fn page(record: &Record) -> String {
             };
             [row.question.to_owned()].into_iter().chain(columns.iter().map(shown)).collect()
         };
-        page += &format!("\n## {head}\n\n{text}\n\n{}", table::markdown(&heads, record.of(part).map(row)));
+        page += &format!("\n## {head}\n\n{text}\n\n{}", markdown(&heads, record.of(part).map(row)));
     }
     page
 }

@@ -8,7 +8,7 @@ use crate::Failure;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes};
 use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
-use cbvh_measure::poses::{apart, diagonal};
+use cbvh_measure::poses::{Approach, Random, diagonal};
 use cbvh_measure::rounds::{Asked, Question, Subject, rounds};
 use cbvh_measure::spread::Spread;
 use cbvh_testkit::ball::ball;
@@ -124,6 +124,20 @@ pub(super) fn reached(bvh: &Bvh, distances: &[f64]) -> Option<[f64; 2]> {
     let least = distances.iter().copied().min_by(f64::total_cmp)?;
     let most = distances.iter().copied().max_by(f64::total_cmp)?;
     Some([least, most].map(|distance| distance / diagonal(bvh)))
+}
+
+/// Returns `count` poses with this gap, a fraction of A's diagonal. Turns and directions are the same for all meshes and
+/// gaps.
+///
+/// # Errors
+/// Returns the first error of a query.
+fn apart(querier: &mut Querier, a: &Bvh, b: &Bvh, gap: f64, count: usize) -> Result<Vec<Pose>, QueryError> {
+    let mut random = Random::default();
+    let mut pose = || {
+        let approach = Approach::new(a, b, random.rotation(), random.direction());
+        Ok(approach.at(approach.reach(querier, gap)?))
+    };
+    (0..count).map(|_| pose()).collect()
 }
 
 #[cfg(test)]
