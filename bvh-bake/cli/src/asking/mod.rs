@@ -8,8 +8,9 @@ use crate::console::{self, Failure, Record, hex, record, significant};
 use crate::options::{LayoutArguments, not_negative, threads, whole};
 use crate::process;
 use bvh_format::checksum::Hasher;
-use bvh_query::{Backend, Distance, Object, Querier, QueryError, Shape};
+use bvh_query::{Backend, Distance, Object, Querier, QueryError, ReadAhead, Shape};
 use cbvh_measure::spread::quantile;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use files::write_file;
 use mesh::{How, LoadedMesh};
@@ -244,7 +245,7 @@ pub(crate) struct AskingArguments {
     #[arg(long, value_name = "raw_%s.txt")]
     pub(crate) out: Option<String>,
     /// How the system reads .cbvh files from the disk
-    #[arg(long, value_enum, value_name = "HOW", default_value = "usual")]
+    #[arg(long, value_name = "HOW", default_value = "usual", value_parser = read_ahead())]
     read_ahead: ReadAhead,
     /// Print one JSON object per file, with the times of its questions, and no answers
     #[arg(long, conflicts_with = "json")]
@@ -263,29 +264,23 @@ impl AskingArguments {
     /// Returns how meshes are prepared.
     pub(crate) fn how(&self) -> How<'_> {
         let (layout, object) = (&self.run.layout, self.object.as_deref());
-        How { layout, object, read_ahead: self.read_ahead.into() }
+        How { layout, object, read_ahead: self.read_ahead }
     }
 }
 
-/// How the system reads a file from the disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum ReadAhead {
-    /// As the system chooses: some pages around each page that is touched
-    Usual,
-    /// Only the pages that queries touch
-    Sparse,
-    /// The whole file, in the background
-    Whole,
-}
-
-impl From<ReadAhead> for bvh_query::ReadAhead {
-    fn from(how: ReadAhead) -> Self {
-        match how {
-            ReadAhead::Usual => Self::Usual,
-            ReadAhead::Sparse => Self::Sparse,
-            ReadAhead::Whole => Self::Whole,
-        }
-    }
+/// Parses how the system reads a file from the disk.
+fn read_ahead() -> impl TypedValueParser<Value = ReadAhead> {
+    let value = |name, help| PossibleValue::new(name).help(help);
+    let values = [
+        value("usual", "As the system chooses: some pages around each page that is touched"),
+        value("sparse", "Only the pages that queries touch"),
+        value("whole", "The whole file, in the background"),
+    ];
+    PossibleValuesParser::new(values).map(|name| match &*name {
+        "sparse" => ReadAhead::Sparse,
+        "whole" => ReadAhead::Whole,
+        _ => ReadAhead::Usual,
+    })
 }
 
 /// Returns how many questions were asked, and how long they took, as the fields of `--bench`.

@@ -47,7 +47,7 @@ relation finds the pairs that touch or of which one is inside the other, wholly 
 names a and b (and relation, as cbvh query numbers it), or of the nearest pair a, b, distance, lower, upper, point_a and \
 point_b in the world, object_a, triangle_a, object_b and triangle_b; the distance is null if there are no pairs. --bench \
 prints one object: what was asked, the times of the frames, and answers_xxh3, which is the same for every --isa and --jobs; \
-it is null if --budget cut the run short. --out writes the lines, each with nanoseconds, which include moving the instances.";
+it is null if --budget cut the run short. --out writes the lines, each with nanoseconds, which include moving the instances and, with --list, the distances of all pairs.";
 
 /// What `scene` accepts.
 #[derive(Debug, Args)]
