@@ -63,7 +63,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     if arguments.max_error.is_some() && !arguments.layout.is_quantized() {
         return Err(Failure::Usage("--max-error requires --triangles quantized (see --help)".into()));
     }
-    if arguments.output.as_deref().is_some_and(|output| output == std::path::Path::new("-")) {
+    if arguments.output.as_deref().is_some_and(|output| output == Path::new("-")) {
         return Err(Failure::Usage(
             "-o: expected a file, found -; an output appears whole or not at all, so it cannot be standard output (write \
              ./- for a file of this name)"
