@@ -22,6 +22,13 @@ pub(crate) struct Run<A> {
     pub(crate) stats: QueryStats,
 }
 
+/// The results of one thread.
+struct Share<A> {
+    answers: Vec<(usize, (A, u64))>,
+    stats: QueryStats,
+    seconds: f64,
+}
+
 /// Asks about all items.
 pub(crate) fn run<T: Sync, A: Clone + Send>(
     items: &[T],
@@ -30,8 +37,46 @@ pub(crate) fn run<T: Sync, A: Clone + Send>(
     limits: &RunArguments,
 ) -> Result<Run<A>, QueryError> {
     let jobs = usize::from(limits.jobs).min(items.len()).max(1);
-    let worker = Worker { items, ask, backend, limits, next: AtomicUsize::new(0), ready: Barrier::new(jobs) };
-    let shares = if jobs == 1 { vec![worker.work()] } else { work_together(&worker, jobs) };
+    let budget = limits.budget.unwrap_or(f64::INFINITY);
+    let (next, ready) = (AtomicUsize::new(0), Barrier::new(jobs));
+    let work = || -> Result<Share<A>, QueryError> {
+        let mut querier = Querier::with_backend(backend);
+        let start = Instant::now();
+        for item in items.iter().rev().take(limits.warm) {
+            if start.elapsed().as_secs_f64() >= budget / 4.0 {
+                break;
+            }
+            // The timed part meets the same error again. Returning it here would leave the other threads at the barrier.
+            let _ = ask(&mut querier, item);
+        }
+        let mut share =
+            Share { answers: Vec::with_capacity(items.len()), stats: QueryStats::default(), seconds: 0.0 };
+        ready.wait();
+        let start = Instant::now();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(index) else { break };
+            let before = Instant::now();
+            let answer = ask(&mut querier, item);
+            let nanoseconds = before.elapsed().as_nanos() as u64;
+            share.answers.push((index, (answer?, nanoseconds)));
+            add(&mut share.stats, querier.stats());
+            if start.elapsed().as_secs_f64() > budget {
+                break;
+            }
+        }
+        share.seconds = start.elapsed().as_secs_f64();
+        Ok(share)
+    };
+    let shares: Vec<_> = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..jobs).map(|_| scope.spawn(work)).collect();
+        let own = work();
+        let joined = others.into_iter().map(|thread| match thread.join() {
+            Ok(share) => share,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        std::iter::once(own).chain(joined).collect()
+    });
     let mut answers = vec![None; items.len()];
     let mut stats = QueryStats::default();
     let mut total_seconds = 0.0f64;
@@ -44,75 +89,4 @@ pub(crate) fn run<T: Sync, A: Clone + Send>(
     // Items are taken in order, and each one that is taken is answered, so that there are no gaps.
     let answers = answers.into_iter().map_while(|answer| answer).collect();
     Ok(Run { answers, requested: items.len(), jobs, total_seconds, stats })
-}
-
-fn work_together<T: Sync, A: Send, F>(
-    worker: &Worker<'_, T, F>,
-    jobs: usize,
-) -> Vec<Result<Share<A>, QueryError>>
-where
-    F: Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
-{
-    std::thread::scope(|scope| {
-        let others: Vec<_> = (1..jobs).map(|_| scope.spawn(|| worker.work())).collect();
-        let own = worker.work();
-        let joined = others.into_iter().map(|thread| match thread.join() {
-            Ok(share) => share,
-            Err(panic) => std::panic::resume_unwind(panic),
-        });
-        std::iter::once(own).chain(joined).collect()
-    })
-}
-
-/// The work that all threads share.
-struct Worker<'a, T, F> {
-    items: &'a [T],
-    ask: F,
-    backend: Backend,
-    limits: &'a RunArguments,
-    next: AtomicUsize,
-    ready: Barrier,
-}
-
-/// The results of one thread.
-struct Share<A> {
-    answers: Vec<(usize, (A, u64))>,
-    stats: QueryStats,
-    seconds: f64,
-}
-
-impl<T, A, F: Fn(&mut Querier, &T) -> Result<A, QueryError>> Worker<'_, T, F> {
-    fn work(&self) -> Result<Share<A>, QueryError> {
-        let mut querier = Querier::with_backend(self.backend);
-        let budget = self.limits.budget.unwrap_or(f64::INFINITY);
-        let start = Instant::now();
-        for item in self.items.iter().rev().take(self.limits.warm) {
-            if start.elapsed().as_secs_f64() >= budget / 4.0 {
-                break;
-            }
-            // The timed part meets the same error again. Returning it here would leave the other threads at the barrier.
-            let _ = (self.ask)(&mut querier, item);
-        }
-        let mut share = Share {
-            answers: Vec::with_capacity(self.items.len()),
-            stats: QueryStats::default(),
-            seconds: 0.0,
-        };
-        self.ready.wait();
-        let start = Instant::now();
-        loop {
-            let index = self.next.fetch_add(1, Ordering::Relaxed);
-            let Some(item) = self.items.get(index) else { break };
-            let before = Instant::now();
-            let answer = (self.ask)(&mut querier, item);
-            let nanoseconds = before.elapsed().as_nanos() as u64;
-            share.answers.push((index, (answer?, nanoseconds)));
-            add(&mut share.stats, querier.stats());
-            if start.elapsed().as_secs_f64() > budget {
-                break;
-            }
-        }
-        share.seconds = start.elapsed().as_secs_f64();
-        Ok(share)
-    }
 }
