@@ -7,7 +7,7 @@
 //! their own: their difference from the answers for the mesh itself is an error that is reported.
 
 use super::meshes::{bake_both, layout_of};
-use super::page::{Column, Words, percent, table};
+use super::page::{Column, Words, excess, percent, scientific, table, tenths};
 use super::{Cells, Kind, Measured, Subject, number};
 use crate::asking::files::read_poses;
 use crate::console::Failure;
@@ -406,19 +406,6 @@ fn tables(rows: &[Cells]) -> String {
         text += &table_of(&title, question, "ns_median", &ASKED);
     }
     text + &table_of("Files, the smallest first", Question::Collide, "file_bytes_per_tri", &SIZES)
-}
-
-fn tenths(value: f64) -> String {
-    format!("{value:.1}")
-}
-
-/// Formats a ratio by its excess over 1.
-fn excess(value: f64) -> String {
-    format!("{:.1} %", 100.0 * (value - 1.0))
-}
-
-fn scientific(value: f64) -> String {
-    if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
 }
 
 #[cfg(test)]

@@ -151,3 +151,16 @@ pub(super) fn percent(value: f64) -> String {
         percent => format!("{percent:.0e} %"),
     }
 }
+
+pub(super) fn tenths(value: f64) -> String {
+    format!("{value:.1}")
+}
+
+/// Formats a ratio by its excess over 1.
+pub(super) fn excess(value: f64) -> String {
+    format!("{:.1} %", 100.0 * (value - 1.0))
+}
+
+pub(super) fn scientific(value: f64) -> String {
+    if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
+}
