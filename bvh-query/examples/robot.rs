@@ -10,7 +10,9 @@
 //! path of a user's own, [`LinkPath`].
 #![allow(clippy::print_stdout, reason = "a program prints its answers")]
 
-use bvh_query::{Bvh, Groups, InstanceId, MotionOptions, OwnedShape, Pose, PoseError, Scene, SceneMotion};
+use bvh_query::{
+    Bvh, Groups, InstanceId, MotionOptions, OwnedShape, Pose, PoseError, Scene, SceneMotionAnswer,
+};
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -46,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let Some(nearest) = scene.distance()? else { continue };
             let (a, b) = (scene.name(nearest.pair.a)?, scene.name(nearest.pair.b)?);
             let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
-            println!("{time:.2}: free; {a} and {b} are {:.4} m apart", nearest.distance.distance);
+            println!("{time:.2}: free; {a} and {b} are {:.4} m apart", nearest.nearest.distance);
         }
         for pair in touching {
             let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
@@ -56,10 +58,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let paths: Vec<LinkPath<'_>> = (0..robot.parts.len())
             .map(|part| LinkPath { robot: &robot, part, from: &values, to: &next })
             .collect();
-        let paths: Vec<(InstanceId, &(dyn bvh_query::Path + Sync))> =
+        let paths: Vec<(InstanceId, &(dyn bvh_query::RigidPath + Sync))> =
             paths.iter().map(|path| (robot.parts[path.part].2, path as _)).collect();
-        if let SceneMotion::Hit { free_until, contact, .. } = scene.motion(&paths, &MotionOptions::new())? {
-            let (a, b) = (scene.name(contact.pair.a)?, scene.name(contact.pair.b)?);
+        if let SceneMotionAnswer::Hit { free_until, nearest, .. } =
+            scene.motion(&paths, &MotionOptions::new())?
+        {
+            let (a, b) = (scene.name(nearest.pair.a)?, scene.name(nearest.pair.b)?);
             let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
             println!(
                 "      the way to the next step is free for {free_until:.4} of it, until {a} and {b} touch"
@@ -100,7 +104,7 @@ impl Robot {
             for (link, _, a) in &parts {
                 for (other, _, b) in &parts {
                     if *link == joint.parent.link && *other == joint.child.link {
-                        scene.allow(*a, *b, true)?;
+                        scene.set_allowed(*a, *b, true)?;
                     }
                 }
             }
@@ -153,7 +157,7 @@ struct LinkPath<'a> {
     to: &'a [f64],
 }
 
-impl bvh_query::Path for LinkPath<'_> {
+impl bvh_query::RigidPath for LinkPath<'_> {
     fn pose(&self, t: f64) -> Pose {
         let values: Vec<f64> =
             self.from.iter().zip(self.to).map(|(from, to)| (1.0 - t) * from + t * to).collect();

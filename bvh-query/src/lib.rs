@@ -12,7 +12,7 @@
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
 //! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_distance`] | inside, on, outside; exact |
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
-//! | is the line between two points free? | [`Querier::meets_segment`] | `bool`, exact |
+//! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
 //! | is the way free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
@@ -87,7 +87,7 @@ pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
 pub use isa::floats::{FloatState, with_default_floats};
 pub use isa::{Backend, BackendError};
-pub use motion::{Motion, MotionError, Path, Polyline, RelativePath};
+pub use motion::{Motion, MotionError, Polyline, RelativePath, RigidPath};
 pub use pose::{Pose, PoseError};
 pub use query::answers::{
     ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, Side, SignedDistance,
@@ -95,7 +95,7 @@ pub use query::answers::{
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
 pub use query::displacement::displacement;
-pub use query::motion::{MotionAnswer, MotionOptions, motion_reach};
+pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
 #[cfg(feature = "parallel")]
 pub use query::probe::batch::ProbeBatch;
@@ -105,7 +105,7 @@ pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
     Groups, InstanceId, InstanceLabel, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneError, SceneMotion, ScenePair, SceneRayHit, SceneShape,
+    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit, SceneShape,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

@@ -72,7 +72,7 @@ fn warm_queries_allocate_nothing() {
             answers += f64::from(querier.side(at, point).unwrap() as u8);
             answers +=
                 querier.first_hit(at, &Ray::new(point, [0.1, 0.2, -0.9])).unwrap().map_or(0.0, |hit| hit.t);
-            answers += f64::from(u8::from(querier.meets_segment(at, point, [0.9, -0.7, -0.8]).unwrap()));
+            answers += f64::from(u8::from(querier.segment_hit(at, point, [0.9, -0.7, -0.8]).unwrap()));
             answers += f64::from(u8::from(tracker.collide(&mut querier, &bvh, &bvh, pose).unwrap()));
             answers += tracker.distance(&mut querier, &bvh, &bvh, pose).unwrap().distance;
             answers += f64::from(u8::from(tracker.within(&mut querier, &bvh, &bvh, pose, 0.1).unwrap()));

@@ -42,7 +42,7 @@ fn batches_answer_as_one_by_one() {
                 pool.install(|| {
                     assert_eq!(batch.collide(&poses), Ok(collide.clone()));
                     assert_eq!(batch.contacts(&poses), Ok(contacts.clone()));
-                    assert_eq!(batch.distance(&poses), Ok(distance.clone()));
+                    assert_eq!(batch.distances(&poses), Ok(distance.clone()));
                     assert_eq!(batch.within(&poses, 0.2), Ok(within.clone()));
                     assert_eq!(batch.first_collision(&poses), Ok(first));
                 });
@@ -173,12 +173,12 @@ fn budgets_hold_for_each_pose_and_end_batches_alike_on_any_number_of_threads() {
     let mut batch = Batch::with_backend(&a, &a, Backend::Scalar);
     for budget in [0, 10, 60, 200, 1000] {
         batch.set_budget(budget);
-        let answers: Vec<_> = pools().iter().map(|pool| pool.install(|| batch.distance(&poses))).collect();
+        let answers: Vec<_> = pools().iter().map(|pool| pool.install(|| batch.distances(&poses))).collect();
         assert!(answers.iter().all(|answer| *answer == answers[0]), "budget {budget}");
         // Each thread's run is shorter than this tracker's, which changes the visits. Still, no query fits in a
         // budget of 0.
         assert!(budget > 0 || (answers[0].is_err() && ends(&mut querier, budget) == Some(0)));
     }
     batch.set_budget(u64::MAX);
-    assert!(batch.distance(&poses).is_ok());
+    assert!(batch.distances(&poses).is_ok());
 }

@@ -15,8 +15,8 @@ use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use bvh_query::{
     Batch, Bvh, Contact, Distance, DistanceOptions, Files, Groups, InstanceId, Motion, MotionOptions,
-    OwnedShape, Path, Pose, ProbeBatch, Querier, QueryError, Ray, Relation, Scene, SceneError, SceneMotion,
-    ScenePair, Side, Tracker,
+    OwnedShape, Pose, ProbeBatch, Querier, QueryError, Ray, Relation, RigidPath, Scene, SceneError,
+    SceneMotionAnswer, ScenePair, Side, Tracker,
 };
 use cbvh_testkit::seal::{put_together, take_apart};
 use common::forged::{blown_up, duplicated};
@@ -80,10 +80,10 @@ fn within_budget<R: Debug, E: Spent>(
 /// A path that counts how often it is asked where B is.
 struct Counted<'a>(&'a dyn PathAndSync, AtomicU64);
 
-trait PathAndSync: Path + Sync {}
-impl<P: Path + Sync> PathAndSync for P {}
+trait PathAndSync: RigidPath + Sync {}
+impl<P: RigidPath + Sync> PathAndSync for P {}
 
-impl Path for Counted<'_> {
+impl RigidPath for Counted<'_> {
     fn pose(&self, t: f64) -> Pose {
         self.1.fetch_add(1, Ordering::Relaxed);
         self.0.pose(t)
@@ -136,12 +136,12 @@ fn each_pair_question(
         ("Tracker::within", &|q| Tracker::new().within(q, a, b, pose, 5.0).map(|yes| yes.to_string())),
         ("Batch::collide", &|_| batch.collide(&poses).map(|all| format!("{all:?}"))),
         ("Batch::contacts", &|_| batch.contacts(&poses).map(|all| format!("{all:?}"))),
-        ("Batch::distance", &|_| batch.distance(&poses).map(|all| format!("{all:?}"))),
+        ("Batch::distances", &|_| batch.distances(&poses).map(|all| format!("{all:?}"))),
         ("Batch::within", &|_| batch.within(&poses, 5.0).map(|all| format!("{all:?}"))),
-        ("Batch::relation", &|_| batch.relation(&poses).map(|all| format!("{all:?}"))),
+        ("Batch::relations", &|_| batch.relations(&poses).map(|all| format!("{all:?}"))),
         ("Batch::first_collision", &|_| batch.first_collision(&poses).map(|all| format!("{all:?}"))),
-        ("Batch::motion", &|_| batch.motion(&paths, options).map(|all| format!("{all:?}"))),
-        ("Batch::is_free", &|_| batch.is_free(&paths, options).map(|all| format!("{all:?}"))),
+        ("Batch::motions", &|_| batch.motions(&paths, options).map(|all| format!("{all:?}"))),
+        ("Batch::are_free", &|_| batch.are_free(&paths, options).map(|all| format!("{all:?}"))),
         ("visit_contacts", &|q| {
             let mut calls = 0;
             let counted = q.visit_contacts(a, b, pose, |_| {
@@ -172,7 +172,7 @@ fn each_probe_question(a: &Bvh, budget: u64, mut check: impl FnMut(&str, AskPair
         ("first_hit", &|q| q.first_hit(a, &ray).map(|hit| format!("{hit:?}"))),
         ("any_hit", &|q| q.any_hit(a, &ray).map(|hit| hit.to_string())),
         ("all_hits", &|q| q.all_hits(a, &ray).map(|hits| format!("{hits:?}"))),
-        ("meets_segment", &|q| q.meets_segment(a, from, to).map(|met| met.to_string())),
+        ("segment_hit", &|q| q.segment_hit(a, from, to).map(|met| met.to_string())),
         ("ProbeBatch::closest_points", &|_| {
             batch.closest_points(&[point], far).map(|all| format!("{all:?}"))
         }),
@@ -183,7 +183,7 @@ fn each_probe_question(a: &Bvh, budget: u64, mut check: impl FnMut(&str, AskPair
         ("ProbeBatch::first_hits", &|_| batch.first_hits(&[ray]).map(|all| format!("{all:?}"))),
         ("ProbeBatch::any_hits", &|_| batch.any_hits(&[ray]).map(|all| format!("{all:?}"))),
         ("ProbeBatch::all_hits", &|_| batch.all_hits(&[ray]).map(|all| format!("{all:?}"))),
-        ("ProbeBatch::meet_segments", &|_| batch.meet_segments(&[[from, to]]).map(|all| format!("{all:?}"))),
+        ("ProbeBatch::segment_hits", &|_| batch.segment_hits(&[[from, to]]).map(|all| format!("{all:?}"))),
     ];
     for (name, ask) in asks {
         check(name, ask);
@@ -403,8 +403,8 @@ type AskScene<'a> = &'a dyn Fn(&mut Scene) -> Result<String, SceneError>;
 
 /// Every question about a scene, as text to compare, with the paths of some instances.
 fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&str, AskScene<'_>)) {
-    let paths: Vec<(InstanceId, &(dyn Path + Sync))> =
-        paths.iter().map(|&(id, path)| (id, path as &(dyn Path + Sync))).collect();
+    let paths: Vec<(InstanceId, &(dyn RigidPath + Sync))> =
+        paths.iter().map(|&(id, path)| (id, path as &(dyn RigidPath + Sync))).collect();
     let options = &MotionOptions::new();
     let (point, ray) = ([0.1, 0.2, 0.3], Ray::new([0.1, 0.2, -3.0], [0.3, 0.2, 1.0]));
     let asks: [(&str, AskScene<'_>); 18] = [
@@ -423,7 +423,7 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         ("first_hits", &|s| s.first_hits(&[ray]).map(|all| format!("{all:?}"))),
         ("any_hits", &|s| s.any_hits(&[ray]).map(|all| format!("{all:?}"))),
         ("all_hits", &|s| s.all_hits(&[ray]).map(|all| format!("{all:?}"))),
-        ("meet_segments", &|s| s.meet_segments(&[[[9.0; 3], point]]).map(|all| format!("{all:?}"))),
+        ("segment_hits", &|s| s.segment_hits(&[[[9.0; 3], point]]).map(|all| format!("{all:?}"))),
         ("visit_pairs_within", &|s| {
             let mut all = Vec::new();
             s.visit_pairs_within(0.01, |pair| {
@@ -573,7 +573,7 @@ fn pairs_in_pieces_are_all_pairs() {
                 assert_eq!(scene.pairs_in_contact().unwrap(), [contacts[0].0]);
                 assert_eq!(scene.relations().unwrap(), [(contacts[0].0, Relation::Touching)]);
                 assert!(scene.collide().unwrap() && scene.within(d).unwrap());
-                assert_eq!(scene.distance().unwrap().map(|at| (at.pair, at.distance)), nearest);
+                assert_eq!(scene.distance().unwrap().map(|at| (at.pair, at.nearest)), nearest);
                 let mut all = Vec::new();
                 scene
                     .visit_contacts(|pair, contacts| {
@@ -603,7 +603,7 @@ fn pairs_in_pieces_are_all_pairs() {
     // With the two in one place apart, the nearest pair is another one.
     scene.set_pose(ids[count - 3], translation(0.0, 1e3, 0.0)).unwrap();
     let least = scene.distance().unwrap().unwrap();
-    assert!(least.distance.distance > 0.2 && near.contains(&least.pair), "{least:?}");
+    assert!(least.nearest.distance > 0.2 && near.contains(&least.pair), "{least:?}");
     assert!(!scene.collide().unwrap());
 }
 
@@ -624,12 +624,12 @@ fn motions_in_pieces_are_those_of_all_pairs() {
         })
         .collect();
     let options = &MotionOptions::new();
-    let paths: Vec<(InstanceId, &(dyn Path + Sync))> =
-        there.iter().map(|(id, path)| (*id, path as &(dyn Path + Sync))).collect();
+    let paths: Vec<(InstanceId, &(dyn RigidPath + Sync))> =
+        there.iter().map(|(id, path)| (*id, path as &(dyn RigidPath + Sync))).collect();
     let moving = *paths.last().unwrap();
     let alone = scene.motion(&[moving], options).unwrap();
-    let SceneMotion::Hit { contact, .. } = alone else { panic!("{alone:?}") };
-    assert_eq!(contact.pair.b, last);
+    let SceneMotionAnswer::Hit { nearest, .. } = alone else { panic!("{alone:?}") };
+    assert_eq!(nearest.pair.b, last);
     assert_eq!(scene.is_free(&[moving], options), Ok(false));
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

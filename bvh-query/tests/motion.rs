@@ -4,8 +4,8 @@
 mod common;
 
 use bvh_query::{
-    Backend, Bvh, Motion, MotionAnswer, MotionError, MotionOptions, Path, Polyline, Pose, Querier,
-    QueryError, displacement, motion_reach,
+    Backend, Bvh, Motion, MotionAnswer, MotionError, MotionOptions, Polyline, Pose, Querier, QueryError,
+    RigidPath, displacement, path_reach,
 };
 use cbvh_testkit::depth::rounds;
 use common::shapes::{cube, plate, sphere, torus};
@@ -28,12 +28,12 @@ fn at(x: f64, y: f64, z: f64) -> Pose {
 fn plain(
     querier: &mut Querier,
     (a, b): (&Bvh, &Bvh),
-    path: &dyn Path,
+    path: &dyn RigidPath,
     (clearance, tolerance): (f64, f64),
 ) -> MotionAnswer {
     let hit = |querier: &mut Querier, free_until: f64, touching_at: f64| {
-        let contact = querier.distance(a, b, &path.pose(touching_at)).unwrap();
-        MotionAnswer::Hit { free_until, touching_at, contact }
+        let nearest = querier.distance(a, b, &path.pose(touching_at)).unwrap();
+        MotionAnswer::Hit { free_until, touching_at, nearest }
     };
     if querier.within(a, b, &path.pose(0.0), clearance).unwrap() {
         return hit(querier, 0.0, 0.0);
@@ -42,7 +42,7 @@ fn plain(
     let mut todo = vec![(0.0, 1.0)];
     while let Some((t0, t1)) = todo.pop() {
         let middle = t0 + (t1 - t0) / 2.0;
-        let reach = motion_reach(b, path, t0, t1);
+        let reach = path_reach(b, path, t0, t1);
         if reach > tolerance / 8.0 {
             todo.extend([(middle, t1), (t0, middle)]);
             continue;
@@ -60,8 +60,8 @@ fn plain(
     if querier.within(a, b, &path.pose(1.0), clearance).unwrap() {
         return hit(querier, free_until, 1.0);
     }
-    let distance = querier.distance(a, b, &path.pose(at)).unwrap();
-    MotionAnswer::Near { free_until, at, distance }
+    let nearest = querier.distance(a, b, &path.pose(at)).unwrap();
+    MotionAnswer::Near { free_until, at, nearest }
 }
 
 /// A path of a user: B swings on an arm.
@@ -69,7 +69,7 @@ struct Pendulum {
     length: f64,
 }
 
-impl Path for Pendulum {
+impl RigidPath for Pendulum {
     fn pose(&self, t: f64) -> Pose {
         let angle = 2.0 * (t - 0.5);
         let (sine, cosine) = angle.sin_cos();
@@ -98,7 +98,7 @@ fn answers_are_those_of_the_definition() {
         let (p, d) = (random.point(), random.point());
         // Along a face, at a gap that the tolerance does not resolve.
         let gap = 2.0 + 0.02 * random.signed().abs();
-        let path: Box<dyn Path> = match round % 5 {
+        let path: Box<dyn RigidPath> = match round % 5 {
             0 => Box::new(Motion::screw(&start, p, d, 7.0 * random.signed(), random.signed()).unwrap()),
             1 => Box::new(Polyline::new(&[start, middle, end]).unwrap()),
             3 if a.objects()[0].triangles() == 12 && b.objects()[0].triangles() == 12 => {
@@ -128,20 +128,26 @@ fn answers_are_those_of_the_definition() {
 }
 
 /// Checks an answer by contact in poses along the way. Returns whether it was a hit.
-fn check(querier: &mut Querier, (a, b): (&Bvh, &Bvh), path: &dyn Path, samples: u32, what: &str) -> bool {
+fn check(
+    querier: &mut Querier,
+    (a, b): (&Bvh, &Bvh),
+    path: &dyn RigidPath,
+    samples: u32,
+    what: &str,
+) -> bool {
     let free_until = match querier.motion(a, b, path, &MotionOptions::new()).unwrap() {
         MotionAnswer::Free => 1.0 + f64::EPSILON,
-        MotionAnswer::Hit { free_until, touching_at, contact } => {
+        MotionAnswer::Hit { free_until, touching_at, nearest } => {
             assert!(
                 querier.collide(a, b, &path.pose(touching_at)).unwrap(),
                 "{what}: no contact at {touching_at}"
             );
-            assert_eq!(contact.distance, 0.0);
+            assert_eq!(nearest.distance, 0.0);
             assert!(free_until <= touching_at);
             free_until
         }
-        MotionAnswer::Near { free_until, at, distance } => {
-            assert!(distance.distance > 0.0 && at >= free_until, "{what}");
+        MotionAnswer::Near { free_until, at, nearest } => {
+            assert!(nearest.distance > 0.0 && at >= free_until, "{what}");
             free_until
         }
     };
@@ -305,7 +311,7 @@ fn hard_motions_have_their_answers() {
     // Nearer than the tolerance, neither can be told.
     let near = Motion::between(&at(-9.0, 2.0 + 1e-9, 0.0), &at(9.0, 2.0 + 1e-9, 0.0)).unwrap();
     let answer = querier.motion(&block, &block, &near, &MotionOptions::new().tolerance(1e-2)).unwrap();
-    assert!(matches!(answer, MotionAnswer::Near { distance, .. } if distance.distance <= 1e-2), "{answer:?}");
+    assert!(matches!(answer, MotionAnswer::Near { nearest, .. } if nearest.distance <= 1e-2), "{answer:?}");
 }
 
 /// On any number of threads, a batch has the answers of the querier.
@@ -325,8 +331,8 @@ fn batches_of_motions_have_the_same_answers() {
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let batch = bvh_query::Batch::new(&a, &b).unwrap();
-        assert_eq!(pool.install(|| batch.motion(&motions, &options)), Ok(expected.clone()));
-        assert_eq!(pool.install(|| batch.is_free(&motions, &options)), Ok(free.clone()));
+        assert_eq!(pool.install(|| batch.motions(&motions, &options)), Ok(expected.clone()));
+        assert_eq!(pool.install(|| batch.are_free(&motions, &options)), Ok(free.clone()));
     }
 }
 
@@ -355,7 +361,7 @@ fn a_distance_says_how_far_b_may_move() {
 /// Comes near for a moment, and then fast, on a path whose bound is lost by then.
 struct Dip;
 
-impl Path for Dip {
+impl RigidPath for Dip {
     fn pose(&self, t: f64) -> Pose {
         let dip = 1.05 * (-((t - 0.5) / 0.02).powi(2)).exp();
         at(3.0 - dip - 40.0 * (t - 0.93).max(0.0), 0.0, 0.0)
@@ -396,7 +402,7 @@ fn numbers_that_mean_nothing_are_refused() {
     assert_eq!(refused(MotionOptions::new().tolerance(1e-18)), "tolerance");
     // A path of a user whose bound is no number leaves nothing certain.
     struct Unbounded(f64);
-    impl Path for Unbounded {
+    impl RigidPath for Unbounded {
         fn pose(&self, t: f64) -> Pose {
             at(9.0 + t, 0.0, 0.0)
         }
@@ -424,7 +430,7 @@ fn a_path_that_jumps_keeps_no_question_busy() {
         to: f64,
         sagitta: f64,
     }
-    impl Path for Jump {
+    impl RigidPath for Jump {
         fn pose(&self, t: f64) -> Pose {
             at(if t < 0.3 { 9.0 } else { self.to }, 0.0, 0.0)
         }
@@ -526,8 +532,8 @@ fn exact_translations_are_answered() {
                 MotionAnswer::Free => assert!(!hits, "{line}"),
                 MotionAnswer::Hit { .. } => assert!(hits, "{line}"),
                 // A point meets a triangle at one instant, which may be no f64. Its two neighbours are apart.
-                MotionAnswer::Near { distance, .. } => {
-                    assert!(hits && distance.distance <= 1e-11, "{line}");
+                MotionAnswer::Near { nearest, .. } => {
+                    assert!(hits && nearest.distance <= 1e-11, "{line}");
                     near += 1;
                 }
             }

@@ -6,7 +6,7 @@ use crate::asking::{self, Answer, AskingArguments, Session};
 use crate::console::{Failure, Record, record, significant};
 use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
-use bvh_query::{Motion, MotionAnswer, MotionOptions, Path as _, Querier, Shape};
+use bvh_query::{Motion, MotionAnswer, MotionOptions, Querier, RigidPath as _, Shape};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -81,14 +81,14 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let answer = session.ask(|querier| ask(querier, session.shapes(), &motion))?;
     let (mut text, end) = match &answer {
         MotionAnswer::Free => ("free\n".to_owned(), None),
-        MotionAnswer::Hit { free_until, touching_at, contact } => {
-            (format!("free until {free_until:?}, hit at {touching_at:?}\n"), Some((*touching_at, contact)))
+        MotionAnswer::Hit { free_until, touching_at, nearest } => {
+            (format!("free until {free_until:?}, hit at {touching_at:?}\n"), Some((*touching_at, nearest)))
         }
-        MotionAnswer::Near { free_until, at, distance } => {
-            let apart = distance.distance;
+        MotionAnswer::Near { free_until, at, nearest } => {
+            let apart = nearest.distance;
             let text =
                 format!("free until {free_until:?}, {apart:?} mesh units apart at {at:?}, undecided\n");
-            (text, Some((*at, distance)))
+            (text, Some((*at, nearest)))
         }
     };
     if let Some((at, distance)) = end {
@@ -127,10 +127,10 @@ impl Answer for MotionAnswer {
     fn json(&self) -> Value {
         let (answer, free_until, when, at, distance) = match self {
             Self::Free => return json!({ "answer": "free" }),
-            Self::Hit { free_until, touching_at, contact } => {
-                ("hit", free_until, "touching_at", touching_at, contact)
+            Self::Hit { free_until, touching_at, nearest } => {
+                ("hit", free_until, "touching_at", touching_at, nearest)
             }
-            Self::Near { free_until, at, distance } => ("near", free_until, "at", at, distance),
+            Self::Near { free_until, at, nearest } => ("near", free_until, "at", at, nearest),
         };
         let mut record = asking::distance_json(distance);
         record["answer"] = json!(answer);

@@ -109,7 +109,7 @@ impl Question {
             Self::Closest(point) => Answer::Closest(querier.closest_point(shape, *point, f64::INFINITY)?),
             Self::Side(point) => Answer::Side(querier.side(shape, *point)?),
             Self::Ray(ray) => Answer::Hit(querier.first_hit(shape, ray)?),
-            Self::Segment([from, to]) => Answer::Meets(querier.meets_segment(shape, *from, *to)?),
+            Self::Segment([from, to]) => Answer::Meets(querier.segment_hit(shape, *from, *to)?),
         })
     }
 }

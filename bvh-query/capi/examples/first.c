@@ -26,7 +26,7 @@ int main(void) {
     bool touching[2];
     cbvh_distance_answer distances[2];
     check(cbvh_collide(querier, tetrahedron, tetrahedron, poses, 2, touching));
-    check(cbvh_distance(querier, tetrahedron, tetrahedron, poses, 2, NULL, distances));
+    check(cbvh_distances(querier, tetrahedron, tetrahedron, poses, 2, NULL, distances));
     for (int i = 0; i < 2; i++) {
         printf("%s, distance %g\n", touching[i] ? "touching" : "apart", distances[i].distance);
     }

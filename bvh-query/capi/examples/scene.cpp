@@ -23,7 +23,7 @@ int main() {
         }
         const auto nearest = scene.distance();
         std::printf("%s and %s are nearest, %g apart\n", scene.name(nearest->pair.a).c_str(),
-                    scene.name(nearest->pair.b).c_str(), nearest->distance.distance);
+                    scene.name(nearest->pair.b).c_str(), nearest->nearest.distance);
 
         // Both fall: only the first one has the floor below it.
         using cbvh::Pose;
@@ -37,14 +37,14 @@ int main() {
         scene.set_poses({{first, cbvh::Pose::translation(0, 0, 0.5)}, {second, cbvh::Pose::translation(1, 0, 0.5)}});
         const auto pairs = scene.pairs_in_contact();
         std::printf("%zu pairs touch\n", pairs.size());
-        scene.allow(floor, first, true);
+        scene.set_allowed(floor, first, true);
         const auto rest = scene.pairs_in_contact();
 
         // A ray from above.
         const auto hit = scene.first_hit({{1, 0, 5}, {0, 0, -1}});
         std::printf("the ray hits %s at height %g\n", scene.name(hit->instance).c_str(), hit->point[2]);
 
-        const bool is_right = nearest->distance.distance == 0.25 && end.outcome == CBVH_HIT && end.at >= 1.0 / 3 &&
+        const bool is_right = nearest->nearest.distance == 0.25 && end.outcome == CBVH_HIT && end.at >= 1.0 / 3 &&
                               end.at < 0.34 && end.free_until <= end.at && is_aside_free && pairs.size() == 3 &&
                               rest.size() == 2 && hit->t == 4 && hit->instance.id == second.id &&
                               scene.find("second") == second && !scene.find("third");

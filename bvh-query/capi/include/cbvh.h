@@ -206,7 +206,7 @@ cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_
  * replaced, also if it is a symbolic link. */
 cbvh_status cbvh_mesh_save(cbvh_mesh mesh, const char *path);
 /* Checks the whole file that a mesh is in: CBVH_DAMAGED with the first rule that it breaks. It is read once. */
-cbvh_status cbvh_mesh_check(cbvh_mesh mesh);
+cbvh_status cbvh_mesh_validate(cbvh_mesh mesh);
 
 /* How a mesh is baked. The names are those of the command `cbvh bake`, which explains them. */
 typedef struct cbvh_bake_options {
@@ -321,7 +321,7 @@ enum {
 };
 
 /* Answers how the meshes lie. CBVH_INVALID_ARGUMENT for a file that was baked without topology. */
-cbvh_status cbvh_relate(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+cbvh_status cbvh_relations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                         cbvh_relation *answers);
 
 /* How far apart two meshes are. */
@@ -353,7 +353,7 @@ typedef struct cbvh_distance_options {
 } cbvh_distance_options;
 
 /* Answers how far apart the meshes are, and where. With an allowed error, one core is used. */
-cbvh_status cbvh_distance(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+cbvh_status cbvh_distances(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                           const cbvh_distance_options *options, cbvh_distance_answer *answers);
 
 /* Two triangles in contact: numbers of objects in their files, and of triangles in the input. */
@@ -463,7 +463,7 @@ typedef struct cbvh_motion_answer {
     cbvh_instance instance_a;
     cbvh_instance instance_b;
     /* The distance at that time. NaN where the way is free. */
-    cbvh_distance_answer distance;
+    cbvh_distance_answer nearest;
 } cbvh_motion_answer;
 
 /* Answers where the way along each path ends. */
@@ -574,7 +574,7 @@ typedef struct cbvh_segment {
 } cbvh_segment;
 
 /* Answers whether each segment meets the mesh, exactly. */
-cbvh_status cbvh_meet_segments(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose,
+cbvh_status cbvh_segment_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose,
                                const cbvh_segment *segments, size_t count, bool *answers);
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
@@ -617,7 +617,7 @@ cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instance
  * group that the other meets. By default all bits are set. */
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
 /* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
-cbvh_status cbvh_scene_allow(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t may_touch);
+cbvh_status cbvh_scene_set_allowed(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t allowed);
 /* Writes the instance with a name. CBVH_NOT_FOUND if there is none. */
 cbvh_status cbvh_scene_find(cbvh_scene scene, const char *name, cbvh_instance *instance);
 /* Lists all instances in ascending order. */
@@ -641,7 +641,7 @@ typedef struct cbvh_scene_pair {
 /* The nearest pair. */
 typedef struct cbvh_scene_distance_answer {
     cbvh_scene_pair pair;
-    cbvh_distance_answer distance;
+    cbvh_distance_answer nearest;
     /* 1, or 0 if there are no pairs. */
     int32_t found;
     int32_t reserved;
@@ -694,7 +694,7 @@ cbvh_status cbvh_scene_first_hits(cbvh_scene scene, const cbvh_ray *rays, size_t
 cbvh_status cbvh_scene_any_hits(cbvh_scene scene, const cbvh_ray *rays, size_t count, bool *answers);
 cbvh_status cbvh_scene_all_hits(cbvh_scene scene, const cbvh_ray *rays, size_t ray_count, size_t *counts,
                                 cbvh_ray_hit *hits, size_t capacity, size_t *count);
-cbvh_status cbvh_scene_meet_segments(cbvh_scene scene, const cbvh_segment *segments, size_t count, bool *answers);
+cbvh_status cbvh_scene_segment_hits(cbvh_scene scene, const cbvh_segment *segments, size_t count, bool *answers);
 
 #ifdef __cplusplus
 }

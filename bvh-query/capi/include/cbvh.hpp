@@ -449,7 +449,7 @@ public:
     }
     void save(const std::string &path) const { check(cbvh_mesh_save(raw(), detail::c_text("path", path))); }
     /// Throws with the first rule that the file breaks.
-    void check_all() const { check(cbvh_mesh_check(raw())); }
+    void validate() const { check(cbvh_mesh_validate(raw())); }
     /// A bound of how far any point moves from one pose to another.
     double displacement(const Pose &from, const Pose &to) const {
         double bound = 0;
@@ -587,28 +587,28 @@ public:
         });
     }
     /// Do they touch, or is one inside the other?
-    cbvh_relation relate(const Mesh &a, const Mesh &b, const Pose &pose) {
+    cbvh_relation relation(const Mesh &a, const Mesh &b, const Pose &pose) {
         cbvh_relation answer = CBVH_RELATION_UNDEFINED;
-        check(cbvh_relate(raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        check(cbvh_relations(raw(), a.raw(), b.raw(), &pose, 1, &answer));
         return answer;
     }
-    std::vector<cbvh_relation> relate(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+    std::vector<cbvh_relation> relations(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
         return detail::answers<cbvh_relation>(poses.size(), [&](cbvh_relation *answers) {
-            return cbvh_relate(raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+            return cbvh_relations(raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
         });
     }
     /// How far apart are they, and where?
     DistanceAnswer distance(const Mesh &a, const Mesh &b, const Pose &pose, const DistanceOptions &options = {}) {
         const cbvh_distance_options raw_options = options.raw();
         DistanceAnswer answer{};
-        check(cbvh_distance(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        check(cbvh_distances(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
         return answer;
     }
     std::vector<DistanceAnswer> distance(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
                                          const DistanceOptions &options = {}) {
         const cbvh_distance_options raw_options = options.raw();
         return detail::answers<DistanceAnswer>(poses.size(), [&](DistanceAnswer *answers) {
-            return cbvh_distance(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+            return cbvh_distances(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
         });
     }
     /// Which triangles touch?
@@ -766,9 +766,9 @@ public:
                 return cbvh_all_hits(raw(), mesh.raw(), &pose, rays.data(), rays.size(), counts, hits, capacity, count);
             });
     }
-    std::vector<bool> meet_segments(const Mesh &mesh, const std::vector<Segment> &segments, const Pose &pose = {}) {
+    std::vector<bool> segment_hits(const Mesh &mesh, const std::vector<Segment> &segments, const Pose &pose = {}) {
         return detail::choices(segments.size(), [&](bool *answers) {
-            return cbvh_meet_segments(raw(), mesh.raw(), &pose, segments.data(), segments.size(), answers);
+            return cbvh_segment_hits(raw(), mesh.raw(), &pose, segments.data(), segments.size(), answers);
         });
     }
 
@@ -889,7 +889,7 @@ public:
     void set_groups(Instance instance, std::uint32_t member, std::uint32_t meets) {
         check(cbvh_scene_set_groups(raw(), instance, member, meets));
     }
-    void allow(Instance a, Instance b, bool may_touch) { check(cbvh_scene_allow(raw(), a, b, may_touch)); }
+    void set_allowed(Instance a, Instance b, bool allowed) { check(cbvh_scene_set_allowed(raw(), a, b, allowed)); }
     std::optional<Instance> find(const std::string &name) const {
         Instance instance{0};
         const cbvh_status status = cbvh_scene_find(raw(), detail::c_text("name", name), &instance);
@@ -1047,9 +1047,9 @@ public:
                 return cbvh_scene_all_hits(raw(), rays.data(), rays.size(), counts, hits, capacity, count);
             });
     }
-    std::vector<bool> meet_segments(const std::vector<Segment> &segments) {
+    std::vector<bool> segment_hits(const std::vector<Segment> &segments) {
         return detail::choices(segments.size(), [&](bool *answers) {
-            return cbvh_scene_meet_segments(raw(), segments.data(), segments.size(), answers);
+            return cbvh_scene_segment_hits(raw(), segments.data(), segments.size(), answers);
         });
     }
 

@@ -40,13 +40,13 @@ fn structures(lines: &mut String) -> std::fmt::Result {
     structure!(lines, "cbvh_distance_options", DistanceChoices, size rel_err abs_err);
     structure!(lines, "cbvh_contact", ContactRow, object_a triangle_a object_b triangle_b);
     structure!(lines, "cbvh_motion_options", MotionChoices, size clearance tolerance);
-    structure!(lines, "cbvh_motion_answer", MotionRow, outcome reserved free_until at instance_a instance_b distance);
+    structure!(lines, "cbvh_motion_answer", MotionRow, outcome reserved free_until at instance_a instance_b nearest);
     structure!(lines, "cbvh_closest_point", ClosestRow, distance lower upper point instance object triangle found side);
     structure!(lines, "cbvh_ray", RayRow, origin direction until);
     structure!(lines, "cbvh_ray_hit", HitRow, t lower upper point instance object triangle found reserved);
     structure!(lines, "cbvh_segment", SegmentRow, from to);
     structure!(lines, "cbvh_scene_pair", PairRow, a b);
-    structure!(lines, "cbvh_scene_distance_answer", SceneDistanceRow, pair distance found reserved);
+    structure!(lines, "cbvh_scene_distance_answer", SceneDistanceRow, pair nearest found reserved);
     structure!(lines, "cbvh_scene_relation", SceneRelationRow, pair relation reserved);
     structure!(lines, "cbvh_scene_contact", SceneContactRow, pair contact);
     Ok(())

@@ -285,8 +285,8 @@ pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, file: *const c_char) -
     })
 }
 
-/// `cbvh_mesh_check`.
+/// `cbvh_mesh_validate`.
 #[unsafe(no_mangle)]
-pub extern "C" fn cbvh_mesh_check(mesh: MeshHandle) -> i32 {
-    ask(mesh, |shape| Ok(shape.bvh().check_all()?))
+pub extern "C" fn cbvh_mesh_validate(mesh: MeshHandle) -> i32 {
+    ask(mesh, |shape| Ok(shape.bvh().validate()?))
 }

@@ -8,7 +8,7 @@ use crate::poses::poses;
 use crate::queriers::{Asker, Probes, QUERIERS};
 use crate::status::Failure;
 use crate::types::{MeshHandle, MotionChoices, MotionRow, PathHandle, PoseRows, QuerierHandle};
-use bvh_query::{Batch, Motion, MotionOptions, Path, Querier, QueryError, Shape};
+use bvh_query::{Batch, Motion, MotionOptions, Querier, QueryError, RigidPath, Shape};
 
 /// A querier, two meshes and what counts as a hit.
 struct Question {
@@ -20,7 +20,7 @@ struct Question {
 
 /// How many paths are asked about, on one core or on all.
 trait Ask<R> {
-    fn all<P: Path + Sync>(
+    fn all<P: RigidPath + Sync>(
         batch: &Batch<'_>,
         paths: &[P],
         options: &MotionOptions,
@@ -28,7 +28,7 @@ trait Ask<R> {
     fn one(
         querier: &mut Querier,
         meshes: [Shape<'_>; 2],
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<R, QueryError>;
 }
@@ -37,18 +37,18 @@ trait Ask<R> {
 struct WhereItEnds;
 
 impl Ask<MotionRow> for WhereItEnds {
-    fn all<P: Path + Sync>(
+    fn all<P: RigidPath + Sync>(
         batch: &Batch<'_>,
         paths: &[P],
         options: &MotionOptions,
     ) -> Result<Vec<MotionRow>, QueryError> {
-        Ok(batch.motion(paths, options)?.into_iter().map(MotionRow::from).collect())
+        Ok(batch.motions(paths, options)?.into_iter().map(MotionRow::from).collect())
     }
 
     fn one(
         querier: &mut Querier,
         [a, b]: [Shape<'_>; 2],
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<MotionRow, QueryError> {
         querier.motion(a, b, path, options).map(MotionRow::from)
@@ -59,18 +59,18 @@ impl Ask<MotionRow> for WhereItEnds {
 struct WhetherFree;
 
 impl Ask<bool> for WhetherFree {
-    fn all<P: Path + Sync>(
+    fn all<P: RigidPath + Sync>(
         batch: &Batch<'_>,
         paths: &[P],
         options: &MotionOptions,
     ) -> Result<Vec<bool>, QueryError> {
-        batch.is_free(paths, options)
+        batch.are_free(paths, options)
     }
 
     fn one(
         querier: &mut Querier,
         [a, b]: [Shape<'_>; 2],
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<bool, QueryError> {
         querier.is_free(a, b, path, options)
@@ -82,7 +82,7 @@ impl Question {
     ///
     /// # Safety
     /// As for `options` and `Room::new`.
-    unsafe fn ask<A: Ask<R>, R: Copy, P: Path + Sync>(
+    unsafe fn ask<A: Ask<R>, R: Copy, P: RigidPath + Sync>(
         &self,
         (answers, count): (*mut R, usize),
         read: impl FnOnce(&mut Probes) -> Result<Vec<P>, Failure>,

@@ -108,9 +108,9 @@ pub unsafe extern "C" fn cbvh_within(
     unsafe { question.each(answers, |batch, poses| batch.within(poses, d), one, |answer| answer) }
 }
 
-/// `cbvh_relate`.
+/// `cbvh_relations`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_relate(
+pub unsafe extern "C" fn cbvh_relations(
     querier: QuerierHandle,
     a: MeshHandle,
     b: MeshHandle,
@@ -121,12 +121,12 @@ pub unsafe extern "C" fn cbvh_relate(
     let one = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], pose: &Pose| querier.relation(a, b, pose);
     let question = Question { querier, a, b, poses, count };
     // SAFETY: the header asks for it.
-    unsafe { question.each(answers, |batch, poses| batch.relation(poses), one, relation) }
+    unsafe { question.each(answers, |batch, poses| batch.relations(poses), one, relation) }
 }
 
-/// `cbvh_distance`.
+/// `cbvh_distances`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_distance(
+pub unsafe extern "C" fn cbvh_distances(
     querier: QuerierHandle,
     a: MeshHandle,
     b: MeshHandle,
@@ -146,7 +146,7 @@ pub unsafe extern "C" fn cbvh_distance(
                 let mut room = Room::new("answers", answers, poses.len())?;
                 // A batch knows exact distances only.
                 if let Some(batch) = batch.filter(|_| choices.is_exact()) {
-                    let answers = batch.distance(poses)?.into_iter().enumerate();
+                    let answers = batch.distances(poses)?.into_iter().enumerate();
                     answers.for_each(|(number, answer)| room.set(number, answer.into()));
                     return Ok(());
                 }

@@ -9,7 +9,7 @@ use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{MeshHandle, PathHandle, PoseRows};
-use bvh_query::{FloatState, Motion, Path, Polyline, Pose, motion_reach};
+use bvh_query::{FloatState, Motion, Polyline, Pose, RigidPath, path_reach};
 use std::cell::RefCell;
 use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -141,7 +141,7 @@ impl AskedPath {
     }
 }
 
-impl Path for AskedPath {
+impl RigidPath for AskedPath {
     fn pose(&self, t: f64) -> Pose {
         match &*self.path {
             PathValue::Motion(motion) => motion.pose(t),
@@ -313,7 +313,7 @@ pub unsafe extern "C" fn cbvh_path_reach(
         if !(t0..=1.0).contains(&t1) {
             return Err(Failure::argument("t1", "a time from t0 to 1", t1));
         }
-        let reach = motion_reach(&shape, &asked, t0, t1);
+        let reach = path_reach(&shape, &asked, t0, t1);
         asked.failure()?;
         out.set(reach);
         Ok(())

@@ -270,9 +270,9 @@ pub unsafe extern "C" fn cbvh_all_hits(
     entry(|| unsafe { Question { querier, mesh, pose }.ask(read_rays(rays, ray_count), ask) })
 }
 
-/// `cbvh_meet_segments`.
+/// `cbvh_segment_hits`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_meet_segments(
+pub unsafe extern "C" fn cbvh_segment_hits(
     querier: QuerierHandle,
     mesh: MeshHandle,
     pose: *const PoseRows,
@@ -286,8 +286,8 @@ pub unsafe extern "C" fn cbvh_meet_segments(
     unsafe {
         Question { querier, mesh, pose }.each(
             (answers, read, |probes: &Probes| &probes.segments),
-            |batch, segments| batch.meet_segments(segments),
-            |querier, shape, [from, to]| querier.meets_segment(shape, from, to),
+            |batch, segments| batch.segment_hits(segments),
+            |querier, shape, [from, to]| querier.segment_hit(shape, from, to),
             |answer| answer,
         )
     }

@@ -7,7 +7,7 @@ use crate::input::{Options, Plain};
 use crate::status::Failure;
 use bvh_query::{
     Backend, ClosestPoint, Contact, Distance, DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Pose,
-    QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotion,
+    QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer,
     ScenePair, SceneRayHit, Side, SignedDistance,
 };
 use std::ffi::c_char;
@@ -357,7 +357,7 @@ pub struct MotionRow {
     pub(crate) at: f64,
     pub(crate) instance_a: Instance,
     pub(crate) instance_b: Instance,
-    pub(crate) distance: DistanceRow,
+    pub(crate) nearest: DistanceRow,
 }
 
 /// `CBVH_FREE`, `CBVH_HIT` and `CBVH_NEAR`.
@@ -373,46 +373,46 @@ impl MotionRow {
         at: f64::NAN,
         instance_a: NO_INSTANCE,
         instance_b: NO_INSTANCE,
-        distance: DistanceRow::NONE,
+        nearest: DistanceRow::NONE,
     };
 }
 
 impl From<MotionAnswer> for MotionRow {
     fn from(of: MotionAnswer) -> Self {
-        let ended = |outcome, free_until, at, distance: Distance| Self {
+        let ended = |outcome, free_until, at, nearest: Distance| Self {
             outcome,
             free_until,
             at,
-            distance: distance.into(),
+            nearest: nearest.into(),
             ..Self::FREE
         };
         match of {
             MotionAnswer::Free => Self::FREE,
-            MotionAnswer::Hit { free_until, touching_at, contact } => {
-                ended(HIT, free_until, touching_at, contact)
+            MotionAnswer::Hit { free_until, touching_at, nearest } => {
+                ended(HIT, free_until, touching_at, nearest)
             }
-            MotionAnswer::Near { free_until, at, distance } => ended(NEAR, free_until, at, distance),
+            MotionAnswer::Near { free_until, at, nearest } => ended(NEAR, free_until, at, nearest),
         }
     }
 }
 
-impl From<SceneMotion> for MotionRow {
-    fn from(of: SceneMotion) -> Self {
+impl From<SceneMotionAnswer> for MotionRow {
+    fn from(of: SceneMotionAnswer) -> Self {
         let ended = |outcome, free_until, at, of: SceneDistance| Self {
             outcome,
             free_until,
             at,
             instance_a: of.pair.a.into(),
             instance_b: of.pair.b.into(),
-            distance: of.distance.into(),
+            nearest: of.nearest.into(),
             ..Self::FREE
         };
         match of {
-            SceneMotion::Free => Self::FREE,
-            SceneMotion::Hit { free_until, touching_at, contact } => {
-                ended(HIT, free_until, touching_at, contact)
+            SceneMotionAnswer::Free => Self::FREE,
+            SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
+                ended(HIT, free_until, touching_at, nearest)
             }
-            SceneMotion::Near { free_until, at, distance } => ended(NEAR, free_until, at, distance),
+            SceneMotionAnswer::Near { free_until, at, nearest } => ended(NEAR, free_until, at, nearest),
         }
     }
 }
@@ -540,7 +540,7 @@ impl From<SceneContact> for SceneContactRow {
 #[repr(C)]
 pub struct SceneDistanceRow {
     pub(crate) pair: PairRow,
-    pub(crate) distance: DistanceRow,
+    pub(crate) nearest: DistanceRow,
     pub(crate) found: i32,
     pub(crate) reserved: i32,
 }
@@ -549,8 +549,8 @@ impl From<Option<SceneDistance>> for SceneDistanceRow {
     fn from(of: Option<SceneDistance>) -> Self {
         let none = PairRow { a: NO_INSTANCE, b: NO_INSTANCE };
         match of {
-            Some(of) => Self { pair: of.pair.into(), distance: of.distance.into(), found: 1, reserved: 0 },
-            None => Self { pair: none, distance: DistanceRow::NONE, found: 0, reserved: 0 },
+            Some(of) => Self { pair: of.pair.into(), nearest: of.nearest.into(), found: 1, reserved: 0 },
+            None => Self { pair: none, nearest: DistanceRow::NONE, found: 0, reserved: 0 },
         }
     }
 }

@@ -61,7 +61,7 @@ static void ask_pairs(const char *mode, const cbvh_pose *poses, size_t count, do
         free(counts);
     } else if (is(mode, "relation")) {
         cbvh_relation *relations = room(count, sizeof *relations);
-        OK(cbvh_relate(querier, a, b, poses, count, relations));
+        OK(cbvh_relations(querier, a, b, poses, count, relations));
         for (size_t k = 0; k < count; k++) {
             values[k] = relations[k];
         }
@@ -69,7 +69,7 @@ static void ask_pairs(const char *mode, const cbvh_pose *poses, size_t count, do
     } else {
         CHECK(is(mode, "distance"));
         cbvh_distance_answer *distances = room(count, sizeof *distances);
-        OK(cbvh_distance(querier, a, b, poses, count, NULL, distances));
+        OK(cbvh_distances(querier, a, b, poses, count, NULL, distances));
         for (size_t k = 0; k < count; k++) {
             values[k] = distances[k].distance;
         }
@@ -138,7 +138,7 @@ static void ask_probes(const char *mode, const double *probes, size_t count, dou
     } else {
         CHECK(is(mode, "segment"));
         bool *answers = room(count, sizeof *answers);
-        OK(cbvh_meet_segments(querier, a, NULL, (const cbvh_segment *)(const void *)probes, count, answers));
+        OK(cbvh_segment_hits(querier, a, NULL, (const cbvh_segment *)(const void *)probes, count, answers));
         for (size_t k = 0; k < count; k++) {
             values[k] = answers[k];
         }
@@ -162,7 +162,7 @@ static void make_scene(const char *list, const char *worlds_file) {
     while (fscanf(file, "%999s", name) == 1) {
         if (is(name, "allow")) {
             CHECK(fscanf(file, "%zu %zu", &first, &second) == 2 && first < number && second < number);
-            OK(cbvh_scene_allow(scene, instances[first], instances[second], 1));
+            OK(cbvh_scene_set_allowed(scene, instances[first], instances[second], 1));
             continue;
         }
         int moves;
@@ -194,7 +194,7 @@ static double ask_scene(const char *mode, double d) {
     }
     if (is(mode, "distance")) {
         OK(cbvh_scene_distance(scene, &nearest));
-        return nearest.distance.distance;
+        return nearest.nearest.distance;
     }
     OK(is(mode, "pairs") ? cbvh_scene_pairs_in_contact(scene, pairs, 10000, &count)
                          : cbvh_scene_pairs_within(scene, d, pairs, 10000, &count));

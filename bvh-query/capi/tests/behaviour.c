@@ -14,7 +14,7 @@ static void cubes(const char *parallel) {
     cbvh_distance_answer answers[4];
     OK(cbvh_collide(querier, one, one, poses, 4, touch));
     OK(cbvh_within(querier, one, one, poses, 4, 0.5, near));
-    OK(cbvh_distance(querier, one, one, poses, 4, NULL, answers));
+    OK(cbvh_distances(querier, one, one, poses, 4, NULL, answers));
     for (int k = 0; k < 4; k++) {
         CHECK(touch[k] == (k < 2) && near[k] == (k < 3) && answers[k].distance == distances[k]);
         CHECK(answers[k].lower <= answers[k].distance && answers[k].distance <= answers[k].upper);
@@ -31,9 +31,9 @@ static void cubes(const char *parallel) {
     CHECK(first == 0);
     const cbvh_pose placed[3] = {shift(0, 0, 0), shift(3, 0, 0), shift(0.5, 0, 0)};
     cbvh_relation relations[3];
-    OK(cbvh_relate(querier, one, quarter, placed, 3, relations));
+    OK(cbvh_relations(querier, one, quarter, placed, 3, relations));
     CHECK(relations[0] == CBVH_B_IN_A && relations[1] == CBVH_APART && relations[2] == CBVH_TOUCHING);
-    OK(cbvh_relate(querier, quarter, one, placed, 1, relations));
+    OK(cbvh_relations(querier, quarter, one, placed, 1, relations));
     CHECK(relations[0] == CBVH_A_IN_B);
 
     const double points[12] = {0, 0, 0.25, 0, 0, 2, 0.5, 0, 0, 0, 5, 0};
@@ -62,7 +62,7 @@ static void cubes(const char *parallel) {
     OK(cbvh_all_hits(querier, one, NULL, rays, 2, counts, hits, 4, &count));
     CHECK(count == 2 && counts[0] == 2 && counts[1] == 0 && hits[0].t == 4.5 && hits[1].t == 5.5);
     const cbvh_segment segments[2] = {{{0, 0, 0}, {0, 0, 0.5}}, {{0, 0, 0}, {0, 0, 0.25}}};
-    OK(cbvh_meet_segments(querier, one, NULL, segments, 2, any));
+    OK(cbvh_segment_hits(querier, one, NULL, segments, 2, any));
     CHECK(any[0] && !any[1]);
     OK(cbvh_mesh_free(one));
     OK(cbvh_mesh_free(quarter));
@@ -96,14 +96,14 @@ static void lists(void) {
     OK(cbvh_mesh_bytes(mesh, bytes, size, &size));
     cbvh_mesh again;
     OK(cbvh_mesh_from_bytes(bytes, size, &again));
-    OK(cbvh_mesh_check(again));
+    OK(cbvh_mesh_validate(again));
     /* Damage is found by who needs it. */
     bytes[size - 100] ^= 1;
     bytes[4200] ^= 1;
     cbvh_mesh damaged;
     const cbvh_status opened = cbvh_mesh_from_bytes(bytes, size, &damaged);
     if (opened == CBVH_OK) {
-        FAILS(cbvh_mesh_check(damaged), CBVH_DAMAGED, "R");
+        FAILS(cbvh_mesh_validate(damaged), CBVH_DAMAGED, "R");
         OK(cbvh_mesh_free(damaged));
     } else {
         CHECK(opened == CBVH_DAMAGED);
@@ -172,7 +172,7 @@ static void borrowed(void) {
         for (int b = 0; b < 20; b++) {
             const cbvh_pose aside = shift(0, (a + b + 2) / 2.0 + 1, 0);
             cbvh_distance_answer distance;
-            OK(cbvh_distance(querier, many[a], many[b], &aside, 1, NULL, &distance));
+            OK(cbvh_distances(querier, many[a], many[b], &aside, 1, NULL, &distance));
             CHECK(distance.distance == 1);
         }
     }
@@ -254,7 +254,7 @@ static void paths(void) {
         for (int k = 0; k < 4; k++) {
             /* The cubes touch from x = -1, three eighths of the way. */
             CHECK(!free_ways[k] && answers[k].outcome == CBVH_HIT && answers[k].free_until <= 0.375);
-            CHECK(answers[k].at >= 0.375 && answers[k].at < 0.37501 && answers[k].distance.distance == 0);
+            CHECK(answers[k].at >= 0.375 && answers[k].at < 0.37501 && answers[k].nearest.distance == 0);
             cbvh_pose at;
             OK(cbvh_path_pose(all[k], 0.25, &at));
             CHECK(at.rows[3] == -2);
@@ -266,14 +266,14 @@ static void paths(void) {
         OK(cbvh_edge_motions(querier, mesh, mesh, starts, ends, 2, NULL, edges));
         OK(cbvh_edges_are_free(querier, mesh, mesh, starts, ends, 2, NULL, free_ways));
         CHECK(edges[0].outcome == CBVH_HIT && !free_ways[0] && edges[1].outcome == CBVH_FREE && free_ways[1]);
-        CHECK(edges[1].free_until == 1 && isnan(edges[1].at) && isnan(edges[1].distance.distance));
+        CHECK(edges[1].free_until == 1 && isnan(edges[1].at) && isnan(edges[1].nearest.distance));
     }
     OK(cbvh_querier_set_parallel(querier, 0));
     /* A hair's breadth is neither free nor a hit within a coarse tolerance. */
     const cbvh_pose hair_start = shift(-4, 1 + 1e-9, 0), hair_end = shift(4, 1 + 1e-9, 0);
     const cbvh_motion_options coarse = {.size = sizeof coarse, .tolerance = 0.125};
     OK(cbvh_edge_motions(querier, mesh, mesh, &hair_start, &hair_end, 1, &coarse, edges));
-    CHECK(edges[0].outcome == CBVH_NEAR && edges[0].distance.distance > 0 && edges[0].distance.distance <= 0.125);
+    CHECK(edges[0].outcome == CBVH_NEAR && edges[0].nearest.distance > 0 && edges[0].nearest.distance <= 0.125);
     double reach, moved;
     OK(cbvh_path_reach(mesh, between, 0, 1, &reach));
     CHECK(reach >= 4 && reach < 4.001);
@@ -371,14 +371,14 @@ static void trackers(void) {
     OK(cbvh_within(querier, mesh, mesh, poses, STEPS, 0.25, near));
     OK(cbvh_tracker_within(tracker, querier, mesh, mesh, poses, STEPS, 0.25, tracked));
     CHECK(memcmp(near, tracked, sizeof near) == 0 && memcmp(near, touch, sizeof near) != 0);
-    OK(cbvh_distance(querier, mesh, mesh, poses, STEPS, NULL, one));
+    OK(cbvh_distances(querier, mesh, mesh, poses, STEPS, NULL, one));
     OK(cbvh_tracker_distance(tracker, querier, mesh, mesh, poses, STEPS, other));
     CHECK(memcmp(one, other, sizeof one) == 0);
     OK(cbvh_tracker_free(tracker));
     FAILS(cbvh_tracker_free(tracker), CBVH_INVALID_HANDLE, "tracker: ");
     /* With an allowed error, the answer is between the bounds that it states. */
     const cbvh_distance_options loose = {.size = sizeof loose, .rel_err = 0.5};
-    OK(cbvh_distance(querier, mesh, mesh, poses, 1, &loose, other));
+    OK(cbvh_distances(querier, mesh, mesh, poses, 1, &loose, other));
     CHECK(other[0].lower <= one[0].distance && one[0].distance <= other[0].upper &&
           other[0].upper <= 1.5 * one[0].distance + 1e-9);
     cbvh_stats stats;
@@ -408,7 +408,7 @@ static void scenes(int parallel, int tracking) {
     cbvh_scene_distance_answer nearest;
     OK(cbvh_scene_distance(scene, &nearest));
     CHECK(nearest.found && nearest.pair.a.id == a.id && nearest.pair.b.id == c.id &&
-          nearest.distance.distance == 0.275);
+          nearest.nearest.distance == 0.275);
     size_t count;
     cbvh_scene_relation relations[3];
     OK(cbvh_scene_relations(scene, relations, 3, &count));
@@ -425,10 +425,10 @@ static void scenes(int parallel, int tracking) {
     CHECK(count == 1 && pairs[0].a.id == a.id && pairs[0].b.id == b.id);
     FAILS(cbvh_scene_contacts(scene, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "contacts: ");
     CHECK(count > 0);
-    OK(cbvh_scene_allow(scene, a, b, 1));
+    OK(cbvh_scene_set_allowed(scene, a, b, 1));
     OK(cbvh_scene_collide(scene, &answer));
     CHECK(!answer);
-    OK(cbvh_scene_allow(scene, a, b, 0));
+    OK(cbvh_scene_set_allowed(scene, a, b, 0));
     OK(cbvh_scene_set_groups(scene, b, 1, 2));
     OK(cbvh_scene_set_groups(scene, a, 1, 2));
     OK(cbvh_scene_collide(scene, &answer));
@@ -472,7 +472,7 @@ static void scenes(int parallel, int tracking) {
     OK(cbvh_scene_any_hits(scene, &ray, 1, &answer));
     CHECK(hits[0].t == 4.5 && answer);
     const cbvh_segment segment = {{0, 0, 3}, {0, 0, 2}};
-    OK(cbvh_scene_meet_segments(scene, &segment, 1, &answer));
+    OK(cbvh_scene_segment_hits(scene, &segment, 1, &answer));
     CHECK(!answer);
     char name[2];
     size_t length;
@@ -532,7 +532,7 @@ static void files(const char *folder, const char *testdata) {
     cbvh_mesh opened[4];
     for (cbvh_open_mode mode = CBVH_MAP; mode <= CBVH_READ; mode++) {
         OK(cbvh_mesh_open(output, mode, &opened[mode]));
-        OK(cbvh_mesh_check(opened[mode]));
+        OK(cbvh_mesh_validate(opened[mode]));
         OK(cbvh_mesh_triangle_count(opened[mode], &triangles[mode]));
         CHECK(triangles[mode] == 216);
     }
@@ -567,7 +567,7 @@ static void files(const char *folder, const char *testdata) {
     FAILS(cbvh_mesh_open(input, CBVH_MAP, &mesh), CBVH_DAMAGED, "R05");
     snprintf(input, sizeof input, "%s/bad-R27-flipped-bit.cbvh", testdata);
     OK(cbvh_mesh_open(input, CBVH_MAP, &mesh));
-    FAILS(cbvh_mesh_check(mesh), CBVH_DAMAGED, "R27");
+    FAILS(cbvh_mesh_validate(mesh), CBVH_DAMAGED, "R27");
     OK(cbvh_mesh_free(mesh));
     /* A pipe that nobody writes to. */
     snprintf(output, sizeof output, "%s/pipe", folder);

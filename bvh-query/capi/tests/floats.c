@@ -120,7 +120,7 @@ static void ask(answers *found, const state *of, int32_t parallel) {
         OK(cbvh_mesh_bytes(mesh, found->bytes[k], sizeof found->bytes[k], &found->sizes[k]));
         OK(cbvh_collide(querier, mesh, mesh, places[k], POSES, found->touch[k]));
         OK(cbvh_within(querier, mesh, mesh, places[k], POSES, ds[k], found->near[k]));
-        OK(cbvh_distance(querier, mesh, mesh, places[k], POSES, NULL, found->distances[k]));
+        OK(cbvh_distances(querier, mesh, mesh, places[k], POSES, NULL, found->distances[k]));
         FAILS(cbvh_contacts(querier, mesh, mesh, places[k], POSES, NULL, NULL, 0, &found->contacts[k]),
               CBVH_BUFFER_TOO_SMALL, "contacts: ");
         if (k == 0) {

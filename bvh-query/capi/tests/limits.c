@@ -64,7 +64,7 @@ static void memory(void) {
     FAILS(cbvh_sides(querier, mesh, NULL, numbers, many, (cbvh_side *)(void *)some), CBVH_LIMIT, "points: expected ");
     FAILS(cbvh_any_hits(querier, mesh, NULL, (const cbvh_ray *)(const void *)numbers, many, &answer), CBVH_LIMIT,
           "rays: expected ");
-    FAILS(cbvh_meet_segments(querier, mesh, NULL, (const cbvh_segment *)(const void *)numbers, many, &answer),
+    FAILS(cbvh_segment_hits(querier, mesh, NULL, (const cbvh_segment *)(const void *)numbers, many, &answer),
           CBVH_LIMIT, "segments: expected ");
     FAILS(cbvh_bake(numbers, many, NULL, 0, NULL, &made), CBVH_LIMIT, "vertices: expected ");
     FAILS(cbvh_motions(querier, mesh, mesh, (const cbvh_path *)(const void *)numbers, many, NULL, &motion), CBVH_LIMIT,
@@ -107,9 +107,9 @@ static void *ask(void *parallel) {
             poses[k] = random_pose(&source, 1.5);
         }
         OK(cbvh_collide(querier, mesh, other, poses, 4, answer));
-        OK(cbvh_distance(querier, mesh, other, poses, 4, NULL, distance));
+        OK(cbvh_distances(querier, mesh, other, poses, 4, NULL, distance));
         OK(cbvh_tracker_distance(tracker, querier, mesh, other, poses, 4, distance));
-        OK(cbvh_relate(querier, mesh, other, poses, 4, relation));
+        OK(cbvh_relations(querier, mesh, other, poses, 4, relation));
         (void)cbvh_contacts(querier, mesh, other, poses, 4, NULL, NULL, 0, &count);
         OK(cbvh_motions(querier, other, mesh, &path, 1, NULL, &motion));
         OK(cbvh_signed_distances(querier, mesh, NULL, poses[0].rows, 1, INFINITY, &closest));

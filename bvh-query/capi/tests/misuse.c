@@ -22,7 +22,7 @@ static void handles(void) {
           "b: expected the handle of an open mesh, found 0x123456789abcdef0");
     FAILS(cbvh_collide(querier, mesh, a_path, &pose, 1, &answer), CBVH_INVALID_HANDLE, "found the handle of a path");
     FAILS(cbvh_collide(querier, mesh, beyond, &pose, 1, &answer), CBVH_INVALID_HANDLE, "never gave out");
-    FAILS(cbvh_mesh_check(no_mesh), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_mesh_validate(no_mesh), CBVH_INVALID_HANDLE, "mesh: ");
     cbvh_mesh freed;
     OK(cbvh_mesh_clone(mesh, &freed));
     OK(cbvh_collide(querier, freed, mesh, &pose, 1, &answer));
@@ -94,7 +94,7 @@ static void pointers(void) {
           "poses: expected at most");
     FAILS(cbvh_collide(querier, mesh, mesh, &pose, 1, NULL), CBVH_INVALID_ARGUMENT,
           "answers: expected a pointer, found NULL");
-    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, NULL, MISALIGNED(cbvh_distance_answer)), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_distances(querier, mesh, mesh, &pose, 1, NULL, MISALIGNED(cbvh_distance_answer)), CBVH_INVALID_ARGUMENT,
           "answers: expected an address");
     FAILS(cbvh_contacts(querier, mesh, mesh, &pose, 1, NULL, NULL, 4, &count), CBVH_INVALID_ARGUMENT,
           "contacts: expected a pointer, found NULL");
@@ -106,7 +106,7 @@ static void pointers(void) {
     FAILS(cbvh_closest_points(querier, mesh, NULL, NULL, 1, INFINITY, NULL), CBVH_INVALID_ARGUMENT,
           "points: expected a pointer");
     FAILS(cbvh_first_hits(querier, mesh, NULL, NULL, 1, NULL), CBVH_INVALID_ARGUMENT, "rays: expected a pointer");
-    FAILS(cbvh_meet_segments(querier, mesh, NULL, NULL, 1, NULL), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_segment_hits(querier, mesh, NULL, NULL, 1, NULL), CBVH_INVALID_ARGUMENT,
           "segments: expected a pointer");
     FAILS(cbvh_edges_are_free(querier, mesh, mesh, NULL, &pose, 1, NULL, &answer), CBVH_INVALID_ARGUMENT, "starts: ");
     FAILS(cbvh_edges_are_free(querier, mesh, mesh, &pose, NULL, 1, NULL, &answer), CBVH_INVALID_ARGUMENT, "ends: ");
@@ -192,7 +192,7 @@ static void numbers(void) {
           "backend: expected a number of cbvh_backend, 0 to 3, found -1");
     FAILS(cbvh_querier_set_parallel(querier, 2), CBVH_INVALID_ARGUMENT, "parallel: expected 0 or 1, found 2");
     FAILS(cbvh_scene_set_tracking(scene, -1), CBVH_INVALID_ARGUMENT, "tracking: expected 0 or 1, found -1");
-    FAILS(cbvh_scene_allow(scene, instance, instance, 3), CBVH_INVALID_ARGUMENT, "may_touch: expected 0 or 1, found 3");
+    FAILS(cbvh_scene_set_allowed(scene, instance, instance, 3), CBVH_INVALID_ARGUMENT, "allowed: expected 0 or 1, found 3");
     cbvh_pose result;
     FAILS(cbvh_path_pose(path, 1.5, &result), CBVH_INVALID_ARGUMENT, "t: expected a time from 0 to 1, found 1.5");
     FAILS(cbvh_path_pose(path, NAN, &result), CBVH_INVALID_ARGUMENT, "t: expected a time from 0 to 1, found NaN");
@@ -215,12 +215,12 @@ static void numbers(void) {
     FAILS(cbvh_path_screw(&pose, room, x_axis, NAN, 1, &made), CBVH_INVALID_ARGUMENT, "angle: ");
     /* Options: sizes first. */
     cbvh_distance_options allowed = {.size = 0};
-    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_distances(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
           "options.size: expected 24");
     allowed.size = sizeof allowed + 8;
-    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT, "found 32");
+    FAILS(cbvh_distances(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT, "found 32");
     allowed = (cbvh_distance_options){.size = sizeof allowed, .rel_err = -1};
-    FAILS(cbvh_distance(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_distances(querier, mesh, mesh, &pose, 1, &allowed, &distance), CBVH_INVALID_ARGUMENT,
           "rel_err: expected a finite fraction");
     cbvh_motion_options motion = {.size = 1};
     FAILS(cbvh_are_free(querier, mesh, mesh, &path, 1, &motion, answers), CBVH_INVALID_ARGUMENT,
@@ -313,7 +313,7 @@ static void limits(void) {
     const cbvh_bake_options options = {.size = sizeof options, .no_topology = 1};
     OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &options, &open));
     cbvh_mesh small = cube(0.25);
-    FAILS(cbvh_relate(querier, open, small, &pose, 1, &relation), CBVH_INVALID_ARGUMENT,
+    FAILS(cbvh_relations(querier, open, small, &pose, 1, &relation), CBVH_INVALID_ARGUMENT,
           "does not say which objects are closed");
     OK(cbvh_mesh_free(small));
     OK(cbvh_mesh_free(open));

@@ -147,8 +147,8 @@ int main(void) {
         switch (below(58)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
-        case 2: status = cbvh_relate(q, a, b, in, n, out); break;
-        case 3: status = cbvh_distance(q, a, b, in, n, options, out); break;
+        case 2: status = cbvh_relations(q, a, b, in, n, out); break;
+        case 3: status = cbvh_distances(q, a, b, in, n, options, out); break;
         case 4: status = cbvh_contacts(q, a, b, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
         case 5: status = cbvh_first_collision(q, a, b, in, n, out); break;
         case 6: status = cbvh_displacement(a, in, more, out); break;
@@ -165,7 +165,7 @@ int main(void) {
         case 17: status = cbvh_first_hits(q, a, more, in, n, out); break;
         case 18: status = cbvh_any_hits(q, a, more, in, n, out); break;
         case 19: status = cbvh_all_hits(q, a, more, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
-        case 20: status = cbvh_meet_segments(q, a, more, in, n, out); break;
+        case 20: status = cbvh_segment_hits(q, a, more, in, n, out); break;
         case 21: status = cbvh_mesh_clone(a, (cbvh_mesh *)&made); break;
         case 22: status = cbvh_mesh_object(a, below(3), (cbvh_mesh *)&made); break;
         case 23: status = cbvh_mesh_object_name(a, below(3), out, capacity, &count); break;
@@ -174,7 +174,7 @@ int main(void) {
         case 26: status = cbvh_mesh_bytes(a, out, below(sizeof output - 8), &count); break;
         case 27: status = cbvh_mesh_duplicates(a, (uint32_t)below(20), out, capacity, &count); break;
         case 28: status = cbvh_mesh_from_bytes(in, below(sizeof input - 8), (cbvh_mesh *)&made); break;
-        case 29: status = cbvh_mesh_check(a); break;
+        case 29: status = cbvh_mesh_validate(a); break;
         case 30: status = cbvh_bake(in, n, (uint32_t *)more, below(ELEMENTS), options, (cbvh_mesh *)&made); break;
         case 31: status = cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, below(13), options, (cbvh_mesh *)&made); break;
         case 32: status = cbvh_querier_new(any_flag(), (cbvh_querier *)&made); break;
@@ -194,7 +194,7 @@ int main(void) {
         case 45: status = cbvh_scene_remove(s, i.id == instance.id ? (cbvh_instance){below(40)} : i); break;
         case 46: status = cbvh_scene_set_poses(s, instances, in, below(3)); break;
         case 47: status = cbvh_scene_set_groups(s, i, (uint32_t)below(4), ~0u); break;
-        case 48: status = cbvh_scene_allow(s, i, instance, any_flag()); break;
+        case 48: status = cbvh_scene_set_allowed(s, i, instance, any_flag()); break;
         case 49: status = cbvh_scene_instances(s, out, capacity, &count); break;
         case 50: status = cbvh_scene_pairs_within(s, x, out, capacity, &count); break;
         case 51: status = cbvh_scene_contacts(s, out, capacity, &count); break;

@@ -17,17 +17,17 @@ static void *ask(void *unused) {
     OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
     for (int round = 0; round < ROUNDS; round++) {
         memset(answers, 0, sizeof answers);
-        OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, answers));
+        OK(cbvh_distances(querier, mesh, mesh, poses, POSES, NULL, answers));
         CHECK(memcmp(answers, expected, sizeof expected) == 0);
         /* One after the other, and with handles that come and go. */
         cbvh_mesh own;
         OK(cbvh_mesh_clone(mesh, &own));
         for (int k = 0; k < POSES; k++) {
-            OK(cbvh_distance(querier, own, mesh, &poses[k], 1, NULL, &answers[k]));
+            OK(cbvh_distances(querier, own, mesh, &poses[k], 1, NULL, &answers[k]));
         }
         OK(cbvh_mesh_free(own));
         CHECK(memcmp(answers, expected, sizeof expected) == 0);
-        FAILS(cbvh_distance(querier, own, mesh, poses, 1, NULL, answers), CBVH_INVALID_HANDLE, "a: ");
+        FAILS(cbvh_distances(querier, own, mesh, poses, 1, NULL, answers), CBVH_INVALID_HANDLE, "a: ");
     }
     OK(cbvh_querier_free(querier));
     return unused;
@@ -82,7 +82,7 @@ static int32_t asking_pose(void *user, double t, cbvh_pose *pose) {
     bool answer;
     cbvh_mesh baked;
     CHECK(pthread_mutex_lock(&lock) == 0);
-    OK(cbvh_distance(inner, mesh, mesh, poses, POSES, NULL, found));
+    OK(cbvh_distances(inner, mesh, mesh, poses, POSES, NULL, found));
     CHECK(memcmp(found, expected, sizeof expected) == 0);
     OK(cbvh_scene_collide(inner_scene, &answer));
     CHECK(answer);
@@ -183,10 +183,10 @@ int main(void) {
     for (int k = 0; k < POSES; k++) {
         poses[k] = random_pose(&source, 1.5);
     }
-    OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, expected));
+    OK(cbvh_distances(querier, mesh, mesh, poses, POSES, NULL, expected));
     cbvh_distance_answer answers[POSES];
     OK(cbvh_querier_set_parallel(querier, 1));
-    OK(cbvh_distance(querier, mesh, mesh, poses, POSES, NULL, answers));
+    OK(cbvh_distances(querier, mesh, mesh, poses, POSES, NULL, answers));
     CHECK(memcmp(answers, expected, sizeof expected) == 0);
 
     pthread_t threads[THREADS];

@@ -92,7 +92,7 @@ void handles() {
     CHECK(mesh.object(0).bytes() == moved.bytes() && mesh.find("") == std::size_t{0} && !mesh.find("x"));
     const auto bytes = mesh.bytes();
     const cbvh::Mesh again = cbvh::Mesh::from_bytes(bytes.data(), bytes.size());
-    again.check_all();
+    again.validate();
     FAILS(cbvh::Mesh::open("/no such folder/x.cbvh"), CBVH_SYSTEM, "x.cbvh");
     FAILS(mesh.object(1), CBVH_NOT_FOUND, "number: expected a number below 1");
     cbvh::BakeOptions options;
@@ -125,7 +125,7 @@ void answers(bool parallel) {
     const std::vector<cbvh::Pose> poses{cbvh::Pose(), cbvh::Pose::translation(1, 0, 0), cbvh::Pose::translation(1.5, 0, 0)};
     CHECK(querier.collide(one, one, poses) == std::vector<bool>({true, true, false}));
     CHECK(querier.within(one, one, poses, 0.5) == std::vector<bool>({true, true, true}) && !querier.within(one, one, poses[2], 0.4));
-    CHECK(querier.relate(one, quarter, poses)[0] == CBVH_B_IN_A && querier.relate(quarter, one, poses[0]) == CBVH_A_IN_B);
+    CHECK(querier.relations(one, quarter, poses)[0] == CBVH_B_IN_A && querier.relation(quarter, one, poses[0]) == CBVH_A_IN_B);
     CHECK(querier.distance(one, one, poses)[2].distance == 0.5 && querier.distance(one, one, poses[2], {0.1, 0}).upper <= 0.55);
     const auto lists = querier.contacts(one, one, poses);
     CHECK(lists.size() == 3 && !lists[0].empty() && !lists[1].empty() && lists[2].empty());
@@ -153,7 +153,7 @@ void answers(bool parallel) {
     CHECK(querier.first_hit(one, rays[0])->t == 4.5 && !querier.first_hit(one, rays[1]));
     CHECK(querier.any_hit(one, rays[0]) && !querier.any_hit(one, rays[0], cbvh::Pose::translation(3, 0, 0)));
     CHECK(querier.all_hits(one, rays)[0].size() == 2 && querier.any_hits(one, rays) == std::vector<bool>({true, false}));
-    CHECK(querier.meet_segments(one, {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 0}, {0, 0, 0.1}}}) == std::vector<bool>({true, false}));
+    CHECK(querier.segment_hits(one, {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 0}, {0, 0, 0.1}}}) == std::vector<bool>({true, false}));
     cbvh::Tracker tracker;
     for (const cbvh::Pose &pose : poses) {
         CHECK(tracker.collide(querier, one, one, pose) == querier.collide(one, one, pose));
@@ -278,7 +278,7 @@ void scenes() {
     const cbvh::Instance b = scene.add(cube(1), cbvh::Pose::translation(1.5, 0, 0));
     cbvh::Scene copy = scene;
     copy.set_pose(b, cbvh::Pose::translation(1, 0, 0));
-    CHECK(copy.collide() && !scene.collide() && scene.within(0.5) && scene.distance()->distance.distance == 0.5);
+    CHECK(copy.collide() && !scene.collide() && scene.within(0.5) && scene.distance()->nearest.distance == 0.5);
     CHECK(copy.pairs_in_contact().size() == 1 && copy.pairs_in_contact()[0].b == b && !copy.contacts().empty());
     CHECK(copy.relations()[0].relation == CBVH_TOUCHING && scene.pairs_within(1).size() == 1);
     CHECK(scene.instances() == std::vector<cbvh::Instance>({a, b}) && scene.name(a) == "a" && scene.find("a") == a);
@@ -290,7 +290,7 @@ void scenes() {
     const cbvh::Ray down({0, 0.1, 5}, {0, 0, -1}), up({0, 0.1, 5}, {0, 0, 1});
     CHECK(scene.first_hits({down, up})[0]->t == 4.5 && !scene.first_hits({down, up})[1] && scene.any_hit(down) && !scene.any_hit(up));
     CHECK(scene.all_hits({{{0, 0.1, 5}, {0, 0, -1}}})[0].size() == 2 && scene.any_hits({{{9, 9, 5}, {0, 0, -1}}})[0] == false);
-    CHECK(scene.sides({{9, 9, 9}})[0] == CBVH_OUTSIDE && scene.meet_segments({{{0, 0, 0}, {0, 0, 3}}})[0]);
+    CHECK(scene.sides({{9, 9, 9}})[0] == CBVH_OUTSIDE && scene.segment_hits({{{0, 0, 0}, {0, 0, 3}}})[0]);
     // Ways are values. One whose path is gone is refused, and a path that has no name is no path for one.
     std::vector<cbvh::Scene::Way> ways;
     {

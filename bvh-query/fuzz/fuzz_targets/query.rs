@@ -43,6 +43,6 @@ fuzz_target!(|bytes: &[u8]| {
         let _ = querier.relation(&a, &b, &pose);
         let (shape, point, away) = (a.all().at(&pose), [near, 0.0, allowed], pose.translation());
         let _ = (querier.closest_point(shape, point, f64::INFINITY), querier.side(shape, point));
-        let _ = (querier.all_hits(shape, &Ray::new(point, away)), querier.meets_segment(shape, point, away));
+        let _ = (querier.all_hits(shape, &Ray::new(point, away)), querier.segment_hit(shape, point, away));
     }
 });

@@ -22,7 +22,7 @@ pub(crate) fn mesh(path: &Path) -> Result<Mesh, Failure> {
 /// Bakes a mesh and checks all pages, so that no query does.
 pub(crate) fn bake(mesh: &Mesh, options: &Options) -> Result<Bvh, Failure> {
     let bvh = Bvh::from_bytes(to_bytes(mesh, options)?.0)?;
-    bvh.check_all()?;
+    bvh.validate()?;
     Ok(bvh)
 }
 

@@ -42,4 +42,4 @@ with tempfile.TemporaryDirectory() as folder:
     scene.set_poses(ids, poses[1::100])
     nearest = scene.distance()
     assert nearest is not None
-    print(f"after they moved, the nearest pair is {nearest.distance.distance} apart")
+    print(f"after they moved, the nearest pair is {nearest.nearest.distance} apart")

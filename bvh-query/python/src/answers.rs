@@ -132,10 +132,10 @@ pub(crate) fn motions<'py>(to: Answers<'py>, of: &[MotionAnswer]) -> PyResult<Bo
         .iter()
         .map(|answer| match *answer {
             MotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
-            MotionAnswer::Hit { free_until, touching_at, contact } => {
-                (HIT, free_until, touching_at, Some(contact))
+            MotionAnswer::Hit { free_until, touching_at, nearest } => {
+                (HIT, free_until, touching_at, Some(nearest))
             }
-            MotionAnswer::Near { free_until, at, distance } => (NEAR, free_until, at, Some(distance)),
+            MotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, Some(nearest)),
         })
         .collect();
     (

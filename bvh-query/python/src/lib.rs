@@ -40,7 +40,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         probes::first_hits,
         probes::any_hits,
         probes::all_hits,
-        probes::meet_segments
+        probes::segment_hits
     ];
     functions![
         scene_pairs::scene_collide,
@@ -60,7 +60,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_probes::scene_first_hits,
         scene_probes::scene_any_hits,
         scene_probes::scene_all_hits,
-        scene_probes::scene_meet_segments
+        scene_probes::scene_segment_hits
     ];
     module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
     module.add("BakeError", module.py().get_type::<errors::BakeError>())?;

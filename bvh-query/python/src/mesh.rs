@@ -95,7 +95,7 @@ impl Mesh {
     }
 
     /// Checks the whole file.
-    fn check(&self, py: Python<'_>) -> PyResult<()> {
-        detached(py, || self.shape.bvh().check_all()).map_err(crate::errors::query_error)
+    fn validate(&self, py: Python<'_>) -> PyResult<()> {
+        detached(py, || self.shape.bvh().validate()).map_err(crate::errors::query_error)
     }
 }

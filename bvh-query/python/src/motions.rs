@@ -49,7 +49,7 @@ pub(crate) fn motion<'py>(
 ) -> PyResult<Bound<'py, PyTuple>> {
     let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let (options, parallel) = (options(clearance, tolerance)?, flag(parallel, "parallel")?);
-    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.motion(paths, &options);
+    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.motions(paths, &options);
     let found = ask(py, &paths, parallel, batch, |querier, path| querier.motion(a, b, path, &options))?;
     answers::motions(Answers { py, one }, &found)
 }
@@ -67,7 +67,7 @@ pub(crate) fn is_free<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let (options, parallel) = (options(clearance, tolerance)?, flag(parallel, "parallel")?);
-    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.is_free(paths, &options);
+    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.are_free(paths, &options);
     let found = ask(py, &paths, parallel, batch, |querier, path| querier.is_free(a, b, path, &options))?;
     Answers { py, one }.values(found.into_iter())
 }

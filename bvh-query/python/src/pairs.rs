@@ -86,7 +86,7 @@ pub(crate) fn relation<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.relation(a, b, pose);
-    let found = question.ask(|batch, poses| batch.relation(poses), one)?;
+    let found = question.ask(|batch, poses| batch.relations(poses), one)?;
     question.answers().values(found.into_iter().map(|relation| relation as u8))
 }
 
@@ -110,7 +110,7 @@ pub(crate) fn distance<'py>(
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| {
         if exact { querier.distance(a, b, pose) } else { querier.distance_with(a, b, pose, &options) }
     };
-    let found = question.ask(|batch, poses| batch.distance(poses), one)?;
+    let found = question.ask(|batch, poses| batch.distances(poses), one)?;
     answers::distances(question.answers(), found.iter().copied().map(Some))
 }
 

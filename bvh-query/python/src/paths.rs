@@ -4,7 +4,7 @@ use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
 use crate::asking::detached;
 use crate::errors::path_error;
-use bvh_query::{Motion, Path, Polyline, Pose, with_default_floats};
+use bvh_query::{Motion, Polyline, Pose, RigidPath, with_default_floats};
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::{PyIndexError, PyRecursionError, PyValueError};
 use pyo3::prelude::*;
@@ -22,7 +22,7 @@ pub(crate) enum Own {
 }
 
 impl Own {
-    fn path(&self) -> &(dyn Path + Sync) {
+    fn path(&self) -> &(dyn RigidPath + Sync) {
         match self {
             Self::Motion(motion) => motion,
             Self::Polyline(polyline) => &**polyline,
@@ -135,7 +135,7 @@ fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
 const MOST_KEPT: usize = 1024;
 
 /// A path that Python code answers for: an object with the methods `pose` and `sagitta`. An exception ends the question: a
-/// `Path` cannot fail, so the exception is kept here, and the question unwound up to [`until_raised`].
+/// `RigidPath` cannot fail, so the exception is kept here, and the question unwound up to [`until_raised`].
 pub(crate) struct Called {
     object: Py<PyAny>,
     /// Never locked while Python code runs.
@@ -226,7 +226,7 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Path for Called {
+impl RigidPath for Called {
     fn pose(&self, t: f64) -> Pose {
         if let Some(&pose) = locked(&self.known).get(&t.to_bits()) {
             return pose;
@@ -279,7 +279,7 @@ impl AnyPath {
         }
     }
 
-    pub(crate) fn path(&self) -> &(dyn Path + Sync) {
+    pub(crate) fn path(&self) -> &(dyn RigidPath + Sync) {
         match self {
             Self::Own(own) => own.path(),
             Self::Called(called) => called,
@@ -287,7 +287,7 @@ impl AnyPath {
     }
 }
 
-impl Path for AnyPath {
+impl RigidPath for AnyPath {
     fn pose(&self, t: f64) -> Pose {
         self.path().pose(t)
     }

@@ -82,18 +82,20 @@ pub(crate) fn sides<'py>(
     question.answers().values(found.into_iter().map(|side| side as i8))
 }
 
-/// NaN where the mesh has no inside.
+/// NaN where the mesh has no inside, and where no surface is within the distance.
 #[pyfunction]
 pub(crate) fn signed_distances<'py>(
     mesh: &Mesh,
     points: &Bound<'py, PyAny>,
+    within: &Bound<'py, PyAny>,
     pose: Option<&Bound<'py, PyAny>>,
     parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(points.py(), mesh, read_points(points, "points")?, pose, parallel)?;
+    let within = number(within, "within")?;
     let found = question.ask(
-        |batch, points| batch.signed_distances(points, f64::INFINITY),
-        |querier, shape, &point| querier.signed_distance(shape, point, f64::INFINITY),
+        |batch, points| batch.signed_distances(points, within),
+        |querier, shape, &point| querier.signed_distance(shape, point, within),
     )?;
     let distances = found.into_iter().map(|found| found.and_then(|found| found.value()).unwrap_or(f64::NAN));
     question.answers().values(distances)
@@ -176,7 +178,7 @@ pub(crate) fn segments(starts: &Bound<'_, PyAny>, ends: &Bound<'_, PyAny>) -> Py
 }
 
 #[pyfunction]
-pub(crate) fn meet_segments<'py>(
+pub(crate) fn segment_hits<'py>(
     mesh: &Mesh,
     starts: &Bound<'py, PyAny>,
     ends: &Bound<'py, PyAny>,
@@ -185,8 +187,8 @@ pub(crate) fn meet_segments<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(starts.py(), mesh, segments(starts, ends)?, pose, parallel)?;
     let found = question.ask(
-        |batch, segments| batch.meet_segments(segments),
-        |querier, shape, &[start, end]| querier.meets_segment(shape, start, end),
+        |batch, segments| batch.segment_hits(segments),
+        |querier, shape, &[start, end]| querier.segment_hit(shape, start, end),
     )?;
     question.answers().values(found.into_iter())
 }

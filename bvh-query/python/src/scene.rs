@@ -285,10 +285,10 @@ impl Scene {
         })
     }
 
-    fn allow(&self, py: Python<'_>, a: i64, b: i64, may_touch: bool) -> PyResult<()> {
+    fn set_allowed(&self, py: Python<'_>, a: i64, b: i64, allowed: bool) -> PyResult<()> {
         self.with(py, |state| {
             let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
-            let allowed = state.scene.allow(first, second, may_touch);
+            let allowed = state.scene.set_allowed(first, second, allowed);
             allowed.map_err(|error| scene_error(state.refused(error)))
         })
     }

@@ -6,7 +6,7 @@ use crate::asking::{detached, on_pool};
 use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
-use bvh_query::{InstanceId, Path, SceneDistance, SceneError, SceneMotion, ScenePair};
+use bvh_query::{InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -18,8 +18,8 @@ type Nearest<'py> = Option<(i64, i64, Bound<'py, PyTuple>)>;
 
 fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], SceneDistance)>) -> PyResult<Nearest<'py>> {
     let Some(([a, b], found)) = found else { return Ok(None) };
-    let distance = answers::distances(Answers { py, one: true }, std::iter::once(Some(found.distance)))?;
-    Ok(Some((a, b, distance)))
+    let nearest = answers::distances(Answers { py, one: true }, std::iter::once(Some(found.nearest)))?;
+    Ok(Some((a, b, nearest)))
 }
 
 fn numbered(state: &State, pairs: Vec<ScenePair>) -> Vec<[i64; 2]> {
@@ -98,7 +98,8 @@ impl Ways {
         &self,
         py: Python<'_>,
         scene: &Scene,
-        ask: impl Fn(&mut bvh_query::Scene, &[(InstanceId, &(dyn Path + Sync))]) -> Result<A, SceneError> + Sync,
+        ask: impl Fn(&mut bvh_query::Scene, &[(InstanceId, &(dyn RigidPath + Sync))]) -> Result<A, SceneError>
+        + Sync,
         read: impl Fn(&State, A) -> T + Sync,
     ) -> PyResult<T> {
         let run = |state: &mut State| -> PyResult<T> {
@@ -138,14 +139,14 @@ pub(crate) fn scene_motion<'py>(
 ) -> PyResult<(u8, f64, f64, Nearest<'py>)> {
     let ways = Ways { numbers, paths: AnyPath::read(paths) };
     let options = options(clearance, tolerance)?;
-    let read = |state: &State, answer: SceneMotion| {
+    let read = |state: &State, answer: SceneMotionAnswer| {
         let of = |found: SceneDistance| Some((state.pair(found.pair), found));
         match answer {
-            SceneMotion::Free => (FREE, 1.0, f64::NAN, None),
-            SceneMotion::Hit { free_until, touching_at, contact } => {
-                (HIT, free_until, touching_at, of(contact))
+            SceneMotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
+            SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
+                (HIT, free_until, touching_at, of(nearest))
             }
-            SceneMotion::Near { free_until, at, distance } => (NEAR, free_until, at, of(distance)),
+            SceneMotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, of(nearest)),
         }
     };
     let (kind, free_until, at, found) =

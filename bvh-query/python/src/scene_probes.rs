@@ -49,10 +49,11 @@ pub(crate) fn scene_sides<'py>(scene: &Scene, points: &Bound<'py, PyAny>) -> PyR
 pub(crate) fn scene_signed_distances<'py>(
     scene: &Scene,
     points: &Bound<'py, PyAny>,
+    within: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (py, points) = (points.py(), read_points(points, "points")?);
-    let found =
-        scene.ask(py, |scene| scene.signed_distances(&points.rows, f64::INFINITY), |_, found| found)?;
+    let within = number(within, "within")?;
+    let found = scene.ask(py, |scene| scene.signed_distances(&points.rows, within), |_, found| found)?;
     let distances = found.into_iter().map(|found| found.and_then(|(_, of)| of.value()).unwrap_or(f64::NAN));
     Answers { py, one: points.one }.values(distances)
 }
@@ -118,12 +119,12 @@ pub(crate) fn scene_all_hits<'py>(
 }
 
 #[pyfunction]
-pub(crate) fn scene_meet_segments<'py>(
+pub(crate) fn scene_segment_hits<'py>(
     scene: &Scene,
     starts: &Bound<'py, PyAny>,
     ends: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (py, segments) = (starts.py(), segments(starts, ends)?);
-    let found = scene.ask(py, |scene| scene.meet_segments(&segments.rows), |_, found| found)?;
+    let found = scene.ask(py, |scene| scene.segment_hits(&segments.rows), |_, found| found)?;
     Answers { py, one: segments.one }.values(found.into_iter())
 }

@@ -60,7 +60,7 @@ class BadArguments(unittest.TestCase):
             (TypeError, "object: expected a number or a name, found float", mesh.object, 1.5),
             (TypeError, "", cbvh.Mesh.from_bytes, 5),
             (ValueError, "directions: expected as many as of origins, 2, found 3", mesh.first_hits, np.zeros((2, 3)), np.ones((3, 3))),
-            (ValueError, "ends: expected as many as of starts, 2, found 3", mesh.meet_segments, np.zeros((2, 3)), np.ones((3, 3))),
+            (ValueError, "ends: expected as many as of starts, 2, found 3", mesh.segment_hits, np.zeros((2, 3)), np.ones((3, 3))),
             (ValueError, "direction", mesh.first_hits, [0, 0, 0], [0, 0, 0]),
             (ValueError, "vertices: expected shape (V, 3), found (8, 2)", cbvh.bake, vertices[:, :2], faces),
             (ValueError, "faces: expected numbers from 0 to 7, found 0 to 8", cbvh.bake, vertices, [[0, 1, 8]]),
@@ -113,7 +113,7 @@ class BadArguments(unittest.TestCase):
             try:
                 mesh = cbvh.Mesh.from_bytes(bytes(damaged))
                 mesh.contacts(mesh, np.eye(4))
-                mesh.check()
+                mesh.validate()
             except cbvh.FormatError:
                 found += 1
         self.assertGreater(found, 50)

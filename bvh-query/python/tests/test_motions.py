@@ -126,7 +126,7 @@ class Ways(unittest.TestCase):
         free = self.cube.motion(self.cube, past)
         self.assertIs(free.kind, MotionKind.FREE)
         self.assertEqual(free.free_until, 1.0)
-        self.assertTrue(np.isnan(free.at) and np.isnan(free.distance.distance))
+        self.assertTrue(np.isnan(free.at) and np.isnan(free.nearest.distance))
         self.assertIs(self.cube.is_free(self.cube, past), True)
         # Half a unit apart.
         self.assertIs(self.cube.is_free(self.cube, past, clearance=0.49), True)
@@ -135,18 +135,18 @@ class Ways(unittest.TestCase):
         hit = self.cube.motion(self.cube, cbvh.Motion.between(*shifts((-5, 0.3, 0), (5, 0.3, 0))))
         self.assertIs(hit.kind, MotionKind.HIT)
         self.assertTrue(hit.free_until <= 0.4 <= hit.at < 0.4 + 1e-6, hit)
-        self.assertEqual((hit.distance.distance, hit.distance.point_a.shape), (0.0, (3,)))
+        self.assertEqual((hit.nearest.distance, hit.nearest.point_a.shape), (0.0, (3,)))
         grazing = cbvh.Motion.between(*shifts((-5, 1 + 1e-9, 0), (5, 1 + 1e-9, 0)))
         near = self.cube.motion(self.cube, grazing, tolerance=1e-3)
         self.assertIs(near.kind, MotionKind.NEAR)
-        self.assertTrue(near.free_until <= near.at and 0 < near.distance.distance < 1e-8)
+        self.assertTrue(near.free_until <= near.at and 0 < near.nearest.distance < 1e-8)
 
     def test_many_motions_get_the_answers_of_each(self):
         starts, ends = random_poses(1, 300, 2.5), random_poses(2, 300, 2.5)
         motions = cbvh.Motion.between(starts, ends)
         found = self.cube.motion(self.cube, motions)
         free = self.cube.is_free(self.cube, motions)
-        self.assertEqual((found.kind.dtype, free.dtype, found.distance.point_a.shape), (np.uint8, bool, (300, 3)))
+        self.assertEqual((found.kind.dtype, free.dtype, found.nearest.point_a.shape), (np.uint8, bool, (300, 3)))
         self.assertEqual(set(found.kind), {0, 1})
         np.testing.assert_array_equal(free, found.kind == MotionKind.FREE)
         for other in (
@@ -154,7 +154,7 @@ class Ways(unittest.TestCase):
             self.cube.motion(self.cube, list(motions)),
             self.cube.motion(self.cube, list(motions), parallel=True),
         ):
-            for one, same in zip((*found[:3], *found.distance), (*other[:3], *other.distance)):
+            for one, same in zip((*found[:3], *found.nearest), (*other[:3], *other.nearest)):
                 np.testing.assert_array_equal(one, same)
         np.testing.assert_array_equal(self.cube.is_free(self.cube, motions, parallel=True), free)
         # Samples: none before the way ends, and the pose of the hit.

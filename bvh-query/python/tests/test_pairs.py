@@ -60,12 +60,14 @@ class Geometry(unittest.TestCase):
         self.assertEqual(self.cube.contacts(self.cube, pose).shape, (0, 4))
         self.assertIs(self.cube.sides([0, 0, 0]), cbvh.Side.INSIDE)
         self.assertEqual(self.cube.signed_distances([0, 0, 0.25]), -0.25)
+        near = self.cube.signed_distances([[0, 0, 0.25], [0, 0, 0], [0, 0, 0.75]], within=0.25)
+        np.testing.assert_array_equal(near, [-0.25, np.nan, 0.25])
         self.assertEqual(self.cube.closest_points([0, 0, 2]).point.tolist(), [0, 0, 0.5])
         hit = self.cube.first_hits([0.1, 0.2, 5], [0, 0, -1])
         self.assertEqual((hit.found, hit.t, hit.point.tolist()), (True, 4.5, [0.1, 0.2, 0.5]))
         self.assertIs(self.cube.any_hits([0, 0, 5], [0, 0, 1]), False)
         self.assertEqual(self.cube.all_hits([0.1, 0.2, 5], [0, 0, -1]).t.tolist(), [4.5, 5.5])
-        self.assertIs(self.cube.meet_segments([0, 0, 0], [0, 0, 0.5]), True)
+        self.assertIs(self.cube.segment_hits([0, 0, 0], [0, 0, 0.5]), True)
 
     def test_no_questions_have_no_answers(self):
         none = np.zeros((0, 4, 4))

@@ -26,12 +26,12 @@ class Geometry(unittest.TestCase):
             np.testing.assert_equal(ask(many, ways[0]), ask(many, np.tile(ways[0], (3, 1))))
         self.assertEqual(self.cube.any_hits([origin], ways[0]).tolist(), [True])
         self.assertEqual(self.cube.any_hits(origin, ways[:1]).tolist(), [True])
-        self.assertEqual(self.cube.meet_segments(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
-        self.assertEqual(self.cube.meet_segments([[0, 0, 0], [0, 0, 4]], origin).tolist(), [True, False])
+        self.assertEqual(self.cube.segment_hits(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
+        self.assertEqual(self.cube.segment_hits([[0, 0, 0], [0, 0, 4]], origin).tolist(), [True, False])
         scene = cbvh.Scene()
         scene.add(self.cube)
         self.assertEqual(scene.any_hits(origin, ways).tolist(), self.cube.any_hits(origin, ways).tolist())
-        self.assertEqual(scene.meet_segments(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
+        self.assertEqual(scene.segment_hits(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
 
     def test_probes(self):
         points = np.random.default_rng(1).uniform(-1, 1, (200, 3))
@@ -57,7 +57,7 @@ class Geometry(unittest.TestCase):
             every = self.cube.all_hits(above, np.tile([0, 0, -1], (200, 1)), until=2, parallel=parallel)
             self.assertEqual([len(hit.t) for hit in every], crosses.astype(int).tolist())
             below = above * [1, 1, -1]
-            np.testing.assert_array_equal(self.cube.meet_segments(above, below, parallel=parallel), crosses)
+            np.testing.assert_array_equal(self.cube.segment_hits(above, below, parallel=parallel), crosses)
 
     def test_as_many_ends_as_rays(self):
         above, down = [[0.1, 0.2, 5], [0.1, 0.2, 5]], [[0, 0, -1], [0, 0, -1]]
@@ -91,7 +91,7 @@ class SameBits(unittest.TestCase):
                             "closest": lambda: mesh.closest_points(first, parallel=parallel).distance,
                             "side": lambda: mesh.sides(first, parallel=parallel),
                             "ray": lambda: np.nan_to_num(mesh.first_hits(first, last, parallel=parallel).t, nan=-1.0),
-                            "segment": lambda: mesh.meet_segments(first, last, parallel=parallel),
+                            "segment": lambda: mesh.segment_hits(first, last, parallel=parallel),
                         }[mode]()
                         np.testing.assert_array_equal(np.asarray(found, float), raw, f"{mesh_name}, {mode}")
 

@@ -29,7 +29,7 @@ def read_scene(path, folder):
         elif word == "moving":
             moving += [scene.find(name) for name in fields]
         elif word == "allow":
-            scene.allow(*map(scene.find, fields))
+            scene.set_allowed(*map(scene.find, fields))
     # What stands still is asked about with what moves alone.
     for number in scene:
         moves = number in moving
@@ -68,7 +68,7 @@ class Pairs(unittest.TestCase):
             groups = {"member": 1 << number % 3, "meets": 0b011 if number % 3 else 0xFFFFFFFF}
             scene.add(self.meshes[number % 7 % 3], pose, name=f"part {number}" if number % 2 else None, **groups)
         for a, b in ((0, 1), (9, 3), (4, 25)):
-            scene.allow(a, b)
+            scene.set_allowed(a, b)
         return scene
 
     def check(self, scene):
@@ -90,19 +90,19 @@ class Pairs(unittest.TestCase):
         self.assertEqual(np.hstack([contacts.pairs, contacts.triangles]).tolist(), rows)
         nearest = scene.distance()
         self.assertEqual([nearest.a, nearest.b], touching[0])
-        self.assertEqual(nearest.distance.distance, 0.0)
+        self.assertEqual(nearest.nearest.distance, 0.0)
         # Without those, the nearest is somewhere else.
         for a, b in touching:
-            scene.allow(a, b)
+            scene.set_allowed(a, b)
         apart = min((of.distance, a, b) for a, b, of in Asked(scene).of(lambda a, b, pose: a.distance(b, pose)))
         nearest = scene.distance()
         self.assertEqual((nearest.a, nearest.b), apart[1:])
-        self.assertAlmostEqual(nearest.distance.distance, apart[0], places=12)
-        between = nearest.distance.point_a - nearest.distance.point_b
+        self.assertAlmostEqual(nearest.nearest.distance, apart[0], places=12)
+        between = nearest.nearest.point_a - nearest.nearest.point_b
         self.assertAlmostEqual(np.linalg.norm(between), apart[0], places=12)
         self.assertIs(scene.collide(), False)
         for a, b in touching:
-            scene.allow(a, b, False)
+            scene.set_allowed(a, b, False)
 
     def test_questions_are_about_all_pairs_that_are_asked_about(self):
         scene = self.scene(1)
@@ -135,7 +135,7 @@ class Pairs(unittest.TestCase):
         np.testing.assert_array_equal(scene.pose(b), poses[1])
         scene.set_groups(a, member=4)
         self.assertEqual(scene.groups(a), (4, 0xFFFFFFFF))
-        scene.allow(c, a)
+        scene.set_allowed(c, a)
         self.assertEqual(scene.allowed().tolist(), [[a, c]])
         scene.remove(a)
         self.assertEqual((scene.allowed().tolist(), scene.find("a"), list(scene)), ([], None, [b, c]))
@@ -160,7 +160,7 @@ class Pairs(unittest.TestCase):
         sides = np.array([mesh.sides(points, pose=pose) for mesh, pose in of])
         hits = [mesh.first_hits(points, others - points, pose=pose) for mesh, pose in of]
         ts = np.array([np.where(hit.found, hit.t, np.inf) for hit in hits])
-        meets = np.array([mesh.meet_segments(points, others, pose=pose) for mesh, pose in of]).any(axis=0)
+        meets = np.array([mesh.segment_hits(points, others, pose=pose) for mesh, pose in of]).any(axis=0)
         for scene.parallel in (False, True):
             near = scene.closest_points(points)
             np.testing.assert_array_equal(near.instance, np.argmin(distances, axis=0))
@@ -174,7 +174,7 @@ class Pairs(unittest.TestCase):
             np.testing.assert_array_equal(first.instance, np.where(first.hit.found, np.argmin(ts, axis=0), -1))
             np.testing.assert_array_equal(first.hit.t[first.hit.found], ts.min(axis=0)[first.hit.found])
             np.testing.assert_array_equal(scene.any_hits(points, others - points), first.hit.found)
-            np.testing.assert_array_equal(scene.meet_segments(points, others), meets)
+            np.testing.assert_array_equal(scene.segment_hits(points, others), meets)
             every = scene.all_hits(points, others - points)
             of_each = [mesh.all_hits(points, others - points, pose=pose) for mesh, pose in of]
             expected = [sum(len(hit.t) for hit in hits) for hits in zip(*of_each)]
@@ -202,7 +202,7 @@ class Ways(unittest.TestCase):
         # At 8 t = 2 they touch.
         self.assertIs(hit.kind, MotionKind.HIT)
         self.assertTrue(hit.free_until <= 0.25 <= hit.at < 0.25 + 1e-6)
-        self.assertEqual((hit.nearest.a, hit.nearest.b, hit.nearest.distance.distance), (self.wall, self.part, 0.0))
+        self.assertEqual((hit.nearest.a, hit.nearest.b, hit.nearest.nearest.distance), (self.wall, self.part, 0.0))
         self.assertIs(self.scene.is_free(way), False)
         # The wall moves away as fast.
         way[self.wall] = cbvh.Motion.between(*shifts((3, 0, 0), (11, 0, 0)))
@@ -316,7 +316,7 @@ class Sharing(unittest.TestCase):
         scene = cbvh.Scene()
         for number, pose in enumerate(random_poses(8, 20, 3.0)):
             scene.add(meshes[number % 2], pose, name=f"part {number}", meets=0xFFFFFFFF ^ number)
-        scene.allow(2, 5)
+        scene.set_allowed(2, 5)
         scene.remove(3)
         scene.tracking = True
         return scene
@@ -354,7 +354,7 @@ class Sharing(unittest.TestCase):
                 scene.remove(scene.add(scene.mesh(0), shifts((99, number, 0))[0]))
             if number % 4 == 2:
                 scene.parallel = number % 8 == 2
-            return scene.pairs_in_contact().tolist(), scene.distance().distance.distance
+            return scene.pairs_in_contact().tolist(), scene.distance().nearest.distance
 
         with concurrent.futures.ThreadPoolExecutor(8) as pool:
             for found in pool.map(use, range(400)):
@@ -399,7 +399,7 @@ class SameAnswers(unittest.TestCase):
                 modes = {
                     "collide": scene.collide,
                     "pairs": lambda: len(scene.pairs_in_contact()),
-                    "distance": lambda: scene.distance().distance.distance,
+                    "distance": lambda: scene.distance().nearest.distance,
                     "within": lambda: len(scene.pairs_within(0.05)),
                 }
                 for mode, ask in modes.items():

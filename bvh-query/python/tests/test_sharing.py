@@ -49,7 +49,7 @@ class Sharing(unittest.TestCase):
             mesh.save(saved)
             self.assertEqual(saved.read_bytes(), output.read_bytes())
             self.assertEqual(sorted(os.listdir(folder)), ["copy.cbvh", "environment.cbvh"])
-            mesh.check()
+            mesh.validate()
 
     def test_pickles_lead_to_the_same_file_and_to_the_same_bytes(self):
         with tempfile.TemporaryDirectory() as folder:

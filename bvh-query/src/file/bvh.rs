@@ -184,7 +184,7 @@ impl Bvh {
     ///
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold.
-    pub fn check_all(&self) -> Result<(), QueryError> {
+    pub fn validate(&self) -> Result<(), QueryError> {
         for object in self.objects() {
             let first = object.record().first_page.get();
             for number in first..first + object.record().pages.get() {

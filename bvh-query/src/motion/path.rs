@@ -8,14 +8,14 @@ use bvh_format::object::MAX_COORDINATE;
 /// A motion of B in A's frame, over times from 0 to 1.
 ///
 /// [`Motion`] and [`Polyline`] are paths. Implement it for others, such as a link of a robot whose joints move.
-pub trait Path {
+pub trait RigidPath {
     /// Returns where B is at a time from 0 to 1. The same time gives the same pose, to the bit.
     fn pose(&self, t: f64) -> Pose;
 
     /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
     /// origin of B's frame, is during `[t0, t1]` from where it would be if it went straight, at a constant rate, from where it
     /// is at `t0` to where it is at `t1`. That is at most an eighth of the greatest acceleration times the square of the time.
-    /// It must hold at every time for which [`Path::pose`] is asked, with all rounding. NaN or a negative number counts as
+    /// It must hold at every time for which [`RigidPath::pose`] is asked, with all rounding. NaN or a negative number counts as
     /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work a question
     /// takes.
     ///
@@ -25,7 +25,7 @@ pub trait Path {
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
 
-impl<P: Path + ?Sized> Path for &P {
+impl<P: RigidPath + ?Sized> RigidPath for &P {
     fn pose(&self, t: f64) -> Pose {
         (**self).pose(t)
     }
@@ -234,7 +234,7 @@ impl Motion {
 /// A point at distance r from the axis moves on an arc of angle a, and linearly along the axis and with the origin, which
 /// adds nothing. On the arc its acceleration is r a^2, for any a. Defects of rotations are linear in time, and stretch lengths
 /// by less than 2^-18.
-impl Path for Motion {
+impl RigidPath for Motion {
     fn pose(&self, t: f64) -> Pose {
         // NaN is no time; it counts as the start.
         if t.is_nan() || t <= 0.0 {
@@ -259,7 +259,12 @@ impl Path for Motion {
 
 /// Returns the sagitta of a path for any numbers, given what it is for radii of at least 0 and times in their order from 0
 /// to 1.
-fn sagitta_of(path: &impl Path, radius: f64, times: [f64; 2], within: impl Fn(f64, [f64; 2]) -> f64) -> f64 {
+fn sagitta_of(
+    path: &impl RigidPath,
+    radius: f64,
+    times: [f64; 2],
+    within: impl Fn(f64, [f64; 2]) -> f64,
+) -> f64 {
     let [t0, t1] = times;
     if !radius.is_finite() || t0.is_nan() || t1.is_nan() {
         return f64::INFINITY;
@@ -349,7 +354,7 @@ impl Polyline {
     }
 }
 
-impl Path for Polyline {
+impl RigidPath for Polyline {
     fn pose(&self, t: f64) -> Pose {
         let (number, t) = self.at(t);
         self.motions[number].pose(t)
@@ -414,8 +419,8 @@ pub(super) mod tests {
         [signed(state), signed(state), signed(state)]
     }
 
-    pub(in crate::motion) fn paths(state: &mut u64) -> Vec<Box<dyn Path>> {
-        let mut paths: Vec<Box<dyn Path>> = Vec::new();
+    pub(in crate::motion) fn paths(state: &mut u64) -> Vec<Box<dyn RigidPath>> {
+        let mut paths: Vec<Box<dyn RigidPath>> = Vec::new();
         for angle in [0.0, 1e-9, 0.1, 1.0, 3.0, 3.1] {
             let start = pose(vector(state), 3.0 * signed(state), vector(state).map(|v| 10.0 * v));
             let turned = pose(vector(state), angle, vector(state));
@@ -495,13 +500,13 @@ pub(super) mod tests {
 
     /// How far a random point is at most from where it would be on its way straight through a random interval of length
     /// 2^-level, as a share of the bound.
-    pub(in crate::motion) fn departure(path: &dyn Path, level: i32, state: &mut u64) -> f64 {
+    pub(in crate::motion) fn departure(path: &dyn RigidPath, level: i32, state: &mut u64) -> f64 {
         let size = 0.5f64.powi(level);
         let t0 = (signed(state).abs() / size).floor() * size;
         departure_between(path, [t0, (t0 + size).min(1.0)], state)
     }
 
-    fn departure_between(path: &dyn Path, [t0, t1]: [f64; 2], state: &mut u64) -> f64 {
+    fn departure_between(path: &dyn RigidPath, [t0, t1]: [f64; 2], state: &mut u64) -> f64 {
         let radius = 2.0 * signed(state).abs() + 1e-6;
         let bound = path.sagitta(radius, t0, t1);
         let p = vector(state);

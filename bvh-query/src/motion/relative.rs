@@ -1,6 +1,6 @@
 //! The path of B in A's frame when both move in the world.
 
-use crate::motion::Path;
+use crate::motion::RigidPath;
 use crate::motion::linear::{difference, length, norm};
 use crate::pose::Pose;
 
@@ -11,19 +11,19 @@ use crate::pose::Pose;
 /// Where they have none, B counts as unmoved, and the sagitta of what begins or ends there as infinite.
 #[derive(Clone, Copy)]
 pub struct RelativePath<'a> {
-    a: &'a dyn Path,
-    b: &'a dyn Path,
+    a: &'a dyn RigidPath,
+    b: &'a dyn RigidPath,
 }
 
 impl<'a> RelativePath<'a> {
     /// Returns the path of B in A's frame.
-    pub fn new(a: &'a dyn Path, b: &'a dyn Path) -> Self {
+    pub fn new(a: &'a dyn RigidPath, b: &'a dyn RigidPath) -> Self {
         Self { a, b }
     }
 }
 
 /// What stands still, in the world.
-impl Path for Pose {
+impl RigidPath for Pose {
     fn pose(&self, _t: f64) -> Pose {
         *self
     }
@@ -50,7 +50,7 @@ const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 /// Together q is within m x W / (1 - x) + m (s_a(W') + s_a(0)) + m e + m^2 |DR| |Dw| / 4 of q_lin. Where x is no less than a
 /// half, 2 m W takes the place of the first two terms. A relative pose is off by the rounding of its formulas, which subtract
 /// translations first: less than 2^-46 W, for the point and both ends, wherever in the world they are.
-impl Path for RelativePath<'_> {
+impl RigidPath for RelativePath<'_> {
     fn pose(&self, t: f64) -> Pose {
         Pose::relative(&self.a.pose(t), &self.b.pose(t)).unwrap_or(Pose::IDENTITY)
     }
@@ -61,7 +61,7 @@ impl Path for RelativePath<'_> {
         if Pose::relative(&a0, &b0).is_err() || Pose::relative(&a1, &b1).is_err() {
             return f64::INFINITY;
         }
-        let of = |path: &dyn Path, radius: f64| {
+        let of = |path: &dyn RigidPath, radius: f64| {
             let sagitta = path.sagitta(radius, t0, t1);
             if sagitta >= 0.0 { sagitta } else { f64::INFINITY }
         };
@@ -120,7 +120,7 @@ mod tests {
         let state = &mut 6;
         for path in paths(state) {
             let still = path.pose(0.3);
-            let of = |a: &dyn Path, b: &dyn Path| RelativePath::new(a, b).sagitta(1.0, 0.25, 0.5);
+            let of = |a: &dyn RigidPath, b: &dyn RigidPath| RelativePath::new(a, b).sagitta(1.0, 0.25, 0.5);
             // Poses that are farther from rigid than those of a world have no relative pose.
             if Pose::relative(&still, &still).is_err() {
                 assert_eq!(of(&still, &still), f64::INFINITY);

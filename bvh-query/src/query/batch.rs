@@ -11,7 +11,7 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::isa::Backend;
-use crate::motion::Path;
+use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
 use crate::query::motion::{MotionAnswer, MotionOptions};
@@ -41,7 +41,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// let down = |step: i32| Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, 1.0 - f64::from(step) / 64.0]);
 /// let path: Vec<Pose> = (0..100).map(down).collect::<Result<_, _>>()?;
 /// let batch = Batch::new(&triangle, &triangle)?;
-/// assert_eq!(batch.distance(&path)?[32].distance, 0.5);
+/// assert_eq!(batch.distances(&path)?[32].distance, 0.5);
 /// assert_eq!(batch.first_collision(&path)?, Some(64));
 /// # Ok(())
 /// # }
@@ -101,7 +101,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// Returns the error of the first pose that fails.
-    pub fn distance(&self, poses: &[Pose]) -> Result<Vec<Distance>, QueryError> {
+    pub fn distances(&self, poses: &[Pose]) -> Result<Vec<Distance>, QueryError> {
         self.each(poses, |querier, tracker, pose| tracker.distance(querier, self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
@@ -120,7 +120,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// Returns the error of the first pose that fails.
-    pub fn relation(&self, poses: &[Pose]) -> Result<Vec<Relation>, QueryError> {
+    pub fn relations(&self, poses: &[Pose]) -> Result<Vec<Relation>, QueryError> {
         self.each(poses, |querier, _, pose| querier.relation(self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
@@ -150,7 +150,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// Returns the error of the first path that fails.
-    pub fn motion<P: Path + Sync>(
+    pub fn motions<P: RigidPath + Sync>(
         &self,
         paths: &[P],
         options: &MotionOptions,
@@ -163,7 +163,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// Returns the error of the first path that fails.
-    pub fn is_free<P: Path + Sync>(
+    pub fn are_free<P: RigidPath + Sync>(
         &self,
         paths: &[P],
         options: &MotionOptions,

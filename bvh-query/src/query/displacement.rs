@@ -20,7 +20,7 @@ fn half_sides(object: &Object) -> [f64; 3] {
 /// Returns an upper bound of how far any vertex of B moves from one pose to another, in mesh units. So one answer about a
 /// distance shows how far B may move or turn and surely stays apart: as long as this is below
 /// [`Distance::lower`](crate::Distance::lower), the meshes do not touch. It says nothing of the way: see
-/// [`motion_reach`](crate::motion_reach).
+/// [`path_reach`](crate::path_reach).
 pub fn displacement<'a>(b: impl Into<Shape<'a>>, from: &Pose, to: &Pose) -> f64 {
     // A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
     // moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.

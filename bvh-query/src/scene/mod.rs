@@ -20,7 +20,7 @@ mod world_box;
 pub use error::{InstanceLabel, OpenSceneError, SceneError};
 pub use groups::Groups;
 pub use instance::{InstanceId, SceneShape};
-pub use motion::SceneMotion;
+pub use motion::SceneMotionAnswer;
 pub use probe::{SceneClosestPoint, SceneRayHit};
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
@@ -44,7 +44,7 @@ use world_box::WorldBox;
 /// Many placed shapes, and questions over all pairs that are asked about.
 ///
 /// An instance is a shape with its pose in the world. A question is over each pair of instances whose [`Groups`] meet and
-/// whose contact is not allowed ([`Scene::allow`]). Of a pair, the lower [`InstanceId`] is A, and the answer about it is
+/// whose contact is not allowed ([`Scene::set_allowed`]). Of a pair, the lower [`InstanceId`] is A, and the answer about it is
 /// that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers come in ascending order
 /// of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of threads, nor on what was
 /// asked before. Which error a question ends with, if a page is damaged, may depend on the latter two where the answer can do
@@ -71,10 +71,10 @@ use world_box::WorldBox;
 /// let floor = scene.add(shape.clone(), at(0.0)?)?;
 /// let part = scene.add(shape, at(2.0)?)?;
 /// assert!(!scene.collide()?);
-/// assert_eq!(scene.distance()?.map(|nearest| nearest.distance.distance), Some(2.0));
+/// assert_eq!(scene.distance()?.map(|nearest| nearest.nearest.distance), Some(2.0));
 /// scene.set_pose(part, at(0.0)?)?;
 /// assert_eq!(scene.pairs_in_contact()?.len(), 1);
-/// scene.allow(floor, part, true)?;
+/// scene.set_allowed(floor, part, true)?;
 /// assert!(!scene.collide()?);
 /// # Ok(())
 /// # }
@@ -334,11 +334,11 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::NoInstance`].
-    pub fn allow(&mut self, a: InstanceId, b: InstanceId, may_touch: bool) -> Result<(), SceneError> {
+    pub fn set_allowed(&mut self, a: InstanceId, b: InstanceId, allowed: bool) -> Result<(), SceneError> {
         let places = [(self.place(a)?, b.place), (self.place(b)?, a.place)];
         for (own, other) in places {
             let Some(instance) = &mut self.instances[own] else { continue };
-            match (instance.allowed.binary_search(&other), may_touch) {
+            match (instance.allowed.binary_search(&other), allowed) {
                 (Err(at), true) => instance.allowed.insert(at, other),
                 (Ok(at), false) => {
                     instance.allowed.remove(at);
@@ -388,7 +388,7 @@ impl Scene {
         Ok(self.instance(id)?.groups)
     }
 
-    /// Returns the pairs that [`Scene::allow`] lets touch, in ascending order.
+    /// Returns the pairs that [`Scene::set_allowed`] lets touch, in ascending order.
     pub fn allowed(&self) -> impl Iterator<Item = ScenePair> {
         self.instances().flat_map(move |a| {
             let allowed = self.instances[a.place as usize].iter().flat_map(|instance| &instance.allowed);

@@ -6,7 +6,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::motion::{Path, RelativePath};
+use crate::motion::{RelativePath, RigidPath};
 use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
 use crate::query::querier::Querier;
 use crate::scene::instance::{Instance, InstanceId};
@@ -23,7 +23,7 @@ const MOST_SLICES: usize = 16;
 /// Whether the ways of all moving instances are free. In the pairs named here, A is the one that stands still or, if both
 /// move, the lower one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SceneMotion {
+pub enum SceneMotionAnswer {
     /// At no time from 0 to 1 is any pair within the clearance.
     Free,
     /// A pair is within the clearance in the poses at `touching_at`.
@@ -33,7 +33,7 @@ pub enum SceneMotion {
         /// A time at which the pair is: the earliest one found.
         touching_at: f64,
         /// The pair, and its distance at that time. Of several, the first pair.
-        contact: SceneDistance,
+        nearest: SceneDistance,
     },
     /// A pair comes so near that neither can be told, as for [`MotionAnswer::Near`].
     Near {
@@ -42,12 +42,12 @@ pub enum SceneMotion {
         /// The time of the first undecided poses.
         at: f64,
         /// The pair, and its distance at that time.
-        distance: SceneDistance,
+        nearest: SceneDistance,
     },
 }
 
 /// A path in the world that threads share.
-type WorldPath<'a> = &'a (dyn Path + Sync);
+type WorldPath<'a> = &'a (dyn RigidPath + Sync);
 
 /// A pair to ask about: places of instances, and the first slice in which their boxes come near each other.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +101,7 @@ impl Scene {
         &mut self,
         paths: &[(InstanceId, WorldPath<'_>)],
         options: &MotionOptions,
-    ) -> Result<SceneMotion, SceneError> {
+    ) -> Result<SceneMotionAnswer, SceneError> {
         let ways = self.ways(paths, options)?;
         let earliest = Earliest::new();
         let mut together = Together::default();
@@ -122,7 +122,7 @@ impl Scene {
         }
     }
 
-    /// Returns whether the ways are certainly free: whether [`Scene::motion`] answers [`SceneMotion::Free`], which takes less
+    /// Returns whether the ways are certainly free: whether [`Scene::motion`] answers [`SceneMotionAnswer::Free`], which takes less
     /// time to find out. This is what planners ask. To check many edges on all cores, clone the scene for each thread.
     ///
     /// # Errors
@@ -272,7 +272,13 @@ impl Scene {
     fn each_way<R: Send>(
         &mut self,
         ways: &Ways<'_>,
-        ask: impl Fn(&mut Querier, ScenePair, Shape<'_>, Shape<'_>, &dyn Path) -> Result<Option<R>, QueryError>
+        ask: impl Fn(
+            &mut Querier,
+            ScenePair,
+            Shape<'_>,
+            Shape<'_>,
+            &dyn RigidPath,
+        ) -> Result<Option<R>, QueryError>
         + Sync,
         mut adopt: impl FnMut(Vec<R>) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
@@ -306,7 +312,7 @@ impl Scene {
 
 impl Ways<'_> {
     /// Returns the path of an instance, which may be its pose.
-    fn path<'a>(&'a self, place: u32, instance: &'a Instance) -> &'a dyn Path {
+    fn path<'a>(&'a self, place: u32, instance: &'a Instance) -> &'a dyn RigidPath {
         match self.paths.get(&place) {
             Some(&path) => path,
             None => &instance.world,
@@ -340,14 +346,14 @@ impl Default for Together {
 impl Together {
     fn add(&mut self, answers: Vec<(ScenePair, Result<MotionAnswer, EndedByError>)>) {
         for (pair, answer) in answers {
-            let of = |time: f64, distance| (time, SceneDistance { pair, distance });
+            let of = |time: f64, distance| (time, SceneDistance { pair, nearest: distance });
             let (free_until, found, first) = match answer {
                 Ok(MotionAnswer::Free) => continue,
-                Ok(MotionAnswer::Hit { free_until, touching_at, contact }) => {
-                    (free_until, of(touching_at, contact), &mut self.hit)
+                Ok(MotionAnswer::Hit { free_until, touching_at, nearest }) => {
+                    (free_until, of(touching_at, nearest), &mut self.hit)
                 }
-                Ok(MotionAnswer::Near { free_until, at, distance }) => {
-                    (free_until, of(at, distance), &mut self.near)
+                Ok(MotionAnswer::Near { free_until, at, nearest }) => {
+                    (free_until, of(at, nearest), &mut self.near)
                 }
                 Err(ended) => {
                     self.errors.push((pair, ended));
@@ -379,12 +385,12 @@ impl Together {
         Some((pair, ended.error))
     }
 
-    fn answer(&self) -> SceneMotion {
+    fn answer(&self) -> SceneMotionAnswer {
         let free_until = self.free_until;
         match (self.hit, self.near) {
-            (Some((touching_at, contact)), _) => SceneMotion::Hit { free_until, touching_at, contact },
-            (None, Some((at, distance))) => SceneMotion::Near { free_until, at, distance },
-            (None, None) => SceneMotion::Free,
+            (Some((touching_at, nearest)), _) => SceneMotionAnswer::Hit { free_until, touching_at, nearest },
+            (None, Some((at, nearest))) => SceneMotionAnswer::Near { free_until, at, nearest },
+            (None, None) => SceneMotionAnswer::Free,
         }
     }
 }

@@ -128,12 +128,12 @@ impl Scene {
         })
     }
 
-    /// Returns whether each of many closed segments in the world meets any instance: see [`Querier::meets_segment`].
+    /// Returns whether each of many closed segments in the world meets any instance: see [`Querier::segment_hit`].
     ///
     /// # Errors
-    /// [`SceneError::Query`] for ends that [`Querier::meets_segment`] refuses, and [`SceneError::Instance`] with an instance
+    /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an instance
     /// whose question has no answer; of several segments, the first one's error.
-    pub fn meet_segments(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
+    pub fn segment_hits(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
         self.each_probe(segments, |asked, [from, to]| {
             let mut question = MeetsSegment::new(*from, *to)?;
             asked.line(&mut question)?;

@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A pair of instances; A is the lower one, but in answers about motions ([`SceneMotion`](crate::SceneMotion)) one that stands
+/// A pair of instances; A is the lower one, but in answers about motions ([`SceneMotionAnswer`](crate::SceneMotionAnswer)) one that stands
 /// still.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct ScenePair {
@@ -43,7 +43,7 @@ pub struct SceneDistance {
     /// The instances. Of pairs that are equally near, the first.
     pub pair: ScenePair,
     /// The answer of [`Querier::distance`].
-    pub distance: Distance,
+    pub nearest: Distance,
 }
 
 /// How many pairs of a question are known at a time: 1.5 MiB of them. If more are near each other, the pairs of one instance
@@ -236,7 +236,7 @@ impl Scene {
         }
         let mut next = Next::All;
         let limit =
-            |nearest: &Option<SceneDistance>| nearest.map_or(f64::INFINITY, |held| held.distance.upper);
+            |nearest: &Option<SceneDistance>| nearest.map_or(f64::INFINITY, |held| held.nearest.upper);
         while let Some(mut candidates) = self.next_piece(&mut next, limit(&nearest))? {
             nearest_first(&mut candidates);
             for run in candidates.chunks(self.workers.threads()) {
@@ -280,20 +280,20 @@ impl Scene {
         nearest: &mut Option<SceneDistance>,
         candidates: &[Candidate],
     ) -> Result<(), SceneError> {
-        let limit = nearest.map_or(f64::INFINITY, |held| held.distance.upper);
+        let limit = nearest.map_or(f64::INFINITY, |held| held.nearest.upper);
         // Where the pair held touches, only an earlier one can take its place.
         let is_beaten = |pair: ScenePair| {
-            nearest.is_some_and(|held| held.pair == pair || held.distance.distance == 0.0 && held.pair < pair)
+            nearest.is_some_and(|held| held.pair == pair || held.nearest.distance == 0.0 && held.pair < pair)
         };
         let found = self.each(candidates, |querier, pair| {
             if is_beaten(pair.ids) {
                 return Ok(None);
             }
             let found = querier.distance_below(pair.a, pair.b, &pair.pose, limit)?;
-            Ok(found.map(|distance| SceneDistance { pair: pair.ids, distance }))
+            Ok(found.map(|distance| SceneDistance { pair: pair.ids, nearest: distance }))
         })?;
         for found in found {
-            let order = |of: &SceneDistance| (of.distance.distance, of.pair);
+            let order = |of: &SceneDistance| (of.nearest.distance, of.pair);
             if nearest.is_none_or(|held| order(&found) < order(&held)) {
                 *nearest = Some(found);
             }

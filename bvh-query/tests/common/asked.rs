@@ -73,7 +73,7 @@ pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) 
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
-            segment: querier.meets_segment(at, point, [0.1, 0.2, -0.3]),
+            segment: querier.segment_hit(at, point, [0.1, 0.2, -0.3]),
         }
     };
     Some([ask(&bvh, good), ask(good, &bvh)])

@@ -298,8 +298,8 @@ fn batches_of_all_probes_have_the_same_answers() {
         let expected: Vec<_> = rays.iter().map(|ray| q.all_hits(shape, ray).unwrap()).collect();
         assert_eq!(batch.all_hits(&rays), Ok(expected));
         let expected: Vec<_> =
-            segments.iter().map(|[p, q_]| q.meets_segment(shape, *p, *q_).unwrap()).collect();
-        assert_eq!(batch.meet_segments(&segments), Ok(expected));
+            segments.iter().map(|[p, q_]| q.segment_hit(shape, *p, *q_).unwrap()).collect();
+        assert_eq!(batch.segment_hits(&segments), Ok(expected));
     }
     let mut bad = rays.clone();
     bad[300].direction = [0.0; 3];

@@ -46,9 +46,9 @@ fn labelled_segments_meet_what_they_should() {
     each_label(&MESHES, "segments", |bvh, [a, b, c, d, e, f], label, line| {
         let label = number(label, "hit") == 1.0;
         for querier in &mut queriers {
-            let found = querier.meets_segment(bvh, [a, b, c], [d, e, f]).unwrap();
+            let found = querier.segment_hit(bvh, [a, b, c], [d, e, f]).unwrap();
             assert_eq!(found, label, "{line} {:?}", querier.backend());
-            assert_eq!(querier.meets_segment(bvh, [d, e, f], [a, b, c]), Ok(found), "{line}");
+            assert_eq!(querier.segment_hit(bvh, [d, e, f], [a, b, c]), Ok(found), "{line}");
         }
         met += u32::from(label);
         all += 1;
@@ -131,7 +131,7 @@ fn hard_segments_meet_what_rationals_say() {
             });
             for querier in &mut queriers {
                 let what = format!("{} {from:?} {to:?} {:?}", mesh_of.name, querier.backend());
-                assert_eq!(querier.meets_segment(shape, from, to), Ok(expected), "{what}");
+                assert_eq!(querier.segment_hit(shape, from, to), Ok(expected), "{what}");
             }
             asked += 1;
             met += u32::from(expected);
@@ -192,8 +192,8 @@ fn numbers_that_mean_nothing_are_refused() {
         let far = Ray::new([2f64.powi(120), 0.0, 0.0], [-(2f64.powi(500)), 0.0, 0.0]);
         assert_eq!(querier.first_hit(&bvh, &far).unwrap().unwrap().t, 2f64.powi(-380));
         assert!(querier.any_hit(&bvh, &Ray::new([0.0; 3], [2f64.powi(-500), 0.0, 0.0])).unwrap());
-        assert_eq!(querier.meets_segment(&bvh, [0.0; 3], [0.0; 3]), Ok(false));
-        assert_eq!(querier.meets_segment(&bvh, [1.0; 3], [1.0; 3]), Ok(true));
-        assert!(querier.meets_segment(&bvh, [0.0; 3], [f64::NAN; 3]).is_err());
+        assert_eq!(querier.segment_hit(&bvh, [0.0; 3], [0.0; 3]), Ok(false));
+        assert_eq!(querier.segment_hit(&bvh, [1.0; 3], [1.0; 3]), Ok(true));
+        assert!(querier.segment_hit(&bvh, [0.0; 3], [f64::NAN; 3]).is_err());
     }
 }

@@ -95,7 +95,7 @@ fn a_batch_has_the_relations_of_its_poses() {
     assert!(
         [Relation::BInA, Relation::Touching, Relation::Apart].iter().all(|found| expected.contains(found))
     );
-    assert_eq!(bvh_query::Batch::new(&cube, &ball).unwrap().relation(&poses), Ok(expected));
+    assert_eq!(bvh_query::Batch::new(&cube, &ball).unwrap().relations(&poses), Ok(expected));
 }
 
 /// Random poses of closed meshes: of those that do not touch, rationals tell for one corner of each component.

@@ -39,7 +39,7 @@ fn a_scene_file_is_the_scene_of_its_instances() {
     opened.set_groups(turned, Groups::ALL).unwrap();
     built.set_groups(turned, Groups::ALL).unwrap();
     assert_eq!(ask(&mut opened), ask(&mut built));
-    assert_eq!(opened.distance().unwrap().unwrap().distance.distance, 0.0);
+    assert_eq!(opened.distance().unwrap().unwrap().nearest.distance, 0.0);
 
     let plain = path.with_file_name("ok-plain.cbvh");
     let said = Scene::open(&plain).unwrap_err().to_string();

@@ -136,7 +136,7 @@ fn ask(scene: &mut Scene) -> Answers {
         in_contact: pairs(scene.pairs_in_contact().unwrap()),
         within: pairs(scene.pairs_within(D).unwrap()),
         contacts: contacts.into_iter().map(|of| (of.pair.a, of.pair.b, of.contact)).collect(),
-        distance: scene.distance().unwrap().map(|of| (of.pair.a, of.pair.b, of.distance)),
+        distance: scene.distance().unwrap().map(|of| (of.pair.a, of.pair.b, of.nearest)),
     };
     assert_eq!(scene.collide().unwrap(), !answers.in_contact.is_empty());
     assert_eq!(scene.within(D).unwrap(), !answers.within.is_empty());
@@ -212,7 +212,7 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
                         placed[own].allowed.push(other);
                     }
                 }
-                scenes.iter_mut().for_each(|scene| scene.allow(a, b, allows).unwrap());
+                scenes.iter_mut().for_each(|scene| scene.set_allowed(a, b, allows).unwrap());
             }
             let expected = brute_force(&placed, &mut querier);
             touching += expected.in_contact.len();
@@ -288,7 +288,7 @@ fn of_equally_near_pairs_the_first_is_the_answer() {
         assert_eq!(scene.distance().unwrap().unwrap().pair, ScenePair { a: ids[1], b: ids[2] });
         scene.set_pose(ids[2], at(6.0)).unwrap();
         let found = scene.clone().distance().unwrap().unwrap();
-        assert_eq!((found.pair, found.distance.distance), (first, 1.0));
+        assert_eq!((found.pair, found.nearest.distance), (first, 1.0));
         assert_eq!(scene.distance().unwrap(), Some(found));
         // Of the pair that was nearest in the last question, the answer is kept; the other one is asked about.
         assert_eq!((scene.distance().unwrap(), scene.pairs_asked()), (Some(found), 2));
@@ -444,8 +444,8 @@ fn bad_instances_are_refused_and_change_nothing() {
     for refused in [
         scene.set_pose(tip, Pose::IDENTITY),
         scene.set_groups(tip, Groups::ALL),
-        scene.allow(base, tip, true),
-        scene.allow(tip, base, true),
+        scene.set_allowed(base, tip, true),
+        scene.set_allowed(tip, base, true),
         scene.remove(tip),
     ] {
         assert_eq!(refused, Err(SceneError::NoInstance(tip)));

@@ -4,8 +4,8 @@ use super::common::shapes::{cube, plate, sphere, torus};
 use super::common::{Random, random_pose};
 use super::{Triangle, shape};
 use bvh_query::{
-    Backend, Distance, Groups, InstanceId, Motion, MotionAnswer, MotionOptions, OwnedShape, Path, Pose,
-    Querier, QueryError, RelativePath, Scene, SceneError, SceneMotion,
+    Backend, Distance, Groups, InstanceId, Motion, MotionAnswer, MotionOptions, OwnedShape, Pose, Querier,
+    QueryError, RelativePath, RigidPath, Scene, SceneError, SceneMotionAnswer,
 };
 use cbvh_testkit::depth::rounds;
 
@@ -23,7 +23,7 @@ struct Placed {
 }
 
 impl Placed {
-    fn path(&self) -> &dyn Path {
+    fn path(&self) -> &dyn RigidPath {
         self.path.as_ref().map_or(&self.world, |path| path)
     }
 }
@@ -31,13 +31,15 @@ impl Placed {
 /// An answer that is not free: whether it is a hit, until when the ways are free, the time, the pair and its distance.
 type Told = (bool, f64, f64, (InstanceId, InstanceId), Distance);
 
-fn told(answer: SceneMotion) -> Option<Told> {
+fn told(answer: SceneMotionAnswer) -> Option<Told> {
     let (is_hit, free_until, time, of) = match answer {
-        SceneMotion::Free => return None,
-        SceneMotion::Hit { free_until, touching_at, contact } => (true, free_until, touching_at, contact),
-        SceneMotion::Near { free_until, at, distance } => (false, free_until, at, distance),
+        SceneMotionAnswer::Free => return None,
+        SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
+            (true, free_until, touching_at, nearest)
+        }
+        SceneMotionAnswer::Near { free_until, at, nearest } => (false, free_until, at, nearest),
     };
-    Some((is_hit, free_until, time, (of.pair.a, of.pair.b), of.distance))
+    Some((is_hit, free_until, time, (of.pair.a, of.pair.b), of.nearest))
 }
 
 /// The answers about all pairs, put together: the earliest hit, else the earliest undecided pose.
@@ -56,11 +58,11 @@ fn pair_by_pair(placed: &[Placed], allowed: [InstanceId; 2], options: &MotionOpt
             let pair = (a.id, b.id);
             answers.extend(match querier.motion(a.shape.shape(), b.shape.shape(), &path, options).unwrap() {
                 MotionAnswer::Free => None,
-                MotionAnswer::Hit { free_until, touching_at, contact } => {
-                    Some((true, free_until, touching_at, pair, contact))
+                MotionAnswer::Hit { free_until, touching_at, nearest } => {
+                    Some((true, free_until, touching_at, pair, nearest))
                 }
-                MotionAnswer::Near { free_until, at, distance } => {
-                    Some((false, free_until, at, pair, distance))
+                MotionAnswer::Near { free_until, at, nearest } => {
+                    Some((false, free_until, at, pair, nearest))
                 }
             });
         }
@@ -106,16 +108,16 @@ fn answers_are_those_of_the_pairs_put_together() {
             placed.push(Placed { id: id.unwrap(), shape, world, groups, path });
         }
         let allowed = [placed[0].id, placed[count - 1].id];
-        let paths: Vec<(InstanceId, &(dyn Path + Sync))> = placed
+        let paths: Vec<(InstanceId, &(dyn RigidPath + Sync))> = placed
             .iter()
-            .filter_map(|one| Some((one.id, one.path.as_ref()? as &(dyn Path + Sync))))
+            .filter_map(|one| Some((one.id, one.path.as_ref()? as &(dyn RigidPath + Sync))))
             .collect();
         let options = MotionOptions::new()
             .clearance([0.0, 0.1][random.below(2)])
             .tolerance([1e-3, 0.3][random.below(2)]);
         let expected = pair_by_pair(&placed, allowed, &options);
         for scene in &mut scenes {
-            scene.allow(allowed[0], allowed[1], true).unwrap();
+            scene.set_allowed(allowed[0], allowed[1], true).unwrap();
             let answer = scene.motion(&paths, &options).unwrap();
             assert_eq!(told(answer), expected, "round {round}");
             assert_eq!(scene.is_free(&paths, &options), Ok(expected.is_none()), "round {round}");
@@ -155,9 +157,9 @@ fn two_that_change_places_meet_and_two_side_by_side_do_not() {
         [way(at(-9.0, 0.0, 0.0), at(9.0, 0.0, 0.0)), way(at(9.0, 0.0, 0.0), at(-9.0, 0.0, 0.0))];
     let options = MotionOptions::new();
     let answer = scene.motion(&[(ids[0], &there), (ids[1], &back)], &options).unwrap();
-    let Some((true, free_until, touching_at, pair, contact)) = told(answer) else { panic!("{answer:?}") };
+    let Some((true, free_until, touching_at, pair, nearest)) = told(answer) else { panic!("{answer:?}") };
     assert!(free_until <= 8.0 / 18.0 && touching_at >= 8.0 / 18.0 - 1e-15 && touching_at - free_until < 1e-6);
-    assert_eq!((pair, contact.distance), ((ids[0], ids[1]), 0.0));
+    assert_eq!((pair, nearest.distance), ((ids[0], ids[1]), 0.0));
     // What stands still is A.
     let answer = scene.motion(&[(ids[0], &there)], &options).unwrap();
     let Some((true, _, touching_at, pair, _)) = told(answer) else { panic!("{answer:?}") };
@@ -166,14 +168,14 @@ fn two_that_change_places_meet_and_two_side_by_side_do_not() {
     let axis = [0.3, -0.2, 1.0];
     let starts = [at(0.0, 0.0, 0.0), at(2.002, 0.0, 0.0)];
     let turns = starts.map(|start| Motion::screw(&start, [5.0, 1.0, 0.0], axis, 4.0, 3.0).unwrap());
-    let paths = [(ids[0], &turns[0] as &(dyn Path + Sync)), (ids[1], &turns[1])];
-    assert_eq!(scene.motion(&paths, &options), Ok(SceneMotion::Free));
+    let paths = [(ids[0], &turns[0] as &(dyn RigidPath + Sync)), (ids[1], &turns[1])];
+    assert_eq!(scene.motion(&paths, &options), Ok(SceneMotionAnswer::Free));
     assert_eq!(scene.is_free(&paths, &options), Ok(true));
     // A path that is named later counts; nobody on a path is no motion.
     let stays = at(50.0, 0.0, 0.0);
-    assert_eq!(scene.motion(&[(ids[0], &there), (ids[0], &stays)], &options), Ok(SceneMotion::Free));
+    assert_eq!(scene.motion(&[(ids[0], &there), (ids[0], &stays)], &options), Ok(SceneMotionAnswer::Free));
     scene.set_pose(ids[1], at(-9.0, 0.0, 0.0)).unwrap();
-    assert_eq!(scene.motion(&[], &options), Ok(SceneMotion::Free));
+    assert_eq!(scene.motion(&[], &options), Ok(SceneMotionAnswer::Free));
 }
 
 #[test]
@@ -183,7 +185,7 @@ fn what_means_nothing_is_refused() {
     let still = scene.add_named("wall", block.clone(), at(0.0, 0.0, 0.0)).unwrap();
     let id = scene.add_named("part", block, at(9.0, 0.0, 0.0)).unwrap();
     let through = Motion::between(&at(9.0, 0.0, 0.0), &at(-9.0, 0.0, 0.0)).unwrap();
-    let mut refused = |path: &(dyn Path + Sync), options: MotionOptions| {
+    let mut refused = |path: &(dyn RigidPath + Sync), options: MotionOptions| {
         let error = scene.motion(&[(id, path)], &options).unwrap_err();
         assert_eq!(scene.is_free(&[(id, path)], &options).unwrap_err().to_string(), error.to_string());
         error
@@ -201,7 +203,7 @@ fn what_means_nothing_is_refused() {
     );
     /// In the middle, less rigid than a scene's poses are.
     struct Gap;
-    impl Path for Gap {
+    impl RigidPath for Gap {
         fn pose(&self, t: f64) -> Pose {
             let sheared = [[1.0, 9e-7, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let rotation = if t == 0.5 { sheared } else { *Pose::IDENTITY.rotation() };
@@ -212,7 +214,7 @@ fn what_means_nothing_is_refused() {
         }
     }
     // A shear that queries take, and scenes do not: it moves nothing far enough to matter, and has a relative pose.
-    assert_eq!(scene.motion(&[(id, &Gap)], &MotionOptions::new()), Ok(SceneMotion::Free));
+    assert_eq!(scene.motion(&[(id, &Gap)], &MotionOptions::new()), Ok(SceneMotionAnswer::Free));
     // The broad phase looks at the path and at three boxes.
     for budget in [3, 7] {
         scene.set_budget(budget);
@@ -224,7 +226,7 @@ fn what_means_nothing_is_refused() {
     }
     scene.set_budget(u64::MAX);
     scene.remove(still).unwrap();
-    assert_eq!(scene.motion(&[(id, &through)], &MotionOptions::new()), Ok(SceneMotion::Free));
+    assert_eq!(scene.motion(&[(id, &through)], &MotionOptions::new()), Ok(SceneMotionAnswer::Free));
     let error = scene.motion(&[(still, &through)], &MotionOptions::new()).unwrap_err();
     assert_eq!(error, SceneError::NoInstance(still));
 }
@@ -235,7 +237,7 @@ struct Lost {
     until: f64,
 }
 
-impl Path for Lost {
+impl RigidPath for Lost {
     fn pose(&self, t: f64) -> Pose {
         at(self.from + t, 0.0, 0.0)
     }
@@ -283,11 +285,11 @@ fn motions_far_from_the_origin_have_answers() {
         let answer = scene.motion(&[(mover, &past(0.5))], &MotionOptions::new()).unwrap();
         let Some((true, _, touching_at, pair, _)) = told(answer) else { panic!("{answer:?} at {far}") };
         assert!((touching_at - 0.3).abs() < 1e-6 && pair == (still, mover));
-        assert_eq!(scene.motion(&[(mover, &past(2.1))], &MotionOptions::new()), Ok(SceneMotion::Free));
+        assert_eq!(scene.motion(&[(mover, &past(2.1))], &MotionOptions::new()), Ok(SceneMotionAnswer::Free));
         let turned = Pose::from_quaternion([0.0, 0.0, 0.6, 0.8], [far, -far, 0.0]).unwrap();
         let turns = Motion::between(&at(far, -far, 0.0), &turned).unwrap();
         let away = Motion::between(&at(far + 3.0, -far, 0.0), &at(far + 3.5, -far, 1.0)).unwrap();
         let answer = scene.motion(&[(still, &turns), (mover, &away)], &MotionOptions::new());
-        assert_eq!(answer, Ok(SceneMotion::Free), "at {far}");
+        assert_eq!(answer, Ok(SceneMotionAnswer::Free), "at {far}");
     }
 }

@@ -58,7 +58,7 @@ fn probes_of_a_scene_are_those_of_its_instances() {
             let first = scene.first_hits(&rays).unwrap();
             let any = scene.any_hits(&rays).unwrap();
             let all = scene.all_hits(&rays).unwrap();
-            let meet = scene.meet_segments(&segments).unwrap();
+            let meet = scene.segment_hits(&segments).unwrap();
             let (mut inside, mut hit) = (0, 0);
             for number in 0..points.len() {
                 let (point, ray, [from, to]) = (points[number], rays[number], segments[number]);
@@ -83,7 +83,7 @@ fn probes_of_a_scene_are_those_of_its_instances() {
                         t = t.min(found.t);
                     }
                     hits += querier.all_hits(at, &ray).unwrap().len();
-                    met |= querier.meets_segment(at, from, to).unwrap();
+                    met |= querier.segment_hit(at, from, to).unwrap();
                 }
                 let (distance, id, triangle) = nearest.unwrap();
                 let found = closest[number].unwrap();

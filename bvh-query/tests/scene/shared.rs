@@ -79,7 +79,7 @@ fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
                 let (member, meets) = if moves { (1, 3) } else { (2, 1) };
                 scene.set_groups(id, Groups { member, meets }).unwrap();
             }
-            shared.allowed.iter().for_each(|&(a, b)| scene.allow(ids[a], ids[b], true).unwrap());
+            shared.allowed.iter().for_each(|&(a, b)| scene.set_allowed(ids[a], ids[b], true).unwrap());
         }
         let mut worlds: Vec<Pose> = shared.instances.iter().map(|(_, _, world)| *world).collect();
         let mut querier = Querier::new().unwrap();
@@ -134,9 +134,9 @@ fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
                     assert_eq!(pairs(scene.pairs_within(0.02).unwrap()), expected.within, "{name} {number}");
                     assert_eq!(scene.collide().unwrap(), !expected.in_contact.is_empty());
                     let found = scene.distance().unwrap().unwrap();
-                    assert_eq!(found.distance.distance == 0.0, !expected.in_contact.is_empty());
+                    assert_eq!(found.nearest.distance == 0.0, !expected.in_contact.is_empty());
                     if asks_distance {
-                        let found = (found.distance.distance, found.pair.a, found.pair.b);
+                        let found = (found.nearest.distance, found.pair.a, found.pair.b);
                         assert_eq!(Some(found), nearest, "{name} {number}");
                     }
                 });

@@ -50,7 +50,7 @@ fn bake(path: &Path, mesh: &Mesh, options: &Options) -> Result<Baked, Failure> {
     let failed = |error: &BakeError| Failure::from_bake(&path.display().to_string(), error);
     let (bytes, report) = to_bytes(mesh, options).map_err(|error| failed(&error))?;
     let bvh = Bvh::from_bytes(bytes).map_err(|error| failed(&BakeError::Unproved(error)))?;
-    bvh.check_all().map_err(|error| Failure::invalid(path, error))?;
+    bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     Ok((Arc::new(bvh), report))
 }
 

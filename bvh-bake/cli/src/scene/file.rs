@@ -178,7 +178,7 @@ impl LoadedScene {
 pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
     let start = Instant::now();
     let bvh = Arc::new(Bvh::open(path)?);
-    bvh.check_all().map_err(|error| Failure::invalid(path, error))?;
+    bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
     let scene = scene.map_err(|error| Failure::invalid(path, error))?;
     let records = bvh.objects().iter().map(|object| object.record());
@@ -239,7 +239,7 @@ pub(super) fn load(
         }
     }
     for &(a, b) in &text.allowed {
-        loaded.scene.allow(ids[a], ids[b], true).map_err(refused)?;
+        loaded.scene.set_allowed(ids[a], ids[b], true).map_err(refused)?;
     }
     Ok(loaded)
 }

@@ -180,7 +180,7 @@ impl Answer {
         match self {
             Self::Flag(flag) => f64::from(u8::from(*flag)),
             Self::Pairs(pairs) => pairs.len() as f64,
-            Self::Nearest(nearest, _) => nearest.map_or(f64::INFINITY, |of| of.distance.distance),
+            Self::Nearest(nearest, _) => nearest.map_or(f64::INFINITY, |of| of.nearest.distance),
         }
     }
 
@@ -227,7 +227,7 @@ impl Question {
                     Some(backend) => others(scene, found.map(|of| of.pair), backend)?,
                     None => Vec::new(),
                 };
-                if let Some(SceneDistance { pair, distance, .. }) = &mut found {
+                if let Some(SceneDistance { pair, nearest: distance, .. }) = &mut found {
                     let world = scene.pose(pair.a)?;
                     distance.point_a = world.place(distance.point_a);
                     distance.point_b = world.place(distance.point_b);

@@ -96,7 +96,7 @@ pub(super) fn json(scene: &LoadedScene, frame: usize, answer: &Answer) -> Value 
         Answer::Pairs(pairs) => json!({ "pairs": pairs.iter().map(related).collect::<Vec<_>>() }),
         Answer::Nearest(None, _) => json!({ "distance": null }),
         Answer::Nearest(Some(of), _) => {
-            let mut record = distance_json(&of.distance);
+            let mut record = distance_json(&of.nearest);
             record["a"] = json!(name(of.pair.a));
             record["b"] = json!(name(of.pair.b));
             record
@@ -137,7 +137,7 @@ pub(super) fn list(scene: &LoadedScene, question: &Question, number: usize, answ
         Answer::Nearest(Some(of), others) => {
             let line = |pair, distance| format!("{} {} mesh units apart", names(pair), significant(distance));
             let others = others.iter().map(|(pair, distance)| format!("\n  {}", line(pair, *distance)));
-            line(&of.pair, of.distance.distance) + &others.collect::<String>()
+            line(&of.pair, of.nearest.distance) + &others.collect::<String>()
         }
     };
     format!("frame {number}: {text}")

@@ -208,10 +208,10 @@ pub extern "C" fn cbvh_scene_set_groups(
     with(scene, |scene| Ok(scene.set_groups(instance.into(), Groups { member, meets })?))
 }
 
-/// `cbvh_scene_allow`.
+/// `cbvh_scene_set_allowed`.
 #[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_allow(scene: SceneHandle, a: Instance, b: Instance, may_touch: i32) -> i32 {
-    with(scene, |scene| Ok(scene.allow(a.into(), b.into(), flag("may_touch", may_touch)?)?))
+pub extern "C" fn cbvh_scene_set_allowed(scene: SceneHandle, a: Instance, b: Instance, allowed: i32) -> i32 {
+    with(scene, |scene| Ok(scene.set_allowed(a.into(), b.into(), flag("allowed", allowed)?)?))
 }
 
 /// `cbvh_scene_find`.

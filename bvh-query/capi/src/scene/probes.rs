@@ -130,9 +130,9 @@ pub unsafe extern "C" fn cbvh_scene_all_hits(
     })
 }
 
-/// `cbvh_scene_meet_segments`.
+/// `cbvh_scene_segment_hits`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_meet_segments(
+pub unsafe extern "C" fn cbvh_scene_segment_hits(
     scene: SceneHandle,
     given: *const SegmentRow,
     count: usize,
@@ -141,6 +141,6 @@ pub unsafe extern "C" fn cbvh_scene_meet_segments(
     // SAFETY: the header asks for it.
     unsafe {
         let read = |into: &mut _| segments(given, count, into);
-        each(scene, (answers, read), |scene, segments| scene.meet_segments(segments), |answer| answer)
+        each(scene, (answers, read), |scene, segments| scene.segment_hits(segments), |answer| answer)
     }
 }

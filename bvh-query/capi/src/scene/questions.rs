@@ -9,7 +9,7 @@ use crate::types::{
     Instance, MotionChoices, MotionRow, PairRow, PathHandle, SceneContactRow, SceneDistanceRow, SceneHandle,
     SceneRelationRow,
 };
-use bvh_query::{InstanceId, MotionOptions, Path, Scene, SceneError};
+use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
 /// Asks a question with one answer.
 ///
@@ -148,7 +148,11 @@ impl Ways {
         &self,
         scene: SceneHandle,
         answer: *mut R,
-        ask: impl FnOnce(&mut Scene, &[(InstanceId, &(dyn Path + Sync))], &MotionOptions) -> Result<R, SceneError>,
+        ask: impl FnOnce(
+            &mut Scene,
+            &[(InstanceId, &(dyn RigidPath + Sync))],
+            &MotionOptions,
+        ) -> Result<R, SceneError>,
     ) -> i32 {
         with(scene, |scene| {
             // SAFETY: the caller vouches for it.
@@ -162,7 +166,7 @@ impl Ways {
             };
             each_once(instances)?;
             let asked: Vec<AskedPath> = AskedPath::many("paths", paths)?;
-            let path = |path| path as &(dyn Path + Sync);
+            let path = |path| path as &(dyn RigidPath + Sync);
             let ids = instances.iter().map(|&instance| InstanceId::from(instance));
             let ways: Vec<_> = ids.zip(asked.iter().map(path)).collect();
             let found = ask(scene, &ways, &options);

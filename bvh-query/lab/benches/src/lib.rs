@@ -13,7 +13,7 @@ pub fn ball(triangles: u64) -> Mesh {
 /// Returns the baked mesh with all pages checked.
 pub fn bake(mesh: &Mesh) -> Bvh {
     let bvh = Bvh::from_bytes(to_bytes(mesh, &Options::default()).unwrap().0).unwrap();
-    bvh.check_all().unwrap();
+    bvh.validate().unwrap();
     bvh
 }
 

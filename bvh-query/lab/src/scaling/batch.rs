@@ -62,6 +62,6 @@ fn ask(question: Question, batch: &Batch<'_>, poses: &[Pose]) -> Result<Vec<f64>
         Question::Collide => {
             batch.collide(poses)?.into_iter().map(|touch| f64::from(u8::from(touch))).collect()
         }
-        Question::Distance(_) => batch.distance(poses)?.into_iter().map(|found| found.distance).collect(),
+        Question::Distance(_) => batch.distances(poses)?.into_iter().map(|found| found.distance).collect(),
     })
 }

@@ -83,7 +83,7 @@ impl Scene<'_> {
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
-            segment: querier.meets_segment(at, point, point.map(|x| -x)),
+            segment: querier.segment_hit(at, point, point.map(|x| -x)),
         }
     }
 }

@@ -10,7 +10,7 @@ use super::pairs::{place_all, queriers, truth};
 use super::record::{Counts, Finding};
 use super::stars::Stars;
 use crate::Failure;
-use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Path, Pose, QueryError};
+use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Pose, QueryError, RigidPath};
 use cbvh_testkit::Random;
 
 /// Ways of a round.

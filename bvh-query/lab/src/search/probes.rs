@@ -57,8 +57,8 @@ fn wrong(
     [on, met]: [bool; 2],
     is_proved: bool,
 ) -> Result<Option<String>, QueryError> {
-    if querier.meets_segment(file, p, q)? != met {
-        return Ok(Some(format!("meets_segment: {}", !met)));
+    if querier.segment_hit(file, p, q)? != met {
+        return Ok(Some(format!("segment_hit: {}", !met)));
     }
     let Some(answer) = querier.closest_point(file, p, f64::INFINITY)? else {
         return Ok(Some("closest_point: none".to_owned()));

@@ -87,14 +87,14 @@ class MotionAnswer(NamedTuple):
       way is free.
     - ``at``: of a hit, a time at which they are, the earliest one found; of NEAR, that of the first undecided pose;
       else NaN.
-    - ``distance``: their distance at the time `at`, where the way is not free: 0 where they touch. Else its numbers
+    - ``nearest``: their distance at the time `at`, where the way is not free: 0 where they touch. Else its numbers
       are NaN and 0.
     """
 
     kind: Any
     free_until: Any
     at: Any
-    distance: Distance
+    nearest: Distance
 
 
 class ClosestPoint(NamedTuple):
@@ -167,15 +167,15 @@ class SceneDistance(NamedTuple):
 
     - ``a``: the number of the instance whose frame the points are in.
     - ``b``: the number of the other instance.
-    - ``distance``: the answer of `Mesh.distance`.
+    - ``nearest``: the answer of `Mesh.distance`.
     """
 
     a: int
     b: int
-    distance: Distance
+    nearest: Distance
 
 
-class SceneMotion(NamedTuple):
+class SceneMotionAnswer(NamedTuple):
     """Whether the ways of instances are free.
 
     - ``kind``: a `MotionKind`.

@@ -100,12 +100,12 @@ class Mesh:
         found = self._mesh.object(number if 0 <= number < 2**63 else -1)
         return Mesh(found, self._path, number)
 
-    def check(self) -> None:
+    def validate(self) -> None:
         """Checks all checksums and rules of the whole file, which questions check only where they go.
 
         Raises FormatError for the first rule that is broken.
         """
-        self._mesh.check()
+        self._mesh.validate()
 
     def tobytes(self) -> bytes:
         """The bytes of the file."""
@@ -224,14 +224,19 @@ class Mesh:
         return named(Side, _cbvh.sides(self._mesh, points, pose, parallel))
 
     def signed_distances(
-        self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
+        self,
+        points: ArrayLike,
+        *,
+        within: float = np.inf,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
     ) -> Any:
         """Distances of points from the surface, negative inside: a float, or an array of shape (N,).
 
-        NaN where the mesh has no inside, because it is not closed. ``points`` have shape (3,) or (N, 3). ``pose``: of
-        this mesh in the frame of the points (body to world).
+        NaN where the mesh has no inside, because it is not closed, and where the surface is farther than ``within``.
+        ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return _cbvh.signed_distances(self._mesh, points, pose, parallel)
+        return _cbvh.signed_distances(self._mesh, points, within, pose, parallel)
 
     def first_hits(
         self,
@@ -280,14 +285,14 @@ class Mesh:
         found = _cbvh.all_hits(self._mesh, origins, directions, until, pose, parallel)
         return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)
 
-    def meet_segments(
+    def segment_hits(
         self, starts: ArrayLike, ends: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False
     ) -> Any:
         """Whether closed segments meet the surface, exactly: bool, or an array of shape (N,).
 
         ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
         """
-        return _cbvh.meet_segments(self._mesh, starts, ends, pose, parallel)
+        return _cbvh.segment_hits(self._mesh, starts, ends, pose, parallel)
 
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:

@@ -19,7 +19,7 @@ from ._answers import (
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
-    SceneMotion,
+    SceneMotionAnswer,
     SceneRayHit,
     SceneRelations,
     Side,
@@ -74,7 +74,7 @@ class Scene:
     >>> pose[:3, 3] = [0, 0, 3]
     >>> scene = cbvh.Scene()
     >>> floor, part = scene.add(tetrahedron, name="floor"), scene.add(tetrahedron, pose, name="part")
-    >>> scene.distance().distance.distance
+    >>> scene.distance().nearest.distance
     2.0
     >>> scene.set_pose(part, np.eye(4))
     >>> scene.pairs_in_contact().tolist()
@@ -170,10 +170,10 @@ class Scene:
         """The groups that an instance is in, and those that it meets."""
         return self._scene.groups(_number(id, "id"))
 
-    def allow(self, a: int, b: int, may_touch: bool = True) -> None:
+    def set_allowed(self, a: int, b: int, allowed: bool = True) -> None:
         """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a
         robot."""
-        self._scene.allow(_number(a, "a"), _number(b, "b"), bool(may_touch))
+        self._scene.set_allowed(_number(a, "a"), _number(b, "b"), bool(allowed))
 
     def allowed(self) -> NDArray[np.int64]:
         """The pairs that may touch, shape (K, 2)."""
@@ -285,13 +285,13 @@ class Scene:
         """
         return named(Side, _cbvh.scene_sides(self._scene, points))
 
-    def signed_distances(self, points: ArrayLike) -> Any:
+    def signed_distances(self, points: ArrayLike, *, within: float = np.inf) -> Any:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
         (N,).
 
-        NaN where the side is UNDEFINED, and without instances.
+        NaN where the side is UNDEFINED, and where no instance is within ``within``.
         """
-        return _cbvh.scene_signed_distances(self._scene, points)
+        return _cbvh.scene_signed_distances(self._scene, points, within)
 
     def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
         """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""
@@ -309,13 +309,13 @@ class Scene:
         found = _cbvh.scene_all_hits(self._scene, origins, directions, until)
         return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)
 
-    def meet_segments(self, starts: ArrayLike, ends: ArrayLike) -> Any:
+    def segment_hits(self, starts: ArrayLike, ends: ArrayLike) -> Any:
         """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
-        return _cbvh.scene_meet_segments(self._scene, starts, ends)
+        return _cbvh.scene_segment_hits(self._scene, starts, ends)
 
     def motion(
         self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
-    ) -> SceneMotion:
+    ) -> SceneMotionAnswer:
         """Are the ways of some instances free, while they move in the world at the same time and the rest stands still?
 
         ``paths`` has a `Motion`, a `Polyline` or a path of your own (body to world) for the number of each that moves.
@@ -324,7 +324,7 @@ class Scene:
         """
         numbers, ways = _ways(paths)
         kind, until, at, nearest = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
-        return SceneMotion(MotionKind(kind), until, at, _nearest(nearest))
+        return SceneMotionAnswer(MotionKind(kind), until, at, _nearest(nearest))
 
     def is_free(
         self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
@@ -367,7 +367,7 @@ def _scene_of(
     for number, mesh, name, groups, pose in rows:
         scene._scene.add(mesh._mesh, mesh, pose, name, list(groups), number)
     for a, b in allowed.tolist():
-        scene.allow(a, b)
+        scene.set_allowed(a, b)
     scene._scene.skip_to(next)
     scene._scene.set_switches(*switches)
     return scene

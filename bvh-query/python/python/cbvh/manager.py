@@ -327,7 +327,7 @@ class CollisionManager:
         nearest = scene.distance()
         if nearest is None:
             return float("inf"), None, None
-        found, pose = nearest.distance, scene.pose(nearest.a)
+        found, pose = nearest.nearest, scene.pose(nearest.a)
         names, is_swapped = _ordered(nearest.a, nearest.b, own, others)
         points = [pose[:3, :3] @ point + pose[:3, 3] for point in (found.point_a, found.point_b)]
         rows = list(zip((found.triangle_a, found.triangle_b), points))

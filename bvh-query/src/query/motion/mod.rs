@@ -1,7 +1,7 @@
 //! Is the way free, and where does it end? A search over time, certain at every moment.
 //!
 //! An answer has a definition that knows nothing of how it is found. Time is halved again and again into *cells*, until B
-//! moves by at most an eighth of the tolerance within a cell: [`motion_reach`]. A cell is *clear* if, in the pose of its
+//! moves by at most an eighth of the tolerance within a cell: [`path_reach`]. A cell is *clear* if, in the pose of its
 //! middle, the meshes are farther apart than the clearance and that reach, added and rounded up. The cells are met in the
 //! order of time:
 //!
@@ -24,7 +24,7 @@ pub(crate) use search::Earliest;
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::motion::Path;
+use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::Distance;
 use crate::query::options::{DistanceOptions, check};
@@ -88,7 +88,7 @@ pub enum MotionAnswer {
         /// A time at which they are: the earliest one found.
         touching_at: f64,
         /// The answer of [`Querier::distance`] for that pose.
-        contact: Distance,
+        nearest: Distance,
     },
     /// They come so near that neither can be told: the distance is at most the clearance and the tolerance, and in no pose
     /// that was looked at are they within the clearance.
@@ -98,7 +98,7 @@ pub enum MotionAnswer {
         /// The time of the first undecided pose.
         at: f64,
         /// The answer of [`Querier::distance`] for that pose.
-        distance: Distance,
+        nearest: Distance,
     },
 }
 
@@ -129,7 +129,7 @@ impl Querier {
         &mut self,
         a: impl Into<Shape<'a>>,
         b: impl Into<Shape<'a>>,
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<MotionAnswer, QueryError> {
         self.motion_before(a.into(), b.into(), path, options, &Earliest::new()).map_err(|ended| ended.error)
@@ -140,7 +140,7 @@ impl Querier {
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
         earliest: &Earliest,
     ) -> Result<MotionAnswer, EndedByError> {
@@ -160,12 +160,12 @@ impl Querier {
         match *outcome {
             Outcome::Free => Ok(MotionAnswer::Free),
             Outcome::Hit { free_until, touching_at } => {
-                let contact = self.distance_at(question, &question.path.pose(touching_at))?;
-                Ok(MotionAnswer::Hit { free_until, touching_at, contact })
+                let nearest = self.distance_at(question, &question.path.pose(touching_at))?;
+                Ok(MotionAnswer::Hit { free_until, touching_at, nearest })
             }
             Outcome::Undecided { free_until, at } => {
-                let distance = self.distance_at(question, &question.path.pose(at))?;
-                Ok(MotionAnswer::Near { free_until, at, distance })
+                let nearest = self.distance_at(question, &question.path.pose(at))?;
+                Ok(MotionAnswer::Near { free_until, at, nearest })
             }
         }
     }
@@ -179,7 +179,7 @@ impl Querier {
         &mut self,
         a: impl Into<Shape<'a>>,
         b: impl Into<Shape<'a>>,
-        path: &dyn Path,
+        path: &dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<bool, QueryError> {
         let (a, b) = (a.into(), b.into());
@@ -208,7 +208,7 @@ impl Querier {
 /// Returns how far any vertex of B is at most, during `[t0, t1]`, from where it is in the middle of that time, in mesh units:
 /// how far vertices are there from where they are at either end, and the sagitta of either half. [`Querier::motion`] halves
 /// time until this is at most an eighth of the tolerance.
-pub fn motion_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn Path, t0: f64, t1: f64) -> f64 {
+pub fn path_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn RigidPath, t0: f64, t1: f64) -> f64 {
     let b = b.into();
     let question = Question::unchecked(b, b, path);
     question.middle(&question.stretch(t0, t1)).reach

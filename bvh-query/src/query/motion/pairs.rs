@@ -2,7 +2,7 @@
 //! that may first be.
 
 use crate::isa::{Isa, Task};
-use crate::motion::Path;
+use crate::motion::RigidPath;
 use crate::narrow::{Closest, Point, Triangle, cross, dot, subtract, triangle_distance, triangles_within};
 use crate::pose::Pose;
 use crate::query::exact::placed;
@@ -171,7 +171,7 @@ impl Task for AnyWithin<'_> {
 /// Guesses when pairs come within the clearance: from where B is, it goes on until the closest points would meet if they kept
 /// to the chords of their ways.
 struct ContactTime<'a> {
-    path: &'a dyn Path,
+    path: &'a dyn RigidPath,
     clearance: f64,
     stretch: &'a Stretch,
     pairs: &'a [SweptPair],

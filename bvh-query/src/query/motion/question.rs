@@ -3,7 +3,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::motion::Path;
+use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 pub(super) struct Question<'a> {
     pub(super) a: Shape<'a>,
     pub(super) b: Shape<'a>,
-    pub(super) path: &'a dyn Path,
+    pub(super) path: &'a dyn RigidPath,
     pub(super) clearance: f64,
     pub(super) tolerance: f64,
     /// The diagonal of the larger object's box.
@@ -49,7 +49,7 @@ impl<'a> Question<'a> {
     pub(super) fn new(
         a: Shape<'a>,
         b: Shape<'a>,
-        path: &'a dyn Path,
+        path: &'a dyn RigidPath,
         options: &MotionOptions,
     ) -> Result<Self, QueryError> {
         options.check()?;
@@ -59,7 +59,7 @@ impl<'a> Question<'a> {
     }
 
     /// A question without clearance and tolerance.
-    pub(super) fn unchecked(a: Shape<'a>, b: Shape<'a>, path: &'a dyn Path) -> Self {
+    pub(super) fn unchecked(a: Shape<'a>, b: Shape<'a>, path: &'a dyn RigidPath) -> Self {
         let size = size(a.objects()).max(size(b.objects()));
         Self {
             a,

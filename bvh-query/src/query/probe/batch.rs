@@ -111,13 +111,13 @@ impl<'a> ProbeBatch<'a> {
         self.each(rays, |ray| ray.origin, |querier, ray| querier.all_hits(self.shape, ray))
     }
 
-    /// Answers [`Querier::meets_segment`] for each segment, given by its ends.
+    /// Answers [`Querier::segment_hit`] for each segment, given by its ends.
     ///
     /// # Errors
     /// The error of the first segment that fails.
-    pub fn meet_segments(&self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, QueryError> {
+    pub fn segment_hits(&self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, QueryError> {
         let middle = |[p, q]: &[[f64; 3]; 2]| [0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0);
-        self.each(segments, middle, |querier, [from, to]| querier.meets_segment(self.shape, *from, *to))
+        self.each(segments, middle, |querier, [from, to]| querier.segment_hit(self.shape, *from, *to))
     }
 
     /// Asks about each probe, in the order of where they are.

@@ -16,7 +16,7 @@ impl Querier {
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::Damaged`] if a page that the query
     /// touches is damaged, [`QueryError::Budget`] if the budget does not suffice.
-    pub fn meets_segment<'a>(
+    pub fn segment_hit<'a>(
         &mut self,
         shape: impl Into<PlacedShape<'a>>,
         from: [f64; 3],

@@ -4,7 +4,7 @@
 //! Samples may miss a contact and be late with one. They may not find one where the way is certified free: this would be an
 //! error of the certified answer, or of the query about a pose.
 
-use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Path, Querier, QueryError};
+use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
 use cbvh_measure::spread::median;
 use cbvh_measure::table::whole;
 
