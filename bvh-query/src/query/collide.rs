@@ -14,7 +14,7 @@ use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::RecentTriangles;
 use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
-use crate::traverse::node_test::Measure;
+use crate::traverse::node_filter::Measure;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 

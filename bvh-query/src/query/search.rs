@@ -18,7 +18,7 @@ use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{Found, PlacedPair};
 use crate::traverse::align::round_up;
-use crate::traverse::node_test::Measure;
+use crate::traverse::node_filter::Measure;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 

@@ -60,14 +60,14 @@ enum Next {
 
 /// A pair to ask about: places of instances, and the square of a lower bound of the distance.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+struct NearPair {
     a: u32,
     b: u32,
     squared_gap: f64,
 }
 
 /// A pair of instances as questions about two shapes take it.
-struct PlacedPair<'a> {
+struct InstancePair<'a> {
     ids: ScenePair,
     a: &'a OwnedShape,
     b: &'a OwnedShape,
@@ -77,7 +77,7 @@ struct PlacedPair<'a> {
     tracker: Option<MutexGuard<'a, Tracker>>,
 }
 
-impl PlacedPair<'_> {
+impl InstancePair<'_> {
     fn collide(&mut self, querier: &mut Querier) -> Result<bool, QueryError> {
         match &mut self.tracker {
             Some(tracker) => tracker.collide(querier, self.a, self.b, &self.pose),
@@ -93,13 +93,13 @@ impl PlacedPair<'_> {
     }
 }
 
-/// Sorts candidates by the gaps of their boxes.
-fn nearest_first(candidates: &mut [Candidate]) {
-    candidates
+/// Sorts near pairs by the gaps of their boxes.
+fn nearest_first(near_pairs: &mut [NearPair]) {
+    near_pairs
         .sort_unstable_by(|x, y| x.squared_gap.total_cmp(&y.squared_gap).then((x.a, x.b).cmp(&(y.a, y.b))));
 }
 
-impl Candidate {
+impl NearPair {
     /// Returns whether both are of the same instances.
     fn is_of(&self, other: &Self) -> bool {
         (self.a, self.b) == (other.a, other.b)
@@ -181,11 +181,11 @@ impl Scene {
         mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
         check_distance(d)?;
-        self.each_piece(d, |scene, candidates| {
-            scene.remember(&candidates);
-            for candidate in candidates {
+        self.each_piece(d, |scene, near_pairs| {
+            scene.remember(&near_pairs);
+            for near_pair in near_pairs {
                 let found = scene
-                    .each(&[candidate], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
+                    .each(&[near_pair], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
                 if found.into_iter().any(|pair| visit(pair).is_break()) {
                     return Ok(ControlFlow::Break(()));
                 }
@@ -203,9 +203,9 @@ impl Scene {
         &mut self,
         mut visit: impl FnMut(ScenePair, &[Contact]) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
-        self.each_piece(0.0, |scene, candidates| {
-            for candidate in candidates {
-                let found = scene.each(&[candidate], |querier, pair| {
+        self.each_piece(0.0, |scene, near_pairs| {
+            for near_pair in near_pairs {
+                let found = scene.each(&[near_pair], |querier, pair| {
                     Ok(Some((pair.ids, querier.contacts(pair.a, pair.b, &pair.pose)?)))
                 })?;
                 let mut touching = found.iter().filter(|(_, contacts)| !contacts.is_empty());
@@ -227,7 +227,7 @@ impl Scene {
         let mut nearest = None;
         // The pair that was nearest in the last question is likely to be near. Else the one with the nearest boxes is, and a
         // distance says how near other boxes have to be.
-        let first = match self.likely_candidate() {
+        let first = match self.likely_pair() {
             None => self.nearest_boxes()?,
             likely => likely,
         };
@@ -237,9 +237,9 @@ impl Scene {
         let mut next = Next::All;
         let limit =
             |nearest: &Option<SceneDistance>| nearest.map_or(f64::INFINITY, |held| held.nearest.upper);
-        while let Some(mut candidates) = self.next_piece(&mut next, limit(&nearest))? {
-            nearest_first(&mut candidates);
-            for run in candidates.chunks(self.workers.threads()) {
+        while let Some(mut near_pairs) = self.next_piece(&mut next, limit(&nearest))? {
+            nearest_first(&mut near_pairs);
+            for run in near_pairs.chunks(self.workers.threads()) {
                 if run[0].squared_gap > limit(&nearest).powi(2) {
                     break;
                 }
@@ -251,12 +251,12 @@ impl Scene {
     }
 
     /// Returns the pair asked about whose boxes are nearest, unless finding it takes too much memory.
-    fn nearest_boxes(&self) -> Result<Option<Candidate>, SceneError> {
+    fn nearest_boxes(&self) -> Result<Option<NearPair>, SceneError> {
         let mut order = NearestFirst::new(&self.broad);
         self.charged(|budget| {
             while let Some((x, y, squared_gap)) = order.next(&self.broad, budget)? {
-                if let Some(candidate) = self.candidate(x, y, squared_gap) {
-                    return Ok(Some(candidate));
+                if let Some(near_pair) = self.near_pair(x, y, squared_gap) {
+                    return Ok(Some(near_pair));
                 }
             }
             Ok(None)
@@ -274,18 +274,18 @@ impl Scene {
         Ok(found?)
     }
 
-    /// Adopts the least distance of candidates, if it is less than the one held, or as little and of an earlier pair.
+    /// Adopts the least distance of near pairs, if it is less than the one held, or as little and of an earlier pair.
     fn improve(
         &mut self,
         nearest: &mut Option<SceneDistance>,
-        candidates: &[Candidate],
+        near_pairs: &[NearPair],
     ) -> Result<(), SceneError> {
         let limit = nearest.map_or(f64::INFINITY, |held| held.nearest.upper);
         // Where the pair held touches, only an earlier one can take its place.
         let is_beaten = |pair: ScenePair| {
             nearest.is_some_and(|held| held.pair == pair || held.nearest.distance == 0.0 && held.pair < pair)
         };
-        let found = self.each(candidates, |querier, pair| {
+        let found = self.each(near_pairs, |querier, pair| {
             if is_beaten(pair.ids) {
                 return Ok(None);
             }
@@ -305,21 +305,21 @@ impl Scene {
     fn any(
         &mut self,
         limit: f64,
-        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<bool, SceneError> {
         self.start();
-        let likely = self.likely_candidate();
+        let likely = self.likely_pair();
         if let Some(likely) = likely
             && self.any_of(&[likely], &ask)?
         {
             return Ok(true);
         }
         let (mut next, mut first_error) = (Next::All, None);
-        while let Some(mut candidates) = self.next_piece(&mut next, limit)? {
-            candidates.retain(|candidate| likely.is_none_or(|likely| !candidate.is_of(&likely)));
+        while let Some(mut near_pairs) = self.next_piece(&mut next, limit)? {
+            near_pairs.retain(|near_pair| likely.is_none_or(|likely| !near_pair.is_of(&likely)));
             // The nearest boxes are the likeliest.
-            nearest_first(&mut candidates);
-            match self.any_of(&candidates, &ask) {
+            nearest_first(&mut near_pairs);
+            match self.any_of(&near_pairs, &ask) {
                 Ok(false) => {}
                 Ok(true) => return Ok(true),
                 // Where no visits are left, none of the other pairs has an answer.
@@ -330,16 +330,16 @@ impl Scene {
         first_error.map_or(Ok(false), Err)
     }
 
-    /// Asks candidates until one says yes. Where one says yes, an error about another does not matter.
+    /// Asks near pairs until one says yes. Where one says yes, an error about another does not matter.
     fn any_of(
         &mut self,
-        candidates: &[Candidate],
-        ask: &(impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync),
+        near_pairs: &[NearPair],
+        ask: &(impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync),
     ) -> Result<bool, SceneError> {
         // By a pair that says yes, or because no visits are left.
         let is_decided = AtomicBool::new(false);
-        self.remember(candidates);
-        let answers = self.each(candidates, |querier, pair| {
+        self.remember(near_pairs);
+        let answers = self.each(near_pairs, |querier, pair| {
             if is_decided.load(Ordering::Relaxed) {
                 return Ok(None);
             }
@@ -363,12 +363,12 @@ impl Scene {
     fn all(
         &mut self,
         limit: f64,
-        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<bool, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync,
     ) -> Result<Vec<ScenePair>, SceneError> {
         let mut all = Vec::new();
-        self.each_piece(limit, |scene, candidates| {
-            scene.remember(&candidates);
-            all.extend(scene.each(&candidates, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))?);
+        self.each_piece(limit, |scene, near_pairs| {
+            scene.remember(&near_pairs);
+            all.extend(scene.each(&near_pairs, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))?);
             Ok(ControlFlow::Continue(()))
         })?;
         Ok(all)
@@ -378,11 +378,11 @@ impl Scene {
     fn each_near<R: Send>(
         &mut self,
         limit: f64,
-        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
+        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         let mut all = Vec::new();
-        self.each_piece(limit, |scene, candidates| {
-            all.extend(scene.each(&candidates, &ask)?);
+        self.each_piece(limit, |scene, near_pairs| {
+            all.extend(scene.each(&near_pairs, &ask)?);
             Ok(ControlFlow::Continue(()))
         })?;
         Ok(all)
@@ -393,13 +393,13 @@ impl Scene {
     fn each_piece(
         &mut self,
         limit: f64,
-        mut visit: impl FnMut(&mut Self, Vec<Candidate>) -> Result<ControlFlow<()>, SceneError>,
+        mut visit: impl FnMut(&mut Self, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>,
     ) -> Result<(), SceneError> {
         self.start();
         let mut next = Next::All;
-        while let Some(mut candidates) = self.next_piece(&mut next, limit)? {
-            candidates.sort_unstable_by_key(|candidate| (candidate.a, candidate.b));
-            if visit(self, candidates)?.is_break() {
+        while let Some(mut near_pairs) = self.next_piece(&mut next, limit)? {
+            near_pairs.sort_unstable_by_key(|near_pair| (near_pair.a, near_pair.b));
+            if visit(self, near_pairs)?.is_break() {
                 break;
             }
         }
@@ -408,16 +408,16 @@ impl Scene {
 
     /// Returns the next pairs asked about whose boxes are at most `limit` apart, in any order: all of them, unless they are too
     /// many. Each piece comes before the next one in the order of the pairs.
-    fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<Candidate>>, SceneError> {
-        let mut candidates = Vec::new();
+    fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
+        let mut near_pairs = Vec::new();
         let places = self.instances.len() as u32;
         self.charged(|budget| {
             if matches!(next, Next::All) {
                 let all = self.broad.pairs(limit, budget, |x, y, squared_gap| {
-                    if candidates.len() == MAX_KNOWN_PAIRS {
+                    if near_pairs.len() == MAX_KNOWN_PAIRS {
                         return ControlFlow::Break(());
                     }
-                    candidates.extend(self.candidate(x, y, squared_gap));
+                    near_pairs.extend(self.near_pair(x, y, squared_gap));
                     ControlFlow::Continue(())
                 })?;
                 if all.is_continue() {
@@ -425,11 +425,11 @@ impl Scene {
                     return Ok(());
                 }
                 *next = Next::From(0);
-                candidates.clear();
+                near_pairs.clear();
             }
             while let Next::From(place) = next
                 && *place < places
-                && candidates.len() < MAX_KNOWN_PAIRS
+                && near_pairs.len() < MAX_KNOWN_PAIRS
             {
                 let a = *place;
                 *place += 1;
@@ -441,61 +441,61 @@ impl Scene {
                     budget,
                     |b, squared_gap| {
                         if b > a {
-                            candidates.extend(self.candidate(a, b, squared_gap));
+                            near_pairs.extend(self.near_pair(a, b, squared_gap));
                         }
                     },
                 )?;
             }
             Ok(())
         })?;
-        Ok((!candidates.is_empty()).then_some(candidates))
+        Ok((!near_pairs.is_empty()).then_some(near_pairs))
     }
 
     /// Returns a pair of places in order, unless it may touch.
-    fn candidate(&self, x: u32, y: u32, squared_gap: f64) -> Option<Candidate> {
+    fn near_pair(&self, x: u32, y: u32, squared_gap: f64) -> Option<NearPair> {
         let (a, b) = (x.min(y), x.max(y));
         let is_asked = self.instances.get(a as usize)?.as_ref().is_some_and(|instance| !instance.allows(b));
-        is_asked.then_some(Candidate { a, b, squared_gap })
+        is_asked.then_some(NearPair { a, b, squared_gap })
     }
 
     /// Returns the pair of the last answer, if it is still asked about.
-    fn likely_candidate(&self) -> Option<Candidate> {
+    fn likely_pair(&self) -> Option<NearPair> {
         let (a, b) = self.likely?;
-        let candidate = Candidate { a, b, squared_gap: 0.0 };
-        let (first, second) = self.both(&candidate)?;
-        (first.groups.meet(second.groups) && !first.allows(b)).then_some(candidate)
+        let near_pair = NearPair { a, b, squared_gap: 0.0 };
+        let (first, second) = self.both(&near_pair)?;
+        (first.groups.meet(second.groups) && !first.allows(b)).then_some(near_pair)
     }
 
     /// Makes a tracker for each candidate, if the scene wants that.
-    fn remember(&mut self, candidates: &[Candidate]) {
-        self.trackers.expect(candidates.iter().map(|candidate| (candidate.a, candidate.b)));
+    fn remember(&mut self, near_pairs: &[NearPair]) {
+        self.trackers.expect(near_pairs.iter().map(|near_pair| (near_pair.a, near_pair.b)));
     }
 
-    /// Asks about each candidate, in the order of the candidates.
+    /// Asks about each candidate, in the order of the near pairs.
     fn each<R: Send>(
         &mut self,
-        candidates: &[Candidate],
-        ask: impl Fn(&mut Querier, &mut PlacedPair<'_>) -> Result<Option<R>, QueryError> + Sync,
+        near_pairs: &[NearPair],
+        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         let mut stats = self.stats;
         let asked = AtomicU64::new(self.pairs_asked);
         let scene = &*self;
-        let found = scene.workers.each(candidates, &mut stats, |querier, candidate| {
-            let Some((a, b)) = scene.both(candidate) else { return Ok(None) };
+        let found = scene.workers.each(near_pairs, &mut stats, |querier, near_pair| {
+            let Some((a, b)) = scene.both(near_pair) else { return Ok(None) };
             let pose = Pose::relative(&a.world, &b.world)?;
-            let ids = ScenePair { a: a.id(candidate.a), b: b.id(candidate.b) };
+            let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
             let (a, b) = (a.shape.opened()?, b.shape.opened()?);
-            let tracker = scene.trackers.get((candidate.a, candidate.b));
-            let pair = &mut PlacedPair { ids, a: &a, b: &b, pose, tracker };
+            let tracker = scene.trackers.get((near_pair.a, near_pair.b));
+            let pair = &mut InstancePair { ids, a: &a, b: &b, pose, tracker };
             let answer = scene.workers.ask_rest(querier, |querier| ask(querier, pair));
             asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
             answer
         });
         (self.stats, self.pairs_asked) = (stats, asked.into_inner());
-        found.map_err(|(number, source)| match self.both(&candidates[number]) {
+        found.map_err(|(number, source)| match self.both(&near_pairs[number]) {
             Some((a, b)) => {
-                let Candidate { a: place_a, b: place_b, .. } = candidates[number];
+                let NearPair { a: place_a, b: place_b, .. } = near_pairs[number];
                 self.pair_error(ScenePair { a: a.id(place_a), b: b.id(place_b) }, source)
             }
             None => source.into(),
@@ -508,8 +508,8 @@ impl Scene {
     }
 
     /// Returns both instances of a candidate.
-    fn both(&self, candidate: &Candidate) -> Option<(&Instance, &Instance)> {
-        self.instances_at(candidate.a, candidate.b)
+    fn both(&self, near_pair: &NearPair) -> Option<(&Instance, &Instance)> {
+        self.instances_at(near_pair.a, near_pair.b)
     }
 
     /// Returns the instances in two places.

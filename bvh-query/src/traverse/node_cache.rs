@@ -8,7 +8,7 @@ use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::decode_group;
-use crate::traverse::node_test::Reach;
+use crate::traverse::node_filter::Reach;
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef, check_crossing, check_parent};

@@ -6,9 +6,9 @@
 use crate::isa::{Isa, Task};
 use crate::traverse::frames::Tested;
 use crate::traverse::node_cache::{CachedNode, NodeCache};
-use crate::traverse::node_test::{Measure, NodeTest};
+use crate::traverse::node_filter::{Measure, NodeFilter};
 use crate::traverse::placement::ObjectPair;
-use crate::traverse::slab_test::{Seen, SlabTest, TurningGroup};
+use crate::traverse::slab_filter::{Seen, SlabFilter, TurningGroup};
 
 /// Builds with debug assertions, which tests are, make all slab tests, so that small meshes take part.
 const ALWAYS: bool = cfg!(debug_assertions);
@@ -28,7 +28,7 @@ const FIRST_PAUSE: u32 = 24;
 pub(crate) struct SlabMemory {
     nodes_a: Vec<NodeSlabs>,
     nodes_b: Vec<NodeSlabs>,
-    test: Option<Box<SlabTest>>,
+    test: Option<Box<SlabFilter>>,
     /// The walk for which `test` was prepared.
     prepared: u64,
     /// Numbers walks, from 1.
@@ -104,7 +104,7 @@ fn grow(nodes: &mut Vec<NodeSlabs>, node: usize) {
 /// Tests pairs that a node test has left along their turning slabs, and returns the lanes that are left.
 pub(crate) struct TestSlabs<'a> {
     pub(crate) memory: &'a mut SlabMemory,
-    pub(crate) node_test: &'a NodeTest,
+    pub(crate) node_filter: &'a NodeFilter,
     pub(crate) measure: Measure,
     pub(crate) nodes: ((&'a NodeCache, usize), (&'a NodeCache, usize)),
     pub(crate) limit: f32,
@@ -117,16 +117,16 @@ impl Task for TestSlabs<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> u16 {
-        let Self { memory, node_test, measure, nodes, limit, tested, mask } = self;
+        let Self { memory, node_filter, measure, nodes, limit, tested, mask } = self;
         let ((cache_a, number_a), (cache_b, number_b)) = nodes;
         let (node_a, node_b) = (cache_a.get(number_a), cache_b.get(number_b));
         if !node_a.turning.any() && !node_b.turning.any() {
             return mask;
         }
-        let test = memory.test.get_or_insert_with(|| Box::new(SlabTest::NONE));
+        let test = memory.test.get_or_insert_with(|| Box::new(SlabFilter::NONE));
         if memory.prepared != memory.walk {
             memory.prepared = memory.walk;
-            prepare(test, node_test);
+            prepare(test, node_filter);
         }
         let (a, b) = (of(&mut memory.nodes_a, number_a), of(&mut memory.nodes_b, number_b));
         a.decode(isa, node_a, cache_a.generation());
@@ -154,7 +154,7 @@ impl Task for TestSlabs<'_> {
 }
 
 #[inline(never)]
-fn prepare(test: &mut SlabTest, node_test: &NodeTest) {
-    let placement = node_test.placement();
-    test.prepare(placement, &placement.inverse(), node_test.magnitudes());
+fn prepare(test: &mut SlabFilter, node_filter: &NodeFilter) {
+    let placement = node_filter.placement();
+    test.prepare(placement, &placement.inverse(), node_filter.magnitudes());
 }

@@ -28,7 +28,7 @@ use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
 use crate::traverse::frames::Entry;
 use crate::traverse::node_cache::{CachedNode, ChildRef};
-use crate::traverse::node_test::{Measure, NodeTest, Witness};
+use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::TestSlabs;
 use crate::traverse::walk_memory::WalkMemory;
@@ -115,9 +115,9 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     memory: &mut WalkMemory,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    let mut node_test = memory.node_test.take().unwrap_or_else(|| Box::new(NodeTest::NONE));
-    let tests = walk(isa, pair, memory, &mut node_test, visitor);
-    memory.node_test = Some(node_test);
+    let mut node_filter = memory.node_filter.take().unwrap_or_else(|| Box::new(NodeFilter::NONE));
+    let tests = walk(isa, pair, memory, &mut node_filter, visitor);
+    memory.node_filter = Some(node_filter);
     tests
 }
 
@@ -126,7 +126,7 @@ fn walk<I: Isa, W: Visitor>(
     isa: I,
     pair: ObjectPair<'_>,
     memory: &mut WalkMemory,
-    node_test: &mut NodeTest,
+    node_filter: &mut NodeFilter,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
     memory.stack.clear();
@@ -138,14 +138,14 @@ fn walk<I: Isa, W: Visitor>(
     let reach_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
     let reach_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
     memory.slabs.start(&pair);
-    node_test.prepare(isa, &pair, (reach_a, reach_b));
+    node_filter.prepare(isa, &pair, (reach_a, reach_b));
     if W::SWEEPS {
         // What else bounds a pair knows of one placement only.
-        node_test.prepare_end(isa, pair.end);
+        node_filter.prepare_end(isa, pair.end);
         memory.slabs.stop();
     }
     let mut witness: Option<Witness> = None;
-    node_test.update_witness(&mut witness, visitor.witness());
+    node_filter.update_witness(&mut witness, visitor.witness());
     let (mut tests, mut leaves) = (0, 0);
     let order = visitor.order();
     let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
@@ -161,7 +161,7 @@ fn walk<I: Isa, W: Visitor>(
             if memory.visit_leaf_pairs(isa, visitor)?.is_break() {
                 return Ok(tests);
             }
-            node_test.update_witness(&mut witness, visitor.witness());
+            node_filter.update_witness(&mut witness, visitor.witness());
         }
         let next = match memory.stack.pop(isa) {
             Some(next) if next.bound > visitor.limit() => continue,
@@ -184,7 +184,7 @@ fn walk<I: Isa, W: Visitor>(
             if isa.run(VisitLeaves { visitor, leaves: leaves_of_pair, at_once })?.is_break() {
                 return Ok(tests);
             }
-            node_test.update_witness(&mut witness, visitor.witness());
+            node_filter.update_witness(&mut witness, visitor.witness());
             leaves += u32::from(phase == Phase::BestFirst);
             if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
             {
@@ -199,21 +199,21 @@ fn walk<I: Isa, W: Visitor>(
             && large_leaves.are_beyond(
                 &pair,
                 (nodes_a, nodes_b),
-                node_test.reaches(),
+                node_filter.reaches(),
                 next,
                 visitor.limit(),
             )?
         {
             continue;
         }
-        if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_test.looks_along_b() {
-            node_test.look_along_b(isa);
+        if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
+            node_filter.look_along_b(isa);
         }
-        let sides = memory.open::<I, W>(isa, &pair, node_test, next)?;
+        let sides = memory.open::<I, W>(isa, &pair, node_filter, next)?;
         tests += memory.push_children(
             isa,
             W::MEASURE,
-            node_test,
+            node_filter,
             &witness,
             &sides,
             visitor.limit(),
@@ -267,7 +267,7 @@ impl<W: Visitor> Task for Finish<'_, W> {
 
 /// Aligns an opened node of A to B's directions.
 struct AlignA<'a> {
-    node_test: &'a NodeTest,
+    node_filter: &'a NodeFilter,
     node: &'a CachedNode,
     to: &'a mut [Group; 2],
 }
@@ -278,14 +278,14 @@ impl Task for AlignA<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         for part in 0..self.node.count.div_ceil(4) {
-            self.node_test.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+            self.node_filter.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
         }
     }
 }
 
 /// Aligns an opened node of B to A's directions.
 struct AlignB<'a> {
-    node_test: &'a NodeTest,
+    node_filter: &'a NodeFilter,
     node: &'a CachedNode,
     to: &'a mut [Group; 2],
 }
@@ -296,14 +296,14 @@ impl Task for AlignB<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         for part in 0..self.node.count.div_ceil(4) {
-            self.node_test.align_b(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+            self.node_filter.align_b(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
         }
     }
 }
 
 /// Aligns an opened node of B in both placements to A's directions, and joins the slabs.
 struct AlignBothEnds<'a> {
-    node_test: &'a NodeTest,
+    node_filter: &'a NodeFilter,
     node: &'a CachedNode,
     to: &'a mut [Group; 2],
 }
@@ -314,7 +314,7 @@ impl Task for AlignBothEnds<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         for part in 0..self.node.count.div_ceil(4) {
-            self.node_test.align_b_at_both_ends(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
+            self.node_filter.align_b_at_both_ends(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
         }
     }
 }
@@ -363,7 +363,7 @@ impl WalkMemory {
         &mut self,
         isa: I,
         pair: &ObjectPair<'_>,
-        node_test: &NodeTest,
+        node_filter: &NodeFilter,
         entry: Entry,
     ) -> Result<Sides, QueryError> {
         let (node_a, node_b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
@@ -390,9 +390,9 @@ impl WalkMemory {
             if !is_aligned {
                 let node = self.nodes_b.get(number);
                 if W::SWEEPS {
-                    isa.run(AlignBothEnds { node_test, node, to });
+                    isa.run(AlignBothEnds { node_filter, node, to });
                 } else {
-                    isa.run(AlignB { node_test, node, to });
+                    isa.run(AlignB { node_filter, node, to });
                 }
             }
         }
@@ -406,7 +406,7 @@ impl WalkMemory {
         &mut self,
         isa: I,
         measure: Measure,
-        node_test: &NodeTest,
+        node_filter: &NodeFilter,
         witness: &Option<Witness>,
         sides: &Sides,
         limit: f32,
@@ -426,21 +426,21 @@ impl WalkMemory {
                 tested.a = ChildRef::new(sides.node_a, 4 * part_a);
                 tested.b = ChildRef::new(sides.node_b, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
-                let mut mask = node_test.run(isa, measure, groups, witness, limit, &mut tested.bounds);
+                let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
                 mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
                 mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
                 if mask != 0 && self.slabs.are_due() {
                     let memory = &mut self.slabs;
                     let nodes = ((&self.nodes_a, sides.node_a), (&self.nodes_b, sides.node_b));
-                    mask = isa.run(TestSlabs { memory, node_test, measure, nodes, limit, tested, mask });
+                    mask = isa.run(TestSlabs { memory, node_filter, measure, nodes, limit, tested, mask });
                 }
-                if mask != 0 && node_test.looks_along_b() {
+                if mask != 0 && node_filter.looks_along_b() {
                     let (to, is_aligned) = self.aligned_a.of(sides.node_a);
                     if !is_aligned {
-                        isa.run(AlignA { node_test, node: side_a, to });
+                        isa.run(AlignA { node_filter, node: side_a, to });
                     }
                     let groups = (&to[part_a & 1], &side_b.groups[part_b & 1]);
-                    mask &= node_test.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
+                    mask &= node_filter.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
                 if phase == Phase::DepthFirst {
                     let leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));

@@ -6,7 +6,7 @@ use crate::traverse::frames::Frames;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::NodeCache;
-use crate::traverse::node_test::NodeTest;
+use crate::traverse::node_filter::NodeFilter;
 use crate::traverse::probe_walk::{ProbeStack, ProbeVisitor, ProbeWalk};
 use crate::traverse::slab_memory::SlabMemory;
 use bvh_format::object::Object;
@@ -20,7 +20,7 @@ const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
 #[derive(Default)]
 pub(crate) struct WalkMemory {
     /// Taken out while a walk is under way.
-    pub(super) node_test: Option<Box<NodeTest>>,
+    pub(super) node_filter: Option<Box<NodeFilter>>,
     pub(super) nodes_a: NodeCache,
     pub(super) nodes_b: NodeCache,
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.

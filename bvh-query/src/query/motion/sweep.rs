@@ -20,7 +20,7 @@ use crate::query::exact::stored;
 use crate::query::motion::pairs::{CountApart, Sweep, SweptPair};
 use crate::query::placed_pair::{PlacedPair, Walk};
 use crate::query::querier::Querier;
-use crate::traverse::node_test::Measure;
+use crate::traverse::node_filter::Measure;
 use crate::traverse::placement::{ObjectPair, Placement};
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;

@@ -20,7 +20,7 @@ use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
-use crate::traverse::point_test::PointTest;
+use crate::traverse::point_filter::PointFilter;
 use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
@@ -169,7 +169,7 @@ struct Nearest<'a> {
     stretch: f64,
     /// The limit in the unit of filters.
     limit: f32,
-    test: PointTest,
+    test: PointFilter,
     local: LocalPoint,
     /// Room for packets that are encoded.
     rooms: [Packet; 4],
@@ -201,7 +201,7 @@ impl<'a> Nearest<'a> {
             scale,
             stretch,
             limit: round_up(search.limit * stretch * scale),
-            test: PointTest::new(&point, object.profile().directions(), error, scale as f32),
+            test: PointFilter::new(&point, object.profile().directions(), error, scale as f32),
             local: LocalPoint::new(&point, error, scale as f32),
             rooms: [Packet::NONE; 4],
             search,

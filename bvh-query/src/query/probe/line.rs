@@ -17,7 +17,7 @@ use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::sum_of_magnitudes;
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
-use crate::traverse::line_test::{LineTest, Segment};
+use crate::traverse::line_filter::{LineFilter, Segment};
 use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
@@ -232,7 +232,7 @@ impl<Q: LineQuestion> Task for AskObject<'_, Q> {
             object,
             placed,
             number: (placed.shape.first() + index) as u32,
-            test: LineTest::new(isa, &clipped.segment, object.profile().directions()),
+            test: LineFilter::new(isa, &clipped.segment, object.profile().directions()),
             direction: direction(&clipped.direction),
             limit: clipped.share(question.limit()),
             clipped,
@@ -252,7 +252,7 @@ struct Walked<'a, Q> {
     object: &'a Object,
     placed: &'a PlacedShape<'a>,
     number: u32,
-    test: LineTest,
+    test: LineFilter,
     direction: [f32; 3],
     clipped: Clipped,
     /// The share of the segment that is left.

@@ -1,4 +1,4 @@
-//! The node test: bounds 16 pairs of nodes at a time along A's directions and, later in a walk, along B's.
+//! The node filter: bounds 16 pairs of nodes at a time along A's directions and, later in a walk, along B's.
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{Alignment, Prepare, form_error};
@@ -53,7 +53,7 @@ pub(crate) struct Witness {
 }
 
 /// The test of 16 pairs of nodes, for one pose.
-pub(crate) struct NodeTest {
+pub(crate) struct NodeFilter {
     /// B along A's directions.
     alignment: Alignment,
     /// B along A's directions in the other placement, if there are two.
@@ -68,7 +68,7 @@ pub(crate) struct NodeTest {
     reach_b: Reach,
 }
 
-impl NodeTest {
+impl NodeFilter {
     /// An empty test, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
         alignment: Alignment::NONE,

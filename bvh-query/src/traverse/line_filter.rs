@@ -1,8 +1,8 @@
-//! The node test for a line: where a segment enters each of four nodes.
+//! The node filter for a line: where a segment enters each of four nodes.
 //!
 //! A segment leads from p to p + q, and its points are p + s q for s from 0 to 1. Along a direction n of a slab that is from
 //! (lo - n p) / (n q) to (hi - n p) / (n q), and within a node where it is so along all directions (T. L. Kay, J. T. Kajiya,
-//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_test`]), a register holds four slabs of
+//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_filter`]), a register holds four slabs of
 //! four nodes.
 //!
 //! Error, with u = 2^-24: what is subtracted and n q are rounded to f32, which moves a point along n by at most
@@ -16,7 +16,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{FACTORS_BY_AXIS, U};
-use crate::traverse::point_test::quads;
+use crate::traverse::point_filter::quads;
 use bvh_format::kdop::DirectionSet;
 use bvh_format::slabs::Group;
 
@@ -30,7 +30,7 @@ pub(crate) struct Segment {
 }
 
 /// A segment as node tests need it, by rows of slabs, in all four columns.
-pub(crate) struct LineTest {
+pub(crate) struct LineFilter {
     set: DirectionSet,
     /// n p and what slabs are moved by: subtracted from their lower ends.
     above: [[f32; 16]; 4],
@@ -40,7 +40,7 @@ pub(crate) struct LineTest {
     inverse: [[f32; 16]; 4],
 }
 
-impl LineTest {
+impl LineFilter {
     #[inline(always)]
     pub(crate) fn new<I: Isa>(isa: I, segment: &Segment, set: DirectionSet) -> Self {
         let (mut above, mut below, mut inverse) = ([0.0; 16], [0.0; 16], [0.0; 16]);

@@ -1,4 +1,4 @@
-//! The node test for a point: lower bounds of its distance from four nodes.
+//! The node filter for a point: lower bounds of its distance from four nodes.
 //!
 //! A group has four children in columns and slabs in rows, four to a register. Against a single point, each register is
 //! one comparison of sixteen slabs, where a pair of nodes takes one for each slab.
@@ -8,16 +8,16 @@
 //!
 //! Error: the point's slabs hold its projections. A gap is one difference (u = 2^-24), times the inverse length of its
 //! direction (2u, rounded down before); the root of the sum of squares adds three products, two sums and a root. Together
-//! that is less than 2^-20, by which the result is scaled: see `gaps` in [`crate::traverse::node_test`], which says as well
+//! that is less than 2^-20, by which the result is scaled: see `gaps` in [`crate::traverse::node_filter`], which says as well
 //! what becomes of squares that underflow.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::node_test::INVERSE_LENGTHS;
+use crate::traverse::node_filter::INVERSE_LENGTHS;
 use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::slabs::{Group, row};
 
 /// A point's slabs, in all four columns, and what makes a distance of a gap.
-pub(crate) struct PointTest {
+pub(crate) struct PointFilter {
     slabs: Group,
     /// Inverse lengths of directions, in units of the test.
     inverse_lengths: [[f32; 16]; 4],
@@ -27,7 +27,7 @@ pub(crate) struct PointTest {
 /// More than `f32` loses of a subnormal number, 2^-148.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 148) << 52);
 
-impl PointTest {
+impl PointFilter {
     /// Prepares the test of a point around the object's origin; `error` bounds that of its coordinates added up. `scale` is
     /// the inverse of the unit, a power of two.
     #[inline(always)]

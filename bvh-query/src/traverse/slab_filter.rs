@@ -1,4 +1,4 @@
-//! The slab test: bounds 16 pairs of nodes along the directions of their turning slabs, and along the line between them.
+//! The slab filter: bounds 16 pairs of nodes along the directions of their turning slabs, and along the line between them.
 //!
 //! Along a direction `x` a node reaches no further than `alpha` times its slab along `u`, and its box along what remains
 //! of `x`, which is `x - alpha u`. That holds for every `alpha`; the projection `x . u` leaves the least rest. With a box
@@ -17,7 +17,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{U, round_up};
-use crate::traverse::node_test::Measure;
+use crate::traverse::node_filter::Measure;
 use crate::traverse::placement::Placement;
 use bvh_format::quantize::STEP_U8;
 use bvh_format::slabs::Group;
@@ -116,7 +116,7 @@ fn sum<I: Isa>(isa: I, rows: I::V) -> I::H {
 }
 
 /// The slab test for one pose.
-pub(crate) struct SlabTest {
+pub(crate) struct SlabFilter {
     rotation: [[f32; 3]; 3],
     /// Columns of the rotation's transpose, which turns directions of A's frame to B's, each element repeated four times.
     to_b: [Rows; 3],
@@ -131,7 +131,7 @@ pub(crate) struct SlabTest {
     least_square: f32,
 }
 
-impl SlabTest {
+impl SlabFilter {
     pub(crate) const NONE: Self = Self {
         rotation: [[0.0; 3]; 3],
         to_b: [Rows::ZERO; 3],
@@ -538,7 +538,7 @@ mod tests {
 
     /// Decodes both nodes and tests all pairs of their children.
     struct Run<'a> {
-        test: &'a SlabTest,
+        test: &'a SlabFilter,
         nodes: [&'a Node; 2],
         measure: Measure,
         limit: f32,
@@ -568,13 +568,13 @@ mod tests {
         }
     }
 
-    fn prepared(nodes: &[Node; 2], rotation: [[f64; 3]; 3], translation: Point) -> (SlabTest, Placement) {
+    fn prepared(nodes: &[Node; 2], rotation: [[f64; 3]; 3], translation: Point) -> (SlabFilter, Placement) {
         let pose = Pose::new(rotation, translation).unwrap();
         let magnitudes = (nodes[0].magnitude(), nodes[1].magnitude());
         let all = f64::from(magnitudes.0) + f64::from(magnitudes.1);
         let whole = 9.0 * all + translation.iter().map(|t| t.abs()).sum::<f64>();
         let placement = Placement { rotation: *pose.rotation(), translation, error: POSE_ERROR * whole };
-        let mut test = SlabTest::NONE;
+        let mut test = SlabFilter::NONE;
         test.prepare(&placement, &placement.inverse(), magnitudes);
         (test, placement)
     }
