@@ -2,11 +2,13 @@
 //! searches.
 //!
 //! Nothing here depends on bvh-bake or bvh-query, so that every crate of the workspace can use it in its tests.
-//! Meshes are therefore plain arrays. The unit tests within `src` of a published crate do not use this crate, because
-//! it is not published and a packaged crate must be able to test itself.
+//! Meshes are therefore plain arrays. In the unit tests of bvh-format, this crate stands on another build of bvh-format,
+//! so that only what has no types of bvh-format is of use there. A packaged crate has no dependency on this one, which is
+//! not published: its tests run in this repository only.
 
 pub mod ball;
 pub mod depth;
+pub mod exact;
 pub mod forge;
 pub mod hard_cases;
 pub mod loosen;

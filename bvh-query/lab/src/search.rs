@@ -4,7 +4,6 @@
 //! of each kind is its share. The record is saved every few seconds. A panic is a finding, and so is a round that
 //! takes minutes.
 
-mod exact;
 mod files;
 mod hostile;
 mod loosen;
@@ -13,7 +12,6 @@ mod pairs;
 mod probes;
 mod record;
 mod shrink;
-mod slow;
 mod stars;
 
 use crate::arguments::SearchArguments;

@@ -3,7 +3,6 @@
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 pub(crate) mod asked;
-pub(crate) mod exact;
 pub(crate) mod forged;
 pub(crate) mod nearest;
 pub(crate) mod shapes;

@@ -4,6 +4,7 @@
 //! is skipped only if its boxes are too far apart. No code is shared with the library.
 
 use super::Triangle;
+use cbvh_testkit::exact::{Boxed, Decided, intersect};
 
 type Point = [f64; 3];
 
@@ -85,27 +86,6 @@ pub(crate) fn point_triangle(p: Point, triangle: &Triangle) -> f64 {
     distance(&[p; 3], triangle)
 }
 
-/// Returns whether a gap along one of the usual axes shows that the triangles do not meet, by far more than f64
-/// rounds. This saves the exact oracle the easy cases.
-fn certainly_apart(a: &Triangle, b: &Triangle) -> bool {
-    let [p, q] = [a, b].map(|t| t.map(|corner| subtract(corner, a[0])));
-    let edges = |t: Triangle| [subtract(t[1], t[0]), subtract(t[2], t[1]), subtract(t[0], t[2])];
-    let (edges_p, edges_q) = (edges(p), edges(q));
-    let reach = p.iter().chain(&q).flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let apart = |axis: Point| {
-        let ends = |t: Triangle| {
-            let heights = t.map(|corner| dot(axis, corner));
-            (heights.into_iter().fold(f64::MAX, f64::min), heights.into_iter().fold(f64::MIN, f64::max))
-        };
-        let (p, q) = (ends(p), ends(q));
-        let margin = 1e-12 * reach * axis.iter().map(|x| x.abs()).sum::<f64>();
-        q.0 - p.1 > margin || p.0 - q.1 > margin
-    };
-    apart(cross(edges_p[0], edges_p[1]))
-        || apart(cross(edges_q[0], edges_q[1]))
-        || edges_p.iter().any(|&e| edges_q.iter().any(|&f| apart(cross(e, f))))
-}
-
 #[derive(Clone, Copy)]
 struct Bounds {
     lo: Point,
@@ -185,8 +165,8 @@ impl<'a> Blocks<'a> {
     pub(crate) fn contacts(&self, other: &Self) -> Vec<(usize, usize)> {
         let mut contacts = Vec::new();
         self.pairs(other, 0.0, |a, b| {
-            let (triangle_a, triangle_b) = (&self.triangles[a], &other.triangles[b]);
-            if !certainly_apart(triangle_a, triangle_b) && super::exact::intersect(triangle_a, triangle_b) {
+            let [of_a, of_b] = [self.triangles[a], other.triangles[b]].map(Boxed::new);
+            if intersect(&of_a, &of_b, &mut Decided::default()) {
                 contacts.push((a, b));
             }
             0.0

@@ -1,8 +1,9 @@
 //! Computes the right answers for two meshes in a pose by brute force, and compares the library's answers with them.
 
 use super::nearest::{Blocks, point_triangle};
-use super::{Stored, Triangle, corners, exact, placed, size};
+use super::{Stored, Triangle, corners, placed, size};
 use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
+use cbvh_testkit::exact::Length;
 
 /// The largest error of a distance, as a fraction of the size.
 const TOLERANCE: f64 = 1e-12;
@@ -101,13 +102,13 @@ impl Truth {
         let named = Contact { object_a, triangle_a, object_b, triangle_b };
         assert_eq!(d == 0.0, self.contacts.contains(&named), "{named:?} at {d}");
         assert_eq!(d == 0.0, !self.contacts.is_empty(), "{named:?} at {d}");
-        let pair = exact::distance(a, b);
+        let pair = Length::between(a, b);
         assert!(pair.is(d, self.tolerance), "{d} is not the distance of {named:?}");
         assert!(answer.lower <= d && d <= answer.upper, "{answer:?}");
         assert!(pair.compare(answer.lower).is_ge() && pair.compare(answer.upper).is_le(), "{answer:?}");
         assert!(d == 0.0 || !self.nearest.is_empty(), "nothing is as near as {d}");
         for &(nearest, i, j) in self.nearest.iter().take(3) {
-            let exact = exact::distance(&self.corners_a[i], &self.corners_b[j]);
+            let exact = Length::between(&self.corners_a[i], &self.corners_b[j]);
             assert!(exact.compare(d - self.tolerance).is_ge(), "{d}, but pair {i}, {j} is {nearest} apart");
             assert!(exact.compare(answer.lower).is_ge(), "{answer:?}, but pair {i}, {j} is {nearest} apart");
         }

@@ -4,10 +4,10 @@
 //! meshes touch, and the true distance of the placed meshes lies between `lower` and `upper`. `within` is exact on
 //! the placed meshes, too. All backends give the same answers.
 
-use super::length::Length;
 use super::tally::Tally;
 use super::truth::Truth;
 use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
+use cbvh_testkit::exact::Length;
 
 /// The largest error of the distance of two triangles in f64, relative to the largest difference between two of their
 /// coordinates. The tests of the narrow phase allow the same error. A pair with the least such distance may be

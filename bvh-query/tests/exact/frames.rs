@@ -2,52 +2,15 @@
 //!
 //! Each identity is evaluated in integers times a power of two, so that nothing but the library rounds.
 
-use super::dyadic::{compare, parts};
 use crate::common::Random;
 use bvh_query::{Pose, PoseError};
 use cbvh_testkit::depth::rounds;
-use dashu_int::IBig;
-use std::cmp::Ordering;
+use cbvh_testkit::exact::{Dyadic, Number};
 
-/// An integer times a power of two.
-#[derive(Clone)]
-struct Exact(IBig, i32);
-
-impl Exact {
-    const ZERO: Self = Self(IBig::ZERO, 0);
-
-    fn of(x: f64) -> Self {
-        match parts(x) {
-            (0, _) => Self::ZERO,
-            (mantissa, exponent) => Self(IBig::from(mantissa), exponent),
-        }
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        let grid = self.1.min(other.1);
-        let on = |x: &Self| x.0.clone() << usize::try_from(x.1 - grid).unwrap();
-        Self(on(self) + on(other), grid)
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        Self(&self.0 * &other.0, self.1 + other.1)
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        self.plus(&Self(-&other.0, other.1))
-    }
-
-    fn is_within(&self, bound: f64) -> bool {
-        let magnitude = if self.0 < IBig::ZERO { -&self.0 } else { self.0.clone() };
-        let bound = Self::of(bound);
-        compare(magnitude, self.1, bound.0, bound.1) != Ordering::Greater
-    }
-}
-
-type Matrix = [[Exact; 3]; 3];
+type Matrix = [[Dyadic; 3]; 3];
 
 fn matrix(m: &[[f64; 3]; 3]) -> Matrix {
-    m.map(|row| row.map(Exact::of))
+    m.map(|row| row.map(Dyadic::of))
 }
 
 fn transposed(m: &Matrix) -> Matrix {
@@ -56,20 +19,20 @@ fn transposed(m: &Matrix) -> Matrix {
 
 fn times(a: &Matrix, b: &Matrix) -> Matrix {
     [0, 1, 2]
-        .map(|i| [0, 1, 2].map(|j| (0..3).fold(Exact::ZERO, |sum, k| sum.plus(&a[i][k].times(&b[k][j])))))
+        .map(|i| [0, 1, 2].map(|j| (0..3).fold(Dyadic::ZERO, |sum, k| sum.plus(&a[i][k].times(&b[k][j])))))
 }
 
 /// Returns R x + t.
-fn place(pose: &Pose, x: &[Exact; 3]) -> [Exact; 3] {
+fn place(pose: &Pose, x: &[Dyadic; 3]) -> [Dyadic; 3] {
     let r = matrix(pose.rotation());
     [0, 1, 2].map(|i| {
-        let turned = (0..3).fold(Exact::ZERO, |sum, k| sum.plus(&r[i][k].times(&x[k])));
-        turned.plus(&Exact::of(pose.translation()[i]))
+        let turned = (0..3).fold(Dyadic::ZERO, |sum, k| sum.plus(&r[i][k].times(&x[k])));
+        turned.plus(&Dyadic::of(pose.translation()[i]))
     })
 }
 
-fn are_near(a: &[Exact], b: &[Exact], bound: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| a.minus(b).is_within(bound))
+fn are_near(a: &[Dyadic], b: &[Dyadic], bound: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| a.minus(b).abs() <= Dyadic::of(bound))
 }
 
 fn are_equal_matrices(a: &Matrix, b: &Matrix, bound: f64) -> bool {
@@ -111,16 +74,16 @@ fn inverses_and_compositions_take_points_where_they_should_be() {
         let both = first.then(&next).unwrap();
         let expected = times(&matrix(next.rotation()), &matrix(first.rotation()));
         assert!(are_equal_matrices(&matrix(both.rotation()), &expected, 5.0 * u), "{first:?} {next:?}");
-        let placed = place(&next, &first.translation().map(Exact::of));
+        let placed = place(&next, &first.translation().map(Dyadic::of));
         let bound = 64.0 * u * (largest(first.translation()) + largest(next.translation()));
-        assert!(are_near(&both.translation().map(Exact::of), &placed, bound), "{first:?} {next:?}");
+        assert!(are_near(&both.translation().map(Dyadic::of), &placed, bound), "{first:?} {next:?}");
 
         let back = first.inverse().unwrap();
         let one = times(&matrix(back.rotation()), &matrix(first.rotation()));
         assert!(are_equal_matrices(&one, &matrix(Pose::IDENTITY.rotation()), 64.0 * u), "{first:?}");
-        let origin = place(&back, &first.translation().map(Exact::of));
+        let origin = place(&back, &first.translation().map(Dyadic::of));
         let bound = 64.0 * u * largest(first.translation());
-        assert!(are_near(&origin, &[Exact::ZERO, Exact::ZERO, Exact::ZERO], bound), "{first:?}");
+        assert!(are_near(&origin, &[Dyadic::ZERO, Dyadic::ZERO, Dyadic::ZERO], bound), "{first:?}");
     }
 }
 
@@ -134,9 +97,9 @@ fn relative_poses_are_those_between_two_poses_of_the_world() {
         let b_in_a = Pose::relative(&a, &b).unwrap();
         let through = times(&matrix(a.rotation()), &matrix(b_in_a.rotation()));
         assert!(are_equal_matrices(&through, &matrix(b.rotation()), 64.0 * u), "{a:?} {b:?}");
-        let origin = place(&a, &b_in_a.translation().map(Exact::of));
+        let origin = place(&a, &b_in_a.translation().map(Dyadic::of));
         let between: f64 = (0..3).map(|i| (b.translation()[i] - a.translation()[i]).abs()).sum();
-        assert!(are_near(&origin, &b.translation().map(Exact::of), 64.0 * u * between), "{a:?} {b:?}");
+        assert!(are_near(&origin, &b.translation().map(Dyadic::of), 64.0 * u * between), "{a:?} {b:?}");
         // Far from the world's origin, near to each other.
         let far = |pose: &Pose| Pose::new(*pose.rotation(), [1e9 + 0.5, -3e9, 7e9]).unwrap();
         let near = Pose::relative(&far(&a), &far(&b)).unwrap();
@@ -170,11 +133,11 @@ fn quaternions_turn_as_their_polynomials_do() {
         // As far from unit length as is allowed.
         let q = q.map(|c| c / length * (1.0 + 0.49 * 2f64.powi(-20) * random.signed()));
         let pose = Pose::from_quaternion(q, [1.0, 2.0, 3.0]).unwrap();
-        let [x, y, z, w] = q.map(Exact::of);
-        let squared = [&x, &y, &z, &w].into_iter().fold(Exact::ZERO, |sum, c| sum.plus(&c.times(c)));
-        let two = Exact::of(2.0);
-        let double = |a: Exact, b: Exact| two.times(&a.plus(&b));
-        let minus = |a: Exact| Exact(-a.0, a.1);
+        let [x, y, z, w] = q.map(Dyadic::of);
+        let squared = [&x, &y, &z, &w].into_iter().fold(Dyadic::ZERO, |sum, c| sum.plus(&c.times(c)));
+        let two = Dyadic::of(2.0);
+        let double = |a: Dyadic, b: Dyadic| two.times(&a.plus(&b));
+        let minus = |a: Dyadic| Dyadic::ZERO.minus(&a);
         let expected = [
             [
                 squared.minus(&double(y.times(&y), z.times(&z))),

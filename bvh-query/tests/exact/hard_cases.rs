@@ -1,11 +1,6 @@
 //! Proves every fact that the hard cases state, and compares every answer of the library with it.
 
 use super::ask::Asked;
-use super::dyadic::{compare, grid, on_grid, parts};
-use super::features::{Fraction, is_less, squared_distance};
-use super::length::Length;
-use super::meet::meet;
-use super::number::Corners;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
 use crate::common::{bake, mesh, options, queriers, stored};
@@ -14,8 +9,8 @@ use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Pose};
 use cbvh_testkit::Triangle;
 use cbvh_testkit::depth::step;
+use cbvh_testkit::exact::{Corners, Dyadic, Length, Number, dot, meet};
 use cbvh_testkit::hard_cases::{self as cases, Case, Ordered, Truth as Stated};
-use dashu_int::IBig;
 use std::collections::BTreeSet;
 
 /// The largest error of a distance, as a fraction of the stated one, if corners are placed without rounding. It is a
@@ -74,46 +69,11 @@ fn stated_facts_are_proved() {
     tally.report("stated facts");
 }
 
-/// Both meshes as integers in units of 2^`grid`, with B placed without rounding.
-struct Real {
-    a: Vec<Corners<IBig>>,
-    b: Vec<Corners<IBig>>,
-    grid: i32,
-}
-
-impl Real {
-    fn new(case: &Case) -> Self {
-        let numbers = case.a.iter().chain(&case.b).flatten().flatten().chain(&case.pose).copied();
-        let unit = grid(numbers).min(0);
-        // A product of two is in units of 2^(2 unit), and so are all other numbers here.
-        let single = |x: f64| on_grid(x, unit) << unit.unsigned_abs() as usize;
-        let entry = |i: usize, j: usize| on_grid(case.pose[4 * i + j], unit);
-        let place = |p: [f64; 3]| {
-            let p = p.map(|x| on_grid(x, unit));
-            [0, 1, 2]
-                .map(|i| (0..3).fold(single(case.pose[4 * i + 3]), |sum, j| sum + entry(i, j) * p[j].clone()))
-        };
-        let a = case.a.iter().map(|t| t.map(|p| p.map(single))).collect();
-        Self { a, b: case.b.iter().map(|t| t.map(place)).collect(), grid: 2 * unit }
-    }
-
-    fn truth(&self) -> (u64, Fraction<IBig>) {
-        let pairs = || self.a.iter().flat_map(|a| self.b.iter().map(move |b| (a, b)));
-        let contacts = pairs().filter(|(a, b)| meet(a, b).unwrap()).count() as u64;
-        let squares = pairs().map(|(a, b)| squared_distance(a, b, &[IBig::ZERO, IBig::ONE]).unwrap());
-        let nearer = |one, other| if is_less(&other, &one).unwrap() { other } else { one };
-        (contacts, squares.reduce(nearer).unwrap())
-    }
-
-    /// Compares a squared length in these units with the square of a number that is not negative.
-    fn compare(&self, square: &Fraction<IBig>, x: f64) -> std::cmp::Ordering {
-        let (mantissa, exponent) = parts(x);
-        if mantissa == 0 {
-            return square.0.cmp(&IBig::ZERO);
-        }
-        let of_x = IBig::from(mantissa) * IBig::from(mantissa) * &square.1;
-        compare(square.0.clone(), 2 * self.grid, of_x, 2 * exponent)
-    }
+/// Places a triangle without rounding.
+fn place(case: &Case, t: &Triangle) -> Corners<Dyadic> {
+    let entry = |at: usize| Dyadic::of(case.pose[at]);
+    let rows = [0, 4, 8].map(|at| ([0, 1, 2].map(|j| entry(at + j)), entry(at + 3)));
+    t.map(|p| rows.each_ref().map(|(row, shift)| dot(row, &p.map(Dyadic::of)).plus(shift)))
 }
 
 /// Checks that the facts also hold for other ways of placing corners than this library's.
@@ -122,19 +82,22 @@ fn facts_hold_however_corners_are_placed() {
     let mut tally = Tally::default();
     for case in cases::all() {
         let Ok(pose) = Pose::from_rows(&case.pose) else { continue };
-        let real = Real::new(&case);
-        let single = |x: f64| on_grid(x, real.grid);
-        let rounded: Vec<_> = case.b.iter().map(|t| t.map(|p| pose.place(p).map(single))).collect();
-        if rounded == real.b {
+        let exactly = |t: &Triangle| t.map(|p| p.map(Dyadic::of));
+        let a: Vec<_> = case.a.iter().map(exactly).collect();
+        let b: Vec<_> = case.b.iter().map(|t| place(&case, t)).collect();
+        if case.b.iter().map(|t| exactly(&t.map(|p| pose.place(p)))).eq(b.iter().cloned()) {
             continue;
         }
         tally.poses += 1;
-        let (contacts, square) = real.truth();
+        let pairs = || a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+        let contacts = pairs().filter(|(a, b)| meet(a, b).unwrap()).count() as u64;
+        let lengths = pairs().map(|(a, b)| Length::of(a, b));
+        let least = lengths.reduce(|one, other| if other.is_less(&one) { other } else { one }).unwrap();
         let right = match case.truth {
             Stated::Touching { contacts: stated } => contacts == stated,
             Stated::Apart(stated) => {
-                let (least, most) = (stated.floor() * (1.0 - SAME), stated.ceil() * (1.0 + SAME));
-                contacts == 0 && real.compare(&square, least).is_ge() && real.compare(&square, most).is_le()
+                let (low, high) = (stated.floor() * (1.0 - SAME), stated.ceil() * (1.0 + SAME));
+                contacts == 0 && least.compare(low).is_ge() && least.compare(high).is_le()
             }
             Stated::Refused { .. } => false,
         };

@@ -6,14 +6,13 @@
 //! terms, so it stays below 2^60.
 
 use super::kinds::exact_turns;
-use super::meet::meet;
-use super::number::Corners;
 use super::tally::Tally;
 use crate::common::{Random, Triangle, bake, mesh, options, queriers};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Contact, Pose};
 use cbvh_testkit::depth::rounds;
+use cbvh_testkit::exact::{Corners, meet};
 
 /// The number of triangles per mesh.
 const COUNT: usize = 48;

@@ -7,24 +7,15 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-mod agreement;
 mod ask;
-mod ball;
 mod boundary;
-mod decide;
-mod dyadic;
 mod far_apart;
-mod features;
 mod frames;
 mod hard_cases;
 mod kinds;
 mod lattice;
-mod length;
-mod meet;
 mod near_tie;
-mod number;
 mod placement;
-mod separation;
 mod subnormal;
 mod tally;
 mod tiny_origin;

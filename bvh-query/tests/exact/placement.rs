@@ -3,7 +3,6 @@
 //! A stored coordinate is origin + v without rounding. A placed one is `((R0 x + R1 y) + R2 z) + t`, where each
 //! product and each sum is rounded to nearest, ties to even. The tests recompute both in integers.
 
-use super::dyadic::{on_grid, parts};
 use super::kinds::turn;
 use crate::common::{Random, bake, mesh, options};
 use bvh_format::leaf::{TriangleEncoding, decode_packet};
@@ -11,42 +10,16 @@ use bvh_format::page::Page;
 use bvh_format::profile::Profile;
 use bvh_format::validate::packets;
 use bvh_query::Pose;
-use dashu_int::IBig;
-use std::cmp::Ordering;
+use cbvh_testkit::exact::{Dyadic, Number};
 
-/// An integer times a power of two.
-#[derive(Clone)]
-struct Dyadic(IBig, i32);
-
-impl Dyadic {
-    fn new(x: f64) -> Self {
-        let (mantissa, exponent) = parts(x);
-        if mantissa == 0 { Self(IBig::ZERO, 0) } else { Self(IBig::from(mantissa), exponent) }
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        let lowest = self.1.min(other.1);
-        let at = |x: &Self| x.0.clone() << (x.1 - lowest) as usize;
-        Self(at(self) + at(other), lowest)
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        Self(&self.0 * &other.0, self.1 + other.1)
-    }
-
-    fn compare(&self, other: &Self) -> Ordering {
-        self.plus(&Self(-other.0.clone(), other.1)).0.cmp(&IBig::ZERO)
-    }
-
-    /// Returns whether `x` is this number, rounded to nearest, ties to even: no farther away than half way to a
-    /// neighbour, and half way only with an even mantissa.
-    fn rounds_to(&self, x: f64) -> bool {
-        let twice = self.times(&Self::new(2.0));
-        let half_way = |neighbour: f64| Self::new(x).plus(&Self::new(neighbour));
-        let (below, above) = (twice.compare(&half_way(x.next_down())), twice.compare(&half_way(x.next_up())));
-        let even = x.to_bits() & 1 == 0;
-        (below.is_gt() || (even && below.is_eq())) && (above.is_lt() || (even && above.is_eq()))
-    }
+/// Returns whether `x` is an exact number, rounded to nearest, ties to even: no farther away than half way to a neighbour,
+/// and half way only with an even mantissa.
+fn rounds_to(exact: &Dyadic, x: f64) -> bool {
+    let twice = exact.plus(exact);
+    let half_way = |neighbour: f64| Dyadic::of(x).plus(&Dyadic::of(neighbour));
+    let (below, above) = (twice.cmp(&half_way(x.next_down())), twice.cmp(&half_way(x.next_up())));
+    let even = x.to_bits() & 1 == 0;
+    (below.is_gt() || (even && below.is_eq())) && (above.is_lt() || (even && above.is_eq()))
 }
 
 /// Computes the four steps exactly and rounds after each. Panics if `place` rounded otherwise.
@@ -57,29 +30,26 @@ fn check_place(pose: &Pose, point: [f64; 3]) {
         let mut sum = 0.0;
         for (j, (factor, x)) in row.into_iter().zip(point).enumerate() {
             let product = factor * x;
-            assert!(Dyadic::new(factor).times(&Dyadic::new(x)).rounds_to(product), "{factor:e} {x:e}");
+            assert!(rounds_to(&Dyadic::of(factor).times(&Dyadic::of(x)), product), "{factor:e} {x:e}");
             let before = sum;
             sum = if j == 0 { product } else { sum + product };
-            assert!(j == 0 || Dyadic::new(before).plus(&Dyadic::new(product)).rounds_to(sum));
+            assert!(j == 0 || rounds_to(&Dyadic::of(before).plus(&Dyadic::of(product)), sum));
         }
         assert!(
-            Dyadic::new(sum).plus(&Dyadic::new(translation[k])).rounds_to(placed[k]),
+            rounds_to(&Dyadic::of(sum).plus(&Dyadic::of(translation[k])), placed[k]),
             "{pose:?} {point:?}"
         );
 
         // With u = 2^-53, a product passes at most four roundings and t passes one. The result is off by at most 4u
         // of the sum of the magnitudes, and a small second-order term. An underflow adds less than one subnormal
         // number each.
-        let terms = [0, 1, 2].map(|j| Dyadic::new(row[j]).times(&Dyadic::new(point[j])));
-        let all = [&terms[0], &terms[1], &terms[2], &Dyadic::new(translation[k])];
-        let zero = Dyadic::new(0.0);
-        let exact = all.iter().fold(zero.clone(), |sum, term| sum.plus(term));
-        let magnitude =
-            |x: &Dyadic| if x.compare(&zero).is_lt() { Dyadic(-x.0.clone(), x.1) } else { x.clone() };
-        let sum = all.iter().fold(zero.clone(), |sum, term| sum.plus(&magnitude(term)));
-        let off = magnitude(&exact.plus(&Dyadic::new(-placed[k])));
-        let bound = sum.times(&Dyadic::new(2.0 * f64::EPSILON * (1.0 + 8.0 * f64::EPSILON)));
-        assert!(off.compare(&bound).is_le(), "{pose:?} {point:?}");
+        let terms = [0, 1, 2].map(|j| Dyadic::of(row[j]).times(&Dyadic::of(point[j])));
+        let all = [&terms[0], &terms[1], &terms[2], &Dyadic::of(translation[k])];
+        let sum_of = |terms: [Dyadic; 4]| terms.iter().fold(Dyadic::ZERO, |sum, term| sum.plus(term));
+        let off = sum_of(all.each_ref().map(|&term| term.clone())).minus(&Dyadic::of(placed[k])).abs();
+        let bound =
+            Dyadic::of(2.0 * f64::EPSILON * (1.0 + 8.0 * f64::EPSILON)).times(&sum_of(all.map(Dyadic::abs)));
+        assert!(off <= bound, "{pose:?} {point:?}");
     }
 }
 
@@ -134,9 +104,7 @@ fn stored_corners_are_sums_without_rounding() {
             for corner in (0..count).flat_map(|lane| values.triangle(lane)) {
                 for k in 0..3 {
                     let (v, sum) = (f64::from(corner[k]), origin[k] + f64::from(corner[k]));
-                    let grid = parts(origin[k]).1.min(parts(v).1).min(parts(sum).1);
-                    let [origin, v, sum] = [origin[k], v, sum].map(|x| on_grid(x, grid));
-                    assert_eq!(origin + v, sum);
+                    assert_eq!(Dyadic::of(origin[k]).plus(&Dyadic::of(v)), Dyadic::of(sum));
                 }
             }
         }

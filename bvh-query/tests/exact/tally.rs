@@ -1,7 +1,7 @@
 //! Counts what was searched: queries, widths of intervals, wrong answers.
 
-use super::decide::Decided;
 use crate::common::note;
+use cbvh_testkit::exact::Decided;
 
 /// The most wrong answers that are kept; the search ends when there are as many.
 const MANY: usize = 20;

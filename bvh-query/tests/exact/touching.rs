@@ -5,13 +5,13 @@
 
 use super::ask::Asked;
 use super::kinds::exact_turns;
-use super::length::Length;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
 use crate::common::{Random, Triangle, bake, mesh, queriers, stored};
 use bvh_bake::Options;
 use bvh_query::{Pose, Querier};
 use cbvh_testkit::depth::rounds;
+use cbvh_testkit::exact::Length;
 
 type Integer = [i64; 3];
 

@@ -1,10 +1,9 @@
 //! Computes the right answers for two meshes in a pose, from the oracles over all pairs of triangles.
 
-use super::decide::{Boxed, Triangle, certainly_farther, intersect};
-use super::length::Length;
 use super::tally::Tally;
-use crate::common::{Stored, placed, size};
+use crate::common::{Stored, Triangle, placed, size};
 use bvh_query::{Contact, Distance, Pose};
+use cbvh_testkit::exact::{Boxed, Length, certainly_farther, intersect};
 
 /// A mesh as a file stores it.
 pub(crate) struct Surface {

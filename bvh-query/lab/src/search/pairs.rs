@@ -7,14 +7,13 @@
 //! A pair is *near the boundary* if moving B by [`ROUNDINGS`] of the largest magnitude in the pose parts the pair, or if
 //! the pair is apart by no more than that. One pair of a star in [`SAMPLE`] is tested for that, in exact arithmetic.
 
-use super::exact::meet;
 use super::files::{Layout, bake, stored};
 use super::record::{Counts, Finding};
 use super::shrink::{Case, shrunk};
-use super::slow::length::Length;
 use super::stars::Stars;
 use crate::Failure;
 use bvh_query::{Backend, Bvh, Contact, Pose, Querier, QueryError};
+use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
 
 /// Poses of a round.
@@ -157,49 +156,27 @@ fn largest_magnitude(stars: &Stars, rotation: &[[f64; 3]; 3], translation: [f64;
     of_b.chain(of_a).fold(0.0, f64::max)
 }
 
-/// Returns all pairs in contact in ascending order, from boxes of stars, boxes of triangles and exact arithmetic.
+/// Returns all pairs in contact in ascending order, from boxes of stars and exact arithmetic.
 pub(super) fn truth(a: &[Triangle], b: &[Triangle], sizes: [usize; 2], counts: &mut Counts) -> Vec<Pair> {
-    let boxes = |triangles: &[Triangle]| triangles.iter().map(box_of).collect::<Vec<_>>();
-    let (boxes_a, boxes_b) = (boxes(a), boxes(b));
-    let joined = |boxes: &[Box3]| boxes.iter().copied().reduce(|p, q| join(&p, &q)).unwrap_or_default();
-    let stars_b: Vec<_> = boxes_b.chunks(sizes[1]).map(joined).collect();
-    let (mut pairs, mut slow) = (Vec::new(), 0);
-    for (star_a, group) in boxes_a.chunks(sizes[0]).enumerate() {
-        let whole = joined(group);
-        let near: Vec<usize> = (0..stars_b.len()).filter(|&star| overlap(&whole, &stars_b[star])).collect();
-        for (i, box_a) in group.iter().enumerate() {
-            let i = star_a * sizes[0] + i;
+    let boxed = |triangles: &[Triangle]| triangles.iter().copied().map(Boxed::new).collect::<Vec<_>>();
+    let (a, b) = (boxed(a), boxed(b));
+    let (mut pairs, mut decided) = (Vec::new(), Decided::default());
+    let stars_b: Vec<_> = b.chunks(sizes[1]).map(Boxed::around).collect();
+    for (star_a, group) in a.chunks(sizes[0]).enumerate() {
+        let whole = Boxed::around(group);
+        let near: Vec<usize> = (0..stars_b.len()).filter(|&star| whole.overlaps(&stars_b[star])).collect();
+        for (i, of_a) in (star_a * sizes[0]..).zip(group) {
             for j in near.iter().flat_map(|star| star * sizes[1]..((star + 1) * sizes[1]).min(b.len())) {
-                if overlap(box_a, &boxes_b[j]) {
-                    let (touch, fast) = meet(&a[i], &b[j]);
-                    slow += u64::from(!fast);
-                    if touch {
-                        pairs.push((i as u32, j as u32));
-                    }
+                if intersect(of_a, &b[j], &mut decided) {
+                    pairs.push((i as u32, j as u32));
                 }
             }
         }
     }
     counts.add("pairs", (a.len().div_ceil(sizes[0]) * sizes[0] * sizes[1]) as u64);
     counts.add("contacts", pairs.len() as u64);
-    counts.add("decided by the slow oracle", slow);
+    counts.add("decided in integers", decided.by_integers);
     pairs
-}
-
-/// The low and the high corner of a box.
-type Box3 = [[f64; 3]; 2];
-
-fn box_of(t: &Triangle) -> Box3 {
-    let end = |pick: fn(f64, f64) -> f64| [0, 1, 2].map(|k| pick(t[0][k], pick(t[1][k], t[2][k])));
-    [end(f64::min), end(f64::max)]
-}
-
-fn join(p: &Box3, q: &Box3) -> Box3 {
-    [[0, 1, 2].map(|k| p[0][k].min(q[0][k])), [0, 1, 2].map(|k| p[1][k].max(q[1][k]))]
-}
-
-fn overlap(p: &Box3, q: &Box3) -> bool {
-    (0..3).all(|k| p[0][k] <= q[1][k] && q[0][k] <= p[1][k])
 }
 
 /// Tests of a few pairs of a star whether they are near the boundary.
@@ -219,7 +196,7 @@ fn sample(
         let [i, j] = [0, 1].map(|side| star * stars.sizes[side] + random.below(stars.sizes[side]));
         let is_near = if truth.binary_search(&(i as u32, j as u32)).is_ok() {
             let moved = b[j].map(|p| [0, 1, 2].map(|k| p[k] + off * stars.normal[k] / length));
-            !meet(&stars.a[i], &moved).0
+            !intersect(&Boxed::new(stars.a[i]), &Boxed::new(moved), &mut Decided::default())
         } else {
             Length::between(&stars.a[i], &b[j]).compare(off).is_le()
         };

@@ -3,14 +3,13 @@
 //! The points are corners of placed stars, which are at most some roundings off A, and the segments are their edges. A
 //! point is a triangle whose corners are the same, and a segment one with two such corners.
 
-use super::exact::meet;
 use super::files::{Layout, bake};
 use super::pairs::{place_all, queriers};
 use super::record::{Counts, Finding};
-use super::slow::length::Length;
 use super::stars::Stars;
 use crate::Failure;
 use bvh_query::{Bvh, Pose, Querier, QueryError};
+use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
 
 /// Triangles of B from which points and segments are taken in a round.
@@ -28,11 +27,11 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
     let mut findings = Vec::new();
     for number in 0..PROBES {
         let [p, q, _] = placed[random.below(placed.len())];
-        let near = |probe: &Triangle| {
-            let all = stars.a.iter();
-            all.filter(|t| boxes_overlap(t, probe) && meet(t, probe).0).count()
+        let is_met = |probe: Triangle| {
+            let probe = Boxed::new(probe);
+            stars.a.iter().any(|t| intersect(&Boxed::new(*t), &probe, &mut Decided::default()))
         };
-        let (on, met) = (near(&[p; 3]) > 0, near(&[p, q, q]) > 0);
+        let (on, met) = (is_met([p; 3]), is_met([p, q, q]));
         for querier in &mut queriers() {
             counts.add("queries", 2);
             let is_proved = number % PROVED == 0;
@@ -72,11 +71,4 @@ fn wrong(
     }
     let nearer = |t: &Triangle| Length::between(&[p; 3], t).compare(answer.lower).is_lt();
     Ok((is_proved && triangles.iter().any(nearer)).then(|| format!("{answer:?}, but another is nearer")))
-}
-
-fn boxes_overlap(t: &Triangle, other: &Triangle) -> bool {
-    let end = |t: &Triangle, k: usize, pick: fn(f64, f64) -> f64| pick(t[0][k], pick(t[1][k], t[2][k]));
-    (0..3).all(|k| {
-        end(t, k, f64::min) <= end(other, k, f64::max) && end(other, k, f64::min) <= end(t, k, f64::max)
-    })
 }

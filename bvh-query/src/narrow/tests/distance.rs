@@ -1,10 +1,12 @@
 //! Compares `triangle_distance` with the oracle: value, bounds and witness points.
 
-use super::generate::{KINDS, Random, float, pair};
-use super::oracle::{Exact, dot_triangle};
+use super::generate::{KINDS, float, grid_triangle, pair, shuffled, small};
 use crate::narrow::{
     Closest, Point, Triangle, add_scaled, point_distance, subtract, triangle_distance, triangles_intersect,
 };
+use cbvh_testkit::Random;
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::exact::Length;
 
 /// The largest error allowed, as a fraction of the largest difference of two coordinates.
 const TOLERANCE: f64 = 1e-14;
@@ -15,7 +17,7 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 
 #[track_caller]
 fn check(name: &str, a: &Triangle, b: &Triangle) -> Closest {
-    let exact = Exact::new(a, b);
+    let exact = Length::between(a, b);
     let closest = triangle_distance(a, b);
     let Closest { distance, lower, upper, point_a, point_b } = closest;
     let context = format!("{name}: {a:?} {b:?} {closest:?}");
@@ -33,7 +35,7 @@ fn check(name: &str, a: &Triangle, b: &Triangle) -> Closest {
     assert_eq!(distance == 0.0, triangles_intersect(a, b), "{context}");
 
     for (triangle, point) in [(a, point_a), (b, point_b)] {
-        let off = Exact::new(triangle, &dot_triangle(point));
+        let off = Length::between(triangle, &[point; 3]);
         assert!(off.compare(2.0 * ulp + TOLERANCE * size).is_le(), "witness point: {context}");
     }
     if distance == 0.0 {
@@ -57,9 +59,9 @@ fn length(p: &Point, q: &Point) -> f64 {
 #[test]
 fn grid_pairs_agree_with_the_oracle() {
     for (n, rounds) in [(2, 100), (3, 200), (5, 300)] {
-        let mut random = Random(n);
+        let mut random = Random::new(n as u64);
         for _ in 0..rounds {
-            let (a, b) = (random.grid_triangle(n), random.grid_triangle(n));
+            let (a, b) = (grid_triangle(&mut random, n), grid_triangle(&mut random, n));
             check("grid", &float(&a), &float(&b));
         }
     }
@@ -69,9 +71,9 @@ fn grid_pairs_agree_with_the_oracle() {
 fn grid_pairs_at_the_ends_of_the_range_agree_with_the_oracle() {
     // Multiples of 2^-266, and coordinates of 2^125.
     for unit in [2_f64.powi(-266), 2_f64.powi(123)] {
-        let mut random = Random(41);
+        let mut random = Random::new(41);
         for _ in 0..200 {
-            let [a, b] = [(); 2].map(|()| float(&random.grid_triangle(5)).map(|p| p.map(|x| x * unit)));
+            let [a, b] = [(); 2].map(|()| float(&grid_triangle(&mut random, 5)).map(|p| p.map(|x| x * unit)));
             check("end of the range", &a, &b);
         }
     }
@@ -79,16 +81,16 @@ fn grid_pairs_at_the_ends_of_the_range_agree_with_the_oracle() {
 
 #[test]
 fn hard_pairs_agree_with_the_oracle() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     for round in 0..KINDS * 40 {
         let (name, a, b) = pair(round % KINDS, &mut random);
-        check(name, &random.shuffled(&a), &random.shuffled(&b));
+        check(name, &shuffled(&mut random, &a), &shuffled(&mut random, &b));
     }
 }
 
 #[test]
 fn hard_pairs_of_any_scale_agree_with_the_oracle() {
-    let mut random = Random(13);
+    let mut random = Random::new(13);
     for round in 0..KINDS * 20 {
         let (name, a, b) = pair(round % KINDS, &mut random);
         let scale = 2_f64.powi(random.below(201) as i32 - 100);
@@ -99,7 +101,7 @@ fn hard_pairs_of_any_scale_agree_with_the_oracle() {
 
 #[test]
 fn a_common_offset_costs_no_accuracy() {
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     for round in 0..KINDS * 20 {
         let (name, a, b) = pair(round % KINDS, &mut random);
         // The rounded corners are the input, and their distance is as accurate as near the origin.
@@ -111,7 +113,7 @@ fn a_common_offset_costs_no_accuracy() {
 
 #[test]
 fn the_distance_scales_with_a_power_of_two() {
-    let mut random = Random(19);
+    let mut random = Random::new(19);
     for round in 0..KINDS * 200 {
         let (name, a, b) = pair(round % KINDS, &mut random);
         let scale = 2_f64.powi(random.below(301) as i32 - 190);
@@ -179,9 +181,9 @@ fn of_equal_distances_the_first_pair_of_corners_is_named() {
 /// Random points, corners, and points of edges and faces or a little off them, for triangles of any kind and scale.
 #[test]
 fn a_point_has_the_bits_of_a_triangle_that_is_a_point() {
-    let random = &mut Random(77);
+    let random = &mut Random::new(77);
     let (mut on, mut all) = (0, 0);
-    for round in 0..super::depth::rounds(20_000) {
+    for round in 0..rounds(20_000) {
         let (name, t, other) = pair(round as usize % KINDS, random);
         let scale = [1.0, 2f64.powi(-100), 2f64.powi(90)][random.below(3)];
         // Coarse coordinates make points that are exactly on edges and faces.
@@ -190,7 +192,7 @@ fn a_point_has_the_bits_of_a_triangle_that_is_a_point() {
         let along = |p: Point, share: f64, q: Point| add_scaled(p, share, subtract(q, p));
         let share = [random.below(5) as f64 / 4.0, random.unit()][random.below(2)];
         let on_edge = along(t[0], share, t[1]);
-        let near = add_scaled(on_edge, random.small(17.0) * scale, random.point());
+        let near = add_scaled(on_edge, small(random, 17.0) * scale, random.point());
         let inside = along(on_edge, [0.25, random.unit()][random.below(2)], t[2]);
         for point in [other[0].map(|x| x * scale), t[random.below(3)], on_edge, near, inside] {
             let expected = triangle_distance(&t, &[point; 3]);

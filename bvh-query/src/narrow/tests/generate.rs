@@ -1,64 +1,35 @@
 //! Generates pairs of triangles that are hard to decide or to measure, from a seed.
 
 use crate::narrow::{Point, Triangle, add_scaled, cross, dot};
+use cbvh_testkit::Random;
 
-/// A random number generator: Marsaglia's xorshift64*.
-pub(super) struct Random(pub(super) u64);
+pub(super) fn triangle(random: &mut Random) -> Triangle {
+    [random.point(), random.point(), random.point()]
+}
 
-impl Random {
-    pub(super) fn bits(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
+/// Returns a number from 10^-`digits` to 1 whose logarithm is uniform.
+pub(super) fn small(random: &mut Random, digits: f64) -> f64 {
+    10_f64.powf(-digits * random.unit())
+}
 
-    pub(super) fn below(&mut self, n: u64) -> usize {
-        (((self.bits() >> 32) * n) >> 32) as usize
-    }
+pub(super) fn grid_triangle(random: &mut Random, n: usize) -> [[i64; 3]; 3] {
+    [0; 3].map(|_| [0; 3].map(|_| random.below(n) as i64))
+}
 
-    /// Returns a number that is uniform in [0, 1).
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
+pub(super) fn shuffled<T: Copy>(random: &mut Random, t: &[T; 3]) -> [T; 3] {
+    let mut t = *t;
+    t.swap(0, random.below(3));
+    t.swap(1, 1 + random.below(2));
+    t
+}
 
-    /// Returns a number that is uniform in [-1, 1).
-    pub(super) fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    pub(super) fn point(&mut self) -> Point {
-        [self.signed(), self.signed(), self.signed()]
-    }
-
-    pub(super) fn triangle(&mut self) -> Triangle {
-        [self.point(), self.point(), self.point()]
-    }
-
-    /// Returns a number from 10^-`digits` to 1 whose logarithm is uniform.
-    pub(super) fn small(&mut self, digits: f64) -> f64 {
-        10_f64.powf(-digits * self.unit())
-    }
-
-    pub(super) fn grid_triangle(&mut self, n: u64) -> [[i64; 3]; 3] {
-        [0; 3].map(|_| [0; 3].map(|_| self.below(n) as i64))
-    }
-
-    pub(super) fn shuffled<T: Copy>(&mut self, t: &[T; 3]) -> [T; 3] {
-        let mut t = *t;
-        t.swap(0, self.below(3));
-        t.swap(1, 1 + self.below(2));
-        t
-    }
-
-    /// Returns three perpendicular unit vectors, up to rounding.
-    fn frame(&mut self) -> [Point; 3] {
-        let unit = |v: Point| v.map(|x| x / dot(v, v).sqrt());
-        let u = unit(self.point());
-        let v = self.point();
-        let v = unit(add_scaled(v, -dot(u, v), u));
-        [u, v, cross(u, v)]
-    }
+/// Returns three perpendicular unit vectors, up to rounding.
+fn frame(random: &mut Random) -> [Point; 3] {
+    let unit = |v: Point| v.map(|x| x / dot(v, v).sqrt());
+    let u = unit(random.point());
+    let v = random.point();
+    let v = unit(add_scaled(v, -dot(u, v), u));
+    [u, v, cross(u, v)]
 }
 
 pub(super) fn float(t: &[[i64; 3]; 3]) -> Triangle {
@@ -73,16 +44,16 @@ pub(super) const KINDS: usize = 11;
 
 /// Returns a pair of a kind, of size about 1 and near the origin.
 pub(super) fn pair(kind: usize, random: &mut Random) -> Case {
-    let [u, v, n] = random.frame();
+    let [u, v, n] = frame(random);
     let at = |x: f64, y: f64, z: f64| add_scaled(add_scaled(add_scaled([0.0; 3], x, u), y, v), z, n);
-    let gap = random.small(17.0);
-    let thin = random.small(9.0);
-    let slant = random.small(12.0);
+    let gap = small(random, 17.0);
+    let thin = small(random, 9.0);
+    let slant = small(random, 12.0);
     match kind {
-        0 => ("random", random.triangle(), random.triangle()),
+        0 => ("random", triangle(random), triangle(random)),
         1 => {
             let far = random.point().map(|x| 4.0 * x);
-            ("apart", random.triangle(), random.triangle().map(|p| add_scaled(p, 1.0, far)))
+            ("apart", triangle(random), triangle(random).map(|p| add_scaled(p, 1.0, far)))
         }
         2 => {
             let (x, y) = (random.unit() / 2.0, random.unit() / 2.0);
@@ -110,12 +81,12 @@ pub(super) fn pair(kind: usize, random: &mut Random) -> Case {
             ("sliver beside sliver", a, b)
         }
         7 => {
-            let a = random.triangle();
+            let a = triangle(random);
             let b = [a[random.below(3)], random.point(), random.point()];
             ("shared corner", a, b)
         }
         8 => {
-            let a = random.triangle();
+            let a = triangle(random);
             let b = [a[1], a[0], add_scaled(a[2], slant * random.signed(), random.point())];
             ("shared edge, almost folded", a, b)
         }
@@ -125,7 +96,7 @@ pub(super) fn pair(kind: usize, random: &mut Random) -> Case {
             ("nearly coplanar", a, b)
         }
         _ => {
-            let a = random.triangle();
+            let a = triangle(random);
             let middle = add_scaled(a[0], random.unit(), add_scaled(a[1], -1.0, a[0]));
             let b = [middle, add_scaled(middle, gap, random.point()), random.point()];
             let b = if random.below(2) == 0 { [b[0]; 3] } else { [b[0], b[1], b[random.below(2)]] };

@@ -1,10 +1,11 @@
 //! Compares `triangles_intersect` with the oracle: in every touching, coplanar and degenerate position, by name and
 //! at random on small grids, and in positions that rounding cannot tell from touching.
 
-use super::depth::rounds;
-use super::generate::{KINDS, Random, float, pair};
-use super::oracle::{Exact, squared_distance};
+use super::generate::{KINDS, float, grid_triangle, pair, shuffled};
 use crate::narrow::{Triangle, triangles_intersect};
+use cbvh_testkit::Random;
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::exact::{Length, meet};
 
 const A: Triangle = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
@@ -23,11 +24,11 @@ fn expect(a: &Triangle, b: &Triangle, expected: bool) {
 #[test]
 fn grid_pairs_agree_with_the_oracle() {
     for (n, everyday) in [(2, 3000), (3, 4000), (5, 4000)] {
-        let mut random = Random(n);
+        let mut random = Random::new(n as u64);
         for _ in 0..rounds(everyday) {
-            let (a, b) = (random.grid_triangle(n), random.grid_triangle(n));
-            let expected = squared_distance(&a, &b).0 == 0;
-            let (c, d) = (random.shuffled(&a), random.shuffled(&b));
+            let (a, b) = (grid_triangle(&mut random, n), grid_triangle(&mut random, n));
+            let expected = meet(&a, &b).unwrap();
+            let (c, d) = (shuffled(&mut random, &a), shuffled(&mut random, &b));
             assert_eq!(triangles_intersect(&float(&a), &float(&b)), expected, "{a:?} {b:?}");
             assert_eq!(triangles_intersect(&float(&d), &float(&c)), expected, "{d:?} {c:?}");
         }
@@ -36,11 +37,11 @@ fn grid_pairs_agree_with_the_oracle() {
 
 #[test]
 fn pairs_within_rounding_of_touching_agree_with_the_oracle() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for round in 0..KINDS * 60 {
         let (name, a, b) = pair(round % KINDS, &mut random);
-        let (a, b) = (random.shuffled(&a), random.shuffled(&b));
-        let expected = Exact::new(&a, &b).compare(0.0).is_eq();
+        let (a, b) = (shuffled(&mut random, &a), shuffled(&mut random, &b));
+        let expected = Length::between(&a, &b).compare(0.0).is_eq();
         assert_eq!(triangles_intersect(&a, &b), expected, "{name}: {a:?} {b:?}");
         assert_eq!(triangles_intersect(&b, &a), expected, "{name}, swapped: {a:?} {b:?}");
     }

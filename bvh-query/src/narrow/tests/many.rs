@@ -1,17 +1,17 @@
-//! Compares `triangles_intersect` with the independent oracles of `tests/exact` on many pairs that f64 can hardly
+//! Compares `triangles_intersect` with the independent oracles of cbvh-testkit on many pairs that f64 can hardly
 //! tell from touching, and the interval of `triangle_distance` on some of them.
 //!
 //! `CBVH_TEST_DEPTH` multiplies the number of pairs.
 
-use super::depth::rounds;
-use super::exact::decide::{Boxed, Decided, intersect};
-use super::exact::length::Length;
-use super::generate::{KINDS, Random, pair};
+use super::generate::{KINDS, pair, shuffled};
 use crate::narrow::{Point, Triangle, subtract, triangle_distance, triangles_intersect};
+use cbvh_testkit::Random;
+use cbvh_testkit::depth::rounds;
+use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 
 /// Returns a corner, a point of an edge or a point of the face, rounded.
 fn point_of(t: &Triangle, random: &mut Random) -> Point {
-    let [p, q, r] = random.shuffled(t);
+    let [p, q, r] = shuffled(random, t);
     let (x, y) = match random.below(3) {
         0 => (0.0, 0.0),
         1 => (random.unit(), 0.0),
@@ -23,7 +23,7 @@ fn point_of(t: &Triangle, random: &mut Random) -> Point {
 /// Returns a hard pair at a random place and scale; three in four would touch if nothing were rounded.
 fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Triangle) {
     let (name, a, b) = pair(round as usize % KINDS, random);
-    let mut b = random.shuffled(&b);
+    let mut b = shuffled(random, &b);
     if random.below(4) != 0 {
         let gap = subtract(point_of(&a, random), point_of(&b, random));
         b = b.map(|p| [0, 1, 2].map(|k| p[k] + gap[k]));
@@ -47,7 +47,8 @@ fn close_pair(round: u64, random: &mut Random) -> (&'static str, Triangle, Trian
 #[test]
 #[allow(clippy::print_stderr, reason = "a longer search is run for its counts")]
 fn pairs_that_almost_touch_agree_with_the_exact_oracle() {
-    let (mut random, mut decided, mut touching, mut lengths) = (Random(23), Decided::default(), 0_u64, 0_u64);
+    let (mut random, mut decided, mut touching, mut lengths) =
+        (Random::new(23), Decided::default(), 0_u64, 0_u64);
     let count = rounds(40_000);
     for round in 0..count {
         let (name, a, b) = close_pair(round, &mut random);

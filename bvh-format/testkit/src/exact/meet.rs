@@ -4,10 +4,11 @@
 //! one or the other. So the triangles meet exactly if an edge of one meets the other. The answer is `None` if a sign
 //! is not certain.
 
-use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
+use super::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
 use std::cmp::Ordering::{Equal, Greater, Less};
 
-pub(crate) fn meet<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Option<bool> {
+/// Returns whether two closed triangles share a point, or `None` if that is not certain.
+pub fn meet<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Option<bool> {
     for (one, other) in [(a, b), (b, a)] {
         for i in 0..3 {
             if edge_meets(&one[i], &one[(i + 1) % 3], other)? {

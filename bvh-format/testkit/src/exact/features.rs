@@ -3,19 +3,18 @@
 //! Each candidate is the distance between two points of the triangles, so the least one is never too small.
 //! `separation` proves that it is never too large.
 
-use super::meet::meet;
-use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
+use super::{Corners, Number, Vector, cross, dot, edges, is_zero, meet, subtract};
 
 /// A squared length: numerator and positive denominator.
-pub(crate) type Fraction<N> = (N, N);
+pub type Fraction<N> = (N, N);
 
 /// Returns whether the first fraction is smaller.
-pub(crate) fn is_less<N: Number>(p: &Fraction<N>, q: &Fraction<N>) -> Option<bool> {
+pub fn is_less<N: Number>(p: &Fraction<N>, q: &Fraction<N>) -> Option<bool> {
     Some(p.0.times(&q.1).minus(&q.0.times(&p.1)).sign()?.is_lt())
 }
 
 /// Returns the squared distance of two closed triangles. `zero` and `one` are the numbers 0 and 1.
-pub(crate) fn squared_distance<N: Number>(
+pub fn squared_distance<N: Number>(
     a: &Corners<N>,
     b: &Corners<N>,
     [zero, one]: &[N; 2],

@@ -6,15 +6,15 @@
 //! over features, both are proved right, no matter how they were found.
 
 use super::features::{Fraction, is_less};
-use super::number::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
+use super::{Corners, Number, Vector, cross, dot, edges, is_zero, subtract};
 
 /// Returns the vectors from each corner of `a` to each corner of `b`.
-pub(crate) fn gaps<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Vec<Vector<N>> {
+pub(super) fn gaps<N: Number>(a: &Corners<N>, b: &Corners<N>) -> Vec<Vector<N>> {
     a.iter().flat_map(|p| b.iter().map(|q| subtract(q, p))).collect()
 }
 
 /// Calls `visit` with all directions along which triangles may be apart, some of them zero, until it breaks.
-pub(crate) fn directions<N: Number>(
+pub(super) fn directions<N: Number>(
     a: &Corners<N>,
     b: &Corners<N>,
     mut visit: impl FnMut(Vector<N>) -> Option<bool>,
@@ -35,7 +35,7 @@ pub(crate) fn directions<N: Number>(
 }
 
 /// Returns the squared width of the widest slab between the triangles, or `None` if there is none.
-pub(crate) fn widest<N: Number>(a: &Corners<N>, b: &Corners<N>, zero: &N) -> Option<Fraction<N>> {
+pub(super) fn widest<N: Number>(a: &Corners<N>, b: &Corners<N>, zero: &N) -> Option<Fraction<N>> {
     let gaps = gaps(a, b);
     let mut best: Option<Fraction<N>> = None;
     directions(a, b, |direction| {

@@ -1,44 +1,53 @@
 //! Runs the oracles fast: boxes and balls settle the certain cases, and integers settle the rest.
 
-use super::ball::Ball;
-use super::dyadic::Integers;
-use super::meet::meet;
-use super::number::{Corners, Number, dot};
+use super::dyadic::on_common_grid;
 use super::separation::{directions, gaps};
-
-pub(crate) type Triangle = [[f64; 3]; 3];
+use super::{Ball, Corners, Dyadic, Number, dot, meet};
+use crate::Triangle;
 
 /// A triangle and its box.
 #[derive(Clone, Copy)]
-pub(crate) struct Boxed {
-    pub(crate) corners: Triangle,
+pub struct Boxed {
+    /// The corners.
+    pub corners: Triangle,
     low: [f64; 3],
     high: [f64; 3],
 }
 
 impl Boxed {
-    pub(crate) fn new(corners: Triangle) -> Self {
+    /// Returns a triangle with its box.
+    pub fn new(corners: Triangle) -> Self {
         let end = |pick: fn(f64, f64) -> f64| {
             [0, 1, 2].map(|k| pick(corners[0][k], pick(corners[1][k], corners[2][k])))
         };
         Self { corners, low: end(f64::min), high: end(f64::max) }
     }
 
+    /// Returns one whose box is around the boxes of all; its corners stand for nothing.
+    pub fn around(all: &[Self]) -> Self {
+        let join = |p: Self, q: &Self| Self {
+            low: [0, 1, 2].map(|k| p.low[k].min(q.low[k])),
+            high: [0, 1, 2].map(|k| p.high[k].max(q.high[k])),
+            ..p
+        };
+        all[1..].iter().fold(all[0], join)
+    }
+
     /// Returns whether the boxes share a point. The comparisons are exact.
-    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+    pub fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 
     /// Returns a lower bound of the distance between the boxes. Each gap is off by a factor of at most 1 + u with u =
     /// 2^-53, and the square, two sums and the root add four more. Squares that underflow only lessen the bound.
-    pub(crate) fn gap(&self, other: &Self) -> f64 {
+    pub fn gap(&self, other: &Self) -> f64 {
         let along = |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
         let [x, y, z] = [along(0), along(1), along(2)];
         (x * x + y * y + z * z).sqrt() * (1.0 - 8.0 * f64::EPSILON)
     }
 
     /// Returns the longest side of the box around both.
-    pub(crate) fn span(&self, other: &Self) -> f64 {
+    pub fn span(&self, other: &Self) -> f64 {
         let side = |k: usize| self.high[k].max(other.high[k]) - self.low[k].min(other.low[k]);
         side(0).max(side(1)).max(side(2))
     }
@@ -56,14 +65,17 @@ fn balls(a: &Triangle, b: &Triangle) -> (Corners<Ball>, Corners<Ball>, f64) {
 
 /// The number of pairs that each way decided.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Decided {
-    pub(crate) by_boxes: u64,
-    pub(crate) by_balls: u64,
-    pub(crate) by_integers: u64,
+pub struct Decided {
+    /// Pairs whose boxes are apart.
+    pub by_boxes: u64,
+    /// Pairs whose signs are certain in balls.
+    pub by_balls: u64,
+    /// Pairs that only exact numbers decide.
+    pub by_integers: u64,
 }
 
 /// Returns whether two closed triangles share a point.
-pub(crate) fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
+pub fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
     if !a.overlaps(b) {
         decided.by_boxes += 1;
         return false;
@@ -74,17 +86,19 @@ pub(crate) fn intersect(a: &Boxed, b: &Boxed, decided: &mut Decided) -> bool {
         return answer;
     }
     decided.by_integers += 1;
-    let integers = Integers::new(&a.corners, &b.corners);
-    match integers.narrow() {
-        Some((a, b)) => meet(&a, &b).unwrap(),
-        None => meet(&integers.a, &integers.b).unwrap(),
+    match on_common_grid(&a.corners, &b.corners) {
+        Some([a, b]) => meet(&a, &b).unwrap(),
+        None => {
+            let [a, b] = [a, b].map(|t| t.corners.map(|p| p.map(Dyadic::of)));
+            meet(&a, &b).unwrap()
+        }
     }
 }
 
 /// Returns whether a slab wider than `limit` certainly separates the triangles.
 ///
 /// Any direction is valid, so for a direction of balls its middle is used.
-pub(crate) fn certainly_farther(a: &Boxed, b: &Boxed, limit: f64) -> bool {
+pub fn certainly_farther(a: &Boxed, b: &Boxed, limit: f64) -> bool {
     if a.gap(b) > limit {
         return true;
     }

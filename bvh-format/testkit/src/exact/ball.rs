@@ -5,39 +5,42 @@
 //! the smallest normal number. A radius is computed in at most eight operations on numbers that are not negative,
 //! each of which is off by a factor of at most 1 + u. To make up for that, it is finally enlarged by 16u.
 
-use super::number::Number;
+use super::Number;
 use std::cmp::Ordering;
 
 const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ball {
+/// A real number that is known to within a radius.
+pub struct Ball {
     middle: f64,
     radius: f64,
 }
 
 impl Ball {
-    pub(crate) fn exactly(middle: f64) -> Self {
+    /// Returns a number that is known exactly.
+    pub fn exactly(middle: f64) -> Self {
         Self { middle, radius: 0.0 }
     }
 
     /// Returns `x` times a power of two, which is exact unless it underflows.
-    pub(crate) fn scaled(x: f64, power: f64) -> Self {
+    pub fn scaled(x: f64, power: f64) -> Self {
         let middle = x * power;
         Self { middle, radius: if middle / power == x { 0.0 } else { f64::MIN_POSITIVE } }
     }
 
-    pub(crate) fn middle(&self) -> f64 {
+    /// Returns the middle, which need not be the number.
+    pub fn middle(&self) -> f64 {
         self.middle
     }
 
     /// Returns a lower bound of the number.
-    pub(crate) fn least(&self) -> f64 {
+    pub fn least(&self) -> f64 {
         (self.middle - self.radius).next_down()
     }
 
     /// Returns an upper bound of the number.
-    pub(crate) fn most(&self) -> f64 {
+    pub fn most(&self) -> f64 {
         (self.middle + self.radius).next_up()
     }
 
