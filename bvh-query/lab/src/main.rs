@@ -5,14 +5,8 @@
 
 mod arguments;
 mod hard;
-mod input;
-mod layouts;
 mod output;
-mod placed;
-mod scaling;
 mod search;
-mod tree;
-mod walk;
 
 use arguments::{Arguments, Experiment};
 use clap::Parser;
@@ -24,8 +18,6 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn main() -> ExitCode {
     let result = match &Arguments::parse().experiment {
         Experiment::Hard(arguments) => hard::run(arguments),
-        Experiment::Scaling(arguments) => scaling::run(arguments),
-        Experiment::Layouts(arguments) => layouts::run(arguments),
         Experiment::Search(arguments) => search::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {

@@ -1,7 +1,6 @@
 //! Writes the files of an experiment, its summary and its progress.
 
 use crate::Failure;
-use cbvh_measure::pin::Pinned;
 use cbvh_measure::table;
 use serde::Serialize;
 use std::fs;
@@ -37,20 +36,4 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 pub(crate) fn tell(line: &str) {
     // If standard error cannot be written, the work goes on.
     let _ = writeln!(io::stderr(), "{line}");
-}
-
-/// Says where the measuring thread ran.
-pub(crate) fn pinned(pinned: Option<Pinned>) -> String {
-    pinned.map_or("not bound to a processor".to_owned(), |pinned| {
-        format!("bound to processor {} of {} allowed", pinned.processor, pinned.allowed)
-    })
-}
-
-/// Writes rows as a table in Markdown with these headings.
-pub(crate) fn markdown(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let mut text = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
-    for row in rows {
-        text += &format!("| {} |\n", row.join(" | "));
-    }
-    text
 }

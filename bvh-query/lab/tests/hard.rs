@@ -84,8 +84,6 @@ fn what_is_missing_is_told_before_the_work() {
     for (arguments, words) in [
         (&["hard", "--out", file][..], "expected a folder"),
         (&["hard", "--out", out, "--peers", "missing"], "expected programs peer_*, found none"),
-        (&["scaling", "--out", file], "expected a folder"),
-        (&["layouts", file, "--out", out], "expected lines NAME A B"),
     ] {
         let ended = lab(arguments);
         let said = String::from_utf8(ended.stderr).unwrap();
