@@ -77,14 +77,12 @@ mod tests {
     use super::*;
     use crate::kdop::Kdop;
     use crate::treelet::SlabEncoder;
+    use cbvh_testkit::Random;
 
     /// The k-DOPs of eight random point clouds, and of all their points.
     fn clouds(seed: u64) -> (Kdop, Vec<Kdop>) {
-        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 40) as f32 / (1 << 24) as f32 - 0.5
-        };
+        let mut random = Random::new(seed);
+        let mut random = || random.unit() as f32 - 0.5;
         let scale = 2f32.powi((seed % 60) as i32 - 30);
         let mut parent = Kdop::EMPTY;
         let children = (0..8)

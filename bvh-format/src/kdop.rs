@@ -264,6 +264,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::leaf::Packet;
+    use cbvh_testkit::Random;
 
     /// A number of the test in units of 2^-100. Points and sums are multiples of 2^-62, and the neighbours of sums that
     /// are not 0 are multiples of 2^-86.
@@ -273,11 +274,11 @@ mod tests {
 
     #[test]
     fn projections_round_outward_and_stay_tight() {
-        let mut state = 1u64;
+        let mut random = Random::new(1);
         let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            let exponent = -((state >> 59) as i32);
-            (((state >> 20) as u32 & 0xff_ffff) as f32 - 8388608.0) * 2f32.powi(exponent - 24)
+            let bits = random.bits();
+            let exponent = -((bits >> 59) as i32);
+            (((bits >> 20) as u32 & 0xff_ffff) as f32 - 8388608.0) * 2f32.powi(exponent - 24)
         };
         let mut points: Vec<[f32; 3]> = (0..20_000).map(|_| [random(), random(), random()]).collect();
         // One coordinate cancels another, and the third lies below the last bit of either or of their sum.
@@ -337,11 +338,8 @@ mod tests {
 
     #[test]
     fn the_kdop_of_lanes_is_that_of_their_points() {
-        let mut state = 3u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            state >> 33
-        };
+        let mut random = Random::new(3);
+        let mut random = || random.bits() >> 33;
         for round in 0..20_000 {
             // Coordinates close to each other in magnitude, far apart, and some of them 0.
             let spread = [1, 8, 60][round % 3];

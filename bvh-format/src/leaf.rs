@@ -170,13 +170,11 @@ pub fn decode_triangle(encoding: TriangleEncoding, block: &[u8], index: usize, l
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cbvh_testkit::Random;
 
     fn packets(seed: u64, count: usize, make: impl Fn(u64) -> f32) -> Vec<Packet> {
-        let mut state = seed;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            make(state >> 20)
-        };
+        let mut random = Random::new(seed);
+        let mut next = || make(random.bits() >> 20);
         (0..count)
             .map(|i| {
                 let triangles: Vec<_> =
@@ -223,11 +221,8 @@ mod tests {
     /// Whatever the bytes are, a packet and its triangles are read alike.
     #[test]
     fn all_ways_to_decode_agree_on_any_bytes() {
-        let mut state = 9u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 40) as usize
-        };
+        let mut random = Random::new(9);
+        let mut random = || (random.bits() >> 40) as usize;
         for round in 0..20_000 {
             let mut block: Vec<u8> = (0..random() % 400).map(|_| random() as u8).collect();
             if let Some(head) = block.get_mut(..PACKED_HEAD_BYTES) {

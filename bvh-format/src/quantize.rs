@@ -139,14 +139,12 @@ pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], u
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cbvh_testkit::Random;
 
     #[test]
     fn decoded_ends_contain_the_true_ones_and_are_the_tightest() {
-        let mut state = 7u64;
-        let mut random = move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((state >> 40) as f32 / (1u64 << 24) as f32) * 2.0 - 1.0
-        };
+        let mut random = Random::new(7);
+        let mut random = move || random.signed() as f32;
         for encoding in [Encoding::U4, Encoding::U8, Encoding::F16] {
             for round in 0..200_000 {
                 let scale = 2f32.powi(round % 100 - 50);

@@ -135,6 +135,7 @@ const fn is_set(bits: u8, bit: u8) -> bool {
 mod tests {
     use super::*;
     use crate::kdop::DIRECTIONS;
+    use cbvh_testkit::Random;
 
     /// How far a form says that the k-DOP of a unit ball reaches: each end is the length of its direction.
     fn reach_of_ball(slabs: [usize; 3], coefficients: [f64; 3]) -> f64 {
@@ -167,11 +168,8 @@ mod tests {
 
     #[test]
     fn forms_are_the_tightest_for_a_ball() {
-        let mut state = 5u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
+        let mut random = Random::new(5);
+        let mut random = || random.signed();
         for _ in 0..2000 {
             let d = [random(), random(), random()];
             for set in [DirectionSet::Dop6, DirectionSet::Dop14, DirectionSet::Dop26] {
@@ -185,11 +183,8 @@ mod tests {
 
     #[test]
     fn forms_represent_their_direction() {
-        let mut state = 11u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
+        let mut random = Random::new(11);
+        let mut random = || random.signed();
         for round in 0..30_000 {
             let mut d = [random(), random(), random()];
             if round % 5 == 0 {

@@ -123,14 +123,12 @@ impl<'a> Iterator for Lines<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cbvh_testkit::Random;
 
     #[test]
     fn short_decimals_are_what_the_standard_library_reads() {
-        let mut state = 1u64;
-        let mut random = |below: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % below
-        };
+        let mut random = Random::new(1);
+        let mut random = |below: u64| random.below(below as usize) as u64;
         let mut fast = 0;
         for _ in 0..100_000 {
             let digits = |count: u64, random: &mut dyn FnMut(u64) -> u64| -> String {

@@ -164,14 +164,12 @@ mod tests {
     use crate::tree::Builder;
     use crate::tree::binary::TreeNode;
     use crate::triangles::{Corners, Triangle};
+    use cbvh_testkit::Random;
 
     /// Makes long thin triangles in all directions, some of them far out.
     fn sticks(count: usize) -> Vec<Corners> {
-        let mut state = 1u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 40) as f32 / (1 << 24) as f32
-        };
+        let mut random = Random::new(1);
+        let mut random = || random.unit() as f32;
         let mut stick = || {
             let from = [random(), random(), random()].map(|v| v * 10.0);
             let to = [0, 1, 2].map(|axis| from[axis] + random() * random());

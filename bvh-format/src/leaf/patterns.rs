@@ -332,15 +332,7 @@ pub fn order_of_lanes(triangles: &[[[f32; 3]; 3]]) -> [u8; PACKET] {
 mod tests {
     use super::*;
     use crate::leaf::Packet;
-
-    struct Random(u64);
-
-    impl Random {
-        fn below(&mut self, end: usize) -> usize {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (self.0 >> 33) as usize % end
-        }
-    }
+    use cbvh_testkit::Random;
 
     #[test]
     fn the_table_ascends_and_each_pattern_numbers_its_slots_as_they_come_by() {
@@ -359,7 +351,7 @@ mod tests {
     /// Each pattern fits itself, however its triangles are rotated and its vertices are named.
     #[test]
     fn patterns_fit_however_they_are_rotated() {
-        let mut random = Random(4);
+        let mut random = Random::new(4);
         for (number, places) in PLACES.iter().enumerate() {
             for _ in 0..200 {
                 let mut names: Vec<u8> = (0..12).collect();
@@ -386,7 +378,7 @@ mod tests {
     /// or another one.
     #[test]
     fn an_order_of_lanes_leads_to_a_pattern() {
-        let mut random = Random(9);
+        let mut random = Random::new(9);
         for (number, places) in PLACES.iter().enumerate() {
             let repeated = (1..PACKET).rev().take_while(|&lane| places[lane] == places[lane - 1]).count();
             for _ in 0..50 {

@@ -10,6 +10,7 @@ use bvh_format::profile::Profile;
 use bvh_format::slabs::row;
 use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::{SHORT_TREELET_BYTES, child_slabs};
+use cbvh_testkit::Random;
 
 struct Decode<'a> {
     profile: Profile,
@@ -39,11 +40,8 @@ impl Task for Decode<'_> {
 
 #[test]
 fn every_backend_decodes_to_the_bits_of_the_reference() {
-    let mut state = 3u64;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 32) as u32
-    };
+    let mut random = Random::new(3);
+    let mut random = || (random.bits() >> 32) as u32;
     for backend in Backend::ALL {
         if !backend.is_available() {
             println!("skipped: this CPU lacks {backend}");
@@ -100,11 +98,8 @@ impl Task for Unpack<'_> {
 /// Blocks of ordered, binary and decimal coordinates, with and without further slots, as they are and with bytes changed.
 #[test]
 fn every_backend_unpacks_to_the_bits_of_the_reference() {
-    let mut state = 7u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as usize
-    };
+    let mut random = Random::new(7);
+    let mut random = move || (random.bits() >> 33) as usize;
     let kinds: [fn(usize) -> f32; 4] = [
         |r| f32::from_bits(r as u32 & 0x7bff_ffff),
         |r| (r % 4096) as f32 / 64.0 - 30.0,
@@ -163,11 +158,8 @@ impl Task for Least<'_> {
 
 #[test]
 fn every_backend_finds_the_first_of_the_least_lanes() {
-    let mut state = 5u64;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 40) as u32
-    };
+    let mut random = Random::new(5);
+    let mut random = || (random.bits() >> 40) as u32;
     for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
         assert!(backend.run(Least(&[0.0; 16], 0)) >= 16);
         for round in 0..5000 {

@@ -64,16 +64,14 @@ fn apart_along_sides(placement: &Placement, a: [[f64; 3]; 2], b: [[f64; 3]; 2]) 
 mod tests {
     use super::*;
     use crate::traverse::placement::POSE_ERROR;
+    use cbvh_testkit::Random;
 
     /// Boxes that share a point are not apart, even by a rotation as far off as a pose may have; and most that have
     /// a gap between faces are.
     #[test]
     fn boxes_that_touch_are_not_apart() {
-        let mut state = 3u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
+        let mut random = Random::new(3);
+        let mut random = || random.signed();
         let mut found = 0;
         for round in 0..20_000 {
             let mut sides = || {

@@ -70,17 +70,15 @@ mod tests {
     use super::*;
     use crate::file::bvh::Bvh;
     use crate::file::place::LeafPacket;
+    use cbvh_testkit::Random;
 
     /// Of the golden file's vertices, none goes farther than the bound; and the bound is not much farther than the
     /// farthest goes, and what is charged for rounding, of an origin at 2^22.
     #[test]
     fn no_vertex_moves_farther_than_the_bound() {
         let bvh = Bvh::from_static(include_bytes!("../../../testdata/ok-everything.cbvh")).unwrap();
-        let mut state = 7u64;
-        let mut signed = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = Random::new(7);
+        let mut signed = || random.signed();
         for round in 0..200 {
             let scale = 10f64.powi(-(round % 16));
             let angles = [signed() * 3.0, 0.0].map(|angle| angle + scale * signed());

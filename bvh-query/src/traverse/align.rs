@@ -269,6 +269,7 @@ mod tests {
     use bvh_format::kdop::Kdop;
     use bvh_format::slabs::NodeSlabs;
     use bvh_format::treelet::child_slabs;
+    use cbvh_testkit::Random;
 
     /// The ends of a node along the directions of a set, as a backend aligns them.
     struct Aligned<'a>(&'a Placement, DirectionSet, DirectionSet, &'a NodeSlabs);
@@ -290,11 +291,8 @@ mod tests {
     /// coordinates, many times what is charged.
     #[test]
     fn nodes_of_a_contain_their_points_along_directions_of_b() {
-        let mut state = 7u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
+        let mut random = Random::new(7);
+        let mut random = || random.signed();
         for round in 0..500 {
             let (sin, cos) = (3.0 * random()).sin_cos();
             let shear = if round % 2 == 0 { 0.9e-6 } else { -0.9e-6 };

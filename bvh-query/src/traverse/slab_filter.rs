@@ -291,24 +291,11 @@ mod tests {
     use bvh_format::profile::Profile;
     use bvh_format::slabs::NodeSlabs;
     use bvh_format::turning::{TurningDirection, TurningSlab, decode_turning};
+    use cbvh_testkit::Random;
 
     type Point = [f64; 3];
 
     const PROFILE: Profile = Profile::Dop26U8Wide;
-
-    struct Random(u64);
-
-    impl Random {
-        /// From -1 to 1.
-        fn value(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        }
-
-        fn point(&mut self) -> Point {
-            [self.value(), self.value(), self.value()]
-        }
-    }
 
     /// Four flat patches of up to four triangles in one treelet. Some have no turning slab.
     struct Node {
@@ -336,7 +323,7 @@ mod tests {
                 let [u, v] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
                 let normal =
                     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-                (random.value() > -0.8).then_some(TurningDirection::near(normal))
+                (random.signed() > -0.8).then_some(TurningDirection::near(normal))
             })
         }
 
@@ -369,7 +356,7 @@ mod tests {
             for triangle in &self.triangles[child] {
                 let corners = triangle.map(|corner| corner.map(f64::from));
                 points.extend(corners);
-                let (p, q) = (random.value().abs(), random.value().abs());
+                let (p, q) = (random.signed().abs(), random.signed().abs());
                 let weights = [p * q, p * (1.0 - q), 1.0 - p];
                 points.push([0, 1, 2].map(|i| (0..3).map(|k| weights[k] * corners[k][i]).sum()));
             }
@@ -380,7 +367,7 @@ mod tests {
     /// Where the corners of boxes that reach furthest along their slabs meet, no gap is left for a bound that is too large.
     #[test]
     fn bounds_hold_to_the_last_bit_where_extreme_corners_meet() {
-        let random = &mut Random(5);
+        let random = &mut Random::new(5);
         let (mut found, mut near) = (0, 0);
         for round in 0..4_000 {
             let size = 10f64.powi(round % 21 - 10);
@@ -400,12 +387,12 @@ mod tests {
                 };
                 let (low, high) = (corner(-1.0), corner(1.0));
                 let inside =
-                    [0, 1, 2].map(|i| low[i] + (high[i] - low[i]) * random.value().abs() as f32 * 0.5);
+                    [0, 1, 2].map(|i| low[i] + (high[i] - low[i]) * random.signed().abs() as f32 * 0.5);
                 vec![[low, high, inside]]
             };
             let nodes = [0, 1].map(|_| Node::of_patches(vec![patch(random); 4], |_| Some(direction)));
             // A turn around the direction, and B's lowest corner above A's highest one.
-            let (sin, cos) = (3.0 * random.value()).sin_cos();
+            let (sin, cos) = (3.0 * random.signed()).sin_cos();
             let [x, y, z] = unit;
             let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
             let rotation = [0, 1, 2].map(|i| {
@@ -483,10 +470,10 @@ mod tests {
     /// Codes of any value, and boxes of any size and place.
     #[test]
     fn slabs_are_those_of_the_reference_decoder_to_the_last_bit() {
-        let random = &mut Random(21);
+        let random = &mut Random::new(21);
         for round in 0..5_000 {
             let mut treelet = [0; 128];
-            treelet.iter_mut().for_each(|byte| *byte = (random.value() * 128.0 + 128.0) as u8);
+            treelet.iter_mut().for_each(|byte| *byte = (random.signed() * 128.0 + 128.0) as u8);
             if round % 3 == 0 {
                 [28, 92, 56, 120].iter().for_each(|row| treelet[row + round as usize % 4] = 0);
             }
@@ -495,7 +482,7 @@ mod tests {
             let mut nodes = [NodeSlabs::default(); 4];
             for (child, node) in nodes.iter_mut().enumerate() {
                 for row in 0..3 {
-                    let (p, q) = ((random.value() * size) as f32, (random.value() * size) as f32);
+                    let (p, q) = ((random.signed() * size) as f32, (random.signed() * size) as f32);
                     (node.lo[row], node.hi[row]) = (p.min(q), p.max(q));
                     (group.lo[0][4 * row + child], group.hi[0][4 * row + child]) =
                         (node.lo[row], node.hi[row]);
@@ -582,14 +569,14 @@ mod tests {
     /// A matrix as far from a rotation as a pose may be, and nodes of any size, near the origin and far from it.
     #[test]
     fn bounds_hold_for_all_points_of_both_nodes() {
-        let random = &mut Random(99);
+        let random = &mut Random::new(99);
         let (mut apart, mut pairs) = (0, 0);
         for round in 0..3_000 {
             let size = 10f64.powi(round % 31 - 15) * 3f64.powi(-(round % 7));
             let far = if round % 3 == 0 { 0.0 } else { size * 10f64.powi(round % 5) };
             let centres = [random.point(), random.point()].map(|p| p.map(|c| c * far));
             let nodes = centres.map(|centre| Node::new(random, centre, size));
-            let (sin, cos) = (3.0 * random.value()).sin_cos();
+            let (sin, cos) = (3.0 * random.signed()).sin_cos();
             let shear = if round % 2 == 0 { 0.9e-6 } else { -0.9e-6 };
             let rotation = [[cos, -sin, shear * cos], [sin, cos, shear * sin], [0.0, 0.0, 1.0]];
             // A point of A and one of B meet, or are a part of the size apart.
