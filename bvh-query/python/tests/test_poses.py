@@ -37,7 +37,7 @@ class Poses(unittest.TestCase):
         first, second = scene.add(mesh), scene.add(mesh)
         for number, pose in enumerate(found):
             scene.set_poses([first, second], [a[number], b[number]])
-            nearest = scene.distance().distance
+            nearest = scene.distance().nearest
             self.assertEqual(nearest.distance, mesh.distance(mesh, pose).distance)
 
 

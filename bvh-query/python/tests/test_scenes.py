@@ -263,7 +263,7 @@ class Misuse(unittest.TestCase):
             (KeyError, f"ids: {stale}", scene.poses, [here, gone]),
             (KeyError, f"id: {stale}", scene.set_pose, gone, one),
             (KeyError, f"ids: {stale}", scene.set_poses, [here, gone], [one, one]),
-            (KeyError, f"b: {stale}", scene.allow, here, gone),
+            (KeyError, f"b: {stale}", scene.set_allowed, here, gone),
             (KeyError, f"paths: {stale}", scene.motion, {gone: motion}),
             (KeyError, "found 1208925819614629174706176", scene.remove, 2**80),
             (KeyError, "found -5", scene.pose, -5),
