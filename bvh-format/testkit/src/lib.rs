@@ -2,9 +2,9 @@
 //! searches.
 //!
 //! Nothing here depends on bvh-bake or bvh-query, so that every crate of the workspace can use it in its tests.
-//! Meshes are therefore plain arrays. In the unit tests of bvh-format, this crate stands on another build of bvh-format,
-//! so that only what has no types of bvh-format is of use there. A packaged crate has no dependency on this one, which is
-//! not published: its tests run in this repository only.
+//! Meshes are therefore plain arrays. The unit tests of bvh-format link a second build of bvh-format through this crate, so
+//! they can use only functions without types of bvh-format. This crate is not published, and published crates leave it
+//! out, so their tests run in this repository only.
 
 pub mod ball;
 pub mod depth;

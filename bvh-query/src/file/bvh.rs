@@ -20,8 +20,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`: share it between threads. It is not `Clone`,
-/// because it owns what it knows of its file; an [`OwnedShape`](crate::OwnedShape) shares it and is.
+/// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`, so threads can share a reference to it. It is
+/// not `Clone`; an [`OwnedShape`](crate::OwnedShape), which it converts into, is, and copies a pointer.
 ///
 /// Opening a file reads its head and its object table, whatever the size of the file. A page is checked when a
 /// query first touches it. The memory needed is one byte per page, twice the bytes of the object table, and some KiB,

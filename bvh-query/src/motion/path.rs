@@ -15,9 +15,9 @@ pub trait RigidPath {
     /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
     /// origin of B's frame, is during `[t0, t1]` from where it would be if it went straight, at a constant rate, from where it
     /// is at `t0` to where it is at `t1`. That is at most an eighth of the greatest acceleration times the square of the time.
-    /// It must hold at every time for which [`RigidPath::pose`] is asked, with all rounding. NaN or a negative number counts as
-    /// infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work a question
-    /// takes.
+    /// It must hold at every time for which [`RigidPath::pose`] is asked, with all rounding. NaN or a negative number
+    /// counts as infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work
+    /// a question takes.
     ///
     /// Questions ask with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library answer for any numbers,
     /// so that others can stand on them: times in any order, as of a way back; times before 0 and after 1, when they stand

@@ -179,8 +179,8 @@ impl Scene {
     ///
     /// On the project's test scenes, where instances move by some 3 degrees a frame, a frame takes 0.95 to 1.17 times as long;
     /// with a twentieth of the steps 0.84 to 1.12 times, and with a two-hundredth 0.61 to 0.83 times. A tracker holds some 300
-    /// bytes; there is one for each of the first 16,384 pairs that the last question was about, and at most as many more as the one before was
-    /// about, and 1,024.
+    /// bytes. A scene has one for each of the first 16,384 pairs of the last question, at most as many more for those of the
+    /// question before it, and 1,024 to spare.
     ///
     /// What a tracker knows need not be looked up: a question may have an answer where it would otherwise meet a damaged page or
     /// exceed the budget.

@@ -122,8 +122,8 @@ impl Scene {
         }
     }
 
-    /// Returns whether the ways are certainly free: whether [`Scene::motion`] answers [`SceneMotionAnswer::Free`], which takes less
-    /// time to find out. This is what planners ask. To check many edges on all cores, clone the scene for each thread.
+    /// Returns whether the ways are certainly free: whether [`Scene::motion`] would answer [`SceneMotionAnswer::Free`]. It
+    /// takes less time than the full answer. This is what planners ask. To check many edges on all cores, clone the scene for each thread.
     ///
     /// # Errors
     /// The errors of [`Scene::motion`], unless another pair is found not to be free.

@@ -15,8 +15,8 @@ use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A pair of instances; A is the lower one, but in answers about motions ([`SceneMotionAnswer`](crate::SceneMotionAnswer)) one that stands
-/// still.
+/// A pair of instances. A is the lower one, but where one of the two stands still in the answer to a motion
+/// ([`SceneMotionAnswer`](crate::SceneMotionAnswer)), that one is A.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct ScenePair {
     /// The instance whose frame answers are in.
@@ -471,7 +471,7 @@ impl Scene {
         self.trackers.expect(near_pairs.iter().map(|near_pair| (near_pair.a, near_pair.b)));
     }
 
-    /// Asks about each candidate, in the order of the near pairs.
+    /// Asks about each near pair, in the order given.
     fn each<R: Send>(
         &mut self,
         near_pairs: &[NearPair],

@@ -2,8 +2,8 @@
 //!
 //! A segment leads from p to p + q, and its points are p + s q for s from 0 to 1. Along a direction n of a slab that is from
 //! (lo - n p) / (n q) to (hi - n p) / (n q), and within a node where it is so along all directions (T. L. Kay, J. T. Kajiya,
-//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_filter`]), a register holds four slabs of
-//! four nodes.
+//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_filter`]), a register holds
+//! four slabs of four nodes.
 //!
 //! Error, with u = 2^-24: what is subtracted and n q are rounded to f32, which moves a point along n by at most
 //! 1.01 u (|n p| + |n q|), and the segment's own error by 3 E along a direction of three entries. Slabs are moved outward by

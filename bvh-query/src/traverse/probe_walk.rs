@@ -11,8 +11,7 @@
 //!
 //! Unlike a pair walk, it meets each node once, so it decodes nodes where it needs them, into the frames of its stack, and
 //! keeps none. Lanes are slabs and children, so that one probe fills them ([`crate::traverse::point_filter`],
-//! [`crate::traverse::line_filter`]). The walk ends
-//! because a file is a tree, and has at most one frame for each level.
+//! [`crate::traverse::line_filter`]). The walk ends because a file is a tree, and has at most one frame for each level.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;

@@ -47,10 +47,11 @@ distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compare
 
 With --motions, it bakes each pair as bake does without options, and asks about each motion in 16 ways: by 10, 30, 100, \
 300, 1000, 3000 and 10000 equally spaced poses until one touches, in the order of time and in an order that is spread from \
-the start, and by certified answers, for the first contact and for any. It tells how many of the certified contacts samples \
-miss, how late they are with the others, and how long each way takes. A sample that touches where the motion is certified \
-free is a wrong answer. Each way asks about all motions of a pair once, and again for as many of the rounds as fit into 10 seconds; \
-report.csv has their number. A pair takes some minutes at most, unless one round of 10000 samples takes longer.
+the start, and by certified answers, for the first contact and for any. The report says how many of the certified contacts \
+the samples miss, how late they find the others, and how long each way takes. A sample that touches where the motion is \
+certified free is a wrong answer. Each way asks about all motions of a pair in one round, and in as many \
+further rounds as fit into 10 seconds; report.csv has their number. A pair takes some minutes at most, unless one round of \
+10000 samples takes longer.
 
 Queries run on one thread that is bound to one processor. On a machine that does other work the times include the \
 effects of that work.";

@@ -23,7 +23,7 @@ impl Boxed {
         Self { corners, low: end(f64::min), high: end(f64::max) }
     }
 
-    /// Returns one whose box is around the boxes of all; its corners stand for nothing.
+    /// Returns a stand-in for many triangles: its box encloses all of theirs, and its corners mean nothing.
     pub fn around(all: &[Self]) -> Self {
         let join = |p: Self, q: &Self| Self {
             low: [0, 1, 2].map(|k| p.low[k].min(q.low[k])),
