@@ -20,7 +20,7 @@ pub(crate) enum Experiment {
     Search(SearchArguments),
 }
 
-/// Writes hard.md, hard.csv and hard.json. Each case is a pair of small meshes in a pose with an exactly known answer; it is
+/// Writes hard.md and hard.json. Each case is a pair of small meshes in a pose with an exactly known answer; it is
 /// asked in every profile, in both lossless triangle encodings, on every backend of this CPU, and in a fifth of these with
 /// corners, triangles and sides in other orders. A wrong answer of cbvh ends with exit code 1, after the files are written.
 #[derive(Debug, Args)]

@@ -1,6 +1,5 @@
 //! Hard cases: asks cbvh and, if their programs exist, other libraries, judges the answers, and writes three files.
 
-mod csv;
 mod judge;
 mod libraries;
 mod markdown;
@@ -27,11 +26,7 @@ pub(crate) fn run(arguments: &HardArguments) -> Result<String, Failure> {
     let asked = all.iter().zip(own).map(|(case, own)| ask_others(case, own, &mut peers, &questions));
     let cases = asked.collect::<Result<Vec<_>, _>>()?;
     let record = Record::new(cases, &peers);
-    let files = [
-        ("hard.csv", csv::table(&record)),
-        ("hard.json", output::json(&record)?),
-        ("hard.md", markdown::page(&record)),
-    ];
+    let files = [("hard.json", output::json(&record)?), ("hard.md", markdown::page(&record))];
     output::write(out, &files)?;
     match record.first_wrong() {
         None => Ok(summary(&record, out)),

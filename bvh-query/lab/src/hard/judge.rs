@@ -19,19 +19,6 @@ pub(super) enum Verdict {
     Timeout,
 }
 
-impl Verdict {
-    /// The name in the files.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Wrong => "wrong",
-            Self::Off => "off",
-            Self::Crash => "crash",
-            Self::Timeout => "timeout",
-        }
-    }
-}
-
 /// A verdict, with the error of a distance.
 pub(super) struct Judgement {
     pub(super) verdict: Verdict,

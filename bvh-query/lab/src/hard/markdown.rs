@@ -38,7 +38,7 @@ fn head(record: &Record) -> String {
          touch, for the number of contacts, for the distance with its interval, and nine times whether the meshes are \
          within a distance.\n\n\
          Generated on {} on {} by `cargo run --release -p cbvh-lab -- hard --out DIR{peers}`, which writes this page as \
-         `hard.md`; `hard.csv` and `hard.json` beside it contain every answer. The cases are in \
+         `hard.md`; `hard.json` beside it contains every answer. The cases are in \
          `bvh-format/testkit/src/hard_cases/`, and `cargo test -p bvh-query --test exact hard_cases` proves what they \
          state by integer arithmetic.\n\n\
          A distance that ends in ... lies between the number shown and the next larger `f64`. The interval of cbvh is \
