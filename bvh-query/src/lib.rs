@@ -81,7 +81,7 @@ mod traverse;
 
 pub use error::{OpenError, QueryError};
 pub use file::bvh::Bvh;
-pub use file::files::{Files, StoredShape};
+pub use file::files::{Files, SceneShape};
 pub use file::mapped::ReadAhead;
 pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
@@ -105,7 +105,7 @@ pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
     Groups, InstanceId, InstanceLabel, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit, SceneShape,
+    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

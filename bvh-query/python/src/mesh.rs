@@ -10,7 +10,6 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// All objects of a file, or one of them.
 #[pyclass(frozen, module = "cbvh._cbvh")]
@@ -49,7 +48,7 @@ impl Mesh {
 
     /// One object of the file.
     fn object(&self, number: i64) -> PyResult<Self> {
-        let bvh = Arc::clone(self.shape.bvh());
+        let bvh = self.shape.bvh().clone();
         let objects = bvh.objects().len();
         let shape = usize::try_from(number).ok().and_then(|number| OwnedShape::object(bvh, number));
         let shape = shape.ok_or_else(|| {

@@ -18,15 +18,29 @@ use bytes::Bytes;
 use memmap2::Mmap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, Weak};
 
-/// A bounding volume hierarchy that can be queried. It is `Send` and `Sync`, so threads can share a reference to it. It is
-/// not `Clone`; an [`OwnedShape`](crate::OwnedShape), which it converts into, is, and copies a pointer.
+/// An open file, with all of its objects: what every program starts with. Cloning it copies a pointer, and threads may
+/// share it.
 ///
 /// Opening a file reads its head and its object table, whatever the size of the file. A page is checked when a
 /// query first touches it. The memory needed is one byte per page, twice the bytes of the object table, and some KiB,
 /// whatever numbers the file holds.
-pub struct Bvh {
+#[derive(Clone, Debug)]
+pub struct Bvh(Arc<OpenFile>);
+
+/// A file that is open as long as somebody else keeps it open.
+#[derive(Debug, Default)]
+pub(super) struct WeakBvh(Weak<OpenFile>);
+
+impl WeakBvh {
+    pub(super) fn upgrade(&self) -> Option<Bvh> {
+        self.0.upgrade().map(Bvh)
+    }
+}
+
+/// What all clones of a [`Bvh`] share.
+struct OpenFile {
     bytes: Bytes,
     /// The map that the bytes are, if the system is to be told which blocks are needed next.
     advised: Option<Arc<Mmap>>,
@@ -35,8 +49,8 @@ pub struct Bvh {
     checked: Box<[AtomicU8]>,
     duplicates_checked: AtomicBool,
     /// What the file states about the topology of each object, or how it breaks a rule there, once it has been needed.
-    pub(super) topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
-    /// A number that no other `Bvh` of this process has or had.
+    topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
+    /// A number that no other open file of this process has or had.
     identity: u64,
 }
 
@@ -88,8 +102,8 @@ impl Bvh {
         let map = mapped::map(path, read_ahead).map_err(|source| OpenError::io(path, source))?;
         let map = Arc::new(map);
         let advised = (read_ahead == ReadAhead::Sparse).then(|| map.clone());
-        let opened = Self::new(Bytes::from_owner(MapOwner(map)));
-        Ok(Self { advised, ..opened.map_err(|source| OpenError::format(path, source))? })
+        let opened = Self::new(Bytes::from_owner(MapOwner(map)), advised);
+        opened.map_err(|source| OpenError::format(path, source))
     }
 
     /// Reads a whole file into memory and opens the copy. What becomes of the file afterwards does not matter.
@@ -101,7 +115,7 @@ impl Bvh {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
         let bytes = mapped::read(path).map_err(|source| OpenError::io(path, source))?;
-        Self::new(Bytes::from_owner(bytes)).map_err(|source| OpenError::format(path, source))
+        Self::new(Bytes::from_owner(bytes), None).map_err(|source| OpenError::format(path, source))
     }
 
     /// Opens the bytes of a file in memory, such as those that `bvh_bake::to_bytes` returns.
@@ -116,7 +130,7 @@ impl Bvh {
     pub fn from_bytes(bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, FormatError> {
         let slice = bytes.as_ref();
         let copy = (slice.len() >= MIN_LARGE_PAGES_BYTES).then(|| mapped::copy(slice).ok()).flatten();
-        Self::new(copy.map_or_else(|| Bytes::from_owner(bytes), Bytes::from_owner))
+        Self::new(copy.map_or_else(|| Bytes::from_owner(bytes), Bytes::from_owner), None)
     }
 
     /// Opens bytes that live as long as the program, without a copy: see [`include_cbvh!`](crate::include_cbvh).
@@ -124,43 +138,60 @@ impl Bvh {
     /// # Errors
     /// The rule that the header or the object table breaks.
     pub fn from_static(bytes: &'static [u8]) -> Result<Self, FormatError> {
-        Self::new(Bytes::from_static(bytes))
+        Self::new(Bytes::from_static(bytes), None)
     }
 
-    fn new(bytes: Bytes) -> Result<Self, FormatError> {
+    fn new(bytes: Bytes, advised: Option<Arc<Mmap>>) -> Result<Self, FormatError> {
         let layout = Layout::read(&bytes)?;
         let checked = bytemuck::allocation::zeroed_slice_box(layout.page_count() as usize);
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
         let duplicates_checked = AtomicBool::new(false);
         let topology = OnceLock::new();
-        Ok(Self { bytes, advised: None, layout, checked, duplicates_checked, topology, identity })
+        Ok(Self(Arc::new(OpenFile {
+            bytes,
+            advised,
+            layout,
+            checked,
+            duplicates_checked,
+            topology,
+            identity,
+        })))
+    }
+
+    pub(super) fn downgrade(&self) -> WeakBvh {
+        WeakBvh(Arc::downgrade(&self.0))
     }
 
     /// Returns where everything is in the file.
     pub fn layout(&self) -> &Layout {
-        &self.layout
+        &self.0.layout
     }
 
     /// Returns the bytes of the file.
     pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+        &self.0.bytes
     }
 
     /// Returns whether queries will mostly read bytes that the nearest caches do not hold.
     #[inline(always)]
     pub(crate) fn is_worth_prefetching(&self) -> bool {
-        self.bytes.len() >= MIN_PREFETCH_BYTES
+        self.0.bytes.len() >= MIN_PREFETCH_BYTES
     }
 
-    /// Returns a number that no other `Bvh` of this process has or had.
+    /// Returns what the file states about the topology of its objects, once it has been needed.
+    pub(super) fn known_topology(&self) -> &OnceLock<Result<Box<[ObjectTopology]>, FormatError>> {
+        &self.0.topology
+    }
+
+    /// Returns a number that no other open file of this process has or had.
     pub(crate) fn identity(&self) -> u64 {
-        self.identity
+        self.0.identity
     }
 
     /// Returns the objects of the file, of which there is at least one.
     pub fn objects(&self) -> &[Object] {
-        &self.layout.objects
+        &self.0.layout.objects
     }
 
     /// Returns the ids of the input's triangles that are exact duplicates of triangle `id`, in ascending order.
@@ -170,11 +201,11 @@ impl Bvh {
     /// # Errors
     /// [`QueryError::Damaged`] if the section of duplicates breaks a rule.
     pub fn duplicates_of(&self, id: u32) -> Result<impl Iterator<Item = u32> + '_, QueryError> {
-        if !self.duplicates_checked.load(Ordering::Acquire) {
-            self.layout.check_duplicates(self.bytes())?;
-            self.duplicates_checked.store(true, Ordering::Release);
+        if !self.0.duplicates_checked.load(Ordering::Acquire) {
+            self.0.layout.check_duplicates(self.bytes())?;
+            self.0.duplicates_checked.store(true, Ordering::Release);
         }
-        let pairs = self.layout.duplicate_ids(self.bytes());
+        let pairs = self.0.layout.duplicate_ids(self.bytes());
         let start = pairs.partition_point(|[kept, _]| kept.get() < id);
         let of_id = pairs[start..].iter().take_while(move |[kept, _]| kept.get() == id);
         Ok(of_id.map(|[_, dropped]| dropped.get()))
@@ -200,7 +231,7 @@ impl Bvh {
     /// Returns a page, after checking it if this is its first touch.
     #[inline(always)]
     pub(crate) fn page(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
-        match self.checked.get(number as usize) {
+        match self.0.checked.get(number as usize) {
             Some(flags) if flags.load(Ordering::Acquire) & PAGE_CHECKED != 0 => {}
             _ => self.check_page(object, number)?,
         }
@@ -209,7 +240,7 @@ impl Bvh {
 
     #[inline(always)]
     fn page_unchecked(&self, object: &Object, number: u32) -> Result<Page<'_>, QueryError> {
-        match self.layout.page_bytes(&self.bytes, number) {
+        match self.0.layout.page_bytes(&self.0.bytes, number) {
             Some(bytes) => Ok(Page::new(bytes, object.profile())),
             None => Err(self.no_page(number)),
         }
@@ -217,16 +248,16 @@ impl Bvh {
 
     #[cold]
     fn no_page(&self, number: u32) -> QueryError {
-        let at = self.layout.page_offset(number);
+        let at = self.0.layout.page_offset(number);
         FormatError::new(Rule::ObjectPages, at, "a page", "the end of the section").into()
     }
 
     #[cold]
     fn check_page(&self, object: &Object, number: u32) -> Result<(), QueryError> {
         let bytes: &[u8; PAGE] =
-            self.layout.page_bytes(self.bytes(), number).ok_or_else(|| self.no_page(number))?;
-        check_page(bytes, number, object, self.layout.page_offset(number))?;
-        self.checked[number as usize].fetch_or(PAGE_CHECKED, Ordering::Release);
+            self.0.layout.page_bytes(self.bytes(), number).ok_or_else(|| self.no_page(number))?;
+        check_page(bytes, number, object, self.0.layout.page_offset(number))?;
+        self.0.checked[number as usize].fetch_or(PAGE_CHECKED, Ordering::Release);
         Ok(())
     }
 
@@ -234,32 +265,32 @@ impl Bvh {
     #[inline(always)]
     pub(crate) fn leaf_block(&self, object: &Object, page: &Page) -> Result<&[u8], QueryError> {
         let number = page.header().page_number.get();
-        match self.checked.get(number as usize) {
+        match self.0.checked.get(number as usize) {
             Some(flags) if flags.load(Ordering::Acquire) & LEAVES_CHECKED != 0 => {}
             _ => self.check_leaves(object, page, number)?,
         }
-        Ok(self.layout.leaf_block(&self.bytes, page.header()))
+        Ok(self.0.layout.leaf_block(&self.0.bytes, page.header()))
     }
 
     #[cold]
     fn check_leaves(&self, object: &Object, page: &Page, number: u32) -> Result<(), QueryError> {
-        let block = self.layout.leaf_block(self.bytes(), page.header());
+        let block = self.0.layout.leaf_block(self.bytes(), page.header());
         // A page may state any length, and be met again by each pair of a scene: what is too long for any page is not read.
         if block.len() > MAX_BLOCK_BYTES {
             let (at, expected) =
-                (self.layout.page_offset(number), format!("at most {MAX_BLOCK_BYTES} bytes"));
+                (self.0.layout.page_offset(number), format!("at most {MAX_BLOCK_BYTES} bytes"));
             let found = format!("{} bytes", block.len());
             return Err(FormatError::new(Rule::LeafPlace, at + 24, expected, found).into());
         }
         self.will_need(block);
-        self.layout.check_leaf_block(self.bytes(), page, object)?;
-        self.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
+        self.0.layout.check_leaf_block(self.bytes(), page, object)?;
+        self.0.checked[number as usize].fetch_or(LEAVES_CHECKED, Ordering::Release);
         Ok(())
     }
 
     /// Tells the system which block is about to be checked, if the file was opened with [`ReadAhead::Sparse`].
     fn will_need(&self, block: &[u8]) {
-        if let Some(map) = &self.advised
+        if let Some(map) = &self.0.advised
             && !block.is_empty()
         {
             let start = block.as_ptr() as usize - map.as_ptr() as usize;
@@ -271,13 +302,13 @@ impl Bvh {
     /// without ids.
     fn id_block(&self, page: &Page) -> Result<&[u8], QueryError> {
         let number = page.header().page_number.get();
-        let flags = self.checked.get(number as usize).ok_or_else(|| self.no_page(number))?;
+        let flags = self.0.checked.get(number as usize).ok_or_else(|| self.no_page(number))?;
         if flags.load(Ordering::Acquire) & IDS_CHECKED == 0 {
-            self.will_need(self.layout.id_block(self.bytes(), page.header()));
-            self.layout.check_id_block(self.bytes(), page)?;
+            self.will_need(self.0.layout.id_block(self.bytes(), page.header()));
+            self.0.layout.check_id_block(self.bytes(), page)?;
             flags.fetch_or(IDS_CHECKED, Ordering::Release);
         }
-        Ok(self.layout.id_block(self.bytes(), page.header()))
+        Ok(self.0.layout.id_block(self.bytes(), page.header()))
     }
 
     /// Returns a leaf packet: in place or, if it is encoded, decoded into `room`.
@@ -342,7 +373,7 @@ impl Bvh {
         if count == 0 {
             return &[];
         }
-        let block = self.layout.leaf_block(&self.bytes, page.header());
+        let block = self.0.layout.leaf_block(&self.0.bytes, page.header());
         let first = usize::from(links.first_leaf);
         let range = match object.triangle_encoding() {
             TriangleEncoding::F32 => first * F32_PACKET_BYTES..(first + count) * F32_PACKET_BYTES,
@@ -358,7 +389,7 @@ impl Bvh {
     /// leaves.
     pub(crate) fn triangle_id(&self, object: &Object, place: TrianglePlace) -> Result<u32, QueryError> {
         let page = self.page(object, place.page)?;
-        if !self.layout.has_ids() {
+        if !self.0.layout.has_ids() {
             let packet = page.header().first_packet.get().wrapping_add(u32::from(place.packet));
             return Ok(packet.wrapping_mul(4).wrapping_add(u32::from(place.lane)));
         }
@@ -367,11 +398,11 @@ impl Bvh {
     }
 }
 
-impl std::fmt::Debug for Bvh {
+impl std::fmt::Debug for OpenFile {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bvh")
-            .field("bytes", &self.bytes().len())
-            .field("objects", &self.objects().len())
+        f.debug_struct("OpenFile")
+            .field("bytes", &self.bytes.len())
+            .field("objects", &self.layout.objects.len())
             .finish()
     }
 }

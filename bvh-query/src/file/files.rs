@@ -1,12 +1,13 @@
 //! Files that are opened when a scene first needs them, of which at most so many stay open.
 
 use crate::error::{OpenError, QueryError};
-use crate::file::bvh::Bvh;
+use crate::file::bvh::{Bvh, WeakBvh};
 use crate::file::owned_shape::OwnedShape;
 use bvh_format::object::Object;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Files for scenes of more files than shall be open: each is opened when an instance of it is first near another one, and
 /// at most so many stay open. Cloning it copies a pointer.
@@ -37,7 +38,7 @@ struct Shelf {
     most: usize,
     /// How often a file was used, which tells when each was used last.
     clock: AtomicU64,
-    open: Mutex<Vec<(Arc<Known>, Arc<Bvh>)>>,
+    open: Mutex<Vec<(Arc<Known>, Bvh)>>,
 }
 
 /// What is known of a file while it is closed.
@@ -47,17 +48,20 @@ struct Known {
     content_checksum: u64,
     objects: Vec<Object>,
     /// The file, while anybody has it open.
-    bvh: Mutex<Weak<Bvh>>,
+    bvh: Mutex<WeakBvh>,
     last_use: AtomicU64,
 }
 
-/// One object of a file, or all of its objects, in a file that [`Files`] opens and closes.
+/// A shape as a scene holds it: its file is open as long as the shape lives, or [`Files`] opens it only while a question
+/// needs it. Whatever has its file open converts into one.
 #[derive(Clone, Debug)]
-pub struct StoredShape {
-    files: Files,
-    known: Arc<Known>,
-    /// The number of one object; `None` for all of the file.
-    object: Option<usize>,
+pub struct SceneShape(Held);
+
+#[derive(Clone, Debug)]
+enum Held {
+    Open(OwnedShape),
+    /// The number is that of one object; `None` for all of the file.
+    Stored(Files, Arc<Known>, Option<usize>),
 }
 
 impl Files {
@@ -71,7 +75,7 @@ impl Files {
     ///
     /// # Errors
     /// The errors of [`Bvh::open`], which documents what a file that is open asks for.
-    pub fn shape(&self, path: impl AsRef<Path>) -> Result<StoredShape, OpenError> {
+    pub fn shape(&self, path: impl AsRef<Path>) -> Result<SceneShape, OpenError> {
         let path = path.as_ref();
         let bvh = Bvh::open(path)?;
         let known = Known {
@@ -81,7 +85,7 @@ impl Files {
             bvh: Mutex::default(),
             last_use: AtomicU64::new(0),
         };
-        Ok(StoredShape { files: self.clone(), known: Arc::new(known), object: None })
+        Ok(SceneShape(Held::Stored(self.clone(), Arc::new(known), None)))
     }
 
     /// Returns how many files stay open at present.
@@ -90,17 +94,28 @@ impl Files {
     }
 }
 
-impl StoredShape {
+impl<T: Into<OwnedShape>> From<T> for SceneShape {
+    fn from(shape: T) -> Self {
+        Self(Held::Open(shape.into()))
+    }
+}
+
+impl SceneShape {
     /// Returns one object of the file as a shape, or `None` if the file has no object of this number.
     pub fn object(&self, number: usize) -> Option<Self> {
-        (number < self.known.objects.len()).then(|| Self { object: Some(number), ..self.clone() })
+        match &self.0 {
+            Held::Open(shape) => OwnedShape::object(shape.bvh().clone(), number).map(Self::from),
+            Held::Stored(files, known, _) => (number < known.objects.len())
+                .then(|| Self(Held::Stored(files.clone(), known.clone(), Some(number)))),
+        }
     }
 
-    /// Returns the objects of the shape as the file had them when it was first read.
+    /// Returns the objects of the shape, as the file had them when it was first read.
     pub fn objects(&self) -> &[Object] {
-        match self.object {
-            Some(number) => &self.known.objects[number..=number],
-            None => &self.known.objects,
+        match &self.0 {
+            Held::Open(shape) => shape.shape().objects(),
+            Held::Stored(_, known, Some(number)) => &known.objects[*number..=*number],
+            Held::Stored(_, known, None) => &known.objects,
         }
     }
 
@@ -109,33 +124,46 @@ impl StoredShape {
     /// # Errors
     /// [`QueryError::File`] if the file is not there, or is no longer the one that was first read.
     pub fn opened(&self) -> Result<OwnedShape, QueryError> {
-        let (shelf, known) = (&self.files.0, &self.known);
+        self.held_open().map(Cow::into_owned)
+    }
+
+    /// Returns the shape for a question. A shape whose file is open is lent, because threads that count its uses would get in
+    /// each other's way.
+    pub(crate) fn held_open(&self) -> Result<Cow<'_, OwnedShape>, QueryError> {
+        let (files, known, object) = match &self.0 {
+            Held::Open(shape) => return Ok(Cow::Borrowed(shape)),
+            Held::Stored(files, known, object) => (files, known, *object),
+        };
+        let bvh = files.open(known)?;
+        // The file has the objects it had, so that the number is one of them.
+        let shape = object.and_then(|number| OwnedShape::object(bvh.clone(), number));
+        Ok(Cow::Owned(shape.unwrap_or_else(|| bvh.into())))
+    }
+}
+
+impl Files {
+    /// Returns a file, which it opens if it is not open.
+    fn open(&self, known: &Arc<Known>) -> Result<Bvh, QueryError> {
+        let shelf = &self.0;
         known.last_use.store(shelf.clock.fetch_add(1, Ordering::Relaxed), Ordering::Relaxed);
         let is_open = || locked(&known.bvh).upgrade();
-        let bvh = match is_open() {
-            Some(bvh) => bvh,
-            None => {
-                let mut open = locked(&shelf.open);
-                // Another thread may have opened it meanwhile.
-                match is_open() {
-                    Some(bvh) => bvh,
-                    None => {
-                        while open.len() >= shelf.most {
-                            let last_use = |place: &usize| open[*place].0.last_use.load(Ordering::Relaxed);
-                            let oldest = (0..open.len()).min_by_key(last_use).unwrap_or_default();
-                            open.swap_remove(oldest);
-                        }
-                        let bvh = Arc::new(known.open_again()?);
-                        *locked(&known.bvh) = Arc::downgrade(&bvh);
-                        open.push((known.clone(), bvh.clone()));
-                        bvh
-                    }
-                }
-            }
-        };
-        // The file has the objects it had, so that the number is one of them.
-        let shape = self.object.and_then(|number| OwnedShape::object(bvh.clone(), number));
-        Ok(shape.unwrap_or_else(|| bvh.into()))
+        if let Some(bvh) = is_open() {
+            return Ok(bvh);
+        }
+        let mut open = locked(&shelf.open);
+        // Another thread may have opened it meanwhile.
+        if let Some(bvh) = is_open() {
+            return Ok(bvh);
+        }
+        while open.len() >= shelf.most {
+            let last_use = |place: &usize| open[*place].0.last_use.load(Ordering::Relaxed);
+            let oldest = (0..open.len()).min_by_key(last_use).unwrap_or_default();
+            open.swap_remove(oldest);
+        }
+        let bvh = known.open_again()?;
+        *locked(&known.bvh) = bvh.downgrade();
+        open.push((known.clone(), bvh.clone()));
+        Ok(bvh)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use crate::file::bvh::Bvh;
 use crate::file::shape::Shape;
-use std::sync::Arc;
 
-/// A [`Shape`] that keeps its file open as long as it lives. Cloning it copies a pointer, and threads may share it. A
-/// reference to it converts into a shape, so that every question takes it.
+/// A [`Shape`] that keeps its file open: for one object that outlives the code that opened its file. For all objects of a
+/// file, a [`Bvh`] does as well. Cloning it copies a pointer, and a reference to it converts into a shape, so that every
+/// question takes it.
 ///
 /// ```
 /// use bvh_query::{Bvh, OwnedShape, Pose, Querier};
@@ -24,15 +24,14 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug)]
 pub struct OwnedShape {
-    bvh: Arc<Bvh>,
+    bvh: Bvh,
     /// The number of one object; `None` for all of the file.
     object: Option<usize>,
 }
 
 impl OwnedShape {
     /// Returns one object of a file as a shape, or `None` if the file has no object of this number.
-    pub fn object(bvh: impl Into<Arc<Bvh>>, number: usize) -> Option<Self> {
-        let bvh = bvh.into();
+    pub fn object(bvh: Bvh, number: usize) -> Option<Self> {
         bvh.object(number)?;
         Some(Self { bvh, object: Some(number) })
     }
@@ -44,22 +43,15 @@ impl OwnedShape {
     }
 
     /// Returns the file that the shape is in.
-    pub fn bvh(&self) -> &Arc<Bvh> {
+    pub fn bvh(&self) -> &Bvh {
         &self.bvh
-    }
-}
-
-impl From<Arc<Bvh>> for OwnedShape {
-    /// Returns all objects of a file as one shape.
-    fn from(bvh: Arc<Bvh>) -> Self {
-        Self { bvh, object: None }
     }
 }
 
 impl From<Bvh> for OwnedShape {
     /// Returns all objects of a file as one shape.
     fn from(bvh: Bvh) -> Self {
-        Arc::new(bvh).into()
+        Self { bvh, object: None }
     }
 }
 

@@ -62,7 +62,7 @@ impl Bvh {
     /// The errors of [`Bvh::is_closed`].
     pub(crate) fn topology(&self, object: usize) -> Result<Topology<'_>, QueryError> {
         let check = || self.layout().check_topology(self.bytes()).map(Vec::into_boxed_slice);
-        let all = self.topology.get_or_init(check).as_deref().map_err(Clone::clone)?;
+        let all = self.known_topology().get_or_init(check).as_deref().map_err(Clone::clone)?;
         if all.is_empty() {
             return Err(QueryError::NoTopology);
         }

@@ -1,17 +1,11 @@
 //! Instances: shapes placed in the world, and which of them are asked about.
 
-use crate::error::QueryError;
-use crate::file::bvh::Bvh;
-use crate::file::files::StoredShape;
-use crate::file::owned_shape::OwnedShape;
+use crate::file::files::SceneShape;
 use crate::pose::Pose;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
-use bvh_format::object::Object;
-use std::borrow::Cow;
 use std::fmt;
-use std::sync::Arc;
 
 /// Names an instance of a scene. An identifier is never given twice by one scene, so that a removed instance is not
 /// mistaken for a later one. Identifiers are ordered by the places of their instances, and of a pair of instances the
@@ -42,60 +36,6 @@ impl fmt::Display for InstanceId {
         } else {
             write!(f, "{}.{}", self.place, self.generation)
         }
-    }
-}
-
-/// The shape of an instance: one whose file is open, or one whose file is opened at first need.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub enum SceneShape {
-    /// The file is open as long as the instance lives.
-    Open(OwnedShape),
-    /// [`Files`](crate::Files) opens and closes the file.
-    Stored(StoredShape),
-}
-
-impl SceneShape {
-    /// Returns the objects of the shape.
-    pub fn objects(&self) -> &[Object] {
-        match self {
-            Self::Open(shape) => shape.shape().objects(),
-            Self::Stored(shape) => shape.objects(),
-        }
-    }
-
-    /// Returns the shape for a question, which keeps its file open.
-    pub(super) fn opened(&self) -> Result<Cow<'_, OwnedShape>, QueryError> {
-        Ok(match self {
-            Self::Open(shape) => Cow::Borrowed(shape),
-            Self::Stored(shape) => Cow::Owned(shape.opened()?),
-        })
-    }
-}
-
-impl From<OwnedShape> for SceneShape {
-    fn from(shape: OwnedShape) -> Self {
-        Self::Open(shape)
-    }
-}
-
-impl From<StoredShape> for SceneShape {
-    fn from(shape: StoredShape) -> Self {
-        Self::Stored(shape)
-    }
-}
-
-impl From<Arc<Bvh>> for SceneShape {
-    /// Takes all objects of a file as one shape.
-    fn from(bvh: Arc<Bvh>) -> Self {
-        Self::Open(bvh.into())
-    }
-}
-
-impl From<Bvh> for SceneShape {
-    /// Takes all objects of a file as one shape.
-    fn from(bvh: Bvh) -> Self {
-        Self::Open(bvh.into())
     }
 }
 

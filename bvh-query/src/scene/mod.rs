@@ -19,12 +19,13 @@ mod world_box;
 
 pub use error::{InstanceLabel, OpenSceneError, SceneError};
 pub use groups::Groups;
-pub use instance::{InstanceId, SceneShape};
+pub use instance::InstanceId;
 pub use motion::SceneMotionAnswer;
 pub use probe::{SceneClosestPoint, SceneRayHit};
 pub use question::{SceneContact, SceneDistance, ScenePair};
 
 use crate::file::bvh::Bvh;
+use crate::file::files::SceneShape;
 use crate::file::owned_shape::OwnedShape;
 use crate::isa::Backend;
 use crate::pose::Pose;
@@ -36,7 +37,6 @@ use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
 use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
 use trackers::Trackers;
 use workers::Workers;
 use world_box::WorldBox;
@@ -59,17 +59,16 @@ use world_box::WorldBox;
 /// Clone a scene to ask it on several threads: shapes are shared.
 ///
 /// ```
-/// use bvh_query::{Bvh, OwnedShape, Pose, Scene};
+/// use bvh_query::{Bvh, Pose, Scene};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
 /// # let bvh = Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?.0)?;
-/// let shape = OwnedShape::from(bvh);
 /// let at = |height: f64| Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, height]);
 /// let mut scene = Scene::new()?;
-/// let floor = scene.add(shape.clone(), at(0.0)?)?;
-/// let part = scene.add(shape, at(2.0)?)?;
+/// let floor = scene.add(bvh.clone(), at(0.0)?)?;
+/// let part = scene.add(bvh, at(2.0)?)?;
 /// assert!(!scene.collide()?);
 /// assert_eq!(scene.distance()?.map(|nearest| nearest.nearest.distance), Some(2.0));
 /// scene.set_pose(part, at(0.0)?)?;
@@ -139,7 +138,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoInstances`] if the file says nothing of a world; [`SceneError::Query`] if its instances break a rule
     /// of the format, or as for [`Scene::new`].
-    pub fn of_file(bvh: impl Into<Arc<Bvh>>) -> Result<Self, SceneError> {
+    pub fn of_file(bvh: Bvh) -> Result<Self, SceneError> {
         Self::of_file_with_backend(bvh, Backend::detect().map_err(|error| SceneError::Query(error.into()))?)
     }
 
@@ -148,8 +147,7 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::of_file`], but for those of the backend.
-    pub fn of_file_with_backend(bvh: impl Into<Arc<Bvh>>, backend: Backend) -> Result<Self, SceneError> {
-        let bvh = bvh.into();
+    pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneError> {
         let damaged = |error: FormatError| SceneError::Query(error.into());
         let instances = bvh.layout().read_instances(bvh.bytes()).map_err(damaged)?;
         if instances.is_empty() {

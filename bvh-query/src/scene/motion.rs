@@ -289,7 +289,7 @@ impl Scene {
             let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
                 let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
                 let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
-                let (shape_a, shape_b) = (one.shape.opened()?, other.shape.opened()?);
+                let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
                 let pair = ScenePair { a: one.id(a), b: other.id(b) };
                 let (a, b) = (shape_a.shape(), shape_b.shape());
                 scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, &path))

@@ -251,7 +251,7 @@ impl Asked<'_> {
             };
             let id = instance.id(place);
             let mut ask = || {
-                let shape = instance.shape.opened()?;
+                let shape = instance.shape.held_open()?;
                 let placed = PlacedShape { instance: place, ..shape.shape().at(&instance.world) };
                 visit(querier, id, placed, key)
             };

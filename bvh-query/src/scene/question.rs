@@ -485,7 +485,7 @@ impl Scene {
             let pose = Pose::relative(&a.world, &b.world)?;
             let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
-            let (a, b) = (a.shape.opened()?, b.shape.opened()?);
+            let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
             let tracker = scene.trackers.get((near_pair.a, near_pair.b));
             let pair = &mut InstancePair { ids, a: &a, b: &b, pose, tracker };
             let answer = scene.workers.ask_rest(querier, |querier| ask(querier, pair));

@@ -4,7 +4,6 @@ use super::common::shapes::sphere;
 use super::{Random, ask, place, shape, shapes};
 use bvh_query::{Bvh, Files, Groups, OwnedShape, Pose, Scene, SceneError};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Writes a file of its own for each shape, and returns the folder and the paths.
 fn files_of(shapes: &[OwnedShape]) -> (tempfile::TempDir, Vec<PathBuf>) {
@@ -20,7 +19,7 @@ fn files_of(shapes: &[OwnedShape]) -> (tempfile::TempDir, Vec<PathBuf>) {
 fn a_scene_file_is_the_scene_of_its_instances() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-scene.cbvh");
     let mut opened = Scene::open(&path).unwrap();
-    let bvh = Arc::new(Bvh::open(&path).unwrap());
+    let bvh = Bvh::open(&path).unwrap();
     let mut built = Scene::new().unwrap();
     let turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     let cube = OwnedShape::object(bvh.clone(), 0).unwrap();

@@ -19,7 +19,6 @@ use cbvh_testkit::seal::section;
 use common::shapes::{cube, moved, plate, sphere, torus};
 use common::{Random, Triangle, bake, mesh, random_pose};
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 fn shape(triangles: &[Triangle]) -> OwnedShape {
     bake(&mesh(triangles), &bvh_bake::Options::default()).into()
@@ -29,7 +28,7 @@ fn shape(triangles: &[Triangle]) -> OwnedShape {
 fn shapes() -> Vec<OwnedShape> {
     let mut two = mesh(&sphere(1));
     two.objects.extend(mesh(&moved(&torus(8, 6), 0.5, [3.0, 0.0, 0.0])).objects);
-    let two = Arc::new(bake(&two, &bvh_bake::Options::default().split_objects(true)));
+    let two = bake(&two, &bvh_bake::Options::default().split_objects(true));
     vec![
         shape(&sphere(2)),
         shape(&torus(12, 8)),

@@ -21,7 +21,6 @@ use cbvh_measure::poses::mixed;
 use cbvh_measure::rounds::{Asked, Question, Subject as Asking, rounds};
 use cbvh_measure::spread::{Spread, median};
 use cbvh_measure::table::{self, Cell, micro};
-use std::sync::Arc;
 
 pub(super) const KIND: Kind<Pose> =
     Kind { words: WORDS, items: "poses", read: read_poses, make: mixed, made: MADE, measure };
@@ -105,8 +104,8 @@ impl Layout {
 /// Both meshes in one layout.
 struct Baked {
     layout: Layout,
-    a: Arc<Bvh>,
-    b: Arc<Bvh>,
+    a: Bvh,
+    b: Bvh,
     /// Figures that do not depend on the question, with their names.
     size: [(&'static str, f64); 7],
 }

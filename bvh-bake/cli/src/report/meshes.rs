@@ -8,7 +8,6 @@ use bvh_format::validate::validate;
 use bvh_query::Bvh;
 use cbvh_measure::pairs::Pair;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Returns the mesh of a file, all its objects as one.
 pub(super) fn read(path: &Path) -> Result<Mesh, Failure> {
@@ -36,7 +35,7 @@ fn unbaked(path: &Path) -> Result<Mesh, Failure> {
 }
 
 /// A baked mesh, and the report of the bake.
-pub(super) type Baked = (Arc<Bvh>, BakeReport);
+pub(super) type Baked = (Bvh, BakeReport);
 
 /// Bakes both meshes of a pair. If it is a mesh and itself, the second is the first.
 pub(super) fn bake_both(pair: &Pair, [a, b]: &[Mesh; 2], options: &Options) -> Result<[Baked; 2], Failure> {
@@ -51,7 +50,7 @@ fn bake(path: &Path, mesh: &Mesh, options: &Options) -> Result<Baked, Failure> {
     let (bytes, report) = to_bytes(mesh, options).map_err(|error| failed(&error))?;
     let bvh = Bvh::from_bytes(bytes).map_err(|error| failed(&BakeError::Unproved(error)))?;
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
-    Ok((Arc::new(bvh), report))
+    Ok((bvh, report))
 }
 
 /// Returns the name of a bake's layout, as tables have it.

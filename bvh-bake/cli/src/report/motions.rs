@@ -107,7 +107,7 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
     let methods: Vec<Method> = Method::all().collect();
     let (pinned, answers) = pinned(|| {
         let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
-        let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
+        let certified = motions.iter().map(|motion| querier.motion(a, b, motion, &options));
         let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>()?;
         Ok((certified, ask(&methods, [a, b], motions, backend, rounds)?))
     });

@@ -4,10 +4,9 @@ use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, point_out_units};
 use crate::console::Failure;
 use crate::options::LayoutArguments;
-use bvh_query::{Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, ReadAhead, Scene};
+use bvh_query::{Backend, Bvh, Groups, InstanceId, Pose, ReadAhead, Scene};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 /// The groups of what frames move, and of what stands still.
@@ -177,7 +176,7 @@ impl LoadedScene {
 /// Opens a baked scene, all of whose instances move. All pages are checked, so that no frame pays for that.
 pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
     let start = Instant::now();
-    let bvh = Arc::new(Bvh::open(path)?);
+    let bvh = Bvh::open(path)?;
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
     let scene = scene.map_err(|error| Failure::invalid(path, error))?;
@@ -218,7 +217,7 @@ pub(super) fn load(
         let this = (mesh.size(), file.as_path());
         let [least, most] = ends.unwrap_or([this; 2]);
         ends = Some([if this.0 < least.0 { this } else { least }, if this.0 > most.0 { this } else { most }]);
-        shapes.push(OwnedShape::from(mesh.bvh));
+        shapes.push(mesh.bvh);
     }
     ends.into_iter().for_each(point_out_units);
     let mut ids = Vec::new();

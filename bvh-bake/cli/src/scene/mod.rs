@@ -10,7 +10,6 @@ use crate::console::{self, Failure, significant};
 use crate::options::not_negative;
 use bvh_query::{
     Backend, Pose, Querier, QueryError, QueryStats, Relation, Scene, SceneDistance, SceneError, ScenePair,
-    SceneShape,
 };
 use cbvh_measure::rounds::add;
 use clap::{Args, ValueEnum};
@@ -247,12 +246,10 @@ fn others(
     let mut found = Vec::new();
     let mut querier = Querier::with_backend(backend);
     for pair in scene.pairs_within(f64::MAX)? {
-        let (SceneShape::Open(a), SceneShape::Open(b)) = (scene.shape(pair.a)?, scene.shape(pair.b)?) else {
-            continue;
-        };
+        let (a, b) = (scene.shape(pair.a)?.opened()?, scene.shape(pair.b)?.opened()?);
         let Ok(pose) = Pose::relative(scene.pose(pair.a)?, scene.pose(pair.b)?) else { continue };
         if Some(pair) != nearest {
-            found.push((pair, querier.distance(a.shape(), b.shape(), &pose)?.distance));
+            found.push((pair, querier.distance(&a, &b, &pose)?.distance));
         }
     }
     found.sort_by(|(_, one), (_, other)| one.total_cmp(other));

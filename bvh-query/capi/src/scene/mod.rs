@@ -13,7 +13,7 @@ use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{Instance, MeshHandle, PoseRows, SceneHandle, StatsRow, backend};
-use bvh_query::{Groups, InstanceId, Scene, SceneShape};
+use bvh_query::{Groups, InstanceId, Scene};
 use std::ffi::c_char;
 
 /// All scenes that are open.
@@ -289,11 +289,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
         // SAFETY: the header asks for it.
         let out = unsafe { new_mesh("mesh", mesh) }?;
         let seen = SCENES.see("scene", scene.id)?;
-        match seen.value()?.scene.shape(instance.into())? {
-            SceneShape::Open(shape) => hand_out(out, shape.clone()),
-            SceneShape::Stored(shape) => hand_out(out, shape.opened()?),
-            _ => Err(Failure::new(Status::Internal, "a shape of an unknown kind")),
-        }
+        hand_out(out, seen.value()?.scene.shape(instance.into())?.opened()?)
     })
 }
 

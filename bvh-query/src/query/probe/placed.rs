@@ -7,7 +7,7 @@ use crate::pose::Pose;
 use crate::pose::frames::{inverse, turn};
 use bvh_format::object::Object;
 
-/// A shape and where it is: questions about points, rays and segments take one.
+/// A shape and where it is: for questions about points, rays and segments that are given in the world.
 ///
 /// A `&Bvh` or a [`Shape`] converts into the shape in its own frame, and [`Shape::at`] places it by a pose, so that probes are
 /// given in the world. What is asked about are then the stored vertices as [`Pose::place`] places them, as in questions about
