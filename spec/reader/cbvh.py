@@ -342,6 +342,14 @@ class File:
         """Pairs of ids: the triangle that is stored, and its duplicate that is not (13)."""
         return np.frombuffer(self.bytes_of(DUPLICATES), "<u4").reshape(-1, 2)
 
+    def weights(self):
+        """How many triangles of the input each stored one represents: itself and its listed duplicates (13)."""
+        ids = np.concatenate([one.ids() for one in self.objects])
+        kept, counts = np.unique(self.duplicates()[:, 0], return_counts=True)
+        weights = np.ones(len(ids), int)
+        weights[np.isin(ids, kept)] += counts[np.searchsorted(kept, ids[np.isin(ids, kept)])]
+        return weights
+
     def provenance(self):
         """The keys and values of the provenance (14)."""
         lines = self.bytes_of(PROVENANCE).decode("utf-8", "replace").split("\n")

@@ -10,7 +10,6 @@ import numpy as np
 
 import cbvh
 from cbvh import LEAF, LINE, PAGE, REMOTE, SHORT, SORTS, TREELET, WORD, sort_of
-from query import minus, outer
 
 
 def violations(file):
@@ -175,8 +174,9 @@ def maybe_flat(corners):
 
 
 def is_flat(triangle):
-    p, q, r = (tuple(Fraction(float(value)) for value in corner) for corner in triangle)
-    return outer(minus(q, p), minus(r, p)) == (0, 0, 0)
+    p, q, r = ([Fraction(float(value)) for value in corner] for corner in triangle)
+    u, v = ([end - start for end, start in zip(corner, p)] for corner in (q, r))
+    return all(u[i] * v[j] == u[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
 def of_page(page):

@@ -1,4 +1,4 @@
-"""Tests that the reader and the command `cbvh` agree on baked files and their contents, on damage, and on queries.
+"""Tests that the reader and the command `cbvh` agree on baked files and their contents, and on damage.
 
     CBVH=target/release/cbvh python3 -m unittest discover -s spec/reader
 
@@ -22,8 +22,8 @@ import numpy as np
 import cbvh
 import musts
 import mutate
-import query
 import rules
+from check import load
 from test_reader import Tree, file_of, instances, sections_of, with_section
 
 COMMAND = os.environ.get("CBVH")
@@ -31,7 +31,6 @@ ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 TESTDATA = os.path.join(ROOT, "testdata")
 SHARED = os.path.join(ROOT, "..", "shared")
 ROBOT, ROOM = (os.path.join(TESTDATA, name) for name in ("fclrob.obj", "fclenv.obj"))
-IDENTITY = np.eye(3, 4)
 ORDERS = list(itertools.permutations(range(3)))
 
 
@@ -103,13 +102,6 @@ def run(*arguments):
     return found.stdout
 
 
-def load(path):
-    with open(path, "rb") as stream:
-        file = rules.validate(stream.read())
-    rules.verify(file)
-    return file
-
-
 def distances(points, others):
     return np.sqrt(((points - others) ** 2).sum(-1))
 
@@ -155,7 +147,7 @@ class AgainstCbvh(unittest.TestCase):
         ids = np.concatenate([one.ids() for one in file.objects])
         kept, dropped = file.duplicates().T
         self.assertEqual(sorted([*ids, *dropped]), list(range(len(expected))))
-        self.assertEqual(query.weights(file).sum(), len(expected))
+        self.assertEqual(file.weights().sum(), len(expected))
         for one in file.objects:
             corners, given = one.triangles_f32(), expected[one.ids()]
             self.assertEqual(one.input_triangles, len(expected))
@@ -263,31 +255,6 @@ class AgainstCbvh(unittest.TestCase):
                     may_be_short = one.layout.short and page.is_packed() and slot >= page.roots
                     self.assertEqual(page.is_short(slot), bool(may_be_short and only_leaves), (page.number, slot))
 
-    def answers(self, mode, path_a, path_b, poses):
-        """Returns the answers of `cbvh query` as text."""
-        pose_file = os.path.join(self.folder, "poses.txt")
-        with open(pose_file, "w", encoding="utf-8") as stream:
-            for pose in poses:
-                print(*(repr(value) for value in pose.ravel().tolist()), file=stream)
-        raw = os.path.join(self.folder, "raw_%s.txt")
-        run("query", path_a, path_b, pose_file, "--mode", mode, "--out", raw, "--warm", 0)
-        with open(raw % "poses", encoding="utf-8") as stream:
-            return [line.split()[0] for line in stream if not line.startswith("#")]
-
-    def check_queries(self, path_a, path_b, poses):
-        file_a, file_b = load(path_a), load(path_b)
-        a, b = query.corners(file_a), query.corners(file_b)
-        weights_a, weights_b = query.weights(file_a), query.weights(file_b)
-        modes = ("collide", "contacts", "distance")
-        for pose, *found in zip(poses, *(self.answers(mode, path_a, path_b, poses) for mode in modes), strict=True):
-            placed = query.place(b, pose)
-            of_a, of_b = query.contacts(a, placed)
-            self.assertEqual(int(found[0]), int(len(of_a) > 0))
-            self.assertEqual(int(found[1]), (weights_a[of_a] * weights_b[of_b]).sum())
-            # Both are computed in f64 from the same points, so they differ by a few roundings of coordinates.
-            size = max(np.abs(a).max(), np.abs(placed).max())
-            self.assertAlmostEqual(float(found[2]), query.least_distance(a, placed), delta=1e-12 * size)
-
     def test_every_profile_and_encoding(self):
         profiles = [profile.name for profile in cbvh.PROFILES]
         for mesh, profile, triangles in itertools.product((ROBOT, ROOM), profiles, cbvh.ENCODINGS):
@@ -310,7 +277,6 @@ class AgainstCbvh(unittest.TestCase):
             self.assertGreaterEqual(sum(one.degenerate for one in objects), len(flat))
             self.assertTrue(objects[0].origin[:2].all())
             self.check_bake(self.bake(mesh, profile, triangles), mesh)
-        self.check_queries(path, self.bake(ROBOT), [IDENTITY, np.eye(3, 4) * [1, 1, 1, 0] + np.eye(3, 4, 3) * 80])
 
     def test_closed_and_open_surfaces(self):
         robot = read_obj(ROBOT)
@@ -519,50 +485,6 @@ class AgainstCbvh(unittest.TestCase):
             mesh = self.shared("meshes", name + ".obj")
             for profile, triangles in (("dop26-u8-wide", "packed"), ("dop14-u8", "quantized")):
                 self.check_bake(self.bake(mesh, profile, triangles), mesh)
-
-    def test_queries_near_contact(self):
-        """Poses bring a corner of the robot to one of the room: apart, touching within roundings, or inside."""
-        paths = self.bake(ROOM, "dop26-u4", "packed"), self.bake(ROBOT, "dop6-f16", "f32")
-        room = query.corners(load(paths[0])).reshape(-1, 3)
-        robot = query.corners(load(paths[1])).reshape(-1, 3)
-        poses = []
-        for _ in range(12):
-            rotation = random_rotation(self.chance)
-            # A corner on a corner, then moved away from it by nothing, about an ulp, or more.
-            goal = room[self.chance.randrange(len(room))]
-            moved = rotation @ robot[self.chance.randrange(len(robot))]
-            step = self.chance.choice((0, 1e-12, 1e-3, 30, 300))
-            poses.append(np.column_stack([rotation, goal - moved + step * rotation[0]]))
-        self.check_queries(*paths, poses)
-
-    def test_queries_on_a_grid(self):
-        """Coordinates are small integers: most contacts are touching, many triangles are degenerate or coplanar."""
-        paths = []
-        for name in "ab":
-            triangles = np.array([[self.chance.randrange(5) for _ in range(9)] for _ in range(50)], float).reshape(
-                -1, 3, 3
-            )
-            triangles[:5, 1] = triangles[:5, 0]
-            triangles[:2, 2] = triangles[:2, 0]
-            triangles[5:10, 2] = 2 * triangles[5:10, 1] - triangles[5:10, 0]
-            for triangle in triangles[10:25]:
-                triangle[:, self.chance.randrange(3)] = self.chance.randrange(5)
-            mesh = os.path.join(self.folder, name + ".obj")
-            write_obj(mesh, [(name, triangles)])
-            paths.append(self.bake(mesh))
-        turns = [np.array(rows, float) for rows in itertools.permutations(np.eye(3).tolist())]
-        turns = [turn * np.linalg.det(turn) for turn in turns]
-        poses = []
-        for _ in range(40):
-            translation = [self.chance.choice((-5, -4, -2, -1, 0, 1, 2, 4, 5, 0.5)) for _ in range(3)]
-            poses.append(np.column_stack([self.chance.choice(turns), translation]))
-        self.check_queries(*paths, poses)
-
-    def test_queries_of_known_poses(self):
-        paths = self.bake(ROOM), self.bake(ROBOT)
-        for preset in ("d0sep", "d0pen", "overlap", "d1"):
-            with open(self.shared("poses", f"fcl_{preset}.txt"), encoding="utf-8") as stream:
-                self.check_queries(*paths, query.read_poses(stream.read())[:8])
 
     def test_damaged_files(self):
         names = "everything", "plain", "profiles", "scene", "topology"

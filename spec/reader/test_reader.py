@@ -23,7 +23,6 @@ import cbvh
 import check
 import musts
 import mutate
-import query
 import rules
 from xxh3 import xxh3_64
 
@@ -338,39 +337,6 @@ class Arithmetic(unittest.TestCase):
             children = [[rules.Subtree(None, None, 1, points)]]
             found = rules.turning_slabs_that_hold(page, slabs, slabs, children)
             self.assertEqual(found, {(0, 0): holds}, corner)
-
-    def test_contacts_of_two_triangles(self):
-        flat = [[0, 0, 0], [4, 0, 0], [0, 4, 0]]
-        cases = [
-            ([[1, 1, -1], [1, 1, 1], [5, 5, 1]], True),  # pierced
-            ([[1, 1, 0], [1, 1, 1], [5, 5, 1]], True),  # touched by a corner
-            ([[4, 0, 0], [9, 0, 1], [9, 1, 1]], True),  # corner to corner
-            ([[2, 2, 0], [9, 9, 0], [9, 8, 0]], True),  # in the plane, corner on edge
-            ([[3, 3, 0], [9, 9, 0], [9, 8, 0]], False),  # in the plane
-            ([[1, 1, 0]] * 3, True),  # a point in the face
-            ([[1, 1, 2.0**-400]] * 3, False),  # a point just above
-            ([[-1, 1, 0], [9, 1, 0], [4, 1, 0]], True),  # a segment across
-            ([[-1, -1, 0], [9, -1, 0], [4, -1, 0]], False),  # a segment beside
-            ([[1, 1, 1], [2, 1, 1], [1, 2, 1]], False),  # parallel
-        ]
-        for other, expected in cases:
-            pair = np.array([flat], np.float64), np.array([other], np.float64)
-            self.assertEqual(len(query.contacts(*pair)[0]), expected, other)
-            self.assertEqual(len(query.contacts(*pair[::-1])[0]), expected, other)
-            self.assertEqual(query.have_common_point(pair[0][0], pair[1][0]), expected, other)
-            self.assertEqual(query.least_distance(*pair) == 0, expected)
-
-    def test_distances_of_two_triangles(self):
-        flat = np.array([[[0, 0, 0], [4, 0, 0], [0, 4, 0]]], np.float64)
-        for other, expected in (
-            ([[1, 1, 2], [9, 9, 9], [9, 8, 9]], 2),  # corner to face
-            ([[3, 3, 0], [9, 9, 0], [9, 8, 0]], 2**0.5),  # corner to edge
-            ([[2, -3, -5], [2, -3, 5], [2, -9, 0]], 3),  # edge to edge
-            ([[1, -3, 0], [3, -3, 0], [2, -9, 0]], 3),  # parallel edges
-            ([[7, -4, 0]] * 3, 5),  # a point to a corner
-        ):
-            found = query.least_distance(flat, np.array([other], np.float64))
-            self.assertAlmostEqual(found, expected, delta=1e-15 * expected)
 
 
 def bit_array(fields):
@@ -1506,7 +1472,7 @@ class Golden(unittest.TestCase):
         self.assertEqual(surfaces, [(1, 1, 0), (0, 1, 0), (1, 2, 12), (0, 0, 0)])
         self.assertTrue((files["ok-topology.cbvh"].topology[2].net_list()["net"] == 3).all())
         self.assertEqual(everything.provenance(), {"generator": "a test", "input": "a cube"})
-        self.assertEqual(query.weights(everything).sum(), everything.objects[0].input_triangles)
+        self.assertEqual(everything.weights().sum(), everything.objects[0].input_triangles)
         names = [one.name for one in files["ok-profiles.cbvh"].objects]
         self.assertEqual(len(names), len(cbvh.PROFILES))
 
@@ -1517,7 +1483,7 @@ class Golden(unittest.TestCase):
                 ([paths["ok-plain.cbvh"]], check.OK),
                 ([paths["ok-plain.cbvh"], paths["bad-R01-text.cbvh"]], check.INVALID),
                 ([paths["ok-plain.cbvh"] + ".missing"], check.SYSTEM),
-                (["--query", "collide", paths["ok-plain.cbvh"]], check.USAGE),
+                (["--query", paths["ok-plain.cbvh"]], check.USAGE),
             ):
                 self.assertEqual(exit_code(arguments, nowhere), code, arguments)
 
