@@ -15,7 +15,7 @@ mod patcher;
 mod reader;
 mod writer;
 
-pub use check::{check_crossing, check_nested, check_page, check_parent};
+pub use check::{check_crossing, check_named_link, check_nested, check_page, check_parent};
 pub use patcher::PagePatcher;
 pub use reader::Page;
 pub use writer::{PageWriter, TightBound, WrittenPage};

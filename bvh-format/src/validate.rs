@@ -6,7 +6,7 @@
 
 mod counts;
 
-pub use counts::{Counts, CountsFromEnd};
+pub use counts::Counts;
 
 use crate::checksum::{Hasher, hex};
 use crate::decode::decode_page;
@@ -21,7 +21,6 @@ use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source, chunks};
 use crate::topology::{ObjectTopology, boundary, check_in_pages};
 use crate::treelet::Child;
-use counts::CountsFromStart;
 use std::ops::Range;
 
 /// The number of pages that workers share, and whose counts are in memory at a time.
@@ -148,22 +147,23 @@ fn check_object<S: Source + ?Sized>(
             .step_by(PAGES_PER_BATCH as usize)
             .map(move |start| start..end.min(start.saturating_add(PAGES_PER_BATCH)))
     };
-    let mut counts = CountsFromStart::default();
+    // A breach is reported at the end, since the rules for links come before it.
+    let mut counts = Ok(Counts::default());
     let mut boundary = 0u64;
     for batch in batches() {
-        let checked = workers.each(batch.clone(), |number| {
+        let checked = workers.each(batch, |number| {
             let validated = validate_page(layout, source, object, closed, number)?;
             Ok::<_, S::Error>((validated.counts, validated.boundary))
         })?;
-        for (number, (page, of_page)) in batch.zip(&checked) {
-            counts.add(layout, number, page);
+        for (page, of_page) in &checked {
+            counts = counts.and_then(|counts| counts.followed_by(page, layout));
             boundary = boundary.wrapping_add(*of_page);
         }
     }
     for batch in batches() {
         workers.each(batch, |number| check_links(layout, source, object, number))?;
     }
-    counts.finish(layout, object)?;
+    counts?.check(layout, object)?;
     topology.map_or(Ok(()), |topology| check_in_pages(layout, source, object, topology, boundary))
 }
 
@@ -202,6 +202,7 @@ pub fn validate_page<'a, S: Source + ?Sized>(
     layout.check_id_block_of(&ids, &page)?;
     let (triangles, boundary) = check_values(layout, object, closed, &page, leaves.bytes(), ids.bytes())?;
     let counts = Counts {
+        first_page: number,
         first_packet: header.first_packet.get().into(),
         treelets: header.treelets.into(),
         packets: header.packets.get().into(),

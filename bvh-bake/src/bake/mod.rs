@@ -14,7 +14,7 @@ use crate::pages::Style;
 use crate::pages::assemble::{Contents, assemble};
 use crate::pages::brick::{EncodedObject, encode_object};
 use crate::prepare::duplicates::Found;
-use crate::prepare::layout_choice;
+use crate::prepare::layout_choice::{self, Choice};
 use crate::prepare::quantization::{advised_error, grid_error};
 use crate::prepare::{measure, survey};
 use crate::progress::{Progress, Stage, Step};
@@ -162,26 +162,21 @@ impl<'a> Baker<'a> {
         begin(Stage::Build);
         let f16_exponent = f16_exponent(&measured.bounds);
         let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
-        let bricks = Bricks::divide(&kept, &measured.bounds, grid, width, options.effort, resources)?;
+        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, options.effort, resources)?;
         let triangles = kept.count();
         drop(stream);
-        let style = |tree: &_, of_brick: &_| {
-            let choice = layout_choice::choose(triangles, tree, of_brick, options);
-            let (profile, encoding) = (choice.profile, choice.encoding);
-            (
-                Style {
-                    profile,
-                    encoding,
-                    f16_scale: 2f32.powi(f16_exponent),
-                    ids: options.ids,
-                    turning_slabs: options.turning_slabs && profile.has_turning_slabs(),
-                },
-                choice.reason,
-            )
-        };
         let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles));
+        let (tree, of_brick) = bricks.first_tree(resources)?;
+        let Choice { profile, encoding, reason } = layout_choice::choose(triangles, tree, of_brick, options);
+        let style = Style {
+            profile,
+            encoding,
+            f16_scale: 2f32.powi(f16_exponent),
+            ids: options.ids,
+            turning_slabs: options.turning_slabs && profile.has_turning_slabs(),
+        };
         let encoded = encode_object(bricks, style, survey, topology, resources)?;
-        let EncodedObject { style, reason, pages, packets, treelets, children } = encoded;
+        let EncodedObject { pages, packets, treelets, children } = encoded;
         self.kept += triangles;
         resources.progress.reach(Step::Bake(Stage::Build), self.kept);
         let (first_page, page_count) = (self.contents.page_count(), pages.page_count());

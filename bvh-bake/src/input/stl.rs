@@ -14,7 +14,7 @@ use crate::input::mesh::{Mesh, Object};
 use crate::limits::{MAX_VERTICES, coordinate_fits};
 use crate::triangles::TRIANGLES_PER_PART;
 use rayon::prelude::*;
-use std::hash::BuildHasher;
+use std::collections::HashMap;
 use std::io::Read;
 
 /// Bytes of a binary file before its first triangle: 80 for the header and 4 for the count.
@@ -237,24 +237,18 @@ impl Solids for Joined {
 /// An object that grows by triangles and joins equal vertices.
 struct Solid {
     object: Object,
-    /// An open-addressed hash table of vertex numbers. Its length is a power of two.
-    table: Vec<u32>,
-    /// A random number, so that nobody can make a file whose vertices all collide. The vertex numbers do not depend on
-    /// it.
-    seed: u64,
+    /// The vertices by the bits of their positions. The map's hashes are random, so that nobody can make a file whose
+    /// vertices all collide.
+    numbers: HashMap<[u64; 3], u32>,
 }
-
-/// Marks a free place in the hash table; no vertex has this number.
-const FREE: u32 = u32::MAX;
 
 impl Solid {
     /// Makes an empty solid for `expected` triangles. The file is long enough to hold that many.
     fn new(name: String, expected: usize) -> Self {
         let mut object = Object { name, ..Object::default() };
         object.triangles.reserve_exact(expected);
-        // A closed surface has half as many vertices as triangles, so that the table becomes half full.
-        let table = vec![FREE; expected.next_power_of_two().max(64)];
-        Solid { object, table, seed: std::hash::RandomState::new().hash_one(0) }
+        // A closed surface has half as many vertices as triangles.
+        Solid { object, numbers: HashMap::with_capacity(expected / 2) }
     }
 
     fn push(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Fault> {
@@ -268,43 +262,18 @@ impl Solid {
 
     /// Returns the number of the vertex with this position, and adds the vertex if there is none.
     fn number(&mut self, position: [f64; 3]) -> Result<u32, Fault> {
-        // -0.0 and 0.0 are the same position.
+        // -0.0 and 0.0 are the same position. No coordinate is NaN.
         let position = position.map(|coordinate| coordinate + 0.0);
-        let slot = self.slot(position);
-        if self.table[slot] != FREE {
-            return Ok(self.table[slot]);
+        let next = self.object.positions.len() as u32;
+        let number = *self.numbers.entry(position.map(f64::to_bits)).or_insert(next);
+        if number < next {
+            return Ok(number);
         }
-        let number = self.object.positions.len() as u32;
         if u64::from(number) == MAX_VERTICES {
             return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" });
         }
-        self.table[slot] = number;
         self.object.positions.push(position);
-        if self.object.positions.len() * 3 > self.table.len() * 2 {
-            self.grow();
-        }
         Ok(number)
-    }
-
-    /// Returns the slot of this position, or the free slot where it belongs.
-    fn slot(&self, position: [f64; 3]) -> usize {
-        let hash = xxhash_rust::xxh3::xxh3_64_with_seed(bytemuck::bytes_of(&position), self.seed);
-        let mut slot = hash as usize & (self.table.len() - 1);
-        loop {
-            match self.table[slot] {
-                FREE => return slot,
-                number if self.object.positions[number as usize] == position => return slot,
-                _ => slot = (slot + 1) & (self.table.len() - 1),
-            }
-        }
-    }
-
-    fn grow(&mut self) {
-        self.table = vec![FREE; self.table.len() * 4];
-        for number in 0..self.object.positions.len() {
-            let slot = self.slot(self.object.positions[number]);
-            self.table[slot] = number as u32;
-        }
     }
 
     fn finish(mut self, next_id: &mut u32) -> Result<Object, Fault> {

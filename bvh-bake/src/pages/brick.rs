@@ -39,9 +39,6 @@ struct EncodedBrick {
 
 /// The pages of an object and what they hold.
 pub(crate) struct EncodedObject {
-    pub(crate) style: Style,
-    /// Why the style was chosen.
-    pub(crate) reason: String,
     pub(crate) pages: ObjectPages,
     pub(crate) packets: u64,
     pub(crate) treelets: u64,
@@ -49,21 +46,19 @@ pub(crate) struct EncodedObject {
     pub(crate) children: u64,
 }
 
-/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. `style` chooses how, given
-/// the tree and the triangles of one brick, and says why. The topology of the object, if there is a survey for it, is
+/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. The topology of the object, if there is a survey for it, is
 /// added to `lists`.
 pub(crate) fn encode_object(
     bricks: Bricks,
-    style: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> (Style, String),
+    style: Style,
     survey: Option<Survey>,
     lists: &mut TopologyLists,
     resources: &Resources,
 ) -> Result<EncodedObject, BakeError> {
     let spill = resources.scratch.spill();
-    let ((style, reason), bricks, top) =
-        bricks.build(resources, style, |number, tree, triangles, (style, _)| {
-            encode_brick(number, tree, triangles, *style, survey.as_ref(), &spill)
-        })?;
+    let (bricks, top) = bricks.build(resources, |number, tree, triangles| {
+        encode_brick(number, tree, triangles, style, survey.as_ref(), &spill)
+    })?;
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut top = if top.is_leaf() {
         Arena::empty()
@@ -123,7 +118,7 @@ pub(crate) fn encode_object(
     let (packets, treelets) = (packets + encoded.packets, treelets + encoded.treelets);
     parts.insert(0, UnnumberedPages::new(encoded, &spill)?);
     let pages = ObjectPages { profile: style.profile, parts, parents };
-    Ok(EncodedObject { style, reason, pages, packets, treelets, children })
+    Ok(EncodedObject { pages, packets, treelets, children })
 }
 
 fn encode_brick(

@@ -53,9 +53,9 @@ impl PartialOrd for Hashed {
 /// hash.
 const BITS_PER_HASH: usize = 8;
 
-/// A triangle's corners in a fixed order, then its place in the stream, its id and its [`Turn`].
-pub(crate) type DuplicateCandidate = [u32; 12];
-/// The words of the corners in a [`DuplicateCandidate`], and the positions of its place, its id and its turn.
+/// A triangle that shares its hash with another: its corners in a fixed order, then its place in the stream, its id and its [`Turn`].
+pub(crate) type Suspect = [u32; 12];
+/// The words of the corners in a [`Suspect`], and the positions of its place, its id and its turn.
 const CORNERS: std::ops::Range<usize> = 0..9;
 const PLACE: usize = 9;
 const ID: usize = 10;
@@ -100,7 +100,7 @@ fn canonical(triangle: &Corners) -> ([[u32; 3]; 3], Turn) {
 
 /// The triangle that is kept of equal ones, and the net of those seen so far.
 struct Group {
-    kept: DuplicateCandidate,
+    kept: Suspect,
     net: i64,
 }
 
@@ -174,28 +174,28 @@ pub(crate) fn find(
     if shared.is_empty() {
         return Ok(shared);
     }
-    let mut candidates = Sorter::of_runs(run);
+    let mut suspects = Sorter::of_runs(run);
     let batch = 4 * rayon::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
         let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
-        let parts: Vec<Vec<DuplicateCandidate>> =
+        let parts: Vec<Vec<Suspect>> =
             parts.map(|part| of_part(stream, part, &shared)).collect::<Result<_, _>>()?;
-        parts.iter().try_for_each(|part| candidates.extend(part, spill))?;
+        parts.iter().try_for_each(|part| suspects.extend(part, spill))?;
     }
     let mut dropped = shared;
     dropped.fill(0);
     let mut any = false;
     // Of equal triangles, the one with the first place is kept.
     let mut last: Option<Group> = None;
-    candidates.visit(|candidate| match &mut last {
-        Some(Group { kept, net }) if kept[CORNERS] == candidate[CORNERS] => {
+    suspects.visit(|suspect| match &mut last {
+        Some(Group { kept, net }) if kept[CORNERS] == suspect[CORNERS] => {
             any = true;
-            set(&mut dropped, candidate[PLACE]);
-            *net += if kept[TURN] == candidate[TURN] { 1 } else { -1 };
-            found(Found::Pair([kept[ID], candidate[ID]]))
+            set(&mut dropped, suspect[PLACE]);
+            *net += if kept[TURN] == suspect[TURN] { 1 } else { -1 };
+            found(Found::Pair([kept[ID], suspect[ID]]))
         }
         _ => {
-            let next = Group { kept: *candidate, net: 1 };
+            let next = Group { kept: *suspect, net: 1 };
             last.replace(next).map_or(Ok(()), |group| group.finish(&mut found))
         }
     })?;
@@ -204,30 +204,26 @@ pub(crate) fn find(
 }
 
 /// Returns the triangles of a part whose bit in `shared` is set.
-fn of_part(
-    stream: &TriangleStream,
-    part: usize,
-    shared: &[u64],
-) -> Result<Vec<DuplicateCandidate>, BakeError> {
+fn of_part(stream: &TriangleStream, part: usize, shared: &[u64]) -> Result<Vec<Suspect>, BakeError> {
     let first = part * TRIANGLES_PER_PART;
     let words = &shared[first / 64..shared.len().min((first + TRIANGLES_PER_PART) / 64)];
     if words.iter().all(|&word| word == 0) {
         return Ok(Vec::new());
     }
     let triangles = stream.part(part)?;
-    let candidate = |(place, triangle): (usize, &crate::triangles::Triangle)| {
+    let suspect = |(place, triangle): (usize, &crate::triangles::Triangle)| {
         if words[place / 64] >> (place % 64) & 1 == 0 {
             return None;
         }
-        let mut candidate = [0; 12];
+        let mut suspect = [0; 12];
         let (corners, turn) = canonical(&triangle.corners);
-        candidate[CORNERS].copy_from_slice(corners.as_flattened());
-        candidate[TURN] = turn;
-        candidate[PLACE] = (first + place) as u32;
-        candidate[ID] = triangle.id;
-        Some(candidate)
+        suspect[CORNERS].copy_from_slice(corners.as_flattened());
+        suspect[TURN] = turn;
+        suspect[PLACE] = (first + place) as u32;
+        suspect[ID] = triangle.id;
+        Some(suspect)
     };
-    Ok(triangles.iter().enumerate().filter_map(candidate).collect())
+    Ok(triangles.iter().enumerate().filter_map(suspect).collect())
 }
 
 fn set(bits: &mut [u64], place: u32) {

@@ -14,7 +14,7 @@ use crate::storage::resources::Resources;
 use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
 use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
-use duplicates::{DuplicateCandidate, Found, Hashed};
+use duplicates::{Found, Hashed, Suspect};
 use rayon::prelude::*;
 
 /// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
@@ -70,7 +70,7 @@ pub(crate) fn measure(
             hashes.extend(&part_hashes, &spill)?;
         }
     }
-    let run = resources.sorted_at_once::<DuplicateCandidate>(stream.count);
+    let run = resources.sorted_at_once::<Suspect>(stream.count);
     let dropped = duplicates::find(stream, hashes, run, &spill, &tally(DUPLICATES_WEIGHT), found)?;
     Ok(Measured { moved, bounds, centres, dropped })
 }

@@ -87,6 +87,8 @@ pub(crate) struct Bricks {
     boxes: Vec<Aabb>,
     top: Tree<BrickIndex>,
     builder: Builder,
+    /// The brick whose tree is built, if one is: its number, the tree and its triangles.
+    first: Option<(usize, Tree<PacketTriangles>, Vec<Triangle>)>,
 }
 
 impl Bricks {
@@ -108,7 +110,7 @@ impl Bricks {
             Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks, boxes };
         let top = division.divide(triangles, triangles.count(), bounds, grid)?;
         let (bricks, boxes) = (division.bricks, division.boxes);
-        Ok(Self { bricks, boxes, top, builder })
+        Ok(Self { bricks, boxes, top, builder, first: None })
     }
 
     /// Returns a box of the triangles of each brick.
@@ -116,45 +118,61 @@ impl Bricks {
         &self.boxes
     }
 
-    /// Builds the tree of each brick and passes it to `make`, several bricks at a time. The first tree goes to `settle`
-    /// before, whose result `make` gets each time, with the number of the brick. Returns that result, those of `make` by
-    /// brick, and the tree above the bricks. Packets number the triangles of their brick.
-    pub(crate) fn build<S: Sync, T: Send>(
+    /// Builds the tree of the largest brick, on all threads. Returns it with the brick's triangles, which its packets number.
+    pub(crate) fn first_tree(
+        &mut self,
+        resources: &Resources,
+    ) -> Result<(&Tree<PacketTriangles>, &[Triangle]), BakeError> {
+        let trees = tally(resources, TREES_WEIGHT, self.triangles());
+        // An object has triangles, and so a brick. Of equal bricks, the first one is taken.
+        let largest = (0..self.bricks.len()).rev().max_by_key(|&number| self.bricks[number].count());
+        let number = largest.unwrap_or_default();
+        let brick = std::mem::replace(&mut self.bricks[number], Stream::of_pieces(1));
+        let (tree, triangles) = self.builder.tree_of_brick(brick, &trees)?;
+        let (_, tree, triangles) = self.first.insert((number, tree, triangles));
+        Ok((tree, triangles))
+    }
+
+    /// Returns the number of triangles of all bricks.
+    fn triangles(&self) -> u64 {
+        let first = self.first.as_ref().map_or(0, |(.., triangles)| triangles.len() as u64);
+        first + self.bricks.iter().map(Stream::count).sum::<u64>()
+    }
+
+    /// Builds the tree of each brick, but for the first one, and passes all to `make` with the number of the brick, several
+    /// bricks at a time. Returns the results of `make` by brick, and the tree above the bricks. Packets number the triangles
+    /// of their brick.
+    pub(crate) fn build<T: Send>(
         self,
         resources: &Resources,
-        settle: impl FnOnce(&Tree<PacketTriangles>, &[Triangle]) -> S,
-        make: impl Fn(usize, Tree<PacketTriangles>, &[Triangle], &S) -> Result<T, BakeError> + Sync,
-    ) -> Result<(S, Vec<T>, Tree<BrickIndex>), BakeError> {
-        let Self { bricks, top, builder, .. } = self;
+        make: impl Fn(usize, Tree<PacketTriangles>, &[Triangle]) -> Result<T, BakeError> + Sync,
+    ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
+        let triangles = self.triangles();
+        let Self { bricks, top, builder, first, .. } = self;
         let count = bricks.len();
-        let triangles = bricks.iter().map(Stream::count).sum();
         let (trees, rest) = (
             tally(resources, TREES_WEIGHT, triangles),
             tally(resources, WHOLE - DIVIDE_WEIGHT - TREES_WEIGHT, triangles),
         );
+        let first_number = first.as_ref().map(|(number, ..)| *number);
         // The largest bricks come first, so that few threads wait for the last one.
         let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by_key(|&number| std::cmp::Reverse(bricks[number].count()));
+        order
+            .sort_by_key(|&number| (Some(number) != first_number, std::cmp::Reverse(bricks[number].count())));
         let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
         let tree_of = |number: usize| {
             let brick = bricks[number].lock().ok().and_then(|mut brick| brick.take());
-            let triangles = brick.map_or_else(|| Ok(Vec::new()), Stream::take)?;
-            let tree = builder.tree(&triangles);
-            trees.add(triangles.len() as u64);
-            Ok::<_, BakeError>((tree, triangles))
+            builder.tree_of_brick(brick.unwrap_or_else(|| Stream::of_pieces(1)), &trees)
         };
-        // All threads work on the first tree, and then one on each of the others. An object has triangles, and so a brick.
-        let (first, first_triangles) = tree_of(order[0])?;
-        let settled = settle(&first, &first_triangles);
-        let first = Mutex::new(Some((first, first_triangles)));
+        let first = Mutex::new(first.map(|(_, tree, triangles)| (tree, triangles)));
         let next = AtomicUsize::new(0);
         let work = || {
             while let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let is_first = number == order[0];
+                let is_first = Some(number) == first_number;
                 let built = first.lock().ok().filter(|_| is_first).and_then(|mut first| first.take());
                 let result = built.map_or_else(|| tree_of(number), Ok).and_then(|(tree, triangles)| {
-                    let made = make(number, tree, &triangles, &settled)?;
+                    let made = make(number, tree, &triangles)?;
                     rest.add(triangles.len() as u64);
                     Ok(made)
                 });
@@ -171,7 +189,7 @@ impl Bricks {
         // start bricks.
         rayon::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
         let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
-        Ok((settled, results.collect::<Result<_, _>>()?, top))
+        Ok((results.collect::<Result<_, _>>()?, top))
     }
 }
 
@@ -204,6 +222,18 @@ impl Builder {
             Effort::Default => (swept::MAX_SWEPT, true),
         };
         Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, reinsert }
+    }
+
+    /// Takes the triangles of a brick out of their storage and builds their tree.
+    fn tree_of_brick(
+        &self,
+        brick: Stream<Triangle>,
+        trees: &Tally,
+    ) -> Result<(Tree<PacketTriangles>, Vec<Triangle>), BakeError> {
+        let triangles = brick.take()?;
+        let tree = self.tree(&triangles);
+        trees.add(triangles.len() as u64);
+        Ok((tree, triangles))
     }
 
     /// Builds the tree of a brick.

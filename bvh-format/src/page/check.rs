@@ -210,9 +210,23 @@ pub fn check_crossing(
 /// # Errors
 /// Rule 20.
 #[inline]
-pub fn check_parent(target: &Page, to: RootRef, (from, link): (u32, u8), at: u64) -> Result<(), FormatError> {
+pub fn check_parent(target: &Page, to: RootRef, link: (u32, u8), at: u64) -> Result<(), FormatError> {
     let found =
         if to.root() < target.header().roots { target.anchor_parent(to.root()) } else { (NO_PARENT, 0) };
+    check_named_link(found, to, link, at)
+}
+
+/// Checks that the link that a root names, `found`, is the one that leads to it, as [`check_parent`] does.
+///
+/// # Errors
+/// Rule 20.
+#[inline]
+pub fn check_named_link(
+    found: (u32, u8),
+    to: RootRef,
+    (from, link): (u32, u8),
+    at: u64,
+) -> Result<(), FormatError> {
     ensure(found == (from, link), Rule::AnchorParent, at, || {
         (format!("root {} with parent {from}, link {link}", to.root()), format!("{found:?}"))
     })

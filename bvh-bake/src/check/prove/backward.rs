@@ -8,10 +8,10 @@ use super::InParallel;
 use crate::progress::{Progress, Stage, Step, WHOLE};
 use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box};
 use bvh_format::object::Object;
-use bvh_format::page::{NO_PARENT, Page, RootRef};
+use bvh_format::page::{NO_PARENT, Page, RootRef, check_named_link};
 use bvh_format::source::{Block, PageBytes, Source};
 use bvh_format::topology::{ObjectTopology, check_in_pages};
-use bvh_format::validate::{CountsFromEnd, Workers, check_sections, validate_page};
+use bvh_format::validate::{Counts, Workers, check_sections, validate_page};
 use bvh_format::{FormatError, Layout, Rule};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -73,7 +73,7 @@ pub(super) fn prove_object<S: Source + ?Sized>(
     let mut walk = Walk { layout, object, roots: HashMap::new(), inflation: Inflation::default() };
     let (triangles, count) = (object.triangles(), (pages.end - pages.start).into());
     let tally = progress.tally(Step::Bake(Stage::Prove), WHOLE, triangles, count);
-    let mut counts = CountsFromEnd::default();
+    let mut counts = Counts::default();
     let (topology, mut boundary) = (structure.as_ref().and_then(|structure| structure.topology), 0u64);
     let closed = topology.is_some_and(|topology| topology.closed);
     let mut end = pages.end;
@@ -82,8 +82,8 @@ pub(super) fn prove_object<S: Source + ?Sized>(
         let window = if structure.is_some() {
             let validate = |number| validate_page(layout, source, object, closed, number);
             let checked = InParallel.each(start..end, validate)?;
-            for (number, page) in (start..end).zip(&checked).rev() {
-                counts.add(layout, number, &page.counts)?;
+            for page in checked.iter().rev() {
+                counts = page.counts.followed_by(&counts, layout)?;
                 boundary = boundary.wrapping_add(page.boundary);
             }
             checked.into_iter().map(|page| (page.bytes, page.leaves)).collect()
@@ -99,7 +99,7 @@ pub(super) fn prove_object<S: Source + ?Sized>(
         end = start;
     }
     if structure.is_some() {
-        counts.finish(layout, object)?;
+        counts.check(layout, object)?;
     }
     if let Some(topology) = topology {
         check_in_pages(layout, source, object, topology, boundary)?;
@@ -159,12 +159,8 @@ impl Walk<'_> {
     fn follow_links(&mut self, page: &Page, number: u32) -> Result<(), FormatError> {
         for link in 0..page.header().remotes {
             let to = page.remote(link);
-            let found = self.roots.remove(&to).map(|root| root.parent);
-            if found != Some((number, link)) {
-                let at = self.layout.page_offset(to.page());
-                let expected = format!("root {} with parent {number}, link {link}", to.root());
-                return Err(FormatError::new(Rule::AnchorParent, at, expected, format!("{found:?}")));
-            }
+            let found = self.roots.remove(&to).map_or((NO_PARENT, 0), |root| root.parent);
+            check_named_link(found, to, (number, link), self.layout.page_offset(to.page()))?;
         }
         Ok(())
     }
