@@ -40,7 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Opens a `.cbvh` file, or bakes a mesh file in memory.
 fn open(path: &Path) -> Result<Bvh, Box<dyn Error>> {
     if path.extension().is_some_and(|extension| extension == "cbvh") {
-        return Ok(Bvh::open(path)?);
+        // Large files are better mapped than copied, with `unsafe { Bvh::map(path)? }`: nobody may change them meanwhile.
+        return Ok(Bvh::read(path)?);
     }
     let mesh = bvh_bake::read_meshes(&[path.to_owned()])?;
     let (bytes, _) = bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?;

@@ -104,8 +104,8 @@ pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceId, InstanceLabel, OpenSceneError, Scene, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit,
+    Groups, InstanceId, InstanceLabel, Scene, SceneClosestPoint, SceneContact, SceneDistance, SceneError,
+    SceneMotionAnswer, ScenePair, SceneRayHit,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

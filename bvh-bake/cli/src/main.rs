@@ -2,7 +2,7 @@
 //!
 //! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
 //! `motion`; `probe`; `scene`; `report`. They stand on `asking` (what commands that ask questions have in common), `options` (what
-//! several commands accept), `process` (memory and signals) and `console` (what is printed, and how a command ends). Imports
+//! several commands accept), `process` (memory and signals), `map` (mapped files) and `console` (what is printed, and how a command ends). Imports
 //! lead from the former to the latter only. What scripts may rely on is in `cbvh --help` and in the help of each command.
 
 mod asking;
@@ -11,6 +11,7 @@ mod bake;
 mod check;
 mod console;
 mod dump;
+mod map;
 mod motion;
 mod options;
 mod probe;

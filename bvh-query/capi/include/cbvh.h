@@ -584,8 +584,8 @@ cbvh_status cbvh_segment_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_p
 
 /* Makes an empty scene. */
 cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
-/* Opens a scene file, which `cbvh bake --scene` makes: maps it, with one instance for each of its own.
- * CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
+/* Opens a scene file, which `cbvh bake --scene` makes: maps it as CBVH_MAP does, with one instance for each of
+ * its own. CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
 cbvh_status cbvh_scene_open(const char *path, cbvh_scene *scene);
 /* Makes a scene of the instances in the file of a mesh. */
 cbvh_status cbvh_scene_of_mesh(cbvh_mesh mesh, cbvh_scene *scene);

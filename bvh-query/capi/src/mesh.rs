@@ -51,11 +51,13 @@ pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *m
         // SAFETY: the header asks for it.
         let (out, file) = unsafe { (new_mesh("mesh", mesh)?, path("path", file)?) };
         check_regular(&file)?;
+        // SAFETY: the header asks that nobody changes a mapped file.
+        let map = |read_ahead| unsafe { Bvh::map_with(&file, read_ahead) };
         let opened: Result<Bvh, OpenError> = match mode {
-            MAP => Bvh::open_with(file, ReadAhead::Usual),
-            MAP_SPARSE => Bvh::open_with(file, ReadAhead::Sparse),
-            MAP_WHOLE => Bvh::open_with(file, ReadAhead::Whole),
-            READ => Bvh::read(file),
+            MAP => map(ReadAhead::Usual),
+            MAP_SPARSE => map(ReadAhead::Sparse),
+            MAP_WHOLE => map(ReadAhead::Whole),
+            READ => Bvh::read(&file),
             _ => return Err(Failure::argument("mode", "a number of cbvh_open_mode, 0 to 3", mode)),
         };
         hand_out(out, opened?.into())

@@ -1,7 +1,7 @@
 //! What a function returns when it fails: a status for the program, and a message for a person.
 
 use bvh_bake::{BakeError, ReadError};
-use bvh_query::{MotionError, OpenError, OpenSceneError, PoseError, QueryError, SceneError};
+use bvh_query::{MotionError, OpenError, PoseError, QueryError, SceneError};
 use std::fmt::Display;
 
 /// The numbers of `cbvh_status`.
@@ -84,17 +84,6 @@ impl From<SceneError> for Failure {
 impl From<OpenError> for Failure {
     fn from(error: OpenError) -> Self {
         Self::new(of_open(&error), error.to_string())
-    }
-}
-
-impl From<OpenSceneError> for Failure {
-    fn from(error: OpenSceneError) -> Self {
-        let status = match &error {
-            OpenSceneError::Open(error) => of_open(error),
-            OpenSceneError::Scene { source, .. } => of_scene(source),
-            _ => Status::InvalidArgument,
-        };
-        Self::new(status, error.to_string())
     }
 }
 

@@ -33,10 +33,11 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
-    /// Maps a file.
+    /// Maps a file, of which the caller promises that nobody changes it while it is open.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        detached(py, || Bvh::open(path)).map(Self::new).map_err(open_error)
+        // SAFETY: the documentation of `cbvh.open` asks for it.
+        detached(py, || unsafe { Bvh::map(path) }).map(Self::new).map_err(open_error)
     }
 
     /// Opens the bytes of a file, which are copied.

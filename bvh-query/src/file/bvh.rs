@@ -76,42 +76,22 @@ impl AsRef<[u8]> for MapOwner {
 }
 
 impl Bvh {
-    /// Maps a file into memory and opens it.
-    ///
-    /// Cost: microseconds, whatever the size of the file; for memory see [`Bvh`].
-    ///
-    /// **The bytes of the file must not change while it is open.** Replace a file by renaming another one over it, as
-    /// `cbvh bake` does; then an open file keeps its old content. A file that another process truncates ends this
-    /// process with SIGBUS, and one that is written into gives undefined answers. [`ReadAhead`] documents this promise
-    /// in full, and why this function is safe nevertheless. [`Bvh::read`] asks for no such promise: use it where others
-    /// may write to the file.
-    ///
-    /// # Errors
-    /// [`OpenError::Io`] if the system refuses the file, [`OpenError::Format`] if the header or the object table
-    /// break a rule of the format.
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenError> {
-        Self::open_with(path, ReadAhead::Usual)
-    }
-
-    /// Maps a file as [`Bvh::open`] does, and tells the system how to read it. Answers do not depend on that.
-    ///
-    /// # Errors
-    /// The errors of [`Bvh::open`].
-    pub fn open_with(path: impl AsRef<Path>, read_ahead: ReadAhead) -> Result<Self, OpenError> {
-        let path = path.as_ref();
-        let map = mapped::map(path, read_ahead).map_err(|source| OpenError::io(path, source))?;
+    /// Opens a file that is mapped. `read_ahead` is what the system was told about it.
+    pub(super) fn of_map(path: &Path, map: Mmap, read_ahead: ReadAhead) -> Result<Self, OpenError> {
         let map = Arc::new(map);
         let advised = (read_ahead == ReadAhead::Sparse).then(|| map.clone());
         let opened = Self::new(Bytes::from_owner(MapOwner(map)), advised);
         opened.map_err(|source| OpenError::format(path, source))
     }
 
-    /// Reads a whole file into memory and opens the copy. What becomes of the file afterwards does not matter.
+    /// Reads a whole file into memory and opens the copy. What becomes of the file afterwards does not matter:
+    /// use this where others may write to it, and [`Bvh::map`] where nobody does.
     ///
     /// Cost: that of reading the file, and its size in memory.
     ///
     /// # Errors
-    /// The errors of [`Bvh::open`].
+    /// [`OpenError::Io`] if the system refuses the file, [`OpenError::Format`] if the header or the object table
+    /// break a rule of the format.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
         let bytes = mapped::read(path).map_err(|source| OpenError::io(path, source))?;

@@ -21,7 +21,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// use bvh_query::{Files, Pose, Scene};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let files = Files::new(1000);
+/// // SAFETY: nobody changes the files while the program runs.
+/// let files = unsafe { Files::mapped(1000) };
 /// let mut scene = Scene::new()?;
 /// for part in std::fs::read_dir("parts")? {
 ///     scene.add(files.shape(part?.path())?, Pose::IDENTITY)?;
@@ -36,6 +37,8 @@ pub struct Files(Arc<Shelf>);
 #[derive(Debug)]
 struct Shelf {
     most: usize,
+    /// Maps a file or copies it.
+    open_file: fn(&Path) -> Result<Bvh, OpenError>,
     /// How often a file was used, which tells when each was used last.
     clock: AtomicU64,
     open: Mutex<Vec<(Arc<Known>, Bvh)>>,
@@ -65,19 +68,25 @@ enum Held {
 }
 
 impl Files {
-    /// Makes a shelf of which at most so many files stay open, and at least one.
+    /// Makes a shelf of which at most so many files stay open, and at least one. Each opening copies the file into memory;
+    /// [`Files::mapped`] maps it.
     pub fn new(most: usize) -> Self {
-        Self(Arc::new(Shelf { most: most.max(1), clock: AtomicU64::new(0), open: Mutex::default() }))
+        Self::opened_by(most, |path| Bvh::read(path))
+    }
+
+    pub(super) fn opened_by(most: usize, open_file: fn(&Path) -> Result<Bvh, OpenError>) -> Self {
+        let most = most.max(1);
+        Self(Arc::new(Shelf { most, open_file, clock: AtomicU64::new(0), open: Mutex::default() }))
     }
 
     /// Reads the header and the object table of a file, and returns all of its objects as one shape. Clone a shape rather
     /// than reading its file again: each reading counts as a file of its own.
     ///
     /// # Errors
-    /// The errors of [`Bvh::open`], which documents what a file that is open asks for.
+    /// The errors of [`Bvh::map`].
     pub fn shape(&self, path: impl AsRef<Path>) -> Result<SceneShape, OpenError> {
         let path = path.as_ref();
-        let bvh = Bvh::open(path)?;
+        let bvh = (self.0.open_file)(path)?;
         let known = Known {
             path: path.to_owned(),
             content_checksum: bvh.layout().content_checksum,
@@ -160,7 +169,7 @@ impl Files {
             let oldest = (0..open.len()).min_by_key(last_use).unwrap_or_default();
             open.swap_remove(oldest);
         }
-        let bvh = known.open_again()?;
+        let bvh = known.open_again(shelf.open_file)?;
         *locked(&known.bvh) = bvh.downgrade();
         open.push((known.clone(), bvh.clone()));
         Ok(bvh)
@@ -168,9 +177,9 @@ impl Files {
 }
 
 impl Known {
-    fn open_again(&self) -> Result<Bvh, QueryError> {
+    fn open_again(&self, open_file: fn(&Path) -> Result<Bvh, OpenError>) -> Result<Bvh, QueryError> {
         let failed = |found: String| QueryError::File { path: self.path.clone(), found };
-        let bvh = Bvh::open(&self.path).map_err(|error| {
+        let bvh = open_file(&self.path).map_err(|error| {
             failed(match error {
                 OpenError::Io { source, .. } => source.to_string(),
                 OpenError::Format { source, .. } => format!("a breach of {}", source.rule),

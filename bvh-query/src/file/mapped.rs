@@ -1,7 +1,10 @@
 //! Read-only memory maps, of files and of copies of files: the one place where the bytes of a file become memory.
 //!
-//! [`ReadAhead`] states what a mapped file asks of its user, and why mapping is a safe function.
+//! Mapping is `unsafe`, as in other libraries: [`Bvh::map`] states what its caller has to promise.
 
+use crate::error::OpenError;
+use crate::file::bvh::Bvh;
+use crate::file::files::Files;
 use memmap2::{Mmap, MmapMut};
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
@@ -11,25 +14,6 @@ use std::path::Path;
 /// How the system reads a mapped file from its disk.
 ///
 /// This is a hint; without it, the system guesses. On systems other than Unix all hints are the same.
-///
-/// # What a mapped file asks for
-/// The bytes of a file that is open by [`Bvh::open`](crate::Bvh::open) or
-/// [`Bvh::open_with`](crate::Bvh::open_with) must not change:
-///
-/// - *Replaced* by renaming another file over it, or *removed*: allowed. The old content stays, and so do the answers.
-///   `cbvh bake` replaces its output in this way.
-/// - *Truncated*, by whatever process: on Unix the first access beyond the new end sends SIGBUS, which ends this process.
-///   There is no error to catch.
-/// - *Written into*: answers are undefined, because a page is checked at its first touch only. Formally the behaviour of
-///   the program is undefined as well, since Rust assumes that bytes behind a shared reference do not change. Queries
-///   are written so that they do not depend on that assumption: they take file bytes as numbers of which each value is
-///   valid, they check each index they compute from them, and a walk is bounded by counts that were read once.
-///
-/// # Why mapping is a safe function
-/// An `unsafe fn` asks its caller for a proof, and no caller can prove what other processes do to a file: neither a
-/// file lock nor its permissions bind them. The keyword would make every caller write the same sentence, and leave the
-/// risk as it is. So the promise is documented here and named at [`Bvh::open`](crate::Bvh::open). Programs
-/// that cannot make it have [`Bvh::read`](crate::Bvh::read), which copies the file and asks for nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum ReadAhead {
@@ -45,14 +29,70 @@ pub enum ReadAhead {
     Whole,
 }
 
+impl Bvh {
+    /// Maps a file into memory and opens it.
+    ///
+    /// Cost: microseconds, whatever the size of the file; for memory see [`Bvh`].
+    ///
+    /// # Safety
+    /// Nobody may change the bytes of the file while it is open, neither this process nor another one. In detail:
+    ///
+    /// - *Replaced* by renaming another file over it, or *removed*: allowed. The old content stays, and so do the answers.
+    ///   `cbvh bake` replaces its output in this way.
+    /// - *Truncated*, by whatever process: on Unix the first access beyond the new end sends SIGBUS, which ends this process.
+    ///   There is no error to catch.
+    /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not change.
+    ///   Queries are written so that they do not depend on that assumption: they take file bytes as numbers of which each
+    ///   value is valid, they check each index they compute from them, and a walk is bounded by counts that were read once.
+    ///
+    /// Damaged or forged bytes are no reason not to map a file. [`Bvh::read`] copies a file and needs no promise.
+    ///
+    /// # Errors
+    /// [`OpenError::Io`] if the system refuses the file, [`OpenError::Format`] if the header or the object table
+    /// break a rule of the format.
+    pub unsafe fn map(path: impl AsRef<Path>) -> Result<Self, OpenError> {
+        // SAFETY: the caller vouches for the same.
+        unsafe { Self::map_with(path, ReadAhead::Usual) }
+    }
+
+    /// Maps a file as [`Bvh::map`] does, and tells the system how to read it. Answers do not depend on that.
+    ///
+    /// # Safety
+    /// That of [`Bvh::map`].
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::map`].
+    pub unsafe fn map_with(path: impl AsRef<Path>, read_ahead: ReadAhead) -> Result<Self, OpenError> {
+        let path = path.as_ref();
+        // SAFETY: the caller vouches for the same.
+        let map = unsafe { map(path, read_ahead) }.map_err(|source| OpenError::io(path, source))?;
+        Self::of_map(path, map, read_ahead)
+    }
+}
+
+impl Files {
+    /// Makes a shelf of which at most so many files stay open, and at least one. Files are mapped.
+    ///
+    /// # Safety
+    /// That of [`Bvh::map`], for each file that is given to [`Files::shape`], as long as a shape of it lives. A file may
+    /// change while it is closed: the next question that needs it fails.
+    pub unsafe fn mapped(most: usize) -> Self {
+        // SAFETY: the caller vouches for each file that is opened in this way.
+        Self::opened_by(most, |path| unsafe { Bvh::map(path) })
+    }
+}
+
 /// Maps a whole file for reading.
-pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
+///
+/// # Safety
+/// Nobody changes the file while it is mapped.
+unsafe fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
     // Opening a named pipe would wait for its other end, and another file may take the name before it is opened.
     require_mappable(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
     require_mappable(&file.metadata()?)?;
-    // SAFETY: the map is only ever read, as slices of bytes and as types for which any bytes are valid. That nobody
-    // changes the file meanwhile is what the documentation of `ReadAhead` asks of the user.
+    // SAFETY: the map is only ever read, as slices of bytes and as types for which any bytes are valid, and the caller
+    // vouches that nobody changes the file meanwhile.
     let map = unsafe { Mmap::map(&file) }?;
     // A hint that the system does not know is no error.
     #[cfg(unix)]

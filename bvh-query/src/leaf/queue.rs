@@ -3,7 +3,7 @@
 //! Cheap tests leave one or two of the 16 pairs of two packets. The costly tests are done for 16 of the remaining pairs at
 //! once.
 
-use crate::file::place::LeafPacket;
+use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::Isa;
 use crate::leaf::local::Local;
 use crate::leaf::math::Corners;
@@ -18,6 +18,16 @@ pub(crate) struct TrianglePair {
 }
 
 impl TrianglePair {
+    /// Returns where the triangle of A is stored.
+    pub(crate) fn place_a(&self) -> TrianglePlace {
+        TrianglePlace { page: self.a.page, packet: self.a.packet, lane: self.lane_a }
+    }
+
+    /// Returns where the triangle of B is stored.
+    pub(crate) fn place_b(&self) -> TrianglePlace {
+        TrianglePlace { page: self.b.page, packet: self.b.packet, lane: self.lane_b }
+    }
+
     /// Returns the pair in a lane of two packets: element `4 * a + b`.
     #[inline(always)]
     pub(crate) fn in_lane(a: LeafPacket, b: LeafPacket, lane: u8) -> Self {

@@ -1,8 +1,6 @@
 //! Finds all pairs of triangles in contact.
 
 use crate::error::QueryError;
-use crate::file::bvh::Bvh;
-use crate::file::place::TrianglePlace;
 use crate::file::shape::Shape;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
@@ -12,10 +10,10 @@ use crate::query::bounding_volumes::surely_apart;
 use crate::query::collide::{Candidates, ContactVisitor};
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
+use crate::query::search::ids;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
-use bvh_format::object::Object;
 use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::{FormatError, Rule};
 use std::ops::ControlFlow;
@@ -150,8 +148,7 @@ fn report(
     visit: &mut dyn FnMut(Contact) -> Result<ControlFlow<()>, QueryError>,
 ) -> Result<ControlFlow<TrianglePair>, QueryError> {
     let pair = &placed.pair;
-    let id_a = triangle_id(pair.bvh_a, pair.object_a, candidate.place_a())?;
-    let id_b = triangle_id(pair.bvh_b, pair.object_b, candidate.place_b())?;
+    let (id_a, id_b) = ids(placed, &candidate)?;
     for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)?) {
         for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)?) {
             let (object_a, object_b) = placed.numbers;
@@ -163,25 +160,10 @@ fn report(
     Ok(ControlFlow::Continue(()))
 }
 
-fn triangle_id(bvh: &Bvh, object: &Object, place: TrianglePlace) -> Result<u32, QueryError> {
-    bvh.triangle_id(object, place)
-}
-
-impl TrianglePair {
-    /// Returns where the triangle of A is stored.
-    pub(super) fn place_a(&self) -> TrianglePlace {
-        TrianglePlace { page: self.a.page, packet: self.a.packet, lane: self.lane_a }
-    }
-
-    /// Returns where the triangle of B is stored.
-    pub(super) fn place_b(&self) -> TrianglePlace {
-        TrianglePlace { page: self.b.page, packet: self.b.packet, lane: self.lane_b }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Bvh;
     use bvh_bake::mesh::Mesh;
     use bvh_bake::{Options, Profile, TriangleEncoding, to_bytes};
 

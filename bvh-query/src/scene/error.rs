@@ -1,26 +1,8 @@
-//! Why a scene cannot be opened or refuses an instance, or a question over it has no answer.
+//! Why a scene cannot be made or refuses an instance, or a question over it has no answer.
 
-use crate::error::{OpenError, QueryError};
+use crate::error::QueryError;
 use crate::scene::instance::InstanceId;
 use std::fmt;
-use std::path::PathBuf;
-
-/// Why a scene file cannot be opened.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum OpenSceneError {
-    /// The file cannot be opened.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// The file is valid, but it is no scene that can be asked.
-    #[error("{}: {source}", path.display())]
-    Scene {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: Box<SceneError>,
-    },
-}
 
 /// The instance that an error is about. It is shown by its name or, without one, by its identifier.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -17,7 +17,7 @@ mod trackers;
 mod workers;
 mod world_box;
 
-pub use error::{InstanceLabel, OpenSceneError, SceneError};
+pub use error::{InstanceLabel, SceneError};
 pub use groups::Groups;
 pub use instance::InstanceId;
 pub use motion::SceneMotionAnswer;
@@ -36,7 +36,6 @@ use bvh_format::FormatError;
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
 use std::collections::HashMap;
-use std::path::Path;
 use trackers::Trackers;
 use workers::Workers;
 use world_box::WorldBox;
@@ -119,21 +118,10 @@ impl Scene {
         }
     }
 
-    /// Opens a scene file: maps it and makes a scene of its instances, in their order. `cbvh bake --scene` makes such files.
+    /// Makes a scene of the instances of a file, in their order. `cbvh bake --scene` makes such files.
     ///
-    /// Cost: that of reading the object table and the instances, and some 0.5 to 1.5 us per instance. Nothing else of the file is
-    /// read until a question needs it. [`Bvh::open`] documents what a mapped file asks for.
-    ///
-    /// # Errors
-    /// [`OpenSceneError::Open`] with the errors of [`Bvh::open`], and [`OpenSceneError::Scene`] with those of
-    /// [`Scene::of_file`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, OpenSceneError> {
-        let path = path.as_ref();
-        let scene = Self::of_file(Bvh::open(path)?);
-        scene.map_err(|source| OpenSceneError::Scene { path: path.to_owned(), source: Box::new(source) })
-    }
-
-    /// Makes a scene of the instances of a file, in their order.
+    /// Cost: that of reading the instances, and some 0.5 to 1.5 us per instance. Nothing else of the file is read until a
+    /// question needs it.
     ///
     /// # Errors
     /// [`SceneError::NoInstances`] if the file says nothing of a world; [`SceneError::Query`] if its instances break a rule

@@ -1,6 +1,7 @@
 //! The meshes of a question. Each is an opened file, or a mesh baked in memory.
 
 use crate::console::{Failure, tell_line};
+use crate::map::map;
 use crate::options::LayoutArguments;
 use bvh_bake::{BakeError, Options, input, to_bytes};
 use bvh_format::header::MAGIC;
@@ -52,7 +53,7 @@ impl LoadedMesh {
     /// Opens a `.cbvh` file.
     pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
         let start = Instant::now();
-        let bvh = Bvh::open_with(path, how.read_ahead)?;
+        let bvh = map(path, how.read_ahead)?;
         let mesh = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
         if mesh.object.is_none() {
             refuse_scene(path, &mesh.bvh)?;

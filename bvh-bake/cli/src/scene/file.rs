@@ -3,8 +3,9 @@
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, point_out_units};
 use crate::console::Failure;
+use crate::map::map;
 use crate::options::LayoutArguments;
-use bvh_query::{Backend, Bvh, Groups, InstanceId, Pose, ReadAhead, Scene};
+use bvh_query::{Backend, Groups, InstanceId, Pose, ReadAhead, Scene};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -176,7 +177,7 @@ impl LoadedScene {
 /// Opens a baked scene, all of whose instances move. All pages are checked, so that no frame pays for that.
 pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
     let start = Instant::now();
-    let bvh = Bvh::open(path)?;
+    let bvh = map(path, ReadAhead::Usual)?;
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
     let scene = scene.map_err(|error| Failure::invalid(path, error))?;

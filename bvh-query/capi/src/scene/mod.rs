@@ -13,7 +13,7 @@ use crate::poses::{pose, poses};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{Instance, MeshHandle, PoseRows, SceneHandle, StatsRow, backend};
-use bvh_query::{Groups, InstanceId, Scene};
+use bvh_query::{Bvh, Groups, InstanceId, Scene};
 use std::ffi::c_char;
 
 /// All scenes that are open.
@@ -74,7 +74,9 @@ pub unsafe extern "C" fn cbvh_scene_open(file: *const c_char, scene: *mut SceneH
         // SAFETY: the header asks for it.
         let file = unsafe { path("path", file) }?;
         check_regular(&file)?;
-        Ok(Scene::open(file)?)
+        // SAFETY: the header asks that nobody changes a mapped file.
+        let bvh = unsafe { Bvh::map(&file) }?;
+        Scene::of_file(bvh).map_err(|error| Failure::from(error).at(&file.display().to_string()))
     };
     // SAFETY: the header asks for it.
     unsafe { make("scene", scene, made) }

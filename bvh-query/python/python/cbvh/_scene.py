@@ -90,7 +90,7 @@ class Scene:
     @staticmethod
     def open(path: str | os.PathLike[str]) -> Scene:
         """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the
-        size."""
+        size. The file is mapped, and its bytes must not change while it is open: see `cbvh.open`."""
         name = os.fsdecode(path)
         whole = os.path.abspath(name)
         scene = Scene.__new__(Scene)
