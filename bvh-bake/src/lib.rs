@@ -64,8 +64,7 @@ mod tree;
 mod triangles;
 
 pub use bake::files::{FileBake, Outcome, least_memory};
-pub use bake::report::BakeReport;
-pub use bake::summary::FileSummary;
+pub use bake::report::{BakeReport, FileSummary};
 pub use bake::{to_bytes, to_bytes_with};
 pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::profile::Profile;

@@ -1,6 +1,7 @@
 //! Meshes that are read piece by piece: the same file, the same counts and the same errors as of meshes in memory.
 
 use bvh_bake::{BakeReport, FileBake, Options, Outcome};
+use cbvh_testkit::Random;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -167,18 +168,14 @@ fn damaged_files_are_told_alike() {
         ("b.ply", PLY_FACES_FIRST.as_bytes()),
         ("b.stl", &stl),
     ];
-    let mut state = 1u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as usize
-    };
+    let mut random = Random::new(1);
     for (name, bytes) in files {
         for _ in 0..30 {
-            let _ = folder.compare(name, &bytes[..random() % bytes.len()]);
+            let _ = folder.compare(name, &bytes[..random.below(bytes.len())]);
             let mut changed = bytes.to_vec();
-            for _ in 0..1 + random() % 3 {
-                let at = random() % changed.len();
-                changed[at] = b"0 9-\n\r\\.ex\0\xff"[random() % 12];
+            for _ in 0..1 + random.below(3) {
+                let at = random.below(changed.len());
+                changed[at] = b"0 9-\n\r\\.ex\0\xff"[random.below(12)];
             }
             let _ = folder.compare(name, &changed);
         }

@@ -155,12 +155,6 @@ impl Kdop {
     pub fn contains(&self, inner: &Self, slabs: usize) -> bool {
         (0..slabs).all(|slab| self.lo[slab] <= inner.lo[slab] && self.hi[slab] >= inner.hi[slab])
     }
-
-    /// The surface area of the axis-aligned box in the first three slabs, in square mesh units.
-    pub fn box_area(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|a| f64::from(self.hi[a]) - f64::from(self.lo[a]));
-        2.0 * (x * y + y * z + z * x)
-    }
 }
 
 /// The directions in `f64`, as factors of coordinates.
@@ -374,12 +368,6 @@ mod tests {
                 assert_eq!(below.contains(&inner, set.slabs()), expected, "{slab} {set:?}");
             }
         }
-    }
-
-    #[test]
-    fn the_area_of_a_box_is_that_of_its_six_faces() {
-        let kdop = Kdop::of_points([[-1.0, 7.0, 10.0], [1.0, 4.0, 15.0]]);
-        assert_eq!(kdop.box_area(), f64::from(2 * 2 * 3 + 2 * 3 * 5 + 2 * 5 * 2));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use super::provenance::{self, Provenance};
 use super::report::BakeReport;
-use super::summary::FileSummary;
+use super::report::FileSummary;
 use crate::bake;
 use crate::error::{BakeError, InputError};
 use crate::input::gather::Gatherer;

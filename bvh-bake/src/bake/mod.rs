@@ -3,7 +3,6 @@
 pub(crate) mod files;
 mod provenance;
 pub(crate) mod report;
-pub(crate) mod summary;
 
 use crate::check::prove::prove;
 use crate::error::BakeError;
@@ -26,10 +25,9 @@ use crate::tree::{Aabb, Bricks};
 use crate::triangles::{Gathered, Kept};
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
 use bvh_format::page::MAX_PAGES;
-use report::BakeReport;
+use report::{BakeReport, FileSummary};
 use std::path::Path;
 use std::time::Instant;
-use summary::FileSummary;
 use zerocopy::FromZeros;
 
 /// Bakes a mesh into the bytes of a `.cbvh` file.

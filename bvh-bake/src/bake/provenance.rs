@@ -1,6 +1,6 @@
 //! Writes and compares the provenance text of a file: the origin of its mesh, and what a repeated bake depends on.
 
-use crate::bake::summary::FileSummary;
+use crate::bake::report::FileSummary;
 use crate::input::{self, Checksums};
 use crate::options::Options;
 use crate::progress::Progress;

@@ -110,6 +110,13 @@ impl<R: Read> ByteReader<R> {
         }
     }
 
+    /// Skips a byte order mark, which only states that the file is UTF-8.
+    pub(crate) fn skip_mark(&mut self) {
+        if self.peek(3) == b"\xef\xbb\xbf" {
+            self.skip(3);
+        }
+    }
+
     /// Steps back over the byte that was taken last.
     pub(crate) fn step_back(&mut self) {
         self.start = self.start.saturating_sub(1);
@@ -133,10 +140,7 @@ pub(crate) struct Words<R> {
 
 impl<R: Read> Words<R> {
     pub(crate) fn new(mut reader: ByteReader<R>) -> Self {
-        // A byte order mark only states that the file is UTF-8.
-        if reader.peek(3) == b"\xef\xbb\xbf" {
-            reader.skip(3);
-        }
+        reader.skip_mark();
         Words { reader, line: 0, at_line_start: true }
     }
 

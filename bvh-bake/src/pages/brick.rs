@@ -2,9 +2,9 @@
 //! page, which goes to the pages above the bricks.
 
 use crate::error::BakeError;
+use crate::pages::Style;
 use crate::pages::encode::Encoder;
 use crate::pages::plan::{self, Place};
-use crate::pages::style::Style;
 use crate::pages::unnumbered::{ObjectPages, UnnumberedPages};
 use crate::storage::Spill;
 use crate::storage::resources::Resources;

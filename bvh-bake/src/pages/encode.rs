@@ -3,8 +3,8 @@
 //! Pages, lines, words and packets are numbered from the first page of the same batch. Their places in the file are
 //! known only when all pages have been planned.
 
+use crate::pages::Style;
 use crate::pages::plan::{PagePlan, Place};
-use crate::pages::style::Style;
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;

@@ -4,7 +4,25 @@ pub(crate) mod assemble;
 pub(crate) mod brick;
 mod encode;
 mod plan;
-mod style;
 pub(crate) mod unnumbered;
 
-pub(crate) use style::Style;
+use bvh_format::leaf::TriangleEncoding;
+use bvh_format::profile::Profile;
+
+/// How the pages of an object are written.
+#[derive(Clone, Copy)]
+pub(crate) struct Style {
+    pub(crate) profile: Profile,
+    pub(crate) encoding: TriangleEncoding,
+    pub(crate) f16_scale: f32,
+    pub(crate) ids: bool,
+    pub(crate) turning_slabs: bool,
+}
+
+impl Style {
+    /// Whether treelets of nothing but packets are short: where the size of triangles counts more than time, that of
+    /// treelets does as well.
+    pub(crate) fn has_short_treelets(&self) -> bool {
+        self.profile.has_short_treelets() && self.encoding != TriangleEncoding::F32
+    }
+}

@@ -11,7 +11,7 @@
 //! Each brick is planned by itself, except for a rest of at most half a page. The rests and the tree above the bricks
 //! are planned last and come first in the file; the bricks follow one after the other.
 
-use crate::pages::style::Style;
+use crate::pages::Style;
 use crate::tree::arena::{Arena, TreeletIndex};
 use bvh_format::page::{PAGE, PageShape};
 use bvh_format::profile::Profile;

@@ -73,7 +73,8 @@ fn live() -> MutexGuard<'static, Vec<PathBuf>> {
     LIVE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn failed(path: &Path, action: &'static str) -> impl Fn(io::Error) -> BakeError {
+/// Returns the error of an output at which the system refused an operation.
+pub(crate) fn failed(path: &Path, action: &'static str) -> impl Fn(io::Error) -> BakeError {
     move |source| BakeError::Write { path: path.to_owned(), action, source }
 }
 

@@ -122,6 +122,29 @@ impl<T: Pod + Ord> Merge<'_, T> {
     }
 }
 
+/// A merge with a look at the next record.
+pub(crate) struct Ahead<'a, T: Clone> {
+    merge: Merge<'a, T>,
+    pub(crate) first: Option<T>,
+}
+
+impl<'a, T: Pod + Ord + Send + Sync> Ahead<'a, T> {
+    pub(crate) fn of(sorted: &'a Sorted<T>) -> Result<Self, BakeError> {
+        let mut merge = sorted.merge();
+        let first = merge.next()?;
+        Ok(Self { merge, first })
+    }
+
+    /// Takes the next record if there is one for which `is` is true.
+    pub(crate) fn next_if(&mut self, is: impl FnOnce(&T) -> bool) -> Result<Option<T>, BakeError> {
+        if !self.first.as_ref().is_some_and(is) {
+            return Ok(None);
+        }
+        let next = self.merge.next()?;
+        Ok(std::mem::replace(&mut self.first, next))
+    }
+}
+
 /// Reads a run from its beginning.
 struct Reader<'a, T: Clone> {
     run: Option<&'a Piece<T>>,

@@ -9,7 +9,7 @@
 
 use crate::error::BakeError;
 use crate::progress::Progress;
-use crate::storage::atomic::Temporary;
+use crate::storage::atomic::{Temporary, failed};
 use crate::storage::{read_exact_at, write_all_at};
 use bvh_format::source::Source;
 use std::borrow::Cow;
@@ -113,7 +113,7 @@ impl Output {
             Self::Memory(_) => Ok(()),
             Self::File(OutputFile { file, path, writer, .. }) => {
                 if let Some(writer) = writer {
-                    writer.finish().map_err(|error| failed(&path, "write", error))?;
+                    writer.finish().map_err(failed(&path, "write"))?;
                 }
                 file.rename(&path)
             }
@@ -134,7 +134,7 @@ impl Output {
 
 impl OutputFile {
     fn start_writer(&self) -> Result<Writer, BakeError> {
-        Writer::start(self.file.file()).map_err(|error| failed(&self.path, "create", error))
+        Writer::start(self.file.file()).map_err(failed(&self.path, "create"))
     }
 
     /// Writes bytes at an offset, or passes them to the writer thread.
@@ -145,15 +145,9 @@ impl OutputFile {
                 writer.write(at, bytes);
                 Ok(())
             }
-            None => {
-                write_all_at(self.file.file(), &bytes, at).map_err(|error| failed(&self.path, "write", error))
-            }
+            None => write_all_at(self.file.file(), &bytes, at).map_err(failed(&self.path, "write")),
         }
     }
-}
-
-fn failed(path: &Path, action: &'static str, source: io::Error) -> BakeError {
-    BakeError::Write { path: path.to_owned(), action, source }
 }
 
 /// A thread that writes to a file and then waits for the medium.
@@ -276,7 +270,7 @@ impl Source for OutputSource<'_> {
                 progress.add_output_read(range.len() as u64);
                 let mut bytes = vec![0; range.len()];
                 read_exact_at(file, &mut bytes, range.start as u64)
-                    .map_err(|error| failed(path, "read back what was written to", error))?;
+                    .map_err(failed(path, "read back what was written to"))?;
                 Ok(Cow::Owned(bytes))
             }
         }

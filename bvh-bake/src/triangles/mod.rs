@@ -1,13 +1,11 @@
 //! The triangles on their way through a bake: their records, streams of them, and the placement of their coordinates.
 
-mod gathered;
 mod passes;
 pub(crate) mod placement;
 mod stream;
 
-pub(crate) use gathered::Gathered;
 pub(crate) use passes::{Grouped, InStream, distribute, fold};
-pub(crate) use stream::{Kept, Part, TriangleStream};
+pub(crate) use stream::{Gathered, Kept, Part, TriangleStream};
 
 use crate::error::BakeError;
 use bytemuck::{Pod, Zeroable};

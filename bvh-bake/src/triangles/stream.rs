@@ -23,6 +23,17 @@ pub(crate) struct TriangleStream {
     pub(crate) placement: Option<Placement>,
 }
 
+/// An object of the input, ready to be baked.
+pub(crate) struct Gathered {
+    pub(crate) name: String,
+    pub(crate) origin: [f64; 3],
+    pub(crate) stream: TriangleStream,
+    /// The largest distances by which vertices moved, as far as they have been measured.
+    pub(crate) moved: Moved,
+    /// The number of distinct vertices that the input's triangles refer to.
+    pub(crate) vertices: u64,
+}
+
 impl TriangleStream {
     /// Returns the triangles of a part, and how far their corners were moved.
     pub(crate) fn measured_part(&self, number: usize) -> Result<(Cow<'_, [Triangle]>, Moved), BakeError> {

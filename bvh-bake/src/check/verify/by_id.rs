@@ -8,7 +8,7 @@ use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
 use super::{Stored, VerifyError, distance, each_triangle, place, tolerance};
 use crate::storage::Spill;
-use crate::storage::external_sort::{Merge, Sorted, Sorter};
+use crate::storage::external_sort::{Ahead, Sorted, Sorter};
 use crate::storage::resources::Resources;
 use bvh_format::Layout;
 use bvh_format::header::SectionKind;
@@ -78,14 +78,15 @@ where
     let spill = resources.scratch.spill();
     let stored = stored_claims(layout, source, resources, &spill)?;
     let dropped = dropped_claims(layout, source, &stored, resources, &spill)?;
-    let (mut stored, mut dropped) = (Claims::new(stored.merge())?, Claims::new(dropped.merge())?);
+    let (mut stored, mut dropped) = (Ahead::of(&stored)?, Ahead::of(&dropped)?);
     let mut verdict = Verdict::new(layout, input.counts().iter().sum());
     input.visit(&mut |number, id, corners| {
         let mut any = false;
         // In the order of the leaves.
         loop {
-            let claims = if stored.first_of(id) <= dropped.first_of(id) { &mut stored } else { &mut dropped };
-            let Some(claim) = claims.take(id)? else { break };
+            let claims =
+                if first_of(&stored, id) <= first_of(&dropped, id) { &mut stored } else { &mut dropped };
+            let Some(claim) = claims.next_if(|claim| claim.id == id)? else { break };
             if let Some(way) = verdict.judge(&claim, Some((number, corners)), any) {
                 let ([object, ..], corners) = (claim.leaf, claim.stored().corners);
                 match claim.turn {
@@ -102,7 +103,7 @@ where
     })?;
     // The remaining claims have ids that do not occur in the mesh.
     for claims in [&mut stored, &mut dropped] {
-        while let Some(claim) = claims.next()? {
+        while let Some(claim) = claims.next_if(|_| true)? {
             verdict.judge(&claim, None, false);
         }
     }
@@ -163,33 +164,11 @@ where
     Ok(claims.finish())
 }
 
-/// Claims in ascending order, with a look at the first one.
-struct Claims<'a> {
-    merge: Merge<'a, Claim>,
-    first: Option<Claim>,
-}
-
-impl<'a> Claims<'a> {
-    fn new(mut merge: Merge<'a, Claim>) -> Result<Self, VerifyError> {
-        let first = merge.next()?;
-        Ok(Self { merge, first })
-    }
-
-    /// Returns the place of the first claim to an id, or a place after all others if there is no such claim.
-    fn first_of(&self, id: u32) -> (bool, Leaf, u32) {
-        match &self.first {
-            Some(claim) if claim.id == id => (false, claim.leaf, claim.turn),
-            _ => (true, Leaf::default(), 0),
-        }
-    }
-
-    fn take(&mut self, id: u32) -> Result<Option<Claim>, VerifyError> {
-        if self.first.is_some_and(|claim| claim.id == id) { self.next() } else { Ok(None) }
-    }
-
-    fn next(&mut self) -> Result<Option<Claim>, VerifyError> {
-        let next = self.merge.next()?;
-        Ok(std::mem::replace(&mut self.first, next))
+/// Returns the place of the first claim to an id, or a place after all others if there is no such claim.
+fn first_of(claims: &Ahead<Claim>, id: u32) -> (bool, Leaf, u32) {
+    match &claims.first {
+        Some(claim) if claim.id == id => (false, claim.leaf, claim.turn),
+        _ => (true, Leaf::default(), 0),
     }
 }
 

@@ -5,7 +5,7 @@
 use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
 use super::{VerifyError, distance, each_triangle, place, source_of, tolerance};
-use crate::storage::external_sort::{Merge, Sorter};
+use crate::storage::external_sort::{Ahead, Sorter};
 use crate::storage::resources::Resources;
 use bvh_format::Layout;
 use bvh_format::leaf::TriangleEncoding;
@@ -93,7 +93,7 @@ where
         Ok(expected.extend(&[Keyed::new(number as u32, &rounded, 0)], &spill)?)
     })?;
     let (stored, expected) = (stored.finish(), expected.finish());
-    let (mut stored, mut expected) = (Keys::new(stored.merge())?, Keys::new(expected.merge())?);
+    let (mut stored, mut expected) = (Ahead::of(&stored)?, Ahead::of(&expected)?);
     let mut duplicates = 0;
     for (number, object) in layout.objects.iter().enumerate() {
         if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
@@ -128,45 +128,24 @@ fn check_moves(
     Ok(max_move)
 }
 
-/// Triangles in ascending order, with a look at the first one.
-struct Keys<'a> {
-    merge: Merge<'a, Keyed>,
-    first: Option<Keyed>,
-}
-
-impl<'a> Keys<'a> {
-    fn new(mut merge: Merge<'a, Keyed>) -> Result<Self, VerifyError> {
-        let first = merge.next()?;
-        Ok(Self { merge, first })
+/// Returns the next triangle of an object and skips all that are equal to it. Returns also how many these are, itself
+/// included, and the sum of their ways.
+fn next_distinct_of(keys: &mut Ahead<Keyed>, object: u32) -> Result<(Option<Keyed>, u64, i32), VerifyError> {
+    let Some(now) = keys.next_if(|next| next.object == object)? else { return Ok((None, 0, 0)) };
+    let (mut count, mut ways) = (1, now.way);
+    while let Some(same) = keys.next_if(|next| next.equals(&now))? {
+        count += 1;
+        ways += same.way;
     }
-
-    /// Returns the next triangle of an object.
-    fn next_of(&mut self, object: u32) -> Result<Option<Keyed>, VerifyError> {
-        let Some(now) = self.first.filter(|first| first.object == object) else { return Ok(None) };
-        self.first = self.merge.next()?;
-        Ok(Some(now))
-    }
-
-    /// Returns the next triangle of an object and skips all that are equal to it. Returns also how many these are, itself
-    /// included, and the sum of their ways.
-    fn next_distinct_of(&mut self, object: u32) -> Result<(Option<Keyed>, u64, i32), VerifyError> {
-        let Some(now) = self.next_of(object)? else { return Ok((None, 0, 0)) };
-        let (mut count, mut ways) = (1, now.way);
-        while let Some(same) = self.first.filter(|first| first.equals(&now)) {
-            self.next_of(object)?;
-            count += 1;
-            ways += same.way;
-        }
-        Ok((Some(now), count, ways))
-    }
+    Ok((Some(now), count, ways))
 }
 
 /// Compares the triangles of an object, and returns the number of duplicates.
 fn compare_sorted(
     object: &Object,
     number: u32,
-    expected: &mut Keys,
-    stored: &mut Keys,
+    expected: &mut Ahead<Keyed>,
+    stored: &mut Ahead<Keyed>,
     surfaces: &mut Surfaces,
 ) -> Result<u64, VerifyError> {
     let place = |keyed: Option<Keyed>| match keyed {
@@ -175,8 +154,8 @@ fn compare_sorted(
     };
     let mut duplicates = 0;
     for index in 0u64.. {
-        let (wanted, count, ways) = expected.next_distinct_of(number)?;
-        let found = stored.next_of(number)?;
+        let (wanted, count, ways) = next_distinct_of(expected, number)?;
+        let found = stored.next_if(|next| next.object == number)?;
         match (wanted, found) {
             (None, None) => break,
             (Some(wanted), Some(found)) if wanted.equals(&found) => {

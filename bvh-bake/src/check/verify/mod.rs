@@ -171,11 +171,10 @@ pub fn verify_files(
     options: &VerifyOptions,
 ) -> Result<VerifyReport, VerifyError> {
     let budget = options.max_memory.unwrap_or(USUAL_MEMORY);
-    let enough = |path: &Path, needed: u64| {
-        let path = path.to_owned();
-        if needed <= budget { Ok(()) } else { Err(FileError::Memory { path, needed, budget }) }
-    };
-    enough(path, Resources::least_of_check())?;
+    let needed = Resources::least_of_check();
+    if needed > budget {
+        return Err(FileError::Memory { path: path.to_owned(), needed, budget }.into());
+    }
     let file = StoredFile::open(path, options.max_memory)?;
     let layout = Layout::read_from(&file)?;
     let scratch = options.scratch.clone().unwrap_or_else(std::env::temp_dir);

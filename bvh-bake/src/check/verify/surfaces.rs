@@ -6,7 +6,7 @@
 
 use super::VerifyError;
 use crate::storage::Spill;
-use crate::storage::external_sort::{Merge, Sorter};
+use crate::storage::external_sort::{Ahead, Sorter};
 use crate::storage::resources::Resources;
 use bvh_format::Layout;
 use bvh_format::source::Source;
@@ -125,13 +125,13 @@ impl Surfaces {
             }
         }
         let duplicates = duplicates.finish();
-        let mut nets = Nets::new(duplicates.merge())?;
+        let mut duplicates = Ahead::of(&duplicates)?;
         for (number, topology) in (0..).zip(&stated).filter(|(_, topology)| topology.closed) {
             topology.visit_nets(source, |listed| {
                 let found = Some((listed.place.get(), i64::from(listed.net.get())));
-                differ(number, nets.next_of(number)?, found)
+                differ(number, next_net(&mut duplicates, number)?, found)
             })?;
-            differ(number, nets.next_of(number)?, None)?;
+            differ(number, next_net(&mut duplicates, number)?, None)?;
         }
         Ok(())
     }
@@ -148,32 +148,18 @@ fn differ(number: u32, expected: Option<(u32, i64)>, found: Option<(u32, i64)>) 
     Err(VerifyError::differs(format!("the nets of object {number}"), text(expected), text(found)))
 }
 
-/// The nets that are not 1, by ascending objects and places.
-struct Nets<'a> {
-    merge: Merge<'a, Duplicates>,
-    first: Option<Duplicates>,
-}
-
-impl<'a> Nets<'a> {
-    fn new(mut merge: Merge<'a, Duplicates>) -> Result<Self, VerifyError> {
-        let first = merge.next()?;
-        Ok(Self { merge, first })
-    }
-
-    /// Returns the place and the net of the next triangle of an object that has one. Skips earlier objects.
-    fn next_of(&mut self, object: u32) -> Result<Option<(u32, i64)>, VerifyError> {
-        while let Some(first) = self.first.filter(|first| first.object <= object) {
-            let mut net = 1i64;
-            while let Some(same) =
-                self.first.filter(|next| (next.object, next.place) == (first.object, first.place))
-            {
-                net += i64::from(same.count);
-                self.first = self.merge.next()?;
-            }
-            if first.object == object && net != 1 {
-                return Ok(Some((first.place, net)));
-            }
+/// Returns the place and the net of the next triangle of an object whose net is not 1. Skips earlier objects.
+fn next_net(duplicates: &mut Ahead<Duplicates>, object: u32) -> Result<Option<(u32, i64)>, VerifyError> {
+    while let Some(first) = duplicates.next_if(|next| next.object <= object)? {
+        let mut net = 1 + i64::from(first.count);
+        while let Some(same) =
+            duplicates.next_if(|next| (next.object, next.place) == (first.object, first.place))?
+        {
+            net += i64::from(same.count);
         }
-        Ok(None)
+        if first.object == object && net != 1 {
+            return Ok(Some((first.place, net)));
+        }
     }
+    Ok(None)
 }

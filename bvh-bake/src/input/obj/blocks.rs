@@ -14,13 +14,6 @@ pub(super) struct TooLong {
     pub(super) most: u64,
 }
 
-/// Skips a byte order mark, which only states that the file is UTF-8.
-pub(super) fn skip_mark<R: Read>(reader: &mut ByteReader<R>) {
-    if reader.peek(3) == b"\xef\xbb\xbf" {
-        reader.skip(3);
-    }
-}
-
 /// Returns the length of the next block, which is then in the reader's buffer, or `None` at the end of the file.
 pub(super) fn next_block<R: Read>(reader: &mut ByteReader<R>) -> Result<Option<usize>, TooLong> {
     let mut bytes = BLOCK_BYTES;

@@ -4,7 +4,7 @@
 //! vertices follow. The second reading goes line by line, first over all vertices and then over the faces, and reports
 //! the first error.
 
-use super::blocks::{TooLong, next_block, skip_mark};
+use super::blocks::{TooLong, next_block};
 use super::statements::{Keyword, Statements, check_face, read_corner, read_vertex};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::byte_reader::ByteReader;
@@ -97,7 +97,7 @@ fn walk<R: Read>(
     mut reader: ByteReader<R>,
     mut visit: impl FnMut(Keyword, &Statements, BlockLines) -> Result<bool, Halt>,
 ) -> Result<(), Halt> {
-    skip_mark(&mut reader);
+    reader.skip_mark();
     let mut before = 0;
     loop {
         let length = match next_block(&mut reader) {

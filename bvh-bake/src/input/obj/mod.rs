@@ -21,7 +21,7 @@ use crate::input::names::Names;
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 use crate::storage::resources::Resources;
 use block::{Block, Event};
-use blocks::{BLOCK_BYTES, next_block, skip_mark};
+use blocks::{BLOCK_BYTES, next_block};
 use rayon::prelude::*;
 use std::io::Read;
 
@@ -41,7 +41,7 @@ pub(crate) fn read<R: Read>(
     let mut reading =
         Reading { faces, names: Names::default(), resources, triangles: 0, has_wrong_face: false };
     let mut reader = open(true)?;
-    skip_mark(&mut reader);
+    reader.skip_mark();
     let again = || open(false);
     let blocks_at_once = resources.reading_tasks(BYTES_PER_BLOCK);
     loop {
