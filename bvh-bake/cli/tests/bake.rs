@@ -111,7 +111,6 @@ fn a_bake_is_skipped_only_if_nothing_changed() {
         &["--triangles", "quantized"],
         &["--triangles", "quantized", "--max-error", "0.001"],
         &["--split-objects"],
-        &["--no-turning-slabs"],
         &["--no-topology"],
         &[],
     ] {

@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::documents::{elements, fetches_nothing, number, report_files, same_figures};
+use common::documents::{
+    elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
+};
 use common::{cbvh_in, torus};
 use serde_json::Value;
 use std::fs;
@@ -37,21 +39,7 @@ fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
     rows.iter().for_each(check);
 
     let in_page = elements(&html);
-    let (mut row, mut shown) = (&rows[0], 0);
-    for (name, attributes) in &in_page {
-        if name == "tr" && attributes.contains_key("data-pair") {
-            let is_it = |row: &&Value| {
-                row["pair"] == attributes["data-pair"]
-                    && row["method"] == attributes["data-method"]
-                    && row["samples"].as_u64() == attributes["data-samples"].parse().ok()
-            };
-            row = rows.iter().find(is_it).unwrap();
-        }
-        if let Some(field) = attributes.get("data-field") {
-            assert_eq!(number(row, field), attributes["data-value"].parse().ok(), "{attributes:?}");
-            shown += 1;
-        }
-    }
+    let shown = same_figures_in_page(&in_page, rows);
     // Missed, their share, and three times in each row; in some also how late contacts are.
     assert!(shown > 2 * 16 * 5, "{shown}");
     fetches_nothing(&in_page);

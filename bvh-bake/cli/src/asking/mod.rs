@@ -2,14 +2,13 @@
 
 pub(crate) mod files;
 pub(crate) mod mesh;
-mod runner;
+pub(crate) mod runner;
 
 use crate::console::{self, Failure, Record, hex, record, significant};
 use crate::options::{LayoutArguments, not_negative, threads, whole};
 use crate::process;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, Distance, Object, Querier, QueryError, ReadAhead, Shape};
-use cbvh_measure::spread::quantile;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use files::write_file;
@@ -301,6 +300,13 @@ pub(crate) fn times(nanoseconds: impl Iterator<Item = u64>, requested: usize, to
     }
 }
 
+/// Returns the sorted value at a fraction of the way from the least to the largest, by the rule of the peers' protocol; 0 if
+/// there are none.
+pub(crate) fn quantile(sorted: &[u64], fraction: f64) -> u64 {
+    let index = (fraction * sorted.len() as f64) as usize;
+    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0)
+}
+
 /// Returns the largest resident size so far in MiB.
 pub(crate) fn peak_rss_mb() -> Option<f64> {
     process::peak_bytes().map(|bytes| bytes as f64 / 1048576.0)
@@ -317,5 +323,18 @@ fn of_both(
     match mesh_b.map(of) {
         Some(word_b) if word_b != word_a => format!("{word_a}+{word_b}"),
         _ => word_a.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_follow_the_protocol() {
+        let times: Vec<u64> = (0..10).collect();
+        let found = [0.1, 0.5, 0.9, 1.0].map(|fraction| quantile(&times, fraction));
+        assert_eq!(found, [1, 5, 9, 9]);
+        assert_eq!(quantile(&[], 0.5), 0);
     }
 }

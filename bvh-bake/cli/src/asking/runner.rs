@@ -5,7 +5,6 @@
 
 use super::RunArguments;
 use bvh_query::{Backend, Querier, QueryError, QueryStats};
-use cbvh_measure::rounds::add;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -89,4 +88,11 @@ pub(crate) fn run<T: Sync, A: Clone + Send>(
     // Items are taken in order, and each one that is taken is answered, so that there are no gaps.
     let answers = answers.into_iter().map_while(|answer| answer).collect();
     Ok(Run { answers, requested: items.len(), jobs, total_seconds, stats })
+}
+
+/// Adds the work of one query to a sum.
+pub(crate) fn add(sum: &mut QueryStats, stats: QueryStats) {
+    sum.node_tests += stats.node_tests;
+    sum.packet_tests += stats.packet_tests;
+    sum.exact_tests += stats.exact_tests;
 }

@@ -95,7 +95,6 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
         .ids(!arguments.no_ids)
-        .turning_slabs(!arguments.no_turning_slabs)
         .topology(!arguments.no_topology);
     Ok(options)
 }
@@ -244,9 +243,6 @@ pub(crate) struct BakeArguments {
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,
-    /// Leave out turning slabs, which dop26-u8-wide has; answers and sizes stay the same
-    #[arg(long)]
-    pub(crate) no_turning_slabs: bool,
     /// Leave out which objects are closed; questions about what is inside a mesh need it
     #[arg(long)]
     pub(crate) no_topology: bool,

@@ -5,6 +5,7 @@ mod record;
 
 use crate::asking::files::write_file;
 use crate::asking::mesh::is_baked;
+use crate::asking::runner::add;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure, significant};
 use crate::options::not_negative;
@@ -12,7 +13,6 @@ use bvh_query::{
     Backend, Pose, Querier, QueryError, QueryStats, Relation, Scene, SceneDistance, SceneError, ScenePair,
     SceneShape,
 };
-use cbvh_measure::rounds::add;
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
 use std::path::PathBuf;

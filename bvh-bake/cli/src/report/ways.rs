@@ -4,9 +4,9 @@
 //! Samples may miss a contact and be late with one. They may not find one where the way is certified free: this would be an
 //! error of the certified answer, or of the query about a pose.
 
+use super::page::whole;
+use super::timing::median;
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
-use cbvh_measure::spread::median;
-use cbvh_measure::table::whole;
 
 /// How many poses samplers ask about, with both ends.
 pub(super) const SAMPLES: [u32; 7] = [10, 30, 100, 300, 1_000, 3_000, 10_000];
@@ -83,7 +83,7 @@ impl Method {
     }
 
     /// Returns the times of its samples, in the order in which it asks about them.
-    fn times(self) -> Vec<f64> {
+    pub(super) fn times(self) -> Vec<f64> {
         let order: Vec<u32> = match self {
             Self::Ordered(samples) => (0..samples).collect(),
             Self::Spread(samples) => spread(samples),
@@ -91,6 +91,35 @@ impl Method {
         };
         let last = order.len().saturating_sub(1) as f64;
         order.into_iter().map(|sample| f64::from(sample) / last).collect()
+    }
+
+    /// Asks about a motion at the times of [`Self::times`]. Making the poses of samples is part of the work.
+    pub(super) fn ask(
+        self,
+        times: &[f64],
+        querier: &mut Querier,
+        [a, b]: [&Bvh; 2],
+        motion: &Motion,
+    ) -> Result<Said, QueryError> {
+        let options = MotionOptions::new();
+        match self {
+            Self::Motion => Ok(match querier.motion(a, b, motion, &options)? {
+                MotionAnswer::Free => Said::Free,
+                MotionAnswer::Hit { touching_at, .. } => Said::Contact(touching_at),
+                MotionAnswer::Near { .. } => Said::Undecided,
+            }),
+            Self::IsFree => {
+                Ok(if querier.is_free(a, b, motion, &options)? { Said::Free } else { Said::NotFree })
+            }
+            Self::Ordered(_) | Self::Spread(_) => {
+                for &time in times {
+                    if querier.collide(a, b, &motion.pose(time))? {
+                        return Ok(Said::Contact(time));
+                    }
+                }
+                Ok(Said::Free)
+            }
+        }
     }
 }
 
@@ -101,46 +130,6 @@ fn spread(count: u32) -> Vec<u32> {
     let bits = u32::BITS - last.leading_zeros();
     let reversed = (0..1u32 << bits).map(|number| number.reverse_bits() >> (u32::BITS - bits));
     [0, last].into_iter().chain(reversed.filter(|number| (1..last).contains(number))).collect()
-}
-
-/// A way to ask that is ready to be timed.
-pub(super) struct Asker {
-    method: Method,
-    times: Vec<f64>,
-}
-
-impl Asker {
-    pub(super) fn new(method: Method) -> Self {
-        Self { method, times: method.times() }
-    }
-
-    /// Asks about a motion. To make the poses of samples is part of the work.
-    pub(super) fn ask(
-        &self,
-        querier: &mut Querier,
-        [a, b]: [&Bvh; 2],
-        motion: &Motion,
-    ) -> Result<Said, QueryError> {
-        let options = MotionOptions::new();
-        match self.method {
-            Method::Motion => Ok(match querier.motion(a, b, motion, &options)? {
-                MotionAnswer::Free => Said::Free,
-                MotionAnswer::Hit { touching_at, .. } => Said::Contact(touching_at),
-                MotionAnswer::Near { .. } => Said::Undecided,
-            }),
-            Method::IsFree => {
-                Ok(if querier.is_free(a, b, motion, &options)? { Said::Free } else { Said::NotFree })
-            }
-            Method::Ordered(_) | Method::Spread(_) => {
-                for &time in &self.times {
-                    if querier.collide(a, b, &motion.pose(time))? {
-                        return Ok(Said::Contact(time));
-                    }
-                }
-                Ok(Said::Free)
-            }
-        }
-    }
 }
 
 /// The errors of one way to ask.
