@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 use serde_json::value::{RawValue, to_raw_value};
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -214,6 +214,11 @@ impl Record {
         Self(fields)
     }
 
+    /// Makes a record of one field.
+    pub(crate) fn of(name: &'static str, value: &impl Serialize) -> Self {
+        Self(vec![Self::field(name, value)])
+    }
+
     /// Adds the fields of another record, if there is one.
     pub(crate) fn with(mut self, other: impl Into<Option<Self>>) -> Self {
         self.0.extend(other.into().into_iter().flat_map(|other| other.0));
@@ -245,6 +250,12 @@ impl Record {
             Value::String(text) => text,
             value => value.to_string(),
         }
+    }
+}
+
+impl Display for Record {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&serde_json::to_string(self).map_err(|_| fmt::Error)?)
     }
 }
 

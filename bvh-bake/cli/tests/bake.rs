@@ -244,7 +244,8 @@ fn a_dump_adds_up() {
     let close = |a: &serde_json::Value, b: &serde_json::Value| {
         (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9
     };
-    assert!(close(&object["width_inflation"], &baked["width_inflation"]), "{object}");
+    let verified = cbvh_in(directory, &["verify", "t.cbvh", "torus.obj", "--json"]).done().json();
+    assert!(close(&verified["width_inflation"], &baked["width_inflation"]), "{verified}");
     assert!(close(&object["mean_children"], &baked["mean_children"]));
     let split = &dump["bytes_per_tri"];
     let parts: f64 =

@@ -183,7 +183,7 @@ fn a_folder_is_baked_as_a_tree() {
     assert!(text.starts_with("3 assets: 0 baked, 3 up to date, 0 failed\n"), "{text}");
     fs::write(directory.join("in/a.ply"), "").unwrap();
     cbvh_in(directory, &["bake", "in", "-o", "out"])
-        .failed(3, &["out/a.cbvh", "asset 2 (in/a", "that of asset 1 (in/a"]);
+        .failed(3, &["out/a.cbvh", "used by asset 1 (in/a", "and by asset 2 (in/a"]);
     cbvh_in(directory, &["bake", "in", "-o", "o.jsonl"]).failed(1, &["o.jsonl", "expected a folder"]);
     fs::create_dir(directory.join("empty")).unwrap();
     cbvh_in(directory, &["bake", "empty", "-o", "out"])
@@ -281,10 +281,10 @@ fn two_assets_with_one_output_are_refused_before_the_work() {
         write_assets(directory, 5, line);
         // The whole manifest is checked, whatever the shard.
         for more in [&[][..], &["--shard", "1/5"]] {
-            bake(directory, "out.jsonl", more).failed(3, &["o.cbvh", "asset 4", "that of asset 2"]);
+            bake(directory, "out.jsonl", more).failed(3, &["o.cbvh", "by asset 2 (", "and by asset 4 ("]);
         }
     }
-    for (output, words) in [("meshes/0.obj", "an input that is no output"), ("in.jsonl", "the manifest")] {
+    for (output, words) in [("meshes/0.obj", "an input that no asset writes"), ("in.jsonl", "the manifest")] {
         write_assets(directory, 2, |number| match number {
             1 => json!({"input": "meshes/1.obj", "output": output}),
             _ => usual(number),

@@ -266,7 +266,7 @@ fn each_pose_has_a_line_and_a_record() {
         }
     }
     let one = cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "far.x.txt", "--json", "--limit", "1"]);
-    assert_eq!(one.done().out, "{\"collide\":false,\"pose\":0}\n");
+    assert_eq!(one.done().out, "{\"pose\":0,\"collide\":false}\n");
 }
 
 /// Runs the command in `script`, which is a terminal for it.
@@ -318,7 +318,7 @@ fn one_pose_is_answered_for_a_person() {
     let touching = "1,0,0,2,0,1,0,0,0,0,1,0";
     assert_eq!(ask(apart, &[]), "the meshes do not touch\n");
     assert_eq!(ask(touching, &[]), "the meshes touch\n");
-    assert_eq!(ask(apart, &["--json"]), "{\"collide\":false,\"pose\":0}\n");
+    assert_eq!(ask(apart, &["--json"]), "{\"pose\":0,\"collide\":false}\n");
     let identity = cbvh_in(directory, &["query", "cube.cbvh", "cube.obj", "--mode", "relation"]).done().out;
     assert_eq!(identity, "touching\n");
     assert!(ask(touching, &["--mode", "contacts"]).contains("pairs of triangles in contact"));

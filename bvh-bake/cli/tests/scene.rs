@@ -307,7 +307,12 @@ fn baked_scenes_are_asked_like_text() {
     let dump = cbvh_in(directory, &["dump", "boxes.cbvh", "--json"]).done().json();
     assert_eq!(dump["instances"][1]["name"], "b");
     assert_eq!(dump["instances"][2]["translation"], serde_json::json!([9.0, 0.0, 0.0]));
-    assert!(cbvh_in(directory, &["dump", "boxes.cbvh"]).done().out.contains("\n3 instances\n"));
+    assert!(
+        cbvh_in(directory, &["dump", "boxes.cbvh"])
+            .done()
+            .out
+            .contains("\ninstances\n  number 0, name a, object 0,")
+    );
 
     let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "pairs", "--list"]).done().out;
     assert_eq!(list, "frame 1: 1 pair touching\n  a b\n");
@@ -385,6 +390,9 @@ fn names_in_quotes_have_spaces_and_distances_of_all_pairs_are_listed() {
     assert_eq!(ask(&["distance"]).done().out, "1\n");
     let json = ask(&["distance", "--list", "--json"]).done().json();
     assert_eq!((&json["a"], &json["b"]), (&"left \"arm\"".into(), &"mid".into()));
+    let other = serde_json::json!({ "a": "left \"arm\"", "b": "right arm", "distance": 8.0 });
+    assert_eq!(json["others"], serde_json::json!([other]));
+    assert!(ask(&["distance", "--json"]).done().json().get("others").is_none());
     fs::write(directory.join("s.scene"), scene + "moving \"mid\n").unwrap();
     ask(&["collide"]).failed(3, &["s.scene: line 6", "expected a quote at the end of a name"]);
 }

@@ -95,16 +95,21 @@ impl LoadedMesh {
 
     /// Returns the number of triangles of the mesh, including exact duplicates.
     pub(crate) fn triangles(&self) -> u64 {
-        let records = self.shape().objects().iter().map(|object| object.record());
-        // The counts are as the file states them, and those of a forged file may overflow.
-        let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
-        counts.fold(0, u64::saturating_add)
+        triangles_of(self.shape().objects())
     }
 
     /// Returns the bytes of the file, and the number of triangles stored in it.
     pub(crate) fn bytes_and_stored(&self) -> (u64, u64) {
         (self.bvh.bytes().len() as u64, self.bvh.all().triangles())
     }
+}
+
+/// Returns the number of triangles of these objects, including exact duplicates.
+pub(crate) fn triangles_of(objects: &[Object]) -> u64 {
+    let records = objects.iter().map(|object| object.record());
+    // The counts are as the file states them, and those of a forged file may overflow.
+    let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
+    counts.fold(0, u64::saturating_add)
 }
 
 /// Points out two meshes, by size and file, of which one is so much larger that they may be in different units.

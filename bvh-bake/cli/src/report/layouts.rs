@@ -7,9 +7,9 @@
 //! answers for the mesh itself is an error that is reported.
 
 use super::inputs::bake_both;
-use super::page::{Column, Table, Words, excess, micro, percent, scientific, tenths};
+use super::page::{Column, Table, Words, excess, figure, micro, percent};
 use super::plot::{Panel, Series};
-use super::timing::{median, order, pinned, take_turn, times};
+use super::timing::{median, order, take_turn, times};
 use super::{Kind, Measured, Subject, layout_of, made};
 use crate::asking::files::read_poses;
 use crate::asking::runner::add;
@@ -31,21 +31,21 @@ pub(super) const KIND: Kind<Pose> = Kind {
 
 const ABOUT: &str = "\
 A layout is how a <code>.cbvh</code> file stores bounding volumes (its profile) and triangles (their encoding). This page \
-tells for each pair of meshes how fast every layout answers, how many bytes it takes, and how far its distances are from \
-the exact ones.";
+tells for each pair of meshes how fast each layout answers, how many bytes it takes, and how far its distances are from the \
+exact ones.";
 
 const RIGHT: &str = "\
 All answers are right: layouts that store the same triangles agree about contact, and about distances to the last bit. \
 Distances with an allowed error were within it.";
 
 const METHODS: &str = "\
-<li>Times are those of single queries on one thread that is bound to one processor. All layouts take turns in each round, \
+<li>Times are those of single queries on one thread. All layouts take turns in each round, \
 with three untimed queries before each turn, so caches hold what earlier queries left there. A median is taken over the \
 poses of a round and then over the rounds; nine tenths of the poses take less than the 90 % time.</li>
-<li>A dot marks what no other layout without loss beats in both time and bytes, and distances that none beats in both time \
-and error. Errors are relative to the exact distance of the mesh, over the poses in which the meshes are apart.</li>
+<li>A dot marks a layout that no other layout without loss beats in both time and bytes, and a distance that no other beats \
+in both time and error. Errors are relative to the exact distance of the mesh, over the poses in which the meshes are apart.</li>
 <li>Node tests compare up to 16 pairs of bounding volumes at once, packet tests up to 16 pairs of triangles; what these \
-cannot decide goes to exact tests of one pair of triangles each.</li>
+cannot decide goes to exact tests, each of one pair of triangles.</li>
 <li>The figures are of one machine on one day. They depend on the mix of poses near contact and far apart, and files that \
 are not in memory yet take longer to answer first.</li>";
 
@@ -149,7 +149,7 @@ fn measure(subject: &Subject<'_>, poses: &[Pose]) -> Result<Measured, Failure> {
         Ok(Baked { layout, a, b, size: size_of([&report_a, &report_b], weights) })
     };
     let bakes = Layout::all().map(bake).collect::<Result<Vec<_>, _>>()?;
-    let (pinned, asked) = pinned(|| ask(&bakes, poses, backend, rounds));
+    let asked = ask(&bakes, poses, backend, rounds);
     let asked = asked.map_err(|error| Failure::Invalid(format!("{}: {error}", pair.name)))?;
     let rows = rows(&pair.name, &bakes, &asked);
     let chosen = subject.baked.each_ref().map(|(_, report)| layout_of(report));
@@ -159,7 +159,6 @@ fn measure(subject: &Subject<'_>, poses: &[Pose]) -> Result<Measured, Failure> {
         tables: tables(&rows),
         rows,
         wrong: judge(&pair.name, &asked),
-        pinned,
         ..Measured::default()
     })
 }
@@ -339,10 +338,10 @@ fn sentences(rows: &[Record], [a, b]: &[String; 2]) -> Vec<String> {
     let asked = |question: &'static str| {
         rows.iter().filter(move |row| row.text("question") == question && is_exact(row) && !is_lossy(row))
     };
-    let figure = |row: &Record, name| row.number(name).unwrap_or(f64::INFINITY);
+    let number = |row: &Record, name| row.number(name).unwrap_or(f64::INFINITY);
     let of = |(collide, distance): (&Record, &Record)| {
-        let [contact, far] = [collide, distance].map(|row| figure(row, "ns_median"));
-        let (layout, bytes) = (collide.text("layout"), figure(collide, "file_bytes_per_tri"));
+        let [contact, far] = [collide, distance].map(|row| number(row, "ns_median"));
+        let (layout, bytes) = (collide.text("layout"), number(collide, "file_bytes_per_tri"));
         let shown = format!(
             "{layout}: {} \u{b5}s for contact, {} \u{b5}s for distance, {bytes:.1} bytes per triangle",
             micro(contact),
@@ -403,53 +402,41 @@ fn panels(pair: &str, rows: &[Record]) -> Vec<Panel> {
     vec![by_bytes(Question::Collide), by_bytes(EXACT_DISTANCE), by_error]
 }
 
-/// The columns of the tables about a question, and of the table about files.
-const ASKED: [Column; 8] = [
+/// The columns of the tables. `report.csv` has more about the files.
+const COLUMNS: [Column; 10] = [
     ("median, \u{b5}s", "ns_median", micro),
     ("90 %, \u{b5}s", "ns_p90", micro),
-    ("bytes per triangle", "file_bytes_per_tri", tenths),
+    ("bytes per triangle", "file_bytes_per_tri", figure),
     ("largest error", "distance_error_max", percent),
     ("median error", "distance_error_median", percent),
-    ("node tests", "node_tests", tenths),
-    ("packet tests", "packet_tests", tenths),
-    ("exact tests", "exact_tests", tenths),
-];
-const SIZES: [Column; 7] = [
-    ("bytes per triangle", "file_bytes_per_tri", tenths),
-    ("nodes", "node_bytes_per_tri", tenths),
-    ("triangles", "triangle_bytes_per_tri", tenths),
-    ("ids", "id_bytes_per_tri", tenths),
+    ("node tests", "node_tests", figure),
+    ("packet tests", "packet_tests", figure),
+    ("exact tests", "exact_tests", figure),
     ("width of bounds, excess", "width_inflation", excess),
-    ("volume, excess", "volume_inflation", excess),
-    ("vertices moved by, mesh units", "vertex_error", scientific),
+    ("vertices moved by, mesh units", "vertex_error", figure),
 ];
 
-/// Returns the tables of a pair: one for each question with the fastest layout first, and one of the files.
+/// Returns the tables of a pair: one for each question, with the fastest layout first.
 fn tables(rows: &[Record]) -> Vec<Table> {
-    let table = |title: String, question: Question, by: &str, columns| {
-        let is_front =
-            |row: &Record| ["pareto_bytes", "pareto_error"].iter().any(|name| row.number(name) == Some(1.0));
-        let name = |row: &Record| row.text("layout") + if is_front(row) { " \u{2022}" } else { "" };
-        let found = rows.iter().enumerate().filter(|(_, row)| {
-            row.text("question") == question.name() && row.number("rel_err") == question.rel_err()
-        });
-        let mut found: Vec<_> = found.collect();
-        let figure = |row: &Record| row.number(by).unwrap_or(f64::INFINITY);
-        found.sort_by(|(_, a), (_, b)| figure(a).total_cmp(&figure(b)));
-        Table { title, columns, rows: found.into_iter().map(|(place, row)| (name(row), place)).collect() }
-    };
-    let mut tables: Vec<Table> = Vec::new();
-    for question in QUESTIONS {
+    let is_front =
+        |row: &Record| ["pareto_bytes", "pareto_error"].iter().any(|name| row.number(name) == Some(1.0));
+    let name = |row: &Record| row.text("layout") + if is_front(row) { " \u{2022}" } else { "" };
+    let table = |question: Question| {
         let title = match question {
             Question::Collide => "Contact".to_owned(),
             EXACT_DISTANCE => "Exact distance".to_owned(),
             Question::Distance(rel_err) => format!("Distance with an allowed error of {}", percent(rel_err)),
         };
-        tables.push(table(title, question, "ns_median", &ASKED[..]));
-    }
-    let title = "Files, the smallest first".to_owned();
-    tables.push(table(title, Question::Collide, "file_bytes_per_tri", &SIZES[..]));
-    tables
+        let is_it = |(_, row): &(usize, &Record)| {
+            row.text("question") == question.name() && row.number("rel_err") == question.rel_err()
+        };
+        let mut found: Vec<_> = rows.iter().enumerate().filter(is_it).collect();
+        let time = |row: &Record| row.number("ns_median").unwrap_or(f64::INFINITY);
+        found.sort_by(|(_, a), (_, b)| time(a).total_cmp(&time(b)));
+        let rows = found.into_iter().map(|(place, row)| (name(row), place)).collect();
+        Table { title, columns: &COLUMNS, rows }
+    };
+    QUESTIONS.into_iter().map(table).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,8 @@ use bvh_query::{Bvh, Motion, Pose, Querier, QueryError};
 pub(super) const POSES: &str =
     "made: a fifth overlaps, the others have gaps of 0.000001, 0.005, 0.01, 0.05 of A's diagonal";
 /// How motions are made in turn.
-pub(super) const MOTIONS: &str = "made: a quarter each long ways, short ways, slides and turns on the spot";
+pub(super) const MOTIONS: &str =
+    "made: a quarter each long motions, short motions, slides and turns on the spot";
 
 /// The gaps of poses in turn, as fractions of A's diagonal; 0 stands for overlap.
 const POSE_GAPS: [f64; 5] = [0.0, 1e-6, 0.005, 0.01, 0.05];

@@ -25,7 +25,6 @@ use plot::Panel;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use timing::Pinned;
 
 const REPORT_HELP: &str = "\
 Examples:
@@ -39,7 +38,7 @@ PAIRS is a text file with one pair of meshes per line: NAME A B [FILE[,FILE...]]
 format that bake reads, or .cbvh files, whose triangles are baked again. FILEs have poses or, with --motions, motions, as \
 query and motion read them. File names are relative to the list. For a pair without poses, 60 are made, always the same \
 ones: overlapping, and with gaps of 1e-6, 0.5 %, 1 % and 5 % of A's diagonal. For a pair without motions, 60 are made, \
-too: long ways, short ways, slides and turns on the spot.
+too: long motions, short motions, slides and turns on the spot.
 
 The command writes report.html for people, report.svg with its plots, and report.csv and report.json with the same \
 figures. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
@@ -47,16 +46,15 @@ figures. If an answer is wrong, the exit code is 3 and the files are written nev
 Without --motions, it bakes each pair in every profile with every encoding of triangles, and asks for contact and for \
 distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compared with those of dop14-f32.
 
-With --motions, it bakes each pair as bake does without options, and asks about each motion in 16 ways: by 10, 30, 100, \
-300, 1000, 3000 and 10000 equally spaced poses until one touches, in the order of time and in an order that is spread from \
-the start, and by certified answers, for the first contact and for any. The report says how many of the certified contacts \
+With --motions, it bakes each pair as bake does without options, and asks about each motion in nine ways: by 10, 30, 100, \
+300, 1000, 3000 and 10000 equally spaced poses until one touches, and by certified answers, for the first contact and for \
+any. The report says how many of the certified contacts \
 the samples miss, how late they find the others, and how long each way takes. A sample that touches where the motion is \
 certified free is a wrong answer. Each way asks about all motions of a pair in one round, and in as many \
 further rounds as fit into 10 seconds; report.csv has their number. A pair takes some minutes at most, unless one round of \
 10000 samples takes longer.
 
-Queries run on one thread that is bound to one processor. On a machine that does other work the times include the \
-effects of that work.";
+Queries run on one thread. On a machine that does other work the times include the effects of that work.";
 
 /// What `report` takes.
 #[derive(Debug, Args)]
@@ -138,7 +136,6 @@ struct Measured {
     wrong: Vec<String>,
     /// Further fields of the pair's record.
     counts: Vec<(&'static str, usize)>,
-    pinned: Option<Pinned>,
     /// What is found, the most important sentence first.
     sentences: Vec<String>,
     panels: Vec<Panel>,
@@ -228,7 +225,7 @@ impl Report {
         };
         let [(about_a, a), (about_b, b)] = [side(&pair.a, &baked[0]), side(&pair.b, &baked[1])];
         of.record = json!({
-            "name": pair.name, "a": a, "b": b, items: count, format!("{items}_from"): from, "pinned": of.pinned,
+            "name": pair.name, "a": a, "b": b, items: count, format!("{items}_from"): from,
         });
         of.counts.iter().for_each(|(key, count)| of.record[*key] = json!(count));
         of.name.clone_from(&pair.name);

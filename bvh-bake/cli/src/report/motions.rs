@@ -4,9 +4,9 @@
 //! The ways take turns in rounds. Ten thousand samples take thousands of times as long as a certified answer, so each way
 //! asks in the first round, and then in as many more as fit into its share of time.
 
-use super::page::{Column, Table, Words, micro, percent, whole};
+use super::page::{Column, Table, Words, figure, micro, percent};
 use super::plot::{Panel, Series};
-use super::timing::{order, pinned, take_turn, times};
+use super::timing::{order, take_turn, times};
 use super::ways::{Method, SAMPLES, Said, is_hit, judge};
 use super::{Kind, Measured, Subject, made};
 use crate::asking::files::read_motions;
@@ -28,26 +28,23 @@ pub(super) const KIND: Kind<Motion> = Kind {
 };
 
 const ABOUT: &str = "\
-Whether the way of a moving mesh is free is often asked by samples: poses along the way, of which the first that touches \
-ends the question. Samples miss contacts between them, and find others late. cbvh certifies its answers for every moment \
-between start and end. This page tells for each pair of meshes what samples miss, how late they are, and how long they \
-take beside the certified answers.";
+Programs often test a motion by samples: they check poses along the way until one touches. Samples miss contacts between \
+them, and find others late. cbvh certifies its answers for every moment between start and end. This page tells for each pair \
+of meshes what samples miss, how late they are, and how long they take compared with the certified answers.";
 
 const RIGHT: &str = "\
-No answer contradicts another: no sample touches where a motion is certified free, or before the time until which it is.";
+No answer contradicts another: where a motion is certified free, no sample touches.";
 
 const METHODS: &str = "\
-<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches. A \
-spread order asks about both ends and then in van der Corput's order: halves, quarters, and so on. It finds some contact \
-sooner, but not the first one.</li>
+<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches.</li>
 <li>Certified answers are those of <code>Querier::motion</code>, which finds the first contact, and of \
-<code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided that comes nearer than a millionth of \
-the larger mesh's diagonal without a contact.</li>
-<li>Missed is a certified contact where all samples are free. Late is the time between the moment until which the way is \
-certified free and the contact found, as a fraction of the way, over the contacts that are not missed.</li>
-<li>Times are those of single motions on one thread that is bound to one processor, with the poses of samples made on the \
-way. All ways to ask take turns in rounds, as many as fit into 10 seconds per pair, but at least one; \
-<code>report.csv</code> has their number. A median is taken over the motions of a round and then over the rounds.</li>
+<code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided if the meshes come nearer than a \
+millionth of the larger mesh's diagonal without touching.</li>
+<li>A certified contact is missed if all samples are free. A contact is late by the time between the end of the part that is \
+certified free and the contact found, as a fraction of the motion; only contacts that are not missed count.</li>
+<li>Times are those of single motions on one thread, with the poses of samples made on the way. All ways to ask take turns \
+in rounds, as many as fit into 10 seconds per pair, but at least one; <code>report.csv</code> has their number. A median is \
+taken over the motions of a round and then over the rounds.</li>
 <li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";
 
 /// For how long each way asks about the motions of a pair, in seconds, unless one round takes longer.
@@ -96,14 +93,11 @@ fn ask(
 fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failure> {
     let Subject { pair, baked: [(a, _), (b, _)], backend, rounds, .. } = *subject;
     let methods: Vec<Method> = Method::all().collect();
-    let (pinned, answers) = pinned(|| {
-        let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
-        let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
-        let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>()?;
-        Ok((certified, ask(&methods, [a, b], motions, backend, rounds)?))
-    });
     let failed = |error: QueryError| Failure::Invalid(format!("{}: {error}", pair.name));
-    let (certified, asked) = answers.map_err(failed)?;
+    let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
+    let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
+    let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>().map_err(failed)?;
+    let asked = ask(&methods, [a, b], motions, backend, rounds).map_err(failed)?;
     let count = |is: fn(&MotionAnswer) -> bool| certified.iter().filter(|answer| is(answer)).count();
     let free = count(|answer| matches!(answer, MotionAnswer::Free));
     let undecided = count(|answer| matches!(answer, MotionAnswer::Near { .. }));
@@ -138,7 +132,6 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
         rows,
         wrong,
         counts: vec![("free", free), ("hits", hits), ("undecided", undecided)],
-        pinned,
         ..Measured::default()
     })
 }
@@ -151,16 +144,12 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
     let row = |method: Method| methods.iter().position(|&other| other == method).map(|place| &rows[place]);
     let time = |row: &Record| row.number("ns_median").unwrap_or_default();
     let missed = |row: &Record| row.number("missed").unwrap_or_default();
-    // How many times as long as the other way, with two digits or more.
-    let ratio = |row: &Record, other: &Record| match time(row) / time(other) {
-        ratio @ 10.0.. => whole(ratio),
-        ratio @ 1.0.. => format!("{ratio:.1}"),
-        ratio => format!("{ratio:.2}"),
-    };
+    // How many times as long as the other way.
+    let ratio = |row: &Record, other: &Record| figure(time(row) / time(other));
     let (Some(motion), Some(is_free)) = (row(Method::Motion), row(Method::IsFree)) else { return Vec::new() };
-    let figure = |name| motion.number(name).unwrap_or_default() as u64;
+    let count = |name| motion.number(name).unwrap_or_default() as u64;
     let are = |count: usize| if count == 1 { "is" } else { "are" };
-    let (motions, hits) = (figure("motions"), figure("hits"));
+    let (motions, hits) = (count("motions"), count("hits"));
     let mut sentences = vec![format!(
         "Of {motions} {}, {hits} {}, {free} {} free and {undecided} {} undecided. The median time is {} \u{b5}s for the \
          certified first contact and {} \u{b5}s for the certified yes or no.",
@@ -198,19 +187,18 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
     let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
     let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
     let samples = enough.unwrap_or(SAMPLES[SAMPLES.len() - 1]);
-    if let (Some(ordered), Some(spread)) = (row(Method::Ordered(samples)), row(Method::Spread(samples))) {
-        let number = whole(samples.into());
+    if let Some(ordered) = row(Method::Ordered(samples)) {
+        let number = samples.to_string();
         let lead = match enough {
             Some(_) => format!("From {number} samples on, none is missed: {number} samples"),
             None => format!("Even {number} samples miss {}: they", missed(ordered)),
         };
         sentences.push(format!(
-            "{lead} take {} \u{b5}s in the order of time, {} times as long as the certified first contact, and {} \u{b5}s \
-             in a spread order, {} times as long as the certified yes or no.",
+            "{lead} take {} \u{b5}s, {} times as long as the certified first contact and {} times as long as the certified \
+             yes or no.",
             micro(time(ordered)),
             ratio(ordered, motion),
-            micro(time(spread)),
-            ratio(spread, is_free)
+            ratio(ordered, is_free)
         ));
     }
     sentences
@@ -243,11 +231,11 @@ fn panels(pair: &str, methods: &[Method], rows: &[Record]) -> Vec<Panel> {
 
 /// The columns of the table.
 const COLUMNS: [Column; 8] = [
-    ("contacts missed", "missed", whole),
+    ("contacts missed", "missed", figure),
     ("share missed", "missed_share", percent),
     ("late, median", "late_median", percent),
     ("late, largest", "late_max", percent),
-    ("undecided", "undecided", whole),
+    ("undecided", "undecided", figure),
     ("median, \u{b5}s", "ns_median", micro),
     ("90 %, \u{b5}s", "ns_p90", micro),
     ("mean, \u{b5}s", "ns_mean", micro),

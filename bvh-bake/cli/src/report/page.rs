@@ -94,10 +94,6 @@ fn opening(report: &Report, words: &Words) -> String {
             "This was a quick run that asked little in two rounds. Do not quote its figures.",
         ),
         (origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
-        (
-            report.sections.iter().any(|section| section.pinned.is_none()),
-            "The system did not bind the measuring thread to a processor, so times scatter more.",
-        ),
     ] {
         if holds {
             text += &format!("<p class=\"wrong\">{warning}</p>\n");
@@ -153,48 +149,36 @@ impl Table {
     }
 }
 
-/// Writes nanoseconds as microseconds with three digits.
-pub(super) fn micro(nanoseconds: f64) -> String {
-    let value = nanoseconds / 1000.0;
-    let decimals = if value >= 99.95 { 0 } else { usize::from(value < 9.995) + 1 };
-    format!("{value:.decimals$}")
-}
-
-/// Writes a whole number with commas between thousands.
-pub(super) fn whole(value: f64) -> String {
-    let digits = format!("{value:.0}");
-    let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// Writes a fraction in percent, with two digits.
-pub(super) fn percent(value: f64) -> String {
-    match 100.0 * value {
+/// Writes a number with three digits or more, and 0 and very small ones shortly.
+pub(super) fn figure(value: f64) -> String {
+    match value.abs() {
         0.0 => "0".to_owned(),
-        percent @ 10.0.. => format!("{percent:.0} %"),
-        percent @ 1.0.. => format!("{percent:.1} %"),
-        percent @ 0.001.. => format!("{:.1$} %", percent, (1.0 - percent.log10().floor()) as usize),
-        percent => format!("{percent:.0e} %"),
+        size @ 1e-4..1e9 => {
+            let decimals = (2.0 - size.log10().floor()).max(0.0) as usize;
+            let text = format!("{value:.decimals$}");
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                text
+            }
+        }
+        _ => format!("{value:.1e}"),
     }
 }
 
-pub(super) fn tenths(value: f64) -> String {
-    format!("{value:.1}")
+/// Writes nanoseconds as microseconds.
+pub(super) fn micro(nanoseconds: f64) -> String {
+    figure(nanoseconds / 1000.0)
 }
 
-/// Formats a ratio by its excess over 1.
+/// Writes a fraction in percent.
+pub(super) fn percent(value: f64) -> String {
+    figure(100.0 * value) + if value == 0.0 { "" } else { " %" }
+}
+
+/// Writes a ratio by its excess over 1.
 pub(super) fn excess(value: f64) -> String {
     format!("{:.1} %", 100.0 * (value - 1.0))
-}
-
-pub(super) fn scientific(value: f64) -> String {
-    if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
 }
 
 #[cfg(test)]
@@ -202,11 +186,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_have_three_digits_and_thousands_commas() {
-        assert_eq!(
-            [123456.0, 99960.0, 12345.0, 9996.0, 1234.0, 56.0].map(micro),
-            ["123", "100", "12.3", "10.0", "1.23", "0.06"]
-        );
-        assert_eq!([0.0, 999.0, 1000.0, 1234567.0].map(whole), ["0", "999", "1,000", "1,234,567"]);
+    fn figures_have_three_digits() {
+        let figures = [0.0, 123456.0, 99.96, 12.345, 9.996, 1.5, 0.056, 0.01234, 1.26e-7];
+        let shown = ["0", "123456", "100", "12.3", "10", "1.5", "0.056", "0.0123", "1.3e-7"];
+        assert_eq!(figures.map(figure), shown);
+        assert_eq!((percent(0.0), percent(0.25), micro(1500.0)), ("0".into(), "25 %".into(), "1.5".into()));
     }
 }

@@ -1,4 +1,4 @@
-//! Times single queries in rounds: subjects take turns on one processor, and medians are taken over the rounds.
+//! Times single queries in rounds: subjects take turns on one thread, and medians are taken over the rounds.
 //!
 //! A turn is a few untimed questions and then all items in their order. Caches hold what the previous questions left there,
 //! which is called warm. Within a round all subjects take their turn, and the next round starts with another subject, so
@@ -14,41 +14,6 @@ const WARM_UP_QUESTIONS: usize = 3;
 /// The number of subjects by which the start moves on from round to round. It shares no factor with usual numbers of
 /// subjects, so that the order of turns differs from round to round.
 const STRIDE: usize = 17;
-
-/// The processor that a thread was bound to, and how many it might have used.
-#[derive(Debug, Clone, Copy, serde::Serialize)]
-pub(super) struct Pinned {
-    processor: usize,
-    /// The number of processors that the thread was allowed to run on before.
-    allowed: usize,
-}
-
-/// Runs `work` on a thread of its own that is bound to one processor, if the system allows that, and returns the
-/// processor with the result. Other threads go on using all processors.
-pub(super) fn pinned<T: Send>(work: impl FnOnce() -> T + Send) -> (Option<Pinned>, T) {
-    std::thread::scope(|scope| {
-        let thread = scope.spawn(|| (pin(), work()));
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    })
-}
-
-/// Binds the calling thread to the last processor it may run on: the first has more of the system's work.
-/// Returns `None` where the system has no such call, or refuses.
-#[cfg(target_os = "linux")]
-fn pin() -> Option<Pinned> {
-    use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
-    let may = sched_getaffinity(None).ok()?;
-    let processor = (0..CpuSet::MAX_CPU).rev().find(|&processor| may.is_set(processor))?;
-    let mut only = CpuSet::new();
-    only.set(processor);
-    sched_setaffinity(None, &only).ok()?;
-    Some(Pinned { processor, allowed: may.count() as usize })
-}
-
-#[cfg(not(target_os = "linux"))]
-fn pin() -> Option<Pinned> {
-    None
-}
 
 /// Returns the order in which so many subjects take turns in a round.
 pub(super) fn order(round: usize, subjects: usize) -> impl Iterator<Item = usize> {
