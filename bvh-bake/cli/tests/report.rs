@@ -5,6 +5,7 @@ mod common;
 use common::documents::{
     elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
 };
+use common::{Files as _, place};
 use common::{cbvh_in, poses, torus};
 use serde_json::Value;
 use std::fs;
@@ -21,17 +22,16 @@ fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
 
 #[test]
 fn four_files_hold_the_same_figures_and_all_answers_are_right() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(24, 12)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(24, 12));
     cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "--no-ids"]).done();
-    fs::write(directory.join("p.txt"), poses(8, 0.0, 6.0)).unwrap();
+    directory.write("p.txt", poses(8, 0.0, 6.0));
     for mesh in ["fclenv.obj", "fclrob.obj"] {
         fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();
     }
     let list =
         "# name a b poses\nfcl fclenv.obj fclrob.obj\n\ntori torus.cbvh torus.cbvh p.txt # with poses\n";
-    fs::write(directory.join("pairs.txt"), list).unwrap();
+    directory.write("pairs.txt", list);
     let ended = report(directory, &["pairs.txt", "--out", "new/out", "--quick"]);
     assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
     let [csv, html, json, svg] = report_files(directory, "new/out");
@@ -111,9 +111,8 @@ fn check(row: &Value) {
 
 #[test]
 fn what_is_wrong_is_told_in_one_line_before_the_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    let directory = &place();
+    let write = |name: &str, text: &str| directory.write(name, text);
     write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     write("good.txt", "one one.obj one.obj\n");

@@ -5,6 +5,7 @@ mod common;
 use common::documents::{
     elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
 };
+use common::{Files as _, place};
 use common::{cbvh_in, torus};
 use serde_json::Value;
 use std::fs;
@@ -14,9 +15,8 @@ const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
 #[test]
 fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(24, 12)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(24, 12));
     for mesh in ["fclenv.obj", "fclrob.obj"] {
         fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();
     }
@@ -24,9 +24,9 @@ fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
     let pose = |[x, y]: [f64; 2]| format!("1 0 0 {x} 0 1 0 {y} 0 0 1 0.25");
     let motion = |from, to| format!("{} {} # motion\n", pose(from), pose(to));
     let motions = [motion([-20.0, 0.0], [20.0, 0.0]), motion([-20.0, 20.0], [20.0, 20.0])];
-    fs::write(directory.join("tori.txt"), motions.concat()).unwrap();
+    directory.write("tori.txt", motions.concat());
     let list = "fcl fclenv.obj fclrob.obj\ntori torus.obj torus.obj tori.txt # with motions\n";
-    fs::write(directory.join("pairs.txt"), list).unwrap();
+    directory.write("pairs.txt", list);
     let arguments = ["report", "pairs.txt", "--motions", "--out", "out", "--quick"];
     let said = cbvh_in(directory, &arguments).done().out;
     let [csv, html, json, svg] = report_files(directory, "out");

@@ -207,7 +207,7 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
 /// Returns the plots of a pair: time against the share of contacts missed, and against how late the others are found.
 fn panels(pair: &str, methods: &[Method], rows: &[Record]) -> Vec<Panel> {
     let panel = |title: &str, x, field: &str| {
-        let series = |(kind, name): (usize, &'static str)| {
+        let series = |(kind, [_, name]): (usize, [&'static str; 2])| {
             let of = methods.iter().zip(rows).filter(|(method, _)| method.kind() == kind);
             let points = of.filter_map(|(method, row)| {
                 let at = (100.0 * row.number(field)?, row.number("ns_median")? / 1000.0);

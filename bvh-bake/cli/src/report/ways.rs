@@ -40,9 +40,12 @@ impl Method {
         SAMPLES.map(Self::Ordered).into_iter().chain([Self::Motion, Self::IsFree])
     }
 
-    /// What each kind of way is, for people. Ways of a kind differ in the number of samples.
-    pub(super) const KINDS: [&'static str; 3] =
-        ["samples in the order of time", "certified: first contact", "certified: any contact"];
+    /// What each kind of way is, in tables and for people. Ways of a kind differ in the number of samples.
+    pub(super) const KINDS: [[&'static str; 2]; 3] = [
+        ["ordered samples", "samples in the order of time"],
+        ["motion", "certified: first contact"],
+        ["is_free", "certified: any contact"],
+    ];
 
     /// Returns the place of its kind in [`Self::KINDS`].
     pub(super) fn kind(self) -> usize {
@@ -55,13 +58,13 @@ impl Method {
 
     /// The name in tables.
     pub(super) fn name(self) -> &'static str {
-        ["ordered samples", "motion", "is_free"][self.kind()]
+        Self::KINDS[self.kind()][0]
     }
 
     /// The name for people.
     pub(super) fn in_words(self) -> String {
         let count = self.samples().map_or(String::new(), |samples| format!("{samples} "));
-        count + Self::KINDS[self.kind()]
+        count + Self::KINDS[self.kind()][1]
     }
 
     /// Returns the number of samples.
