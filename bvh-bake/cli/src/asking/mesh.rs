@@ -42,27 +42,17 @@ pub(crate) struct LoadedMesh {
 impl LoadedMesh {
     /// Opens a `.cbvh` file or bakes a mesh. All objects of a mesh become one tree, unless `--object` names one of them.
     pub(crate) fn load(path: &Path, how: &How) -> Result<Self, Failure> {
-        if is_baked(path)? {
-            return Self::open(path, how);
-        }
-        let (bvh, build_seconds) = bake(path, &how.layout.to_options(), how.object)?;
-        Ok(Self::new(path, bvh, how, build_seconds))
-    }
-
-    /// Opens a `.cbvh` file.
-    pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
         let start = Instant::now();
-        let bvh = Bvh::open_with(path, how.read_ahead)?;
-        let mesh = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
-        if mesh.object.is_none() {
-            refuse_scene(path, &mesh.bvh)?;
-        }
-        Ok(mesh)
-    }
-
-    fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {
+        let (bvh, build_seconds) = if is_baked(path)? {
+            (Bvh::open_with(path, how.read_ahead)?, start.elapsed().as_secs_f64())
+        } else {
+            bake(path, &how.layout.to_options(), how.object)?
+        };
         let object = how.object.and_then(|name| bvh.find(name));
-        Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() }
+        if object.is_none() {
+            refuse_scene(path, &bvh)?;
+        }
+        Ok(Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() })
     }
 
     /// Checks all pages before queries are timed, and counts that as building: otherwise the first query that touches a

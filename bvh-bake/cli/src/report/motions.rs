@@ -148,15 +148,11 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
     let ratio = |row: &Record, other: &Record| figure(time(row) / time(other));
     let (Some(motion), Some(is_free)) = (row(Method::Motion), row(Method::IsFree)) else { return Vec::new() };
     let count = |name| motion.number(name).unwrap_or_default() as u64;
-    let are = |count: usize| if count == 1 { "is" } else { "are" };
     let (motions, hits) = (count("motions"), count("hits"));
     let mut sentences = vec![format!(
-        "Of {motions} {}, {hits} {}, {free} {} free and {undecided} {} undecided. The median time is {} \u{b5}s for the \
-         certified first contact and {} \u{b5}s for the certified yes or no.",
+        "{motions} {}: {hits} certified hits, {free} free, {undecided} undecided. The median time is {} \u{b5}s for the certified \
+         first contact and {} \u{b5}s for the certified yes or no.",
         plural(motions, "motion"),
-        if hits == 1 { "hits" } else { "hit" },
-        are(free),
-        are(undecided),
         micro(time(motion)),
         micro(time(is_free))
     )];
@@ -164,11 +160,15 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
         sentences.push("There is no contact to miss.".to_owned());
         return sentences;
     }
-    if let Some(usual) = row(Method::Ordered(USUAL_SAMPLES)) {
-        let late = match (usual.number("late_median"), usual.number("late_max")) {
+    // The usual number of samples, and the one from which on all miss none.
+    let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
+    let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
+    for samples in [USUAL_SAMPLES, enough.unwrap_or(SAMPLES[SAMPLES.len() - 1])] {
+        let Some(row) = row(Method::Ordered(samples)) else { continue };
+        let late = match (row.number("late_median"), row.number("late_max")) {
             (Some(median), Some(max)) => {
                 format!(
-                    ", find the others {} of the way late in the median and {} at worst,",
+                    ", find the others late by {} of the motion in the median and {} at worst",
                     percent(median),
                     percent(max)
                 )
@@ -176,31 +176,15 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
             _ => String::new(),
         };
         sentences.push(format!(
-            "{USUAL_SAMPLES} samples in the order of time miss {} of {hits} contacts{late} and take {} \u{b5}s, {} times as \
-             long as the certified first contact.",
-            missed(usual),
-            micro(time(usual)),
-            ratio(usual, motion)
+            "{samples} samples miss {} of {hits} contacts{late}, and take {} \u{b5}s, {} times as long as the certified first \
+             contact and {} times as long as the certified yes or no.",
+            missed(row),
+            micro(time(row)),
+            ratio(row, motion),
+            ratio(row, is_free)
         ));
     }
-    // The number of samples from which on all miss none.
-    let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
-    let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
-    let samples = enough.unwrap_or(SAMPLES[SAMPLES.len() - 1]);
-    if let Some(ordered) = row(Method::Ordered(samples)) {
-        let number = samples.to_string();
-        let lead = match enough {
-            Some(_) => format!("From {number} samples on, none is missed: {number} samples"),
-            None => format!("Even {number} samples miss {}: they", missed(ordered)),
-        };
-        sentences.push(format!(
-            "{lead} take {} \u{b5}s, {} times as long as the certified first contact and {} times as long as the certified \
-             yes or no.",
-            micro(time(ordered)),
-            ratio(ordered, motion),
-            ratio(ordered, is_free)
-        ));
-    }
+    sentences.dedup();
     sentences
 }
 
