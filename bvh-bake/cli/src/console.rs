@@ -5,8 +5,9 @@ use bvh_bake::{BakeError, FileError, VerifyError};
 use bvh_query::{BackendError, OpenError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::{Serialize, Serializer};
+use serde_json::Value;
 use serde_json::value::{RawValue, to_raw_value};
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -199,6 +200,7 @@ pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
 }
 
 /// A JSON object whose fields stay in the order in which they are written; [`record!`] makes one.
+#[derive(Debug, Clone)]
 pub(crate) struct Record(Vec<(&'static str, Box<RawValue>)>);
 
 impl Record {
@@ -212,10 +214,48 @@ impl Record {
         Self(fields)
     }
 
+    /// Makes a record of one field.
+    pub(crate) fn of(name: &'static str, value: &impl Serialize) -> Self {
+        Self(vec![Self::field(name, value)])
+    }
+
     /// Adds the fields of another record, if there is one.
     pub(crate) fn with(mut self, other: impl Into<Option<Self>>) -> Self {
         self.0.extend(other.into().into_iter().flat_map(|other| other.0));
         self
+    }
+
+    /// Returns the names of all fields.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.0.iter().map(|(name, _)| *name)
+    }
+
+    /// Returns a field as JSON, or null if there is none.
+    fn value(&self, name: &str) -> Value {
+        let found = self.0.iter().find(|(other, _)| *other == name);
+        found.and_then(|(_, raw)| serde_json::from_str(raw.get()).ok()).unwrap_or_default()
+    }
+
+    /// Returns a number, and 1 for true and 0 for false.
+    pub(crate) fn number(&self, name: &str) -> Option<f64> {
+        let value = self.value(name);
+        value.as_f64().or(value.as_bool().map(|flag| f64::from(u8::from(flag))))
+    }
+
+    /// Returns a field as text: a string without quotes, 1 for true and 0 for false, nothing for null.
+    pub(crate) fn text(&self, name: &str) -> String {
+        match self.value(name) {
+            Value::Null => String::new(),
+            Value::Bool(flag) => u8::from(flag).to_string(),
+            Value::String(text) => text,
+            value => value.to_string(),
+        }
+    }
+}
+
+impl Display for Record {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&serde_json::to_string(self).map_err(|_| fmt::Error)?)
     }
 }
 

@@ -69,13 +69,13 @@ enum Command {
     Verify(check::VerifyArguments),
     /// Ask whether two meshes touch, where, how far apart they are, and whether one is inside the other
     Query(query::QueryArguments),
-    /// Ask whether the way between two poses is free at every moment, and where it ends
+    /// Ask whether a motion between two poses is free at every moment, and when it first touches
     Motion(motion::MotionArguments),
-    /// Ask how far a mesh is from points, which of them are inside, and what rays and segments hit
+    /// Ask how far points are from a mesh, which of them are inside it, and what rays and segments hit
     Probe(probe::ProbeArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(scene::SceneArguments),
-    /// Measure speed against error on some meshes: of each layout, or of samples and certified answers about motions
+    /// Measure speed against error on your own meshes: for each layout, or for ways to ask about motions
     Report(report::ReportArguments),
 }
 

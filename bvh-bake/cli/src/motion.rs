@@ -1,4 +1,4 @@
-//! `cbvh motion`: asks whether the way between two poses is free, and where it ends.
+//! `cbvh motion`: asks whether motions between two poses are free, and when they first touch.
 
 use crate::asking::files::{self, read_all, read_motions, write_file};
 use crate::asking::mesh;
@@ -8,7 +8,6 @@ use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
 use bvh_query::{Motion, MotionAnswer, MotionOptions, Querier, RigidPath as _, Shape};
 use clap::Args;
-use serde_json::{Value, json};
 use std::path::PathBuf;
 
 const HELP: &str = "\
@@ -21,8 +20,9 @@ Each line of a file of motions has 24 numbers: the pose of B in the frame of A a
 a 3 by 4 matrix. The origin of B's frame moves on a line, and B turns about one axis the shorter way, both at a constant \
 rate, from time 0 to time 1. # starts a comment.
 
-An answer is certain at every moment: free, a hit with the time until which the way is surely free and a time at which the \
-meshes touch (or are at most --clearance apart), or near, if B comes so near that neither can be told within --tolerance.
+Answers hold for every moment of the motion. free: the meshes do not touch. hit: the motion is certified free until the \
+first time, and at the second time the meshes touch, or are at most --clearance apart. near: the motion is certified free \
+until the first time, and at the second time B is so close that neither free nor hit can be certified within --tolerance.
 
 One answer is printed per line, in the order of the motions: free, hit FREE_UNTIL TOUCHING_AT, or near FREE_UNTIL AT, the \
 times with 17 digits. --json prints one object per motion: motion, its number in the file, from 0; motions, the name of the \
@@ -44,7 +44,7 @@ pub(crate) struct MotionArguments {
     /// Meshes that come as near as this count as a hit, in mesh units
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true)]
     clearance: f64,
-    /// How near B may come to a hit without a certain answer, in mesh units [default: 1e-6 of the larger diagonal]
+    /// How close B may come to a hit before the answer may be near, in mesh units [default: 1e-6 of the larger diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     tolerance: Option<f64>,
     #[command(flatten)]
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
         return Err(Failure::Usage("--witness requires --motion (see --help)".into()));
     }
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
-    let what = (backend, "motion", "motion".to_owned(), true);
+    let what = (backend, ["motion", "motions"], "motion".to_owned(), true);
     let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
     let ask = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], motion: &Motion| {
         querier.motion(a, b, motion, &options)
@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
             write_file(path, &mesh::obj(session.meshes(), &motion.pose(at), distance)?)?;
         }
     } else if arguments.witness.is_some() {
-        text.push_str("no witness, because the way is free\n");
+        text.push_str("no witness, because the motion is free\n");
     }
     session.tell_one(&answer, &text)
 }
@@ -124,19 +124,18 @@ impl Answer for MotionAnswer {
         }
     }
 
-    fn json(&self) -> Value {
-        let (answer, free_until, when, at, distance) = match self {
-            Self::Free => return json!({ "answer": "free" }),
+    fn json(&self) -> Record {
+        match self {
+            Self::Free => record! { answer: "free" },
             Self::Hit { free_until, touching_at, nearest } => {
-                ("hit", free_until, "touching_at", touching_at, nearest)
+                record! { answer: "hit", free_until: free_until, touching_at: touching_at }
+                    .with(asking::distance_json(nearest))
             }
-            Self::Near { free_until, at, nearest } => ("near", free_until, "at", at, nearest),
-        };
-        let mut record = asking::distance_json(distance);
-        record["answer"] = json!(answer);
-        record["free_until"] = json!(free_until);
-        record[when] = json!(at);
-        record
+            Self::Near { free_until, at, nearest } => {
+                record! { answer: "near", free_until: free_until, at: at }
+                    .with(asking::distance_json(nearest))
+            }
+        }
     }
 
     /// Hashes a byte for the kind, and the bits of both times.

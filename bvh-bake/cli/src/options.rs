@@ -19,31 +19,18 @@ pub(crate) struct LayoutArguments {
 impl LayoutArguments {
     /// Returns the default options with this layout.
     pub(crate) fn to_options(&self) -> Options {
-        Options::default().profile(self.profile.named()).triangles(self.triangles.named())
+        Options::default().profile(self.profile.0).triangles(self.triangles.0)
     }
 
     /// Returns whether vertices may move, so that `--max-error` has a meaning.
     pub(crate) fn is_quantized(&self) -> bool {
-        self.triangles.named() == Some(TriangleEncoding::Quantized)
+        self.triangles.0 == Some(TriangleEncoding::Quantized)
     }
 }
 
-/// A choice by name, or the baker's.
+/// A choice by name; `None` leaves it to the baker.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Choice<T> {
-    Auto,
-    Named(T),
-}
-
-impl<T: Copy> Choice<T> {
-    /// Returns the choice as the baker's options have it: `None` leaves it to the baker.
-    pub(crate) fn named(self) -> Option<T> {
-        match self {
-            Self::Auto => None,
-            Self::Named(choice) => Some(choice),
-        }
-    }
-}
+pub(crate) struct Choice<T>(pub(crate) Option<T>);
 
 /// Parses the name of a profile.
 pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
@@ -58,11 +45,11 @@ pub(crate) fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> 
 /// Finds the choice of this name.
 fn choice<T: Copy>(name: &str, all: &[T], name_of: fn(T) -> &'static str) -> Result<Choice<T>, String> {
     if name == "auto" {
-        return Ok(Choice::Auto);
+        return Ok(Choice(None));
     }
     let names = || all.iter().map(|&one| name_of(one)).collect::<Vec<_>>().join(", ");
     let found = all.iter().find(|&&one| name_of(one) == name);
-    found.map(|&one| Choice::Named(one)).ok_or_else(|| format!("expected auto, {}", names()))
+    found.map(|&one| Choice(Some(one))).ok_or_else(|| format!("expected auto, {}", names()))
 }
 
 /// The most threads that `--jobs` may ask for.

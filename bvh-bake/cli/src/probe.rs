@@ -3,12 +3,11 @@
 use crate::asking::files::{self, numbers, read_all, read_lines};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
-use crate::console::Failure;
+use crate::console::{Failure, Record, record};
 use bvh_format::checksum::Hasher;
 use bvh_format::object::MAX_COORDINATE;
 use bvh_query::{ClosestPoint, Querier, QueryError, Ray, RayHit, Shape, Side};
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -70,10 +69,10 @@ enum Mode {
 /// Answers the question about files of points, rays or segments, or about one.
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<(), Failure> {
     let (mode, options) = (arguments.mode, &arguments.asking);
-    let what = (asking::backend(&options.run.isa)?, "probe", asking::mode_name(&mode), true);
+    let what = (asking::backend(&options.run.isa)?, ["probe", "probes"], asking::mode_name(&mode), true);
     let session = || Session::load(options, what, &arguments.a, None);
     if let Some(probe) = &arguments.probe {
-        let question = parse_one(probe, mode)?;
+        let question = files::parse_option("--probe", probe, expected(mode), |text| parse(text, mode))?;
         let session = session()?;
         let answer = session.ask(|querier| question.ask(querier, session.shapes()[0]))?;
         return session.tell_one(&answer, &answer.describe(session.meshes()[0]));
@@ -88,28 +87,24 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<(), Failure> {
 const DIRECTIONS: RangeInclusive<f64> =
     f64::from_bits((1023 - 500) << 52)..=f64::from_bits((1023 + 500) << 52);
 
-/// A question in the frame of the mesh.
+/// A question in the frame of the mesh: a point, a ray by its origin and direction, or a segment by both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Question {
-    /// Where is the mesh closest to a point?
-    Closest([f64; 3]),
-    /// Which side of the mesh is a point on?
-    Side([f64; 3]),
-    /// What does a ray hit first?
-    Ray(Ray),
-    /// Does the segment between two points meet the mesh?
-    Segment([[f64; 3]; 2]),
+struct Question {
+    mode: Mode,
+    first: [f64; 3],
+    second: [f64; 3],
 }
 
 impl Question {
     /// Asks the question.
     #[inline]
     fn ask(&self, querier: &mut Querier, shape: Shape<'_>) -> Result<Answer, QueryError> {
-        Ok(match self {
-            Self::Closest(point) => Answer::Closest(querier.closest_point(shape, *point, f64::INFINITY)?),
-            Self::Side(point) => Answer::Side(querier.side(shape, *point)?),
-            Self::Ray(ray) => Answer::Hit(querier.first_hit(shape, ray)?),
-            Self::Segment([from, to]) => Answer::Meets(querier.segment_hit(shape, *from, *to)?),
+        let Self { mode, first, second } = *self;
+        Ok(match mode {
+            Mode::Closest => Answer::Closest(querier.closest_point(shape, first, f64::INFINITY)?),
+            Mode::Side => Answer::Side(querier.side(shape, first)?),
+            Mode::Ray => Answer::Hit(querier.first_hit(shape, &Ray::new(first, second))?),
+            Mode::Segment => Answer::Meets(querier.segment_hit(shape, first, second)?),
         })
     }
 }
@@ -117,25 +112,20 @@ impl Question {
 /// Reads a file of questions. `#` starts a comment, and blank lines are skipped.
 fn read(path: &Path, mode: Mode) -> Result<Vec<Question>, Failure> {
     let none = format!("{}, in at least one line, found none", expected(mode));
-    read_lines(path, &none, |text| parse(text, mode))
-}
-
-/// Parses the question of `--probe`. Commas may separate the numbers.
-fn parse_one(text: &str, mode: Mode) -> Result<Question, Failure> {
-    files::parse_option("--probe", text, expected(mode), |text| parse(text, mode))
+    read_lines(path, &none, |text| parse(text, mode)).map(files::unnumbered)
 }
 
 /// Parses a question. Returns `None` if the text is blank.
 fn parse(text: &str, mode: Mode) -> Result<Option<Question>, String> {
-    let question = match (mode, &numbers(text)?[..]) {
-        (_, []) => return Ok(None),
-        (Mode::Closest, &[x, y, z]) => Question::Closest(point([x, y, z])?),
-        (Mode::Side, &[x, y, z]) => Question::Side(point([x, y, z])?),
-        (Mode::Ray, &[x, y, z, u, v, w]) => Question::Ray(Ray::new(point([x, y, z])?, direction([u, v, w])?)),
-        (Mode::Segment, &[x, y, z, u, v, w]) => Question::Segment([point([x, y, z])?, point([u, v, w])?]),
-        (_, other) => return Err(wrong_count(mode, other.len())),
+    let is_point = matches!(mode, Mode::Closest | Mode::Side);
+    let (first, second) = match numbers(text)?[..] {
+        [] => return Ok(None),
+        [x, y, z] if is_point => (point([x, y, z])?, [0.0; 3]),
+        [x, y, z, u, v, w] if mode == Mode::Ray => (point([x, y, z])?, direction([u, v, w])?),
+        [x, y, z, u, v, w] if !is_point => (point([x, y, z])?, point([u, v, w])?),
+        ref other => return Err(wrong_count(mode, other.len())),
     };
-    Ok(Some(question))
+    Ok(Some(Question { mode, first, second }))
 }
 
 /// Returns the form of a question, as messages state it.
@@ -213,21 +203,17 @@ impl asking::Answer for Answer {
         }
     }
 
-    fn json(&self) -> Value {
-        match self {
-            Self::Closest(None) => json!({ "distance": null }),
-            Self::Closest(Some(of)) => json!({
-                "distance": of.distance, "lower": of.lower, "upper": of.upper, "point": of.point, "object": of.object,
-                "triangle": of.triangle,
-            }),
-            Self::Side(side) => json!({ "side": *side as i8 }),
-            Self::Hit(None) => json!({ "hit": false }),
-            Self::Hit(Some(of)) => json!({
-                "hit": true, "t": of.t, "lower": of.lower, "upper": of.upper, "point": of.point, "object": of.object,
-                "triangle": of.triangle,
-            }),
-            Self::Meets(meets) => json!({ "meets": meets }),
-        }
+    fn json(&self) -> Record {
+        let record = match self {
+            Self::Closest(of) => record! { distance: of.map(|of| of.distance) },
+            Self::Side(side) => record! { side: *side as i8 },
+            Self::Hit(None) => record! { hit: false },
+            Self::Hit(Some(of)) => record! { hit: true, t: of.t },
+            Self::Meets(meets) => record! { meets: meets },
+        };
+        record.with(self.found().map(|(lower, upper, point, object, triangle)| {
+            record! { lower: lower, upper: upper, point: point, object: object, triangle: triangle }
+        }))
     }
 
     /// Hashes the bits of the value.
@@ -258,19 +244,22 @@ impl Answer {
         words.to_owned()
     }
 
+    /// Returns the bounds, the point, the object and the triangle of a closest point or a hit.
+    fn found(&self) -> Option<(f64, f64, [f64; 3], u32, u32)> {
+        match self {
+            Self::Closest(of) => of.map(|of| (of.lower, of.upper, of.point, of.object, of.triangle)),
+            Self::Hit(of) => of.map(|of| (of.lower, of.upper, of.point, of.object, of.triangle)),
+            _ => None,
+        }
+    }
+
     /// Returns the answer in words, with its bounds, its point and its triangle.
     fn describe(&self, mesh: &LoadedMesh) -> String {
-        let (lower, upper, point, object, triangle) = match self {
-            Self::Closest(Some(of)) => (of.lower, of.upper, of.point, of.object, of.triangle),
-            Self::Hit(Some(of)) => (of.lower, of.upper, of.point, of.object, of.triangle),
-            _ => return format!("{}\n", self.in_words()),
-        };
-        format!(
-            "{}\n  certainly {lower:?} to {upper:?}\n  at {}, {}\n",
-            self.in_words(),
-            mesh::point(point),
-            mesh::name(mesh, object, triangle)
-        )
+        let found = self.found().map(|(lower, upper, point, object, triangle)| {
+            let (point, triangle) = (mesh::point(point), mesh::name(mesh, object, triangle));
+            format!("  certainly {lower:?} to {upper:?}\n  at {point}, {triangle}\n")
+        });
+        format!("{}\n{}", self.in_words(), found.unwrap_or_default())
     }
 }
 

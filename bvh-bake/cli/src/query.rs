@@ -3,12 +3,11 @@
 use crate::asking::files::{self, read_all, read_poses, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
-use crate::console::{Failure, plural};
+use crate::console::{Failure, Record, plural, record};
 use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation, Shape};
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -23,12 +22,12 @@ Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that plac
 numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
 
 One answer is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
-triangles, distance the distance in mesh units (17 digits), relation a number. About one pose, the answer is printed for a \
-person.
+triangles, distance the distance in mesh units (17 digits), relation a number. The answer about a single pose is printed as \
+text for a person.
 
-collide is about surfaces: a mesh that is inside another without touching it does not collide. relation tells: 0 touching, \
+collide is about surfaces: a mesh that is inside another without touching it does not collide. relation is 0 touching, \
 1 apart, 2 A inside B, 3 B inside A, 4 mixed (some parts of a mesh are inside the other and some are not, or some of each \
-mesh are), 5 undefined, because a mesh that is not closed would have to contain something.
+mesh are), or 5 undefined, because a mesh that might contain the other is not closed.
 
 --json prints one object per pose: pose, its number in the file, from 0; poses, the name of the file, if there are several; \
 and collide, within (true or false), relation, contacts and pairs (the triangles), or distance, lower, upper, point_a, \
@@ -36,8 +35,8 @@ point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies betw
 frame of A.
 
 --bench prints one object per file: what was asked, the times of the queries, positives (all answers of relation but 1 and 5) \
-and answers_xxh3, which is the same for every --isa and --jobs. It is null if --budget cut the run short, or if --rel-err or \
---abs-err leave a choice of answers. --out writes the lines, each with its nanoseconds; %s stands for the name of the file.";
+and answers_xxh3, a hash of the answers, which is the same for every --isa and --jobs. It is null if --budget cut the run \
+short, or if --rel-err or --abs-err allow several answers. --out writes the lines, each with its nanoseconds; %s stands for the name of the file.";
 
 /// What `query` accepts.
 #[derive(Debug, Args)]
@@ -47,7 +46,7 @@ pub(crate) struct QueryArguments {
     a: PathBuf,
     /// The second mesh, which the poses place
     b: PathBuf,
-    /// Pose files, separated by commas. Without them, B is where its file says
+    /// Pose files, separated by commas. Without them, both meshes are in one frame
     #[arg(value_name = "POSES[,POSES...]", conflicts_with = "one")]
     poses: Option<String>,
     /// The question
@@ -91,7 +90,7 @@ enum Mode {
 pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.asking.run.isa)?;
     let question = Question::new(arguments)?;
-    let what = (backend, "pose", asking::mode_name(&question.mode), question.is_exact());
+    let what = (backend, ["pose", "poses"], asking::mode_name(&question.mode), question.is_exact());
     let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
     if let Some(files) = &arguments.poses {
         let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;
@@ -231,21 +230,21 @@ impl asking::Answer for Answer {
         }
     }
 
-    fn json(&self) -> Value {
+    fn json(&self) -> Record {
         match self {
-            Self::Collide(flag) => json!({ "collide": flag }),
-            Self::Within(flag) => json!({ "within": flag }),
+            Self::Collide(flag) => record! { collide: flag },
+            Self::Within(flag) => record! { within: flag },
             Self::Contacts(count, contacts) => {
-                let pair = |of: &Contact| {
-                    json!({
-                        "object_a": of.object_a, "triangle_a": of.triangle_a, "object_b": of.object_b,
-                        "triangle_b": of.triangle_b,
-                    })
-                };
-                json!({ "contacts": count, "pairs": contacts.iter().map(pair).collect::<Vec<_>>() })
+                let pairs = contacts.iter().map(|of| {
+                    record! {
+                        object_a: of.object_a, triangle_a: of.triangle_a, object_b: of.object_b,
+                        triangle_b: of.triangle_b,
+                    }
+                });
+                record! { contacts: count, pairs: pairs.collect::<Vec<_>>() }
             }
             Self::Distance(distance) => asking::distance_json(distance),
-            Self::Relation(relation) => json!({ "relation": *relation as u8 }),
+            Self::Relation(relation) => record! { relation: *relation as u8 },
         }
     }
 

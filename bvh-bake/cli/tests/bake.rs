@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::{Files as _, place};
 use common::{cbvh_in, cube, names, torus};
 use std::fs;
 
@@ -10,9 +11,8 @@ const PROFILES: [&str; 7] =
 
 #[test]
 fn every_profile_and_encoding_verifies() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(40, 20)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(40, 20));
     for profile in PROFILES {
         for triangles in ["auto", "f32", "packed", "quantized"] {
             let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--profile", profile, "--triangles", triangles];
@@ -32,9 +32,8 @@ fn every_profile_and_encoding_verifies() {
 
 #[test]
 fn every_effort_verifies_and_is_noted() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(40, 20)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(40, 20));
     for effort in ["fast", "default"] {
         let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q", "--effort", effort];
         assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], false);
@@ -48,10 +47,9 @@ fn every_effort_verifies_and_is_noted() {
 
 #[test]
 fn the_report_has_the_fields_of_the_contract() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let twice = cube() + "f 1 3 4 2\n";
-    fs::write(directory.join("cube.obj"), twice).unwrap();
+    directory.write("cube.obj", twice);
     let baked = cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json", "-q"]).done().json();
     let size = fs::metadata(directory.join("c.cbvh")).unwrap().len();
     assert_eq!(baked["input"], "cube.obj");
@@ -91,8 +89,7 @@ fn the_report_has_the_fields_of_the_contract() {
 
 #[test]
 fn a_bake_is_skipped_only_if_nothing_changed() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let input = directory.join("t.obj");
     fs::write(&input, torus(12, 9)).unwrap();
     let skipped = |more: &[&str]| {
@@ -111,7 +108,6 @@ fn a_bake_is_skipped_only_if_nothing_changed() {
         &["--triangles", "quantized"],
         &["--triangles", "quantized", "--max-error", "0.001"],
         &["--split-objects"],
-        &["--no-turning-slabs"],
         &["--no-topology"],
         &[],
     ] {
@@ -123,19 +119,18 @@ fn a_bake_is_skipped_only_if_nothing_changed() {
     assert!(skipped(&[]));
     let mut damaged = fs::read(directory.join("t.cbvh")).unwrap();
     damaged[9000] ^= 1;
-    fs::write(directory.join("t.cbvh"), &damaged).unwrap();
+    directory.write("t.cbvh", &damaged);
     assert!(!skipped(&[]));
-    fs::write(directory.join("t.cbvh"), "not a bake").unwrap();
+    directory.write("t.cbvh", "not a bake");
     assert!(!skipped(&[]));
     assert_eq!(names(directory), ["t.cbvh", "t.obj"]);
 }
 
 #[test]
 fn content_depends_on_neither_threads_nor_names() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("a.obj"), torus(90, 60)).unwrap();
-    fs::write(directory.join("b.obj"), torus(90, 60)).unwrap();
+    let directory = &place();
+    directory.write("a.obj", torus(90, 60));
+    directory.write("b.obj", torus(90, 60));
     let content = |input: &str, jobs: &str| {
         let bake = ["bake", input, "-o", "o.cbvh", "--force", "--json", "-q", "--jobs", jobs];
         cbvh_in(directory, &bake).done().json()["content_xxh3"].clone()
@@ -148,10 +143,9 @@ fn content_depends_on_neither_threads_nor_names() {
 
 #[test]
 fn several_inputs_are_baked_as_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("torus.obj"), torus(10, 8)).unwrap();
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.write("torus.obj", torus(10, 8));
     let bake = ["bake", "cube.obj", "torus.obj", "-o", "both.cbvh", "--json", "-q"];
     let one = cbvh_in(directory, &bake).done().json();
     assert_eq!((&one["objects"], &one["triangles"]), (&1.into(), &172.into()));
@@ -171,12 +165,11 @@ fn several_inputs_are_baked_as_one() {
 
 #[test]
 fn objects_without_names_are_named_after_their_files() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let unnamed = |text: String| text.lines().skip(1).map(|line| format!("{line}\n")).collect::<String>();
-    fs::write(directory.join("left.obj"), unnamed(cube())).unwrap();
-    fs::write(directory.join("right.v2.obj"), unnamed(torus(10, 8))).unwrap();
-    fs::write(directory.join("named.obj"), cube()).unwrap();
+    directory.write("left.obj", unnamed(cube()));
+    directory.write("right.v2.obj", unnamed(torus(10, 8)));
+    directory.write("named.obj", cube());
     let bake = |more: &[&str]| {
         let bake = ["bake", "left.obj", "named.obj", "right.v2.obj", "-o", "all.cbvh", "--json", "-q"];
         let skipped = cbvh_in(directory, &[&bake[..], more].concat()).done().json()["skipped"] == true;
@@ -202,9 +195,8 @@ fn objects_without_names_are_named_after_their_files() {
 
 #[test]
 fn a_max_error_that_collapses_the_mesh_is_refused_and_a_coarse_one_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("t.obj"), torus(90, 60)).unwrap();
+    let directory = &place();
+    directory.write("t.obj", torus(90, 60));
     for budget in [&[][..], &["--max-memory", "100MiB"]] {
         let bake = |max_error: &str, more: &[&str]| {
             let bake =
@@ -229,9 +221,8 @@ fn a_max_error_that_collapses_the_mesh_is_refused_and_a_coarse_one_is_told() {
 
 #[test]
 fn a_dump_adds_up() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(60, 30)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(60, 30));
     let baked = cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q"]).done().json();
     let dump = cbvh_in(directory, &["dump", "t.cbvh", "--json"]).done().json();
     assert_eq!(dump["content_xxh3"], baked["content_xxh3"]);
@@ -245,7 +236,8 @@ fn a_dump_adds_up() {
     let close = |a: &serde_json::Value, b: &serde_json::Value| {
         (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9
     };
-    assert!(close(&object["width_inflation"], &baked["width_inflation"]), "{object}");
+    let verified = cbvh_in(directory, &["verify", "t.cbvh", "torus.obj", "--json"]).done().json();
+    assert!(close(&verified["width_inflation"], &baked["width_inflation"]), "{verified}");
     assert!(close(&object["mean_children"], &baked["mean_children"]));
     let split = &dump["bytes_per_tri"];
     let parts: f64 =
@@ -261,9 +253,8 @@ fn a_dump_adds_up() {
 
 #[test]
 fn damage_is_told_by_rule() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(60, 30)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(60, 30));
     cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh"]).done();
     let whole = fs::read(directory.join("t.cbvh")).unwrap();
     let file = directory.join("bad.cbvh");
@@ -286,7 +277,7 @@ fn damage_is_told_by_rule() {
         cbvh_in(directory, &["validate", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
         cbvh_in(directory, &["dump", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
     }
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    directory.write("cube.obj", cube());
     let told = cbvh_in(directory, &["verify", "t.cbvh", "cube.obj", "--json"]);
     let json = told.failed(3, &["t.cbvh: triangles of the input: expected 12, found 3600"]).json();
     assert_eq!((&json["expected"], &json["found"]), (&"12".into(), &"3600".into()));
@@ -294,10 +285,9 @@ fn damage_is_told_by_rule() {
 
 #[test]
 fn a_summary_has_the_size_and_a_folder_is_no_output() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("a.obj"), cube()).unwrap();
-    fs::write(directory.join("b.obj"), common::cube_at(3, 10)).unwrap();
+    let directory = &place();
+    directory.write("a.obj", cube());
+    directory.write("b.obj", common::cube_at(3, 10));
     fs::create_dir(directory.join("out")).unwrap();
     for inputs in [&["a.obj"][..], &["a.obj", "b.obj"]] {
         cbvh_in(directory, &[&["bake", "-o", "out"], inputs].concat())

@@ -5,6 +5,7 @@ mod common;
 
 use common::sheet::write_sheet;
 use common::{Ended, cbvh_in, cbvh_within, gltf, names};
+use common::{Files as _, place};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -17,8 +18,7 @@ fn bake(directory: &Path, input: &str, more: &[&str]) -> Value {
 
 #[test]
 fn budgets_jobs_and_formats_do_not_show() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     // The mesh has three bricks.
     let side = 500;
     let mut all = Vec::new();
@@ -39,8 +39,7 @@ fn budgets_jobs_and_formats_do_not_show() {
 
 #[test]
 fn memory_stays_within_the_budget() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("sheet.stl"), 1000);
     let (mut contents, mut jobs) = (Vec::new(), ["1", "2"].into_iter().cycle());
     for mebibytes in [128, 200, 512] {
@@ -60,8 +59,7 @@ fn memory_stays_within_the_budget() {
 /// A sheet and its back: all triangles have duplicates, and only with them is the surface closed.
 #[test]
 fn memory_stays_within_the_budget_where_all_triangles_have_duplicates() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("sheet.stl"), 600);
     let front = fs::read(directory.join("sheet.stl")).unwrap();
     let triangles = front[84..].as_chunks::<50>().0;
@@ -70,7 +68,7 @@ fn memory_stays_within_the_budget_where_all_triangles_have_duplicates() {
     for triangle in triangles {
         both.extend([&triangle[..12], &triangle[24..36], &triangle[12..24], &triangle[36..]].concat());
     }
-    fs::write(directory.join("both.stl"), both).unwrap();
+    directory.write("both.stl", both);
     let free = bake(directory, "both.stl", &[]);
     assert_eq!((&free["closed"], &free["triangles"]), (&1.into(), &triangles.len().into()));
     for jobs in ["1", "2"] {
@@ -87,8 +85,7 @@ fn memory_stays_within_the_budget_where_all_triangles_have_duplicates() {
 
 #[test]
 fn memory_of_checks_stays_within_the_budget() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("sheet.stl"), 1000);
     bake(directory, "sheet.stl", &[]);
     let length = fs::metadata(directory.join("out.cbvh")).unwrap().len();
@@ -122,7 +119,7 @@ fn memory_of_checks_stays_within_the_budget() {
     let mut bytes = fs::read(directory.join("out.cbvh")).unwrap();
     let at = bytes.len() / 20 * 19;
     bytes[at] ^= 1;
-    fs::write(directory.join("out.cbvh"), bytes).unwrap();
+    directory.write("out.cbvh", bytes);
     let budget = format!("{least}MiB");
     let damaged = |more: &[&str]| {
         cbvh_in(directory, &[&["validate", "out.cbvh"], more].concat()).failed(3, &["out.cbvh: byte"]).err
@@ -161,8 +158,7 @@ fn bakes_at_its_limit(directory: &Path, arguments: &[&str]) -> u64 {
 
 #[test]
 fn each_format_bakes_at_its_limit() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     // The mesh has two bricks.
     let side = 400;
     for name in ["sheet.obj", "sheet.stl", "sheet.ply"] {
@@ -183,21 +179,21 @@ fn each_format_bakes_at_its_limit() {
         text += "endloop\nendfacet\n";
         faces += &format!("3 {} {} {}\n", 3 * number, 3 * number + 1, 3 * number + 2);
     }
-    fs::write(directory.join("text.stl"), text + "endsolid\n").unwrap();
+    directory.write("text.stl", text + "endsolid\n");
     let count = positions.len() / 12;
     let head = format!(
         "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         count / 3
     );
-    fs::write(directory.join("text.ply"), head + &ply + &faces).unwrap();
+    directory.write("text.ply", head + &ply + &faces);
     let indices: Vec<u8> = (0..count as u32).flat_map(u32::to_le_bytes).collect();
-    fs::write(directory.join("p.bin"), &positions).unwrap();
-    fs::write(directory.join("i.bin"), &indices).unwrap();
-    fs::write(directory.join("beside.gltf"), gltf(count, count, "p.bin", "i.bin")).unwrap();
+    directory.write("p.bin", &positions);
+    directory.write("i.bin", &indices);
+    directory.write("beside.gltf", gltf(count, count, "p.bin", "i.bin"));
     let uri = |bytes: &[u8]| format!("data:;base64,{}", base64(bytes));
     let inside = gltf(count, count, &uri(&positions), &uri(&indices));
-    fs::write(directory.join("inside.gltf"), inside).unwrap();
+    directory.write("inside.gltf", inside);
     let mut limits = Vec::new();
     for input in ["sheet.obj", "sheet.stl", "sheet.ply", "text.stl", "text.ply", "beside.gltf", "inside.gltf"]
     {
@@ -214,13 +210,12 @@ fn each_format_bakes_at_its_limit() {
 /// Files much larger than the budget, most of whose bytes are vertices that no triangle uses.
 #[test]
 fn large_buffers_of_small_meshes_take_little_memory() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let count = 18 << 20;
     let file = fs::File::create(directory.join("p.bin")).unwrap();
     file.set_len(12 * count as u64).unwrap();
-    fs::write(directory.join("i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
-    fs::write(directory.join("a.gltf"), gltf(count, 3, "p.bin", "i.bin")).unwrap();
+    directory.write("i.bin", [0u32, 1, 2].map(u32::to_le_bytes).concat());
+    directory.write("a.gltf", gltf(count, 3, "p.bin", "i.bin"));
     assert!(bakes_at_its_limit(directory, &["a.gltf", "-o", "out.cbvh", "-q"]) <= 128);
     // The same as one binary file.
     let json = gltf(count, 3, "", "i.bin").replace(r#","uri":"""#, "");
@@ -230,7 +225,7 @@ fn large_buffers_of_small_meshes_take_little_memory() {
     head.extend((28 + json.len() as u32 + length).to_le_bytes());
     head.extend([&(json.len() as u32).to_le_bytes(), b"JSON".as_slice(), json.as_bytes()].concat());
     head.extend([&length.to_le_bytes(), b"BIN\0".as_slice()].concat());
-    fs::write(directory.join("a.glb"), &head).unwrap();
+    directory.write("a.glb", &head);
     let file = fs::File::options().write(true).open(directory.join("a.glb")).unwrap();
     file.set_len(head.len() as u64 + u64::from(length)).unwrap();
     assert!(bakes_at_its_limit(directory, &["a.glb", "-o", "out.cbvh", "-q"]) <= 128);
@@ -248,29 +243,28 @@ fn large_buffers_of_small_meshes_take_little_memory() {
         accessors.join(","),
         views.join(",")
     );
-    fs::write(directory.join("many.gltf"), many).unwrap();
+    directory.write("many.gltf", many);
     assert!(bakes_at_its_limit(directory, &["many.gltf", "-o", "out.cbvh", "-q"]) <= 16);
 }
 
 /// What a file makes the bake keep in memory counts: JSON, names, objects.
 #[test]
 fn what_is_kept_counts() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let nodes = vec!["{}"; 300_000].join(",");
     let document =
         gltf(3, 3, "p.bin", "i.bin").replacen("[{\"mesh\":0}", &format!("[{{\"mesh\":0}},{nodes}"), 1);
-    fs::write(directory.join("nodes.gltf"), document).unwrap();
+    directory.write("nodes.gltf", document);
     fs::write(
         directory.join("p.bin"),
         [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat(),
     )
     .unwrap();
-    fs::write(directory.join("i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
+    directory.write("i.bin", [0u32, 1, 2].map(u32::to_le_bytes).concat());
     let objects: String = (0..60_000).map(|i| format!("o {i}\nf 1 2 3\n")).collect();
-    fs::write(directory.join("objects.obj"), format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{objects}")).unwrap();
+    directory.write("objects.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{objects}"));
     let solids = "solid\nfacet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\nendsolid\n";
-    fs::write(directory.join("solids.stl"), solids.repeat(60_000)).unwrap();
+    directory.write("solids.stl", solids.repeat(60_000));
     for input in ["nodes.gltf", "objects.obj", "solids.stl"] {
         bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"]);
     }

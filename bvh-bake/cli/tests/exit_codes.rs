@@ -2,15 +2,16 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{cbvh_in, cbvh_with_isa, cube, names};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-fn with_cube() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), cube()).unwrap();
-    folder
+fn with_cube() -> Place {
+    let place = place();
+    fs::write(place.join("cube.obj"), cube()).unwrap();
+    place
 }
 
 #[test]
@@ -26,11 +27,10 @@ fn help_and_version_are_no_errors() {
 
 #[test]
 fn wrong_usage_is_1() {
-    let folder = with_cube();
-    let directory = folder.path();
+    let directory = &with_cube();
     let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
     let motion = &format!("{pose} {pose}");
-    fs::write(directory.join("p.txt"), format!("{pose}\n")).unwrap();
+    directory.write("p.txt", format!("{pose}\n"));
     let cases: &[&[&str]] = &[
         &[],
         &["frobnicate"],
@@ -93,13 +93,12 @@ fn wrong_usage_is_1() {
     }
     cbvh_with_isa(directory, "mmx", &["query", "cube.obj", "cube.obj", "p.txt"]).failed(1, &["mmx"]);
     assert_eq!(names(directory), ["cube.obj", "p.txt"]);
-    assert_eq!(fs::read_to_string(directory.join("cube.obj")).unwrap(), cube());
+    assert_eq!(directory.text("cube.obj"), cube());
 }
 
 #[test]
 fn what_the_system_refuses_is_2() {
-    let folder = with_cube();
-    let directory = folder.path();
+    let directory = &with_cube();
     fs::create_dir(directory.join("folder")).unwrap();
     let io = |arguments: &[&str], name: &str| {
         cbvh_in(directory, arguments).failed(2, &[name]);
@@ -124,7 +123,7 @@ fn what_the_system_refuses_is_2() {
     io(&["verify", "cube.cbvh", "folder"], "folder: expected a readable file, found a folder");
     io(&["verify", "cube.cbvh", "cube.obj", "--scratch", "missing"], "missing");
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "p.txt");
-    fs::write(directory.join("p.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    directory.write("p.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
     io(&["query", "cube.cbvh", "missing.cbvh", "p.txt"], "missing.cbvh");
     io(&["query", "cube.cbvh", "missing.obj", "p.txt"], "missing.obj");
     io(&["query", "cube.cbvh", "cube.cbvh", "p.txt", "--out", "missing/raw.txt"], "missing/raw.txt");
@@ -136,16 +135,14 @@ fn what_the_system_refuses_is_2() {
 #[test]
 fn devices_are_no_outputs() {
     let folder = with_cube();
-    cbvh_in(folder.path(), &["bake", "cube.obj", "-o", "/dev/null"])
-        .failed(2, &["/dev/null", "special file"]);
+    cbvh_in(&folder, &["bake", "cube.obj", "-o", "/dev/null"]).failed(2, &["/dev/null", "special file"]);
     assert!(!Path::new("/dev/null").is_file());
 }
 
 #[test]
 fn invalid_input_is_3() {
-    let folder = with_cube();
-    let directory = folder.path();
-    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    let directory = &with_cube();
+    let write = |name: &str, text: &str| directory.write(name, text);
     write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
     write("empty.stl", "");
     write("mesh.xyz", "what is this\n");
@@ -164,6 +161,10 @@ fn invalid_input_is_3() {
         (format!("{good} 0 0 0 1\n"), 1, "found 16; a 4 by 4 matrix? write its first three rows"),
         ("0 0 0 1 5 0 0\n".to_owned(), 1, "found 7; a quaternion and a translation? write"),
         ("2 0 0 5 0 2 0 0 0 0 2 0\n".to_owned(), 1, "scaled by 2; bake the mesh at its size"),
+        ("0 -0.001 0 5 0.001 0 0 0 0 0 0.001 0\n".to_owned(), 1, "scaled by 0.001;"),
+        ("1 0 0 0 1 0 0 0 1\n".to_owned(), 1, "found 9; a rotation alone? write a 0 after each row"),
+        ("1 0 0 5 0 2 0 0 0 0 1 0\n".to_owned(), 1, "orthonormal"),
+        ("0 0 0 0 0 0 0 0 0 0 0 0\n".to_owned(), 1, "orthonormal"),
         ("1 0 0 0 0 1 0 0 0 0 1.1 0\n".to_owned(), 1, "away from orthonormal"),
         ("1 0 0 0 0 1 0 0 0 0 -1 0\n".to_owned(), 1, "reflection"),
         ("1 0 0 nan 0 1 0 0 0 0 1 0\n".to_owned(), 1, "finite"),
@@ -190,8 +191,7 @@ fn invalid_input_is_3() {
 
 #[test]
 fn limits_are_4() {
-    let folder = with_cube();
-    let directory = folder.path();
+    let directory = &with_cube();
     let bake = ["bake", "cube.obj", "-o", "o.cbvh", "--max-memory"];
     for size in ["1", "10kB", "8MiB"] {
         cbvh_in(directory, &[&bake[..], &[size]].concat()).failed(4, &["cube.obj", "memory"]);
@@ -208,11 +208,10 @@ fn limits_are_4() {
 
 #[test]
 fn an_old_output_survives_a_failure() {
-    let folder = with_cube();
-    let directory = folder.path();
+    let directory = &with_cube();
     cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).done();
     let before = fs::read(directory.join("o.cbvh")).unwrap();
-    fs::write(directory.join("cube.obj"), "v 0 0 0\nf 1 1 2\n").unwrap();
+    directory.write("cube.obj", "v 0 0 0\nf 1 1 2\n");
     cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).failed(3, &["cube.obj: line 2"]);
     assert_eq!(fs::read(directory.join("o.cbvh")).unwrap(), before);
     assert_eq!(names(directory), ["cube.obj", "o.cbvh"]);
@@ -222,9 +221,9 @@ fn an_old_output_survives_a_failure() {
 #[test]
 fn a_closed_pipe_is_no_panic() {
     let folder = with_cube();
-    cbvh_in(folder.path(), &["bake", "cube.obj", "-o", "o.cbvh"]).done();
+    cbvh_in(&folder, &["bake", "cube.obj", "-o", "o.cbvh"]).done();
     // More answers than a pipe and all buffers hold.
-    fs::write(folder.path().join("p.txt"), "0.5 0.25 9\n".repeat(100_000)).unwrap();
+    folder.write("p.txt", "0.5 0.25 9\n".repeat(100_000));
     for arguments in [
         &["dump", "o.cbvh"][..],
         &["probe", "o.cbvh", "p.txt", "--mode", "closest"],
@@ -232,7 +231,7 @@ fn a_closed_pipe_is_no_panic() {
     ] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_cbvh"))
             .args(arguments)
-            .current_dir(folder.path())
+            .current_dir(&folder)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

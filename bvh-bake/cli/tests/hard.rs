@@ -2,13 +2,13 @@
 
 mod common;
 
+use common::place;
 use common::{cbvh_in, names, shared, skip};
 
 #[test]
 fn hard_files_bake_or_are_refused() {
     let Some(hard) = shared("hard") else { return skip("no folder of hard files beside the repository") };
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let (mut baked, mut refused) = (0, 0);
     for name in names(&hard).into_iter().filter(|name| name != "HARD.csv") {
         let path = hard.join(&name);

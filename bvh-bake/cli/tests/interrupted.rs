@@ -6,6 +6,7 @@ mod common;
 
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
+use common::place;
 use common::sheet::write_sheet;
 use common::{cbvh_in, names, skip};
 use std::collections::BTreeSet;
@@ -153,8 +154,7 @@ fn a_bake_that_is_told_to_end_leaves_nothing() {
 /// needs no scratch file itself.
 #[test]
 fn scratch_files_that_kept_their_names_are_removed() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("small.stl"), 2);
     fs::create_dir(directory.join("scratch")).unwrap();
     for (place, more) in [

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::{Files as _, place};
 use common::{cbvh_in, shared, skip};
 use std::fs;
 
@@ -14,8 +15,7 @@ fn answers_are_those_of_the_labels() {
     let (Some(poses), Some(meshes)) = (shared("poses"), shared("meshes")) else {
         return skip("no folders of poses and meshes beside the repository");
     };
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     for [pair, a, b] in PAIRS {
         let size = diagonal(&fs::read_to_string(meshes.join(a)).unwrap());
         for (mesh, name) in [(a, "a.cbvh"), (b, "b.cbvh")] {
@@ -30,7 +30,7 @@ fn answers_are_those_of_the_labels() {
                 let query =
                     ["query", "a.cbvh", "b.cbvh", file.to_str().unwrap(), "--mode", mode, "--out", "raw"];
                 cbvh_in(directory, &query).done();
-                let raw = fs::read_to_string(directory.join("raw")).unwrap();
+                let raw = directory.text("raw");
                 raw.lines().map(|line| line.split_once(' ').unwrap().0.parse().unwrap()).collect()
             };
             let collide = values("collide");

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Ended, cbvh_in, cube, names};
+use common::{Files as _, place};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
@@ -25,7 +26,7 @@ fn write_assets(directory: &Path, count: usize, line: impl Fn(usize) -> Value) {
         fs::write(directory.join(format!("meshes/{number}.obj")), tetrahedron(number)).unwrap();
         manifest += &format!("{}\n", line(number));
     }
-    fs::write(directory.join("in.jsonl"), manifest).unwrap();
+    directory.write("in.jsonl", manifest);
 }
 
 fn usual(number: usize) -> Value {
@@ -50,8 +51,7 @@ fn counts(summary: &Value, assets: u64, done: u64, skipped: u64, failed: u64) {
 
 #[test]
 fn ten_broken_ones_do_not_stop_a_thousand() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 1000, usual);
     let is_broken = |number: usize| number % 100 == 7;
     for number in (0..1000).filter(|&number| is_broken(number)) {
@@ -96,7 +96,7 @@ fn ten_broken_ones_do_not_stop_a_thousand() {
     assert_eq!(names(&directory.join("baked")).len(), 990);
     assert_eq!(names(directory), ["baked", "in.jsonl", "meshes", "out.jsonl"]);
     // Only assets that changed are baked again.
-    fs::write(directory.join("meshes/5.obj"), tetrahedron(5000)).unwrap();
+    directory.write("meshes/5.obj", tetrahedron(5000));
     fs::remove_file(directory.join("baked/6.cbvh")).unwrap();
     let lines = run_counts(directory, 2, 988);
     assert_eq!((&lines[5]["skipped"], &lines[4]["skipped"]), (&json!(false), &json!(true)));
@@ -110,8 +110,7 @@ fn run_counts(directory: &Path, done: u64, skipped: u64) -> Vec<Value> {
 
 #[test]
 fn bytes_are_those_of_single_bakes() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     let options: [(Value, &[&str]); 8] = [
         (json!({"topology": false}), &["--no-ids", "--no-topology"]),
         (json!({}), &["--no-ids"]),
@@ -162,13 +161,12 @@ fn bytes_are_those_of_single_bakes() {
 
 #[test]
 fn a_folder_is_baked_as_a_tree() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     fs::create_dir_all(directory.join("in/deep/er")).unwrap();
     for name in ["in/a.obj", "in/deep/b.OBJ", "in/deep/er/c.obj"] {
-        fs::write(directory.join(name), cube()).unwrap();
+        directory.write(name, cube());
     }
-    fs::write(directory.join("in/deep/notes.txt"), "no mesh").unwrap();
+    directory.write("in/deep/notes.txt", "no mesh");
     let summary =
         cbvh_in(directory, &["bake", "in", "-o", "out", "--json", "--out-manifest", "o.jsonl"]).done();
     counts(&summary.json(), 3, 3, 0, 0);
@@ -181,9 +179,9 @@ fn a_folder_is_baked_as_a_tree() {
     assert_eq!(outputs, ["out/a.cbvh", "out/deep/b.cbvh", "out/deep/er/c.cbvh"]);
     let text = cbvh_in(directory, &["bake", "in", "-o", "out"]).done().out;
     assert!(text.starts_with("3 assets: 0 baked, 3 up to date, 0 failed\n"), "{text}");
-    fs::write(directory.join("in/a.ply"), "").unwrap();
+    directory.write("in/a.ply", "");
     cbvh_in(directory, &["bake", "in", "-o", "out"])
-        .failed(3, &["out/a.cbvh", "asset 2 (in/a", "that of asset 1 (in/a"]);
+        .failed(3, &["out/a.cbvh", "used by asset 1 (in/a", "and by asset 2 (in/a"]);
     cbvh_in(directory, &["bake", "in", "-o", "o.jsonl"]).failed(1, &["o.jsonl", "expected a folder"]);
     fs::create_dir(directory.join("empty")).unwrap();
     cbvh_in(directory, &["bake", "empty", "-o", "out"])
@@ -192,10 +190,9 @@ fn a_folder_is_baked_as_a_tree() {
 
 #[test]
 fn shards_are_parts_of_the_whole() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 20, usual);
-    fs::write(directory.join("meshes/13.obj"), "f 1 2 3\n").unwrap();
+    directory.write("meshes/13.obj", "f 1 2 3\n");
     let mut seen = BTreeSet::new();
     let (mut assets, mut bytes) = (0, 0);
     for index in 1..=3 {
@@ -218,7 +215,7 @@ fn shards_are_parts_of_the_whole() {
     counts(&whole.json(), 20, 0, 19, 1);
     assert_eq!(whole.json()["file_bytes"], bytes);
     counts(&bake(directory, "none.jsonl", &["--shard", "30/30"]).done().json(), 0, 0, 0, 0);
-    assert_eq!(fs::read_to_string(directory.join("none.jsonl")).unwrap(), "");
+    assert_eq!(directory.text("none.jsonl"), "");
     for shard in ["0/3", "4/3", "1", "a/b"] {
         bake(directory, "out.jsonl", &["--shard", shard]).failed(1, &["--shard", "I from 1 to N"]);
     }
@@ -232,8 +229,7 @@ fn shards_run_side_by_side_under_xargs() {
     let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("many-assets.md")).unwrap();
     let block = page.split("```sh\n").find(|block| block.contains("xargs")).unwrap();
     let script = block.split("```").next().unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 30, usual);
     let command = Path::new(env!("CARGO_BIN_EXE_cbvh"));
     let mut path = command.parent().unwrap().as_os_str().to_owned();
@@ -254,16 +250,15 @@ fn shards_run_side_by_side_under_xargs() {
     let numbers: BTreeSet<_> = lines.iter().map(|line| line["line"].as_u64().unwrap()).collect();
     assert_eq!((lines.len(), numbers.len()), (30, 30));
     assert_eq!(names(&directory.join("baked")).len(), 30);
-    let summaries = fs::read_to_string(directory.join("summaries.jsonl")).unwrap();
+    let summaries = directory.text("summaries.jsonl");
     assert_eq!(summaries.lines().count(), 4);
-    fs::write(directory.join("meshes/3.obj"), "").unwrap();
+    directory.write("meshes/3.obj", "");
     run(false);
 }
 
 #[test]
 fn two_assets_with_one_output_are_refused_before_the_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     fs::create_dir(directory.join("there")).unwrap();
     for (a, b) in
         [("o.cbvh", "o.cbvh"), ("new/o.cbvh", "./new/x/../o.cbvh"), ("there/o.cbvh", "there/../there/o.cbvh")]
@@ -281,10 +276,10 @@ fn two_assets_with_one_output_are_refused_before_the_work() {
         write_assets(directory, 5, line);
         // The whole manifest is checked, whatever the shard.
         for more in [&[][..], &["--shard", "1/5"]] {
-            bake(directory, "out.jsonl", more).failed(3, &["o.cbvh", "asset 4", "that of asset 2"]);
+            bake(directory, "out.jsonl", more).failed(3, &["o.cbvh", "by asset 2 (", "and by asset 4 ("]);
         }
     }
-    for (output, words) in [("meshes/0.obj", "an input that is no output"), ("in.jsonl", "the manifest")] {
+    for (output, words) in [("meshes/0.obj", "an input that no asset writes"), ("in.jsonl", "the manifest")] {
         write_assets(directory, 2, |number| match number {
             1 => json!({"input": "meshes/1.obj", "output": output}),
             _ => usual(number),
@@ -297,8 +292,7 @@ fn two_assets_with_one_output_are_refused_before_the_work() {
 
 #[test]
 fn an_asset_that_is_its_own_output_fails_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 3, |number| match number {
         1 => json!({"input": "meshes/1.obj", "output": "meshes/1.obj"}),
         _ => usual(number),
@@ -306,13 +300,12 @@ fn an_asset_that_is_its_own_output_fails_alone() {
     let ended = bake(directory, "out.jsonl", &[]);
     assert_eq!(ended.code, 1, "{ended:?}");
     counts(&ended.json(), 3, 2, 0, 1);
-    assert_eq!(fs::read_to_string(directory.join("meshes/1.obj")).unwrap(), tetrahedron(1));
+    assert_eq!(directory.text("meshes/1.obj"), tetrahedron(1));
 }
 
 #[test]
 fn a_wrong_line_is_told_by_its_number() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     for (wrong, words) in [
         ("{", "column 1"),
         ("[1]", "input"),
@@ -329,12 +322,12 @@ fn a_wrong_line_is_told_by_its_number() {
         (r#"{"input": "a", "output": "b"} {}"#, "trailing"),
     ] {
         let manifest = format!("{}\n\n{wrong}\n{}\n", usual(0), usual(1));
-        fs::write(directory.join("in.jsonl"), manifest).unwrap();
+        directory.write("in.jsonl", manifest);
         bake(directory, "out.jsonl", &[]).failed(3, &["in.jsonl: line 3: ", words]);
     }
-    fs::write(directory.join("in.jsonl"), b"{\"input\": \"\xff\", \"output\": \"b\"}\n").unwrap();
+    directory.write("in.jsonl", b"{\"input\": \"\xff\", \"output\": \"b\"}\n");
     bake(directory, "out.jsonl", &[]).failed(3, &["in.jsonl: line 1: "]);
-    fs::write(directory.join("in.jsonl"), "").unwrap();
+    directory.write("in.jsonl", "");
     counts(&bake(directory, "out.jsonl", &[]).done().json(), 0, 0, 0, 0);
     fs::remove_file(directory.join("in.jsonl")).unwrap();
     bake(directory, "out.jsonl", &[]).failed(2, &["in.jsonl"]);
@@ -346,8 +339,7 @@ fn a_wrong_line_is_told_by_its_number() {
 
 #[test]
 fn only_the_systems_faults_are_exit_code_2_and_limits_4() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 3, usual);
     fs::remove_file(directory.join("meshes/1.obj")).unwrap();
     let ended = bake(directory, "out.jsonl", &[]);
@@ -363,8 +355,7 @@ fn only_the_systems_faults_are_exit_code_2_and_limits_4() {
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_of_all_stays_within_the_budget() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 60, usual);
     // A few large meshes among small ones.
     let side = 300;
@@ -383,8 +374,7 @@ fn memory_of_all_stays_within_the_budget() {
 #[cfg(unix)]
 #[test]
 fn what_is_done_when_the_process_is_killed_stays_done() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_assets(directory, 600, usual);
     let part = directory.join("out.jsonl.part");
     let mut told = 0;

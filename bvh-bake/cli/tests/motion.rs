@@ -2,16 +2,16 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{backends, cbvh_in, cbvh_with_isa, cube, torus};
-use std::fs;
 use std::path::Path;
 
 /// A ring and a cube, and three motions of the cube: through the hole of the ring, into the ring, and far away.
-fn world() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
+fn world() -> Place {
+    let place = place();
+    let directory = &place;
+    directory.write("cube.obj", cube());
+    directory.write("torus.obj", torus(48, 24));
     let pose = |[x, y, z]: [f64; 3]| format!("1 0 0 {x} 0 1 0 {y} 0 0 1 {z}");
     let motion = |from, to| format!("{} {}\n", pose(from), pose(to));
     let motions = [
@@ -21,8 +21,8 @@ fn world() -> tempfile::TempDir {
         motion([-20.0, 20.0, 0.0], [20.0, 20.0, 0.0]),
         motion([0.0, 0.0, 0.0], [0.0, 0.0, 20.0]),
     ];
-    fs::write(directory.join("m.txt"), motions.concat()).unwrap();
-    folder
+    directory.write("m.txt", motions.concat());
+    place
 }
 
 fn motion(directory: &Path, more: &[&str]) -> common::Ended {
@@ -31,15 +31,14 @@ fn motion(directory: &Path, more: &[&str]) -> common::Ended {
 
 #[test]
 fn lines_and_fields_are_those_of_the_contract() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let json = motion(directory, &["m.txt", "--bench", "--out", "raw_%s.txt"]).done().json();
     assert_eq!(
         (&json["peer"], &json["mode"], &json["poses"]),
         (&"cbvh".into(), &"motion".into(), &"m".into())
     );
     assert_eq!((&json["queries"], &json["requested"], &json["near"]), (&3.into(), &3.into(), &0.into()));
-    let raw = fs::read_to_string(directory.join("raw_m.txt")).unwrap();
+    let raw = directory.text("raw_m.txt");
     let lines: Vec<Vec<&str>> = raw.lines().map(|line| line.split(' ').collect()).collect();
     assert_eq!(lines.len(), 3);
     let hits = lines.iter().filter(|words| words[0] == "hit").count();
@@ -77,13 +76,12 @@ fn lines_and_fields_are_those_of_the_contract() {
 
 #[test]
 fn one_motion_is_answered_for_a_person() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let through = "1 0 0 -20 0 1 0 0 0 0 1 0  1,0,0,20, 0,1,0,0, 0,0,1,0";
     let said = motion(directory, &["--motion", through, "--witness", "w.obj"]).done().out;
     assert!(said.starts_with("free until 0.") && said.contains(", hit at 0."), "{said}");
     assert!(said.contains("distance 0.0 (the meshes touch)"), "{said}");
-    assert!(fs::read_to_string(directory.join("w.obj")).unwrap().contains("o segment"));
+    assert!(directory.text("w.obj").contains("o segment"));
     let hit = motion(directory, &["--motion", through, "--json"]).done().json();
     assert!(hit["answer"] == "hit" && hit["motion"] == 0 && hit["distance"] == 0.0, "{hit}");
     let away = "1 0 0 90 0 1 0 0 0 0 1 0  1 0 0 99 0 1 0 0 0 0 1 0";
@@ -92,8 +90,7 @@ fn one_motion_is_answered_for_a_person() {
 
 #[test]
 fn bad_motions_are_named() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let identity = "1 0 0 0 0 1 0 0 0 0 1 0";
     let half = "-1 0 0 0 0 -1 0 0 0 0 1 0";
     for (text, words) in [
@@ -103,7 +100,7 @@ fn bad_motions_are_named() {
         (format!("x{} {identity}", &identity[1..]), "line 1: start: expected a number, found \"x\""),
         ("# nothing\n".to_owned(), "in at least one line, found none"),
     ] {
-        fs::write(directory.join("m.txt"), text).unwrap();
+        directory.write("m.txt", text);
         motion(directory, &["m.txt", "--out", "raw.txt"]).failed(3, &["m.txt: ", words]);
     }
     motion(directory, &["none.txt"]).failed(2, &["none.txt"]);

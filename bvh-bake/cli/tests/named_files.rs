@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{cbvh_in, cube, gltf};
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -10,22 +11,21 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Returns a folder with a cube and with a named pipe that nobody writes to, under several names.
-fn with_pipes() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), cube()).unwrap();
+fn with_pipes() -> Place {
+    let place = place();
+    fs::write(place.join("cube.obj"), cube()).unwrap();
     for name in ["pipe", "pipe.obj", "pipe.cbvh", "pipe.txt"] {
-        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+        assert!(Command::new("mkfifo").arg(place.join(name)).status().unwrap().success());
     }
-    folder
+    place
 }
 
 const POSE: &str = "1 0 0 0 0 1 0 0 0 0 1 0";
 
 #[test]
 fn no_named_file_makes_the_command_wait() {
-    let folder = with_pipes();
-    let directory = folder.path();
-    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    let directory = &with_pipes();
+    let write = |name: &str, text: &str| directory.write(name, text);
     for pipe in ["pipe.obj", "pipe.cbvh", "pipe"] {
         write(
             "cell.scene",
@@ -52,13 +52,12 @@ fn no_named_file_makes_the_command_wait() {
 /// The assets beside the pipe are baked.
 #[test]
 fn no_asset_makes_the_command_wait() {
-    let folder = with_pipes();
-    let directory = folder.path();
+    let directory = &with_pipes();
     let manifest = r#"{"input":"pipe.obj","output":"out/a.cbvh"}
 {"input":"cube.obj","output":"out/b.cbvh"}
 {"input":"/dev/zero","output":"out/c.cbvh"}
 "#;
-    fs::write(directory.join("in.jsonl"), manifest).unwrap();
+    directory.write("in.jsonl", manifest);
     let ended = cbvh_in(directory, &["bake", "--manifest", "in.jsonl", "--out-manifest", "out.jsonl", "-q"]);
     assert_eq!(ended.code, 2, "{ended:?}");
     assert_eq!(ended.err.matches("not a regular file").count(), 2, "{ended:?}");
@@ -76,9 +75,8 @@ fn no_asset_makes_the_command_wait() {
 /// What the command line itself names may be a pipe.
 #[test]
 fn arguments_may_be_pipes() {
-    let folder = with_pipes();
-    let directory = folder.path();
-    fs::write(directory.join("p.txt"), format!("{POSE}\n")).unwrap();
+    let directory = &with_pipes();
+    directory.write("p.txt", format!("{POSE}\n"));
     let piped = |input: &str, arguments: &[&str]| {
         let output = Command::new(env!("CARGO_BIN_EXE_cbvh"))
             .args(arguments)
@@ -97,9 +95,8 @@ fn arguments_may_be_pipes() {
 /// A pipe has no end that could be known beforehand.
 #[test]
 fn a_pipe_keeps_to_the_budget() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("long.obj"), "# nothing\n".repeat(4 << 20)).unwrap();
+    let directory = &place();
+    directory.write("long.obj", "# nothing\n".repeat(4 << 20));
     let output = Command::new(env!("CARGO_BIN_EXE_cbvh"))
         .args(["bake", "/dev/stdin", "-o", "out.cbvh", "--max-memory", "24MiB"])
         .current_dir(directory)
@@ -118,15 +115,14 @@ fn cat(path: &Path) -> std::process::ChildStdout {
 
 #[test]
 fn buffers_outside_are_read_if_that_is_allowed() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     fs::create_dir(directory.join("models")).unwrap();
     let values = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    fs::write(directory.join("p.bin"), values.map(f32::to_le_bytes).concat()).unwrap();
-    fs::write(directory.join("models/i.bin"), [0u32, 1, 2].map(u32::to_le_bytes).concat()).unwrap();
+    directory.write("p.bin", values.map(f32::to_le_bytes).concat());
+    directory.write("models/i.bin", [0u32, 1, 2].map(u32::to_le_bytes).concat());
     symlink("../p.bin", directory.join("models/link.bin")).unwrap();
     for uri in ["../p.bin", "link.bin"] {
-        fs::write(directory.join("models/a.gltf"), gltf(3, 3, uri, "i.bin")).unwrap();
+        directory.write("models/a.gltf", gltf(3, 3, uri, "i.bin"));
         let bake = ["bake", "models/a.gltf", "-o", "a.cbvh", "--force", "-q"];
         cbvh_in(directory, &bake)
             .failed(3, &["models/a.gltf", uri, "below the folder", "allow files outside"]);

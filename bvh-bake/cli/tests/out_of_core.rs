@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::Files as _;
 use common::{cbvh_in, torus};
 use serde_json::Value;
 use std::fs;
@@ -31,8 +32,8 @@ fn bake(directory: &Path, side: u32) {
             stl.extend([0; 2]);
         }
     }
-    fs::write(directory.join("sheet.stl"), stl).unwrap();
-    fs::write(directory.join("torus.obj"), torus(40, 30)).unwrap();
+    directory.write("sheet.stl", stl);
+    directory.write("torus.obj", torus(40, 30));
     for (mesh, file) in [("sheet.stl", "sheet.cbvh"), ("torus.obj", "torus.cbvh")] {
         cbvh_in(directory, &["bake", mesh, "-o", file, "-q"]).done();
     }
@@ -41,7 +42,7 @@ fn bake(directory: &Path, side: u32) {
         format!("1 0 0 {x:?} 0 1 0 {y:?} 0 0 1 {z:?}\n")
     };
     let lines = (0..6).map(|at| place(at, if at % 2 == 0 { 0.125 } else { 1.5 }));
-    fs::write(directory.join("poses.txt"), lines.collect::<String>()).unwrap();
+    directory.write("poses.txt", lines.collect::<String>());
 }
 
 fn query(directory: &Path, mode: &str, more: &[&str]) -> Value {

@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{backends, cbvh_in, cbvh_with_isa, cube, cube_at, poses, shared, skip, torus};
 use std::fs;
 use std::path::Path;
@@ -49,11 +50,11 @@ const ASKED: [(&str, usize, Asked); 4] = [
 ];
 
 /// A cube and a torus, each also baked; and a file of questions about the cube for each mode.
-fn world() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
+fn world() -> Place {
+    let place = place();
+    let directory = &place;
+    directory.write("cube.obj", cube());
+    directory.write("torus.obj", torus(48, 24));
     for mesh in ["cube", "torus"] {
         let (input, output) = (format!("{mesh}.obj"), format!("{mesh}.cbvh"));
         cbvh_in(directory, &["bake", &input, "-o", &output, "-q"]).done();
@@ -63,7 +64,7 @@ fn world() -> tempfile::TempDir {
         fs::write(directory.join(format!("{mode}.txt")), format!("# x y z\n{}", lines.collect::<String>()))
             .unwrap();
     }
-    folder
+    place
 }
 
 /// Returns the values of raw lines.
@@ -79,8 +80,7 @@ fn values(raw: &Path) -> Vec<String> {
 
 #[test]
 fn lines_and_fields_are_those_of_the_contract() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     for (mode, positives, asked) in ASKED {
         let expected: Vec<&str> = asked.iter().map(|(_, value)| *value).collect();
         for mesh in ["cube.cbvh", "cube.obj"] {
@@ -114,25 +114,6 @@ fn lines_and_fields_are_those_of_the_contract() {
             let sum: f64 = expected.iter().map(|value| value.parse::<f64>().unwrap()).sum();
             assert!((json["sum"].as_f64().unwrap() - sum).abs() < 1e-12);
             assert_eq!(json["answers_xxh3"].as_str().map(str::len), Some(16));
-            for field in [
-                "build_a_s",
-                "total_s",
-                "query_sum_s",
-                "ns_median",
-                "ns_mean",
-                "ns_p10",
-                "ns_p90",
-                "ns_max",
-                "node_tests",
-                "triangle_tests",
-                "exact_tests",
-                "file_bytes_per_tri",
-            ] {
-                assert!(json[field].as_f64().is_some_and(|value| value >= 0.0), "{field}: {json}");
-            }
-            for field in ["version", "isa", "profile", "triangle_encoding"] {
-                assert!(json[field].is_string(), "{field}: {json}");
-            }
             assert!(
                 ["tris_b", "build_b_s", "api_bytes_per_tri_b"].iter().all(|field| json.get(field).is_none())
             );
@@ -142,8 +123,7 @@ fn lines_and_fields_are_those_of_the_contract() {
 
 #[test]
 fn answers_do_not_depend_on_how_they_are_found() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     // The numbers of poses serve as points and rays, too.
     let numbers: Vec<String> = poses(80, -3.0, 3.0)
         .lines()
@@ -152,8 +132,8 @@ fn answers_do_not_depend_on_how_they_are_found() {
         .collect();
     let points: Vec<String> =
         numbers.iter().map(|line| line.split(' ').skip(1).take(3).collect::<Vec<_>>().join(" ")).collect();
-    fs::write(directory.join("lines.txt"), numbers.join("\n")).unwrap();
-    fs::write(directory.join("points.txt"), points.join("\n")).unwrap();
+    directory.write("lines.txt", numbers.join("\n"));
+    directory.write("points.txt", points.join("\n"));
     let backends = backends(directory);
     for mode in ["closest", "side", "ray", "segment"] {
         let file = if ["closest", "side"].contains(&mode) { "points.txt" } else { "lines.txt" };
@@ -188,26 +168,10 @@ fn answers_do_not_depend_on_how_they_are_found() {
 }
 
 #[test]
-fn limits_and_budgets_cut_runs_short() {
-    let folder = world();
-    let directory = folder.path();
-    let ask = |more: &[&str]| {
-        let probe = ["probe", "cube.cbvh", "side.txt", "--mode", "side", "--out", "raw.txt", "--bench"];
-        cbvh_in(directory, &[&probe[..], more].concat()).done().json()
-    };
-    let limited = ask(&["--limit", "2"]);
-    assert!(limited["queries"] == 2 && limited["requested"] == 2 && limited["answers_xxh3"].is_string());
-    let cut = ask(&["--budget", "0"]);
-    assert!(cut["queries"] == 1 && cut["requested"] == 4 && cut["answers_xxh3"].is_null(), "{cut}");
-    assert_eq!(values(&directory.join("raw.txt")), ["1"]);
-}
-
-#[test]
 fn several_files_are_read_before_the_first_question() {
-    let folder = world();
-    let directory = folder.path();
-    fs::write(directory.join("more.txt"), "0 0 0\n").unwrap();
-    fs::write(directory.join("bad.txt"), "0 0 0\n0 0\n").unwrap();
+    let directory = &world();
+    directory.write("more.txt", "0 0 0\n");
+    directory.write("bad.txt", "0 0 0\n0 0\n");
     let probe = |files: &str| {
         cbvh_in(directory, &["probe", "cube.obj", files, "--mode", "side", "--out", "raw_%s.txt", "--bench"])
     };
@@ -220,9 +184,8 @@ fn several_files_are_read_before_the_first_question() {
 
 #[test]
 fn an_object_can_be_named() {
-    let folder = world();
-    let directory = folder.path();
-    fs::write(directory.join("both.obj"), cube() + "o moved\n" + &cube_at(1, 10)).unwrap();
+    let directory = &world();
+    directory.write("both.obj", cube() + "o moved\n" + &cube_at(1, 10));
     cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
     let ask = |mesh: &str, more: &[&str]| {
         cbvh_in(directory, &[&["probe", mesh, "--probe", "6 0 0"], more].concat())
@@ -237,8 +200,7 @@ fn an_object_can_be_named() {
 
 #[test]
 fn one_question_is_answered_for_a_person() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     for (mode, probe, words) in [
         ("closest", "3,0.5,0.25", &["2.0 mesh units from the mesh\n", "at 1.0 0.5 0.25, triangle "][..]),
         ("closest", "1 0 0", &["on the mesh\n", "certainly 0.0 to 0.0", "at 1.0 0.0 0.0, triangle "]),
@@ -268,8 +230,7 @@ fn one_question_is_answered_for_a_person() {
 
 #[test]
 fn bad_questions_are_named() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let point = "expected 3 numbers, a point, found ";
     let ray = "expected 6 numbers, the origin and the direction of a ray, found ";
     let segment = "expected 6 numbers, both ends of a segment, found ";
@@ -296,7 +257,7 @@ fn bad_questions_are_named() {
         ("ray", "0 0 0 1e-200 0 0", [unit, "1e-200 0.0 0.0"]),
     ] {
         let good = if ["closest", "side"].contains(&mode) { "1 2 3" } else { "1 2 3 4 5 6" };
-        fs::write(directory.join("p.txt"), format!("# a comment\n\n{good}\n{line}\n")).unwrap();
+        directory.write("p.txt", format!("# a comment\n\n{good}\n{line}\n"));
         let probe = ["probe", "cube.obj", "p.txt", "--mode", mode, "--out", "raw.txt"];
         let place = format!("p.txt: line 4: {}{}", words[0], words[1]);
         assert_eq!(cbvh_in(directory, &probe).failed(3, &[&place]).out, "");
@@ -306,7 +267,7 @@ fn bad_questions_are_named() {
         }
     }
     for none in ["", "\n", "# nothing\n\n"] {
-        fs::write(directory.join("p.txt"), none).unwrap();
+        directory.write("p.txt", none);
         cbvh_in(directory, &["probe", "cube.obj", "p.txt"])
             .failed(3, &["p.txt: expected 3 numbers, a point, in at least one line, found none"]);
     }
@@ -317,25 +278,11 @@ fn bad_questions_are_named() {
 }
 
 #[test]
-fn a_damaged_file_is_named() {
-    let folder = world();
-    let directory = folder.path();
-    let mut bytes = fs::read(directory.join("torus.cbvh")).unwrap();
-    bytes[2 * 4096 + 100] ^= 1;
-    fs::write(directory.join("bad.cbvh"), &bytes).unwrap();
-    for more in [["side.txt", "--mode", "side"], ["--probe", "0 0 0", "--mode=closest"]] {
-        cbvh_in(directory, &[&["probe", "bad.cbvh"][..], &more].concat())
-            .failed(3, &["bad.cbvh: byte ", "R15"]);
-    }
-}
-
-#[test]
 fn an_open_mesh_has_no_sides_but_its_surface() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     // The cube without its last face.
     let open: Vec<String> = cube().lines().map(str::to_owned).collect();
-    fs::write(directory.join("open.obj"), open[..open.len() - 1].join("\n")).unwrap();
+    directory.write("open.obj", open[..open.len() - 1].join("\n"));
     for (point, words) in [
         ("0 0 0", "undefined, because the mesh is not closed and consistently oriented\n"),
         ("9 9 9", "undefined, because the mesh is not closed and consistently oriented\n"),
@@ -347,7 +294,7 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
     let probe = ["probe", "open.obj", "side.txt", "--mode", "side", "--out", "raw.txt", "--bench"];
     assert_eq!(cbvh_in(directory, &probe).done().json()["positives"], 0);
     assert_eq!(values(&directory.join("raw.txt")), ["2", "2", "2", "2"]);
-    fs::write(directory.join("tiny.obj"), "o tiny\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n").unwrap();
+    directory.write("tiny.obj", "o tiny\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n");
     let query = ["query", "open.obj", "tiny.obj", "--mode", "relation", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"];
     assert_eq!(
         cbvh_in(directory, &query).done().out,
@@ -357,8 +304,7 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
 
 #[test]
 fn a_file_without_topology_is_named() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     cbvh_in(directory, &["bake", "cube.obj", "-o", "bare.cbvh", "--no-topology", "-q"]).done();
     let refused = |arguments: &[&str]| {
         cbvh_in(directory, arguments)
@@ -382,8 +328,7 @@ fn answers_are_those_of_the_labels() {
     let (Some(probes), Some(meshes)) = (shared("probes"), shared("meshes")) else {
         return skip("no folders of probes and meshes beside the repository");
     };
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     for (name, mesh, is_closed) in
         [("ball", probes.join("ball.obj"), true), ("bunny", meshes.join("bunny.obj"), false)]
     {

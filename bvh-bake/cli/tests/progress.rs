@@ -4,6 +4,7 @@
 mod common;
 
 use common::sheet::write_sheet;
+use common::{Files as _, place};
 use common::{cbvh_in, cube, names, skip};
 use serde_json::Value;
 use std::fs;
@@ -65,8 +66,7 @@ fn check_lines(lines: &[Value], summary: &Value) {
 
 #[test]
 fn bytes_are_those_of_the_files() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     // The mesh has three bricks.
     for input in ["sheet.stl", "sheet.ply", "sheet.obj"] {
         write_sheet(&directory.join(input), 400);
@@ -98,8 +98,7 @@ fn bytes_are_those_of_the_files() {
 #[cfg(target_os = "linux")]
 #[test]
 fn the_system_counts_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("sheet.ply"), 400);
     if fs::read_to_string("/proc/self/io").is_err() {
         return skip("this system does not count bytes");
@@ -116,8 +115,7 @@ fn the_system_counts_the_same_bytes() {
             let line = counted.lines().find_map(|line| line.strip_prefix(label));
             line.unwrap_or_else(|| panic!("{counted:?} {more}")).trim().parse::<u64>().unwrap()
         };
-        let summary: Value =
-            serde_json::from_str(&fs::read_to_string(directory.join("summary")).unwrap()).unwrap();
+        let summary: Value = serde_json::from_str(&directory.text("summary")).unwrap();
         // The system also counts the loading of the program and its messages.
         for (field, label) in [("bytes_read", "rchar:"), ("bytes_written", "wchar:")] {
             let (own, system) = (integer(&summary, field), system(label));
@@ -128,10 +126,8 @@ fn the_system_counts_the_same_bytes() {
 
 #[test]
 fn several_objects_and_duplicates_add_up() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube() + "f 1 3 4 2\no another\nf 1 3 4 2\nf 5 6 8\nf 5 6 8\n")
-        .unwrap();
+    let directory = &place();
+    directory.write("cube.obj", cube() + "f 1 3 4 2\no another\nf 1 3 4 2\nf 5 6 8\nf 5 6 8\n");
     write_sheet(&directory.join("sheet.stl"), 40);
     for more in [&[][..], &["--split-objects"], &["--split-objects", "--max-memory", "100MiB"]] {
         let (_, summary) = bake(directory, &["cube.obj", "sheet.stl", "cube.obj"], more);
@@ -143,9 +139,8 @@ fn several_objects_and_duplicates_add_up() {
 
 #[test]
 fn stages_are_told_only_where_they_are_asked_for() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    let directory = &place();
+    directory.write("cube.obj", cube());
     let bake = ["bake", "cube.obj", "-o", "c.cbvh", "--force"];
     for quiet in [&[][..], &["-q"], &["--json", "-q"]] {
         cbvh_in(directory, &[&bake[..], quiet].concat()).done();
@@ -156,20 +151,15 @@ fn stages_are_told_only_where_they_are_asked_for() {
     fs::create_dir(directory.join("in")).unwrap();
     ["a.obj", "b.obj"].iter().for_each(|name| fs::write(directory.join("in").join(name), cube()).unwrap());
     cbvh_in(directory, &["bake", "in", "-o", "out", "--json"]).done();
-    // The summary for people has the bytes, too.
-    let text = cbvh_in(directory, &bake).done().out;
-    let read = fs::metadata(directory.join("cube.obj")).unwrap().len() as f64 / 1048576.0;
-    for words in [format!("inputs {read:.1}, scratch 0.0"), "\n  written ".into(), "read 0.".into()] {
-        assert!(text.contains(&words), "{words}: {text}");
-    }
+    // The summary for people tells of scratch files only if there were some.
+    assert!(!cbvh_in(directory, &bake).done().out.contains("scratch"));
 }
 
 /// Runs the command in `script`, which is a terminal for it.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_shows_how_far_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     write_sheet(&directory.join("sheet.ply"), 500);
     let on_a_terminal = |more: &str| {
         let command = format!(

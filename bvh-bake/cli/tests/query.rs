@@ -2,23 +2,24 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{backends, cbvh_in, cbvh_with_isa, cube, cube_at, names, poses, torus};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-fn world() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
-    fs::write(directory.join("near.txt"), poses(60, 0.0, 6.0)).unwrap();
-    fs::write(directory.join("far.x.txt"), poses(7, 9.0, 12.0)).unwrap();
+fn world() -> Place {
+    let place = place();
+    let directory = &place;
+    directory.write("cube.obj", cube());
+    directory.write("torus.obj", torus(48, 24));
+    directory.write("near.txt", poses(60, 0.0, 6.0));
+    directory.write("far.x.txt", poses(7, 9.0, 12.0));
     for mesh in ["cube", "torus"] {
         let (input, output) = (format!("{mesh}.obj"), format!("{mesh}.cbvh"));
         cbvh_in(directory, &["bake", &input, "-o", &output, "-q"]).done();
     }
-    folder
+    place
 }
 
 fn ask(directory: &Path, more: &[&str]) -> Vec<Value> {
@@ -29,7 +30,7 @@ fn ask(directory: &Path, more: &[&str]) -> Vec<Value> {
 #[test]
 fn lines_have_the_fields_of_the_contract() {
     let folder = world();
-    let lines = ask(folder.path(), &["--mode", "distance"]);
+    let lines = ask(&folder, &["--mode", "distance"]);
     assert_eq!(lines.len(), 2);
     let [near, far] = &lines[..] else { panic!("{lines:?}") };
     assert_eq!((&near["poses"], &far["poses"]), (&"near".into(), &"far.x".into()));
@@ -51,11 +52,12 @@ fn lines_have_the_fields_of_the_contract() {
         "sum",
         "node_tests",
         "triangle_tests",
+        "exact_tests",
         "file_bytes_per_tri",
     ] {
         assert!(near[field].as_f64().is_some_and(|value| value >= 0.0), "{field}: {near}");
     }
-    assert!(["version", "isa", "profile"].iter().all(|field| near[field].is_string()));
+    assert!(["version", "isa", "profile", "triangle_encoding"].iter().all(|field| near[field].is_string()));
     assert_eq!(near["answers_xxh3"].as_str().map(str::len), Some(16));
     assert!(near["ns_p10"].as_u64() <= near["ns_median"].as_u64());
     assert!(near["ns_median"].as_u64() <= near["ns_p90"].as_u64());
@@ -64,14 +66,13 @@ fn lines_have_the_fields_of_the_contract() {
 
 #[test]
 fn raw_lines_are_values_and_nanoseconds() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let mut sums = Vec::new();
     for (mode, more) in
         [("collide", &[][..]), ("contacts", &[]), ("distance", &[]), ("within", &["--within", "0.5"])]
     {
         let lines = ask(directory, &[&["--mode", mode, "--out", "raw_%s.txt"], more].concat());
-        let raw = fs::read_to_string(directory.join("raw_near.txt")).unwrap();
+        let raw = directory.text("raw_near.txt");
         let values: Vec<f64> = raw
             .lines()
             .map(|line| {
@@ -101,9 +102,8 @@ fn raw_lines_are_values_and_nanoseconds() {
 
 #[test]
 fn a_relation_tells_what_is_inside() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    let directory = &place();
+    let write = |name: &str, text: &str| directory.write(name, text);
     write("cube.obj", &cube());
     write("room.obj", &cube_at(5, 0));
     write("two.obj", &(cube_at(1, 0) + &cube_at(1, 20)));
@@ -117,7 +117,7 @@ fn a_relation_tells_what_is_inside() {
     ] {
         let query = ["query", a, b, "poses.txt", "--mode", "relation", "--out", "raw_%s.txt", "--bench"];
         let json = cbvh_in(directory, &query).done().json();
-        let raw = fs::read_to_string(directory.join("raw_poses.txt")).unwrap();
+        let raw = directory.text("raw_poses.txt");
         let found: Vec<&str> = raw.lines().map(|line| line.split_once(' ').unwrap().0).collect();
         assert_eq!(found, expected, "{a} {b}");
         assert!(json["mode"] == "relation" && json["positives"] == positives, "{json}");
@@ -139,8 +139,7 @@ fn a_relation_tells_what_is_inside() {
 
 #[test]
 fn answers_do_not_depend_on_how_they_are_found() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let backends = backends(directory);
     for mode in ["collide", "contacts", "distance", "within", "relation"] {
         let within: &[&str] = if mode == "within" { &["--within", "0.25"] } else { &[] };
@@ -169,8 +168,7 @@ fn answers_do_not_depend_on_how_they_are_found() {
 
 #[test]
 fn limits_and_budgets_cut_runs_short() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let limited = ask(directory, &["--limit", "5"]);
     assert_eq!((&limited[0]["queries"], &limited[0]["requested"]), (&5.into(), &5.into()));
     assert!(limited[0]["answers_xxh3"].is_string());
@@ -179,7 +177,7 @@ fn limits_and_budgets_cut_runs_short() {
         assert_eq!(cut[0]["requested"], 60);
         let answered = cut[0]["queries"].as_u64().unwrap();
         assert!((1..60).contains(&answered) && cut[0]["answers_xxh3"].is_null(), "{cut:?}");
-        let raw = fs::read_to_string(directory.join("cut_near.txt")).unwrap();
+        let raw = directory.text("cut_near.txt");
         assert_eq!(raw.lines().count() as u64, answered);
     }
     let exact = ask(directory, &["--mode", "distance"])[1]["sum"].as_f64().unwrap();
@@ -190,8 +188,7 @@ fn limits_and_budgets_cut_runs_short() {
 
 #[test]
 fn an_object_can_be_named() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     // The vertex numbers of the second object follow those of the first.
     let shifted: String = torus(48, 24)
         .lines()
@@ -203,7 +200,7 @@ fn an_object_can_be_named() {
             None => format!("{line}\n"),
         })
         .collect();
-    fs::write(directory.join("both.obj"), cube() + &shifted).unwrap();
+    directory.write("both.obj", cube() + &shifted);
     cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
     let ask = |a: &str, more: &[&str]| {
         let query = ["query", a, "cube.cbvh", "near.txt", "--mode", "contacts", "--bench"];
@@ -222,8 +219,7 @@ fn an_object_can_be_named() {
 /// The lines printed are the raw ones without times, whether they go to a file or to a terminal, and `--json` agrees.
 #[test]
 fn each_pose_has_a_line_and_a_record() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     for mode in ["collide", "contacts", "distance", "within", "relation"] {
         let within: &[&str] = if mode == "within" { &["--within", "0.5"] } else { &[] };
         let ask = |more: &[&str]| {
@@ -266,15 +262,14 @@ fn each_pose_has_a_line_and_a_record() {
         }
     }
     let one = cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "far.x.txt", "--json", "--limit", "1"]);
-    assert_eq!(one.done().out, "{\"collide\":false,\"pose\":0}\n");
+    assert_eq!(one.done().out, "{\"pose\":0,\"collide\":false}\n");
 }
 
 /// Runs the command in `script`, which is a terminal for it.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_gets_the_lines_of_a_pipe() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let command =
         format!("{} query torus.cbvh cube.cbvh near.txt --mode distance", env!("CARGO_BIN_EXE_cbvh"));
     let script = ["-qec", &command, "/dev/null"];
@@ -289,11 +284,10 @@ fn a_terminal_gets_the_lines_of_a_pipe() {
 /// Files whose units differ are pointed out, and the answer stands.
 #[test]
 fn meshes_of_very_different_size_are_pointed_out() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
+    let directory = &place();
+    directory.write("cube.obj", cube());
     for (half_side, is_told) in [(999, false), (1001, true)] {
-        fs::write(directory.join("large.obj"), cube_at(half_side, 0)).unwrap();
+        directory.write("large.obj", cube_at(half_side, 0));
         for (a, b) in [("cube.obj", "large.obj"), ("large.obj", "cube.obj")] {
             let ended = cbvh_in(directory, &["query", a, b, "--mode", "relation"]);
             assert_eq!(ended.code, 0);
@@ -308,8 +302,7 @@ fn meshes_of_very_different_size_are_pointed_out() {
 
 #[test]
 fn one_pose_is_answered_for_a_person() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let ask = |pose: &str, more: &[&str]| {
         let query = ["query", "cube.cbvh", "cube.obj", "--pose", pose];
         cbvh_in(directory, &[&query[..], more].concat()).done().out
@@ -318,7 +311,7 @@ fn one_pose_is_answered_for_a_person() {
     let touching = "1,0,0,2,0,1,0,0,0,0,1,0";
     assert_eq!(ask(apart, &[]), "the meshes do not touch\n");
     assert_eq!(ask(touching, &[]), "the meshes touch\n");
-    assert_eq!(ask(apart, &["--json"]), "{\"collide\":false,\"pose\":0}\n");
+    assert_eq!(ask(apart, &["--json"]), "{\"pose\":0,\"collide\":false}\n");
     let identity = cbvh_in(directory, &["query", "cube.cbvh", "cube.obj", "--mode", "relation"]).done().out;
     assert_eq!(identity, "touching\n");
     assert!(ask(touching, &["--mode", "contacts"]).contains("pairs of triangles in contact"));
@@ -330,7 +323,7 @@ fn one_pose_is_answered_for_a_person() {
         text.starts_with("distance 3.0\n") && text.contains("on A 1.0") && text.contains("on B 4.0"),
         "{text}"
     );
-    let witness = fs::read_to_string(directory.join("w.obj")).unwrap();
+    let witness = directory.text("w.obj");
     let vertices: Vec<Vec<f64>> = witness
         .lines()
         .filter_map(|line| line.strip_prefix("v "))
@@ -349,12 +342,11 @@ fn one_pose_is_answered_for_a_person() {
 
 #[test]
 fn a_damaged_file_is_named() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let mut bytes = fs::read(directory.join("torus.cbvh")).unwrap();
     let page = 2 * 4096 + 100;
     bytes[page] ^= 1;
-    fs::write(directory.join("bad.cbvh"), &bytes).unwrap();
+    directory.write("bad.cbvh", &bytes);
     for jobs in ["1", "2"] {
         let query = ["query", "cube.cbvh", "bad.cbvh", "near.txt", "--jobs", jobs];
         cbvh_in(directory, &query).failed(3, &["bad.cbvh: byte ", "R15"]);

@@ -2,7 +2,10 @@
 
 mod common;
 
-use common::documents::{elements, fetches_nothing, number, report_files, same_figures};
+use common::documents::{
+    elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
+};
+use common::{Files as _, place};
 use common::{cbvh_in, poses, torus};
 use serde_json::Value;
 use std::fs;
@@ -11,7 +14,7 @@ use std::process::Command;
 
 const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
-/// Runs the report, which may take longer than other commands because it bakes and measures 21 layouts.
+/// Runs the report, which may take longer than other commands because it bakes and measures 18 layouts.
 fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
     command.arg("report").args(arguments).current_dir(directory).env_remove("CBVH_ISA").output().unwrap()
@@ -19,25 +22,24 @@ fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
 
 #[test]
 fn four_files_hold_the_same_figures_and_all_answers_are_right() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("torus.obj"), torus(24, 12)).unwrap();
+    let directory = &place();
+    directory.write("torus.obj", torus(24, 12));
     cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "--no-ids"]).done();
-    fs::write(directory.join("p.txt"), poses(8, 0.0, 6.0)).unwrap();
+    directory.write("p.txt", poses(8, 0.0, 6.0));
     for mesh in ["fclenv.obj", "fclrob.obj"] {
         fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();
     }
     let list =
         "# name a b poses\nfcl fclenv.obj fclrob.obj\n\ntori torus.cbvh torus.cbvh p.txt # with poses\n";
-    fs::write(directory.join("pairs.txt"), list).unwrap();
+    directory.write("pairs.txt", list);
     let ended = report(directory, &["pairs.txt", "--out", "new/out", "--quick"]);
     assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
     let [csv, html, json, svg] = report_files(directory, "new/out");
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();
-    // There are two pairs, 21 layouts and 5 questions.
-    assert_eq!(rows.len(), 2 * 21 * 5);
+    // There are two pairs, 18 layouts and 5 questions.
+    assert_eq!(rows.len(), 2 * 18 * 5);
     same_figures(&csv, rows);
     for row in rows {
         check(row);
@@ -53,52 +55,29 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
         rows.iter().find(is_it).unwrap()
     };
     let in_page = elements(&html);
-    let (mut row, mut shown) = (&rows[0], 0);
-    for (name, attributes) in &in_page {
-        if name == "tr" && attributes.contains_key("data-pair") {
-            let at = |key: &str| &*attributes[key];
-            let rel_err = at("data-rel-err").parse().unwrap_or(0.0);
-            row = find(at("data-pair"), at("data-layout"), at("data-question"), rel_err);
-        }
-        if let Some(field) = attributes.get("data-field") {
-            assert_eq!(number(row, field), attributes["data-value"].parse().ok(), "{attributes:?}");
-            shown += 1;
-        }
-    }
-    // Per pair and layout, 6 figures about contact, 8 about each of four distances, and 7 about the files. Errors relative to
-    // a distance need poses that are apart.
-    assert_eq!(shown, 2 * 21 * (6 + 4 * 8 + 7));
-    // Each pair has a table for each of five questions, and one of the files.
-    assert_eq!(in_page.iter().filter(|at| at.0 == "tr").count(), 2 * 6 * (1 + 21));
+    let shown = same_figures_in_page(&in_page, rows);
+    // Per pair and layout, 8 figures about contact, and 10 about each of four distances. Errors relative to a distance need
+    // poses that are apart.
+    assert_eq!(shown, 2 * 18 * (8 + 4 * 10));
+    // Each pair has a table for each of five questions.
+    assert_eq!(in_page.iter().filter(|at| at.0 == "tr").count(), 2 * 5 * (1 + 18));
     // Each table about a question begins with the fastest layout.
-    for at in in_page.windows(2).filter(|at| at[0].0 == "tbody" && at[1].1.contains_key("data-pair")) {
-        let at = |key: &str| &*at[1].1[key];
-        let rel_err = at("data-rel-err").parse().unwrap_or(0.0);
-        let of = |layout: &Value| {
-            let row = find(at("data-pair"), layout.as_str().unwrap(), at("data-question"), rel_err);
-            [number(row, "ns_median").unwrap(), number(row, "file_bytes_per_tri").unwrap()]
-        };
-        let (first, all) = (of(&at("data-layout").into()), rows.iter().map(|row| of(&row["layout"])));
-        let least = all.reduce(|[a, b], [c, d]| [a.min(c), b.min(d)]).unwrap();
-        assert!(first[0] == least[0] || first[1] == least[1]);
+    for at in in_page.windows(2).filter(|at| at[0].0 == "tbody" && at[1].1.contains_key("data-row")) {
+        let row: &Value = &rows[at[1].1["data-row"].parse::<usize>().unwrap()];
+        let is_it = |other: &&Value| ["pair", "question", "rel_err"].iter().all(|key| row[key] == other[key]);
+        let time = |row: &Value| number(row, "ns_median").unwrap();
+        assert_eq!(time(row), rows.iter().filter(is_it).map(time).reduce(f64::min).unwrap());
     }
     for document in [&in_page, &elements(&svg)] {
-        // A mark is a polygon. There are 21 layouts in two plots by bytes, and with 4 allowed errors in a plot by
+        // A mark is a polygon. There are 18 layouts in two plots by bytes, and with 4 allowed errors in a plot by
         // error.
         let marks = document.iter().filter(|(name, _)| name == "polygon").count();
-        assert!(marks >= 2 * (2 * 21 + 4 * 21), "{marks}");
+        assert!(marks >= 2 * (2 * 18 + 4 * 18), "{marks}");
     }
     fetches_nothing(&in_page);
     for pair in ["fcl", "tori"] {
         let tests = |layout| number(find(pair, layout, "distance", 0.0), "node_tests").unwrap();
         assert!(tests("dop26-u8-wide f32") < tests("dop6-u8 f32"), "{pair}");
-        let row = |layout: &str| find(pair, layout, "distance", 0.0);
-        let (with, without) = (row("dop26-u8-wide f32"), row("dop26-u8-wide f32 without turning slabs"));
-        assert_eq!(
-            (&with["turning_slabs"], &without["turning_slabs"]),
-            (&Value::from(true), &Value::from(false))
-        );
-        assert_eq!(with["node_bytes_per_tri"], without["node_bytes_per_tri"], "{pair}");
     }
     let pairs = &json["pairs"];
     assert!(pairs[0]["poses_from"].as_str().unwrap().starts_with("made"));
@@ -132,9 +111,8 @@ fn check(row: &Value) {
 
 #[test]
 fn what_is_wrong_is_told_in_one_line_before_the_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    let write = |name: &str, text: &str| fs::write(directory.join(name), text).unwrap();
+    let directory = &place();
+    let write = |name: &str, text: &str| directory.write(name, text);
     write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     write("good.txt", "one one.obj one.obj\n");

@@ -2,16 +2,17 @@
 
 mod common;
 
+use common::{Files as _, Place, place};
 use common::{backends, cbvh_in, cbvh_with_isa, cube, cube_at, names, poses, torus};
 use std::fs;
 use std::path::Path;
 
 /// Three instances, of which two move in 40 frames.
-fn world() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("torus.obj"), torus(48, 24)).unwrap();
+fn world() -> Place {
+    let place = place();
+    let directory = &place;
+    directory.write("cube.obj", cube());
+    directory.write("torus.obj", torus(48, 24));
     cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "-q"]).done();
     let scene = "\
 # a comment
@@ -22,15 +23,15 @@ instance b box 1 0 0 0  0 1 0 0  0 0 1 0
 instance c ring 1 0 0 9  0 1 0 0  0 0 1 0
 moving b c
 ";
-    fs::write(directory.join("s.scene"), scene).unwrap();
+    directory.write("s.scene", scene);
     let lines = |poses: &str| -> Vec<String> {
         let lines = poses.lines().map(|line| line.split('#').next().unwrap().trim().to_owned());
         lines.filter(|line| !line.is_empty()).collect()
     };
     let (b, c) = (lines(&poses(40, 0.0, 6.0)), lines(&poses(40, 2.0, 12.0)));
     let frames: String = b.iter().zip(c).map(|(b, c)| format!("{b} {c}\n")).collect();
-    fs::write(directory.join("f.txt"), format!("# frames\n{frames}")).unwrap();
-    folder
+    directory.write("f.txt", format!("# frames\n{frames}"));
+    place
 }
 
 fn ask(directory: &Path, more: &[&str]) -> common::Ended {
@@ -39,7 +40,7 @@ fn ask(directory: &Path, more: &[&str]) -> common::Ended {
 
 /// Poses of the moving instances, frame by frame.
 fn frames(directory: &Path) -> Vec<(String, String)> {
-    let text = fs::read_to_string(directory.join("f.txt")).unwrap();
+    let text = directory.text("f.txt");
     let halves = |line: &str| {
         let words: Vec<&str> = line.split_whitespace().collect();
         (words[..12].join(" "), words[12..].join(" "))
@@ -49,11 +50,11 @@ fn frames(directory: &Path) -> Vec<(String, String)> {
 
 /// The values of the raw lines that a query about poses of a torus and a cube writes.
 fn query(directory: &Path, meshes: [&str; 2], poses: &str, mode: &[&str]) -> Vec<f64> {
-    fs::write(directory.join("q.txt"), poses).unwrap();
+    directory.write("q.txt", poses);
     let query =
         [&["query", meshes[0], meshes[1], "q.txt", "--out", "raw.txt", "--json", "--mode"], mode].concat();
     cbvh_in(directory, &query).done();
-    values(&fs::read_to_string(directory.join("raw.txt")).unwrap())
+    values(&directory.text("raw.txt"))
 }
 
 fn values(raw: &str) -> Vec<f64> {
@@ -62,16 +63,15 @@ fn values(raw: &str) -> Vec<f64> {
 
 #[test]
 fn answers_are_those_about_each_pair() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     let frames = frames(directory);
     let [b, c] = [0, 1].map(|side| {
         let line = |frame: &(String, String)| format!("{}\n", if side == 0 { &frame.0 } else { &frame.1 });
         frames.iter().map(line).collect::<String>()
     });
     // `a` is at the origin, so that a pose in the world is one in its frame. The pair of `b` and `c` is allowed to touch.
-    let scene = fs::read_to_string(directory.join("s.scene")).unwrap();
-    fs::write(directory.join("s.scene"), format!("{scene}allow c b\n")).unwrap();
+    let scene = directory.text("s.scene");
+    directory.write("s.scene", format!("{scene}allow c b\n"));
     for mode in [&["collide"][..], &["distance"], &["within", "--within", "1.5"]] {
         let of_b = query(directory, ["torus.cbvh", "cube.obj"], &b, mode);
         let of_c = query(directory, ["torus.cbvh", "torus.cbvh"], &c, mode);
@@ -89,7 +89,7 @@ fn answers_are_those_about_each_pair() {
         assert_eq!(values(&printed), expected, "{mode:?}");
         let more = [&["--out", "scene.txt", "--bench", "--mode"], mode].concat();
         let json = ask(directory, &more).done().json();
-        assert_eq!(values(&fs::read_to_string(directory.join("scene.txt")).unwrap()), expected, "{mode:?}");
+        assert_eq!(values(&directory.text("scene.txt")), expected, "{mode:?}");
         assert_eq!(
             (&json["mode"], &json["instances"], &json["moving"]),
             (&mode[0].into(), &3.into(), &2.into())
@@ -129,8 +129,7 @@ fn answers_are_those_about_each_pair() {
 
 #[test]
 fn answers_depend_neither_on_the_backend_nor_on_threads() {
-    let folder = world();
-    let directory = folder.path();
+    let directory = &world();
     for mode in ["collide", "pairs", "distance", "relation"] {
         let mut hashes = Vec::new();
         for isa in backends(directory) {
@@ -151,10 +150,9 @@ fn answers_depend_neither_on_the_backend_nor_on_threads() {
 
 #[test]
 fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
-    let folder = world();
-    let directory = folder.path();
-    let scene = fs::read_to_string(directory.join("s.scene")).unwrap().replace("moving b c\n", "");
-    fs::write(directory.join("s.scene"), scene).unwrap();
+    let directory = &world();
+    let scene = directory.text("s.scene").replace("moving b c\n", "");
+    directory.write("s.scene", scene);
     let list = cbvh_in(directory, &["scene", "s.scene", "--mode", "distance", "--list"]).done().out;
     // The cube of side 2 at the middle of a ring reaches its inner side.
     assert!(
@@ -167,10 +165,9 @@ fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
 /// What is inside what, and instances placed by a position and a quaternion.
 #[test]
 fn relations_tell_what_is_inside() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("room.obj"), cube_at(5, 0)).unwrap();
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.write("room.obj", cube_at(5, 0));
     let scene = "\
 mesh m cube.obj
 mesh l room.obj
@@ -179,7 +176,7 @@ instance room l 0 0 0  0 0 0.70710678118654752 0.70710678118654752
 instance near m 6 0 0  0 0 0 1
 instance far m 20 0 0  0 0 0 1
 ";
-    fs::write(directory.join("s.scene"), scene).unwrap();
+    directory.write("s.scene", scene);
     let ask = |more: &[&str]| cbvh_in(directory, &[&["scene", "s.scene"], more].concat()).done();
     assert_eq!(ask(&["--mode", "relation"]).out, "2\n");
     assert_eq!(
@@ -201,16 +198,15 @@ instance far m 20 0 0  0 0 0 1
     let json = ask(&["--mode", "distance", "--json"]).json();
     assert!(json["distance"] == 3.5 && json["point_a"][0] == 1.5 && json["point_b"][0] == 5.0, "{json}");
     cbvh_in(directory, &["scene", "cell.glb"]).failed(2, &["cell.glb"]);
-    fs::write(directory.join("cell.glb"), "glTF").unwrap();
+    directory.write("cell.glb", "glTF");
     cbvh_in(directory, &["scene", "cell.glb"])
         .failed(3, &["cell.glb: expected a scene file, found glTF", "cbvh bake cell.glb --scene -o"]);
 }
 
 #[test]
 fn bad_files_are_named_with_line_and_remedy() {
-    let folder = world();
-    let directory = folder.path();
-    let good = fs::read_to_string(directory.join("s.scene")).unwrap();
+    let directory = &world();
+    let good = directory.text("s.scene");
     let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
     for (line, code, words) in [
         ("mesh ring cube.obj", 3, "line 8: expected a name of its own, found a second mesh \"ring\""),
@@ -230,15 +226,15 @@ fn bad_files_are_named_with_line_and_remedy() {
         ("allow a", 3, "line 8: expected mesh NAME FILE, instance NAME MESH POSE"),
         ("robot x", 3, "found \"robot x\""),
     ] {
-        fs::write(directory.join("s.scene"), format!("{good}{line}\n")).unwrap();
+        directory.write("s.scene", format!("{good}{line}\n"));
         let ended = ask(directory, &[]);
         assert_eq!(ended.code, code, "{line}: {}", ended.err);
         assert!(ended.err.contains(words) && ended.err.lines().count() == 1, "{line}: {}", ended.err);
         assert!(ended.out.is_empty());
     }
-    fs::write(directory.join("s.scene"), "# nothing\n").unwrap();
+    directory.write("s.scene", "# nothing\n");
     assert!(ask(directory, &[]).err.contains("s.scene: expected at least one line: instance NAME MESH POSE"));
-    fs::write(directory.join("s.scene"), &good).unwrap();
+    directory.write("s.scene", &good);
     for (frames, words) in [
         (pose.to_owned(), "line 1: expected 24 numbers, 12 for each of 2 moving instances, found 12"),
         (format!("{pose} {pose}\n{pose} {}", pose.replace("1 0 0 0 0", "1 0 0 x 0")), "line 2: instance c: "),
@@ -249,7 +245,7 @@ fn bad_files_are_named_with_line_and_remedy() {
             "line 1: instance c: expected a rotation within 2^-23 of orthonormal",
         ),
     ] {
-        fs::write(directory.join("f.txt"), frames).unwrap();
+        directory.write("f.txt", frames);
         let ended = ask(directory, &["--out", "raw.txt"]);
         assert_eq!(ended.code, 3, "{}", ended.err);
         assert!(ended.err.starts_with("cbvh: f.txt: ") && ended.err.contains(words), "{}", ended.err);
@@ -279,7 +275,7 @@ fn boxes(directory: &Path) {
         0u8, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7,
         1, 7, 5,
     ]);
-    fs::write(directory.join("boxes.bin"), blob).unwrap();
+    directory.write("boxes.bin", blob);
     let json = r#"{"asset":{"version":"2.0"},"nodes":[{"name":"a","mesh":0},{"name":"b","mesh":0,"translation":[1.5,0,0]},
         {"mesh":0,"scale":[2,2,2],"translation":[9,0,0]}],
         "meshes":[{"name":"box","primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
@@ -287,14 +283,13 @@ fn boxes(directory: &Path) {
         {"bufferView":1,"componentType":5121,"count":36,"type":"SCALAR"}],
         "bufferViews":[{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":36}],
         "buffers":[{"byteLength":132,"uri":"boxes.bin"}]}"#;
-    fs::write(directory.join("boxes.gltf"), json).unwrap();
+    directory.write("boxes.gltf", json);
 }
 
 /// A baked scene gives the answers of a text file that says the same, as it stands and when its instances move.
 #[test]
 fn baked_scenes_are_asked_like_text() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
+    let directory = &place();
     boxes(directory);
     let bake = ["bake", "boxes.gltf", "-o", "boxes.cbvh", "--scene", "--json", "-q"];
     let json = cbvh_in(directory, &bake).done().json();
@@ -307,7 +302,12 @@ fn baked_scenes_are_asked_like_text() {
     let dump = cbvh_in(directory, &["dump", "boxes.cbvh", "--json"]).done().json();
     assert_eq!(dump["instances"][1]["name"], "b");
     assert_eq!(dump["instances"][2]["translation"], serde_json::json!([9.0, 0.0, 0.0]));
-    assert!(cbvh_in(directory, &["dump", "boxes.cbvh"]).done().out.contains("\n3 instances\n"));
+    assert!(
+        cbvh_in(directory, &["dump", "boxes.cbvh"])
+            .done()
+            .out
+            .contains("\ninstances\n  number 0, name a, object 0,")
+    );
 
     let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "pairs", "--list"]).done().out;
     assert_eq!(list, "frame 1: 1 pair touching\n  a b\n");
@@ -320,14 +320,14 @@ fn baked_scenes_are_asked_like_text() {
         cube().replace('1', "2").lines().filter(|line| line.starts_with('v')).collect::<Vec<_>>().join("\n");
     let faces: String =
         cube().lines().filter(|line| line.starts_with('f')).map(|line| format!("{line}\n")).collect();
-    fs::write(directory.join("cube.obj"), cube()).unwrap();
-    fs::write(directory.join("large.obj"), format!("{large}\n{faces}")).unwrap();
+    directory.write("cube.obj", cube());
+    directory.write("large.obj", format!("{large}\n{faces}"));
     let identity = "1 0 0 0  0 1 0 0  0 0 1 0";
     let text = format!(
         "mesh m cube.obj\nmesh l large.obj\ninstance a m {identity}\ninstance b m {identity}\ninstance box l {identity}\n\
          moving a b box\n"
     );
-    fs::write(directory.join("s.scene"), text).unwrap();
+    directory.write("s.scene", text);
     let of = |from: f64, to: f64| -> Vec<String> {
         let all = poses(30, from, to);
         all.lines()
@@ -337,7 +337,7 @@ fn baked_scenes_are_asked_like_text() {
     };
     let lines = of(0.0, 6.0).into_iter().zip(of(1.0, 9.0)).zip(of(3.0, 0.0));
     let frames: String = lines.map(|((a, b), c)| format!("{a} {b} {c}\n")).collect();
-    fs::write(directory.join("f.txt"), frames).unwrap();
+    directory.write("f.txt", frames);
     for mode in ["collide", "pairs", "distance"] {
         let ask = |scene: &str, jobs: &str| {
             let arguments = ["scene", scene, "f.txt", "--mode", mode, "--bench", "--jobs", jobs];
@@ -349,9 +349,9 @@ fn baked_scenes_are_asked_like_text() {
         }
     }
 
-    fs::write(directory.join("f.txt"), identity).unwrap();
+    directory.write("f.txt", identity);
     cbvh_in(directory, &["scene", "boxes.cbvh", "f.txt"]).failed(3, &["f.txt: line 1: expected 36 numbers"]);
-    fs::write(directory.join("p.txt"), identity).unwrap();
+    directory.write("p.txt", identity);
     let query = ["query", "boxes.cbvh", "cube.obj", "p.txt"];
     cbvh_in(directory, &query)
         .failed(3, &["boxes.cbvh: expected a mesh, or one object of a scene, found a scene"]);
@@ -361,23 +361,22 @@ fn baked_scenes_are_asked_like_text() {
     let mut bytes = fs::read(directory.join("boxes.cbvh")).unwrap();
     let at = bytes.windows(8).rposition(|window| window == 9f64.to_le_bytes()).unwrap();
     bytes[at] ^= 1;
-    fs::write(directory.join("boxes.cbvh"), bytes).unwrap();
+    directory.write("boxes.cbvh", bytes);
     cbvh_in(directory, &["scene", "boxes.cbvh"]).failed(3, &["boxes.cbvh: ", "R10"]);
     cbvh_in(directory, &["validate", "boxes.cbvh"]).failed(3, &["boxes.cbvh", "R10"]);
 }
 
 #[test]
 fn names_in_quotes_have_spaces_and_distances_of_all_pairs_are_listed() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("my #1 cube.obj"), cube()).unwrap();
+    let directory = &place();
+    directory.write("my #1 cube.obj", cube());
     let at = |name: &str, x: i32| format!("instance {name} \"the box\" {x} 0 0 0 0 0 1\n");
     let scene = "mesh \"the box\" \"my #1 cube.obj\" # a comment\n".to_owned()
         + &at("\"left \\\"arm\\\"\"", 0)
         + &at("mid", 3)
         + &at("\"right arm\"", 10)
         + "allow \"right arm\" mid\n";
-    fs::write(directory.join("s.scene"), &scene).unwrap();
+    directory.write("s.scene", &scene);
     let ask = |more: &[&str]| cbvh_in(directory, &[&["scene", "s.scene", "--mode"], more].concat());
     let listed = ask(&["distance", "--list"]).done().out;
     let expected = "frame 1: \"left \\\"arm\\\"\" mid 1 mesh units apart\n  \"left \\\"arm\\\"\" \"right arm\" 8 mesh units apart\n";
@@ -385,19 +384,21 @@ fn names_in_quotes_have_spaces_and_distances_of_all_pairs_are_listed() {
     assert_eq!(ask(&["distance"]).done().out, "1\n");
     let json = ask(&["distance", "--list", "--json"]).done().json();
     assert_eq!((&json["a"], &json["b"]), (&"left \"arm\"".into(), &"mid".into()));
-    fs::write(directory.join("s.scene"), scene + "moving \"mid\n").unwrap();
+    let other = serde_json::json!({ "a": "left \"arm\"", "b": "right arm", "distance": 8.0 });
+    assert_eq!(json["others"], serde_json::json!([other]));
+    assert!(ask(&["distance", "--json"]).done().json().get("others").is_none());
+    directory.write("s.scene", scene + "moving \"mid\n");
     ask(&["collide"]).failed(3, &["s.scene: line 6", "expected a quote at the end of a name"]);
 }
 
 #[test]
 fn meshes_of_very_different_size_are_pointed_out_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let directory = folder.path();
-    fs::write(directory.join("small.obj"), cube()).unwrap();
-    fs::write(directory.join("large.obj"), cube_at(2000, 0)).unwrap();
+    let directory = &place();
+    directory.write("small.obj", cube());
+    directory.write("large.obj", cube_at(2000, 0));
     let lines = ["a small", "b large", "c large"].map(|of| format!("instance {of} 0 0 0 0 0 0 1\n"));
     let scene = format!("mesh small small.obj\nmesh large large.obj\n{}", lines.concat());
-    fs::write(directory.join("s.scene"), scene).unwrap();
+    directory.write("s.scene", scene);
     let ended = cbvh_in(directory, &["scene", "s.scene"]);
     assert_eq!((ended.code, ended.err.lines().count()), (0, 1), "{ended:?}");
     assert!(ended.err.contains("small.obj is about 2.000") && ended.err.contains("same unit?"), "{ended:?}");

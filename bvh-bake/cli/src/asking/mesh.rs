@@ -43,27 +43,17 @@ pub(crate) struct LoadedMesh {
 impl LoadedMesh {
     /// Opens a `.cbvh` file or bakes a mesh. All objects of a mesh become one tree, unless `--object` names one of them.
     pub(crate) fn load(path: &Path, how: &How) -> Result<Self, Failure> {
-        if is_baked(path)? {
-            return Self::open(path, how);
-        }
-        let (bvh, build_seconds) = bake(path, &how.layout.to_options(), how.object)?;
-        Ok(Self::new(path, bvh, how, build_seconds))
-    }
-
-    /// Opens a `.cbvh` file.
-    pub(crate) fn open(path: &Path, how: &How) -> Result<Self, Failure> {
         let start = Instant::now();
-        let bvh = map(path, how.read_ahead)?;
-        let mesh = Self::new(path, bvh, how, start.elapsed().as_secs_f64());
-        if mesh.object.is_none() {
-            refuse_scene(path, &mesh.bvh)?;
-        }
-        Ok(mesh)
-    }
-
-    fn new(path: &Path, bvh: Bvh, how: &How, build_seconds: f64) -> Self {
+        let (bvh, build_seconds) = if is_baked(path)? {
+            (map(path, how.read_ahead)?, start.elapsed().as_secs_f64())
+        } else {
+            bake(path, &how.layout.to_options(), how.object)?
+        };
         let object = how.object.and_then(|name| bvh.find(name));
-        Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() }
+        if object.is_none() {
+            refuse_scene(path, &bvh)?;
+        }
+        Ok(Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() })
     }
 
     /// Checks all pages before queries are timed, and counts that as building: otherwise the first query that touches a
@@ -96,16 +86,21 @@ impl LoadedMesh {
 
     /// Returns the number of triangles of the mesh, including exact duplicates.
     pub(crate) fn triangles(&self) -> u64 {
-        let records = self.shape().objects().iter().map(|object| object.record());
-        // The counts are as the file states them, and those of a forged file may overflow.
-        let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
-        counts.fold(0, u64::saturating_add)
+        triangles_of(self.shape().objects())
     }
 
     /// Returns the bytes of the file, and the number of triangles stored in it.
     pub(crate) fn bytes_and_stored(&self) -> (u64, u64) {
         (self.bvh.bytes().len() as u64, self.bvh.all().triangles())
     }
+}
+
+/// Returns the number of triangles of these objects, including exact duplicates.
+pub(crate) fn triangles_of(objects: &[Object]) -> u64 {
+    let records = objects.iter().map(|object| object.record());
+    // The counts are as the file states them, and those of a forged file may overflow.
+    let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
+    counts.fold(0, u64::saturating_add)
 }
 
 /// Points out two meshes, by size and file, of which one is so much larger that they may be in different units.

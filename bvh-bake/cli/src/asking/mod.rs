@@ -2,20 +2,16 @@
 
 pub(crate) mod files;
 pub(crate) mod mesh;
-mod runner;
+pub(crate) mod runner;
 
-use crate::console::{self, Failure, Record, hex, record, significant};
+use crate::console::{self, Failure, Record, record, significant};
 use crate::options::{LayoutArguments, not_negative, threads, whole};
-use crate::process;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, Distance, Object, Querier, QueryError, ReadAhead, Shape};
-use cbvh_measure::spread::quantile;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use files::write_file;
 use mesh::{How, LoadedMesh};
 use runner::Run;
-use serde_json::{Value, json};
 use std::path::Path;
 
 /// What every answer has, whatever the question.
@@ -31,8 +27,8 @@ pub(crate) trait Answer {
         significant(self.value())
     }
 
-    /// Returns all that the answer has, as a JSON object.
-    fn json(&self) -> Value;
+    /// Returns all that the answer has.
+    fn json(&self) -> Record;
 
     /// Hashes what the line tells.
     fn hash(&self, hasher: &mut Hasher);
@@ -60,8 +56,8 @@ pub(crate) fn mode_name(mode: &impl ValueEnum) -> String {
 pub(crate) struct Session<'a> {
     arguments: &'a AskingArguments,
     backend: Backend,
-    /// What a question is called.
-    noun: &'static str,
+    /// What a question and several of them are called.
+    words: [&'static str; 2],
     mode: String,
     /// Whether answers are the same on every backend and with every number of threads.
     is_exact: bool,
@@ -70,10 +66,10 @@ pub(crate) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Loads the meshes. The tuple has the name of a question and of the mode, and whether answers are exact.
+    /// Loads the meshes. The tuple has the names of questions and of the mode, and whether answers are exact.
     pub(crate) fn load(
         arguments: &'a AskingArguments,
-        (backend, noun, mode, is_exact): (Backend, &'static str, String, bool),
+        (backend, words, mode, is_exact): (Backend, [&'static str; 2], String, bool),
         a: &Path,
         b: Option<&Path>,
     ) -> Result<Self, Failure> {
@@ -84,7 +80,7 @@ impl<'a> Session<'a> {
         if let Some(b) = &b {
             mesh::point_out_units([&a, b].map(|mesh| (mesh.size(), &*mesh.path)));
         }
-        Ok(Self { arguments, backend, noun, mode, is_exact, a, b })
+        Ok(Self { arguments, backend, words, mode, is_exact, a, b })
     }
 
     /// Returns the meshes; the second is the first if there is only one.
@@ -109,9 +105,7 @@ impl<'a> Session<'a> {
         if !self.arguments.run.json {
             return console::text(text);
         }
-        let mut record = answer.json();
-        record[self.noun] = json!(0);
-        console::json(&record)
+        console::json(&Record::of(self.words[0], &0).with(answer.json()))
     }
 
     /// Asks about all files of questions and tells the answers as the arguments say.
@@ -123,43 +117,28 @@ impl<'a> Session<'a> {
         for mesh in std::iter::once(&self.a).chain(&self.b) {
             mesh.check()?;
         }
+        let AskingArguments { run: limits, out, bench, .. } = self.arguments;
         for (stem, questions) in files {
-            let run = runner::run(questions, &ask, self.backend, &self.arguments.run);
+            let run = Run::new(questions, &ask, self.backend, limits);
             let run = run.map_err(|error| mesh::blame(&self.a, self.b.as_ref(), error))?;
-            if let Some(out) = &self.arguments.out {
-                let line = |(answer, ns): &(A, u64)| format!("{} {ns}\n", answer.line());
-                let lines: String = run.answers.iter().map(line).collect();
-                write_file(Path::new(&out.replacen("%s", stem, 1)), &lines)?;
+            if let Some(out) = out {
+                run.write_raw(Path::new(&out.replacen("%s", stem, 1)))?;
             }
-            let answers = run.answers.iter().map(|(answer, _)| answer);
-            if self.arguments.bench {
+            if *bench {
                 console::json(&self.bench(stem, &run))?;
-            } else if self.arguments.run.json {
-                console::lines((0..).zip(answers).map(|(number, answer)| {
-                    let mut record = answer.json();
-                    record[self.noun] = json!(number);
-                    if files.len() > 1 {
-                        record[format!("{}s", self.noun)] = json!(stem);
-                    }
-                    record
-                }))?;
             } else {
-                console::lines(answers.map(Answer::line))?;
+                run.tell(self.words, Some(&**stem).filter(|_| files.len() > 1), limits.json)?;
             }
         }
         Ok(())
     }
 
     /// Returns the line of `--bench` for a file of questions, about one mesh or two: the fields that programs of this protocol
-    /// share, and further ones. The hash of the answers is null if there may be others.
+    /// share, and further ones.
     fn bench<A: Answer>(&self, stem: &str, run: &Run<A>) -> Record {
         let (mesh_a, mesh_b) = (&self.a, self.b.as_ref());
-        let answers = || run.answers.iter().map(|(answer, _)| answer);
         let (bytes_a, stored_a) = mesh_a.bytes_and_stored();
         let (bytes_b, stored_b) = mesh_b.map_or((0, 0), LoadedMesh::bytes_and_stored);
-        let mut hasher = Hasher::default();
-        answers().for_each(|answer| answer.hash(&mut hasher));
-        let is_complete = self.is_exact && run.answers.len() == run.requested;
         record! {
             peer: "cbvh",
             version: env!("CARGO_PKG_VERSION"),
@@ -176,33 +155,23 @@ impl<'a> Session<'a> {
                 api_bytes_per_tri_b: bytes_b as f64 / stored_b as f64,
             }
         }))
-        .with(times(run.answers.iter().map(|&(_, ns)| ns), run.requested, run.total_seconds))
+        .with(run.bench(self.backend, self.is_exact))
         .with(record! {
-            positives: answers().filter(|answer| answer.is_positive()).count(),
-            sum: answers().map(Answer::value).sum::<f64>(),
-            peak_rss_mb: peak_rss_mb(),
             // Not measured: a query needs the bytes of the files, which `api_bytes_per_tri_a` and `_b` give.
             rss_bytes_per_tri: -1.0,
-            isa: self.backend.name(),
             profile: of_both(mesh_a, mesh_b, |object| object.profile().name()),
             triangle_encoding: of_both(mesh_a, mesh_b, |object| object.triangle_encoding().name()),
-            answers_xxh3: is_complete.then(|| hex(hasher.finish())),
-            node_tests: run.stats.node_tests,
-            triangle_tests: run.stats.packet_tests,
-            exact_tests: run.stats.exact_tests,
             file_bytes_per_tri: (bytes_a + bytes_b) as f64 / (stored_a + stored_b) as f64,
-            jobs: run.jobs,
         })
-        .with(A::counts(run.answers.iter().map(|(answer, _)| answer)))
     }
 }
 
-/// Returns all that a distance has, as a JSON object.
-pub(crate) fn distance_json(of: &Distance) -> Value {
-    json!({
-        "distance": of.distance, "lower": of.lower, "upper": of.upper, "point_a": of.point_a, "point_b": of.point_b,
-        "object_a": of.object_a, "triangle_a": of.triangle_a, "object_b": of.object_b, "triangle_b": of.triangle_b,
-    })
+/// Returns all that a distance has.
+pub(crate) fn distance_json(of: &Distance) -> Record {
+    record! {
+        distance: of.distance, lower: of.lower, upper: of.upper, point_a: of.point_a, point_b: of.point_b,
+        object_a: of.object_a, triangle_a: of.triangle_a, object_b: of.object_b, triangle_b: of.triangle_b,
+    }
 }
 
 /// The options of a run of questions. A frame of a scene is one question.
@@ -216,7 +185,7 @@ pub(crate) struct RunArguments {
     pub(crate) jobs: u16,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
-    /// Stop each file of questions after this many seconds
+    /// Stop after this many seconds, for each file of questions
     #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) budget: Option<f64>,
     /// Untimed questions before the timed ones, taken from the end of the file
@@ -283,27 +252,11 @@ fn read_ahead() -> impl TypedValueParser<Value = ReadAhead> {
     })
 }
 
-/// Returns how many questions were asked, and how long they took, as the fields of `--bench`.
-pub(crate) fn times(nanoseconds: impl Iterator<Item = u64>, requested: usize, total_s: f64) -> Record {
-    let mut times: Vec<u64> = nanoseconds.collect();
-    times.sort_unstable();
-    let (sum, queries) = (times.iter().sum::<u64>(), times.len());
-    record! {
-        queries: queries,
-        requested: requested,
-        total_s: total_s,
-        query_sum_s: sum as f64 * 1e-9,
-        ns_median: quantile(&times, 0.5),
-        ns_mean: if queries == 0 { 0.0 } else { sum as f64 / queries as f64 },
-        ns_p10: quantile(&times, 0.1),
-        ns_p90: quantile(&times, 0.9),
-        ns_max: times.last().copied().unwrap_or(0),
-    }
-}
-
-/// Returns the largest resident size so far in MiB.
-pub(crate) fn peak_rss_mb() -> Option<f64> {
-    process::peak_bytes().map(|bytes| bytes as f64 / 1048576.0)
+/// Returns the sorted value at a fraction of the way from the least to the largest, by the rule of the peers' protocol; 0 if
+/// there are none.
+pub(crate) fn quantile(sorted: &[u64], fraction: f64) -> u64 {
+    let index = (fraction * sorted.len() as f64) as usize;
+    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0)
 }
 
 /// Returns a word about the first object of a mesh, and after a plus sign that of the other mesh if it differs.
@@ -317,5 +270,18 @@ fn of_both(
     match mesh_b.map(of) {
         Some(word_b) if word_b != word_a => format!("{word_a}+{word_b}"),
         _ => word_a.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_follow_the_protocol() {
+        let times: Vec<u64> = (0..10).collect();
+        let found = [0.1, 0.5, 0.9, 1.0].map(|fraction| quantile(&times, fraction));
+        assert_eq!(found, [1, 5, 9, 9]);
+        assert_eq!(quantile(&[], 0.5), 0);
     }
 }

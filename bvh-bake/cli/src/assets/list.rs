@@ -44,8 +44,8 @@ impl Asset {
 pub(super) fn require_memory(list: &Path, known: u64, max_memory: Option<u64>) -> Result<(), Failure> {
     match max_memory {
         Some(budget) if known > budget => Err(Failure::Limit(format!(
-            "{}: expected assets that are listed in at most {budget} bytes of memory, found more; raise --max-memory, or \
-             divide the list",
+            "{}: expected a list of assets that fits into {budget} bytes of memory, found a longer one; raise --max-memory or \
+             split the list",
             shown(list)
         ))),
         _ => Ok(()),
@@ -60,10 +60,11 @@ pub(super) fn refuse_shared_outputs(
     manifest: Option<&Path>,
     results: Option<&Path>,
 ) -> Result<(), Failure> {
-    let mut taken: HashMap<PathBuf, String> = HashMap::new();
+    // What is at a place: the manifest, the output manifest, or the output of an asset.
+    let mut taken: HashMap<PathBuf, Result<&Asset, &str>> = HashMap::new();
     for (path, what) in [(manifest, "the manifest"), (results, "the output manifest")] {
         let Some(path) = path else { continue };
-        if taken.insert(place(path), what.to_owned()).is_some() {
+        if taken.insert(place(path), Err(what)).is_some() {
             return Err(Failure::Usage(format!(
                 "{}: expected an output manifest other than the manifest",
                 shown(path)
@@ -71,24 +72,24 @@ pub(super) fn refuse_shared_outputs(
         }
     }
     let label = |asset: &Asset| format!("asset {} ({})", asset.line, shown(&asset.input));
-    let taken_by = |asset: &Asset, whose: &str| {
-        let output = shown(&asset.output);
-        let first = assets.iter().find(|first| format!("asset {}", first.line) == whose);
-        let whose = first.map_or_else(|| whose.to_owned(), label);
-        let what = format!("expected an output of its own for {}, found that of {whose}", label(asset));
-        Failure::Invalid(format!("{output}: {what}"))
-    };
     for asset in assets {
-        if let Some(whose) = taken.insert(place(&asset.output), format!("asset {}", asset.line)) {
-            return Err(taken_by(asset, &whose));
+        if let Some(other) = taken.insert(place(&asset.output), Ok(asset)) {
+            let other = other.map_or_else(str::to_owned, label);
+            let what = format!(
+                "expected an output of one asset only, found it used by {other} and by {}",
+                label(asset)
+            );
+            return Err(Failure::Invalid(format!("{}: {what}", shown(&asset.output))));
         }
     }
     for asset in assets {
-        let Some(whose) = taken.get(&place(&asset.input)) else { continue };
         // The bake refuses an asset that is its own output, and the others go on.
-        if whose.starts_with("asset ") && *whose != format!("asset {}", asset.line) {
+        if let Some(Ok(other)) =
+            taken.get(&place(&asset.input)).filter(|of| of.is_ok_and(|of| of.line != asset.line))
+        {
+            let what =
+                format!("expected an input that no asset writes, found the output of {}", label(other));
             let input = shown(&asset.input);
-            let what = format!("expected an input that is no output, found that of {whose}");
             return Err(Failure::Invalid(format!("{input}: {what}, as the input of asset {}", asset.line)));
         }
     }
@@ -192,12 +193,11 @@ impl Line {
         let wrong =
             |field: &str, found: &str, expected: String| format!("{field}: {expected}, found {found:?}");
         if let Some(name) = &self.profile {
-            options.profile =
-                options::profile(name).map_err(|expected| wrong("profile", name, expected))?.named();
+            options.profile = options::profile(name).map_err(|expected| wrong("profile", name, expected))?.0;
         }
         if let Some(name) = &self.triangles {
             options.triangles =
-                options::triangles(name).map_err(|expected| wrong("triangles", name, expected))?.named();
+                options::triangles(name).map_err(|expected| wrong("triangles", name, expected))?.0;
         }
         if let Some(name) = &self.effort {
             options.effort = bake::effort(name).map_err(|expected| wrong("effort", name, expected))?;

@@ -33,16 +33,16 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let progress = Progress::default();
     let screen = Screen::new(&progress, arguments.quiet);
     let tells_stages = arguments.json && !arguments.quiet;
-    process::remove_unfinished_files(screen.spinner())?;
+    process::remove_unfinished_files(&screen.spinner)?;
     let baked =
         bake(&arguments.inputs, output, &options, arguments, arguments.max_memory, &progress, &mut |event| {
             match event {
                 Event::Begins(step) => screen.begin(step, &progress),
-                Event::Ended(line) if tells_stages => screen.suspend(|| console::tell_json(line)),
+                Event::Ended(line) if tells_stages => screen.spinner.suspend(|| console::tell_json(line)),
                 Event::Ended(_) => {}
             }
         });
-    screen.clear();
+    screen.spinner.finish_and_clear();
     let report = baked.map_err(|error| Failure::from_bake(&names(&arguments.inputs), &error))?;
     match &report.warning {
         Some(warning) if tells_stages => console::tell_json(&serde_json::json!({ "warning": warning })),
@@ -95,7 +95,6 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
         .ids(!arguments.no_ids)
-        .turning_slabs(!arguments.no_turning_slabs)
         .topology(!arguments.no_topology);
     Ok(options)
 }
@@ -149,22 +148,24 @@ its own name; an object that its file does not name is called after the file, wi
 The output appears whole or not at all. It is left alone if it is up to date, that is, if it is undamaged and was baked \
 from the same inputs with the same options by the same version; --force bakes it anyway.
 
-With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF file with a mesh becomes an instance; nodes share their mesh, of which there is one object for each scale. Every object of the other files becomes an instance where it stands. An instance is named after its node, and .2, .3 and so on follow a name that occurs again. cbvh scene asks about such a file.
+With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF file that has a \
+mesh becomes an instance. Nodes share their meshes: the file has one object for each mesh and scale. Each object of other \
+files becomes an instance where it stands. An instance has the name of its node; .2, .3 and so on are added to a name that \
+occurs again. cbvh scene asks about such a file.
 
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
 
-A glTF file may name buffers in files. Such a file must be in the folder of the glTF file or below it; what a symbolic \
-link leads to counts. --allow-outside allows buffers elsewhere: then whoever made the glTF file chooses which files are \
-read.
+A glTF file may name files that hold its buffers. They must be in the folder of the glTF file or below it, after symbolic \
+links are followed. --allow-outside allows buffers elsewhere: whoever made the glTF file then chooses which files are read.
 
---max-memory SIZE keeps the whole process within SIZE, however large the mesh is. Files are read piece by piece, and up to 200 bytes per triangle go to scratch files, which have no names and vanish however the process \
-ends. The output has the same bytes. Pipes and \
-the JSON of glTF files are held in memory as a whole, data URIs included. A SIZE that is too small for the mesh exits \
-with code 4.
+--max-memory SIZE keeps the whole process within SIZE, however large the mesh is. Files are read piece by piece, and up to \
+200 bytes per triangle go to scratch files. These have no names, and they vanish however the process ends. The output has \
+the same bytes. Pipes and the JSON of glTF files are held in memory as a whole, data URIs included. A SIZE that is too small \
+for the mesh exits with code 4.
 
 On a terminal, a line on standard error shows the stage, the share of it that is done, triangles per second, the bytes \
-spilled to scratch files, the elapsed time and the estimated time left.
+spilled to scratch files, the elapsed time, and about how long the stage still takes.
 
 --json prints one JSON object on standard output. Unless -q is given, it also prints one JSON object per stage on \
 standard error when the stage ends: read, prepare, build, assemble, prove, write. Each has the fields stage, seconds, \
@@ -179,8 +180,8 @@ Many assets:
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
 profile, triangles, max_error, effort, split_objects, scene, ids and topology; the options on the command line are their \
-defaults. Paths are relative to the manifest and may lead anywhere, but an input is a regular file: a manifest or a folder \
-never makes the command wait for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
+defaults. Paths are relative to the manifest and may lead anywhere. Inputs must be regular files, so that the command never \
+waits for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
 input: the number of its line, exit_code, and either the fields of --json or an error. Until all assets are done, the \
 lines of finished assets are in out.jsonl.part. --json prints one object with counts and sums, which add up over \
@@ -238,16 +239,13 @@ pub(crate) struct BakeArguments {
     /// Build one tree per object of the input, so that queries can name an object
     #[arg(long)]
     pub(crate) split_objects: bool,
-    /// Bake a scene: the nodes of glTF files become instances that share their meshes; one tree per object
+    /// Bake a scene, with one tree per object: the nodes of glTF files become instances that share their meshes
     #[arg(long)]
     pub(crate) scene: bool,
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,
-    /// Leave out turning slabs, which dop26-u8-wide has; answers and sizes stay the same
-    #[arg(long)]
-    pub(crate) no_turning_slabs: bool,
-    /// Leave out which objects are closed; questions about what is inside a mesh need it
+    /// Do not store which objects are closed; questions about what is inside a mesh need that
     #[arg(long)]
     pub(crate) no_topology: bool,
     /// Bake even if the output is up to date

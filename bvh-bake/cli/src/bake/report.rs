@@ -158,19 +158,11 @@ impl Report {
                 format!("vertices moved by at most {}", length(file.max_quantization_error)),
             );
         }
-        let (width, volume) = (baked.width_inflation, baked.volume_inflation);
-        line("bounds", format!("{width:.4} times the width of tight ones, {volume:.4} times the volume"));
         line("content", content);
-        let mebibytes = |bytes: u64| format!("{:.1}", bytes as f64 / 1048576.0);
-        let traffic = &baked.traffic;
-        let [inputs, scratch, output, all] =
-            [traffic.input_read, traffic.scratch_read, traffic.output_read, traffic.read()].map(mebibytes);
-        line("read", format!("{all} MiB: inputs {inputs}, scratch {scratch}, output {output}"));
-        let [scratch, output, all] =
-            [traffic.scratch_written, traffic.output_written, traffic.written()].map(mebibytes);
-        line("written", format!("{all} MiB: scratch {scratch}, output {output}"));
+        let (traffic, mebibytes) = (&baked.traffic, |bytes: u64| bytes as f64 / 1048576.0);
         if traffic.scratch_most > 0 {
-            line("scratch", format!("{} MiB at most", mebibytes(traffic.scratch_most)));
+            let [most, written] = [traffic.scratch_most, traffic.scratch_written].map(mebibytes);
+            line("scratch", format!("{most:.1} MiB at most, {written:.1} MiB written"));
         }
         let memory = process::memory_in_words();
         let stages: Vec<String> =

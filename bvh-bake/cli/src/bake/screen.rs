@@ -1,15 +1,15 @@
 //! The progress line of a bake, on standard error if that is a terminal.
 
 use crate::console::spinner;
-use bvh_bake::{Progress, Stage, Step};
-use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use bvh_bake::{Progress, Step};
+use indicatif::{FormattedDuration, HumanBytes, HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::{self, Display, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The line on the terminal.
 pub(crate) struct Screen {
-    spinner: ProgressBar,
+    pub(crate) spinner: ProgressBar,
     step: Arc<Mutex<Option<Begun>>>,
 }
 
@@ -51,21 +51,6 @@ impl Screen {
             self.spinner.force_draw();
         }
     }
-
-    /// Hides the line while something else is written.
-    pub(crate) fn suspend(&self, write: impl FnOnce()) {
-        self.spinner.suspend(write);
-    }
-
-    /// Returns the line itself.
-    pub(crate) fn spinner(&self) -> &ProgressBar {
-        &self.spinner
-    }
-
-    /// Removes the line.
-    pub(crate) fn clear(self) {
-        self.spinner.finish_and_clear();
-    }
 }
 
 fn lock(step: &Mutex<Option<Begun>>) -> MutexGuard<'_, Option<Begun>> {
@@ -79,20 +64,25 @@ struct Line {
     triangles_per_second: f64,
     spilled: u64,
     elapsed: Duration,
-    left: Option<Duration>,
+    /// How long the step has run.
+    running: Duration,
 }
+
+/// The share of a step from which on the time left is shown. Before that, too little is done to tell.
+const MIN_SHARE: f64 = 0.02;
 
 impl Line {
     fn now(progress: &Progress, begun: Begun, elapsed: Duration) -> Self {
         let Begun { step, since, triangles } = begun;
         let triangles = progress.triangles(step).saturating_sub(triangles);
+        let running = since.elapsed();
         Self {
             name: step.name(),
             share: progress.share(step),
-            triangles_per_second: triangles as f64 / since.elapsed().as_secs_f64().max(1e-3),
+            triangles_per_second: triangles as f64 / running.as_secs_f64().max(1e-3),
             spilled: progress.traffic().scratch_written,
             elapsed,
-            left: left(elapsed, done(|step| progress.share(step))),
+            running,
         }
     }
 }
@@ -103,51 +93,21 @@ impl Display for Line {
         if let Some(share) = self.share {
             write!(f, " {:.0} %", (share * 100.0).floor())?;
         }
-        match self.triangles_per_second {
-            rate @ 1e6.. => write!(f, ", {:.1} M triangles/s", rate / 1e6)?,
-            rate @ 1e3.. => write!(f, ", {:.0} k triangles/s", rate / 1e3)?,
-            rate @ 1.0.. => write!(f, ", {rate:.0} triangles/s")?,
-            _ => {}
+        if self.triangles_per_second >= 1.0 {
+            write!(f, ", {} triangles/s", HumanCount(self.triangles_per_second as u64))?;
         }
-        match self.spilled as f64 / 1048576.0 {
-            mebibytes @ 10240.0.. => write!(f, ", {:.1} GiB spilled", mebibytes / 1024.0)?,
-            mebibytes if mebibytes > 0.0 => write!(f, ", {mebibytes:.0} MiB spilled")?,
-            _ => {}
+        if self.spilled > 0 {
+            write!(f, ", {} spilled", HumanBytes(self.spilled))?;
         }
-        write!(f, ", {}", clock(self.elapsed))?;
-        match self.left {
-            Some(left) => write!(f, ", about {} left", clock(left)),
+        write!(f, ", {}", FormattedDuration(self.elapsed))?;
+        match self.share.filter(|share| (MIN_SHARE..1.0).contains(share)) {
+            Some(share) => {
+                let left = self.running.mul_f64((1.0 - share) / share);
+                write!(f, ", about {} left in this step", FormattedDuration(left))
+            }
             None => Ok(()),
         }
     }
-}
-
-/// Returns a time in minutes and seconds.
-fn clock(time: Duration) -> String {
-    let seconds = time.as_secs();
-    format!("{}:{:02}", seconds / 60, seconds % 60)
-}
-
-/// The usual share of each step in the time of a bake, in percent. Measured with 2 million triangles as STL and PLY, in
-/// memory and within 200 MiB, on two cores of an Intel Xeon, family 6, model 167, 2026-11-21. Reading text takes longer.
-const USUAL: [(Step, f64); Step::ALL.len()] = [
-    (Step::Read, 23.0),
-    (Step::Bake(Stage::Prepare), 10.0),
-    (Step::Bake(Stage::Build), 48.0),
-    (Step::Bake(Stage::Encode), 9.0),
-    (Step::Bake(Stage::Prove), 7.0),
-    (Step::Write, 3.0),
-];
-
-/// Estimates the share of all steps that is done, from 0 to 1, by their usual shares.
-fn done(share: impl Fn(Step) -> Option<f64>) -> f64 {
-    let all: f64 = USUAL.iter().map(|(_, usual)| usual).sum();
-    USUAL.iter().map(|&(step, usual)| usual * share(step).unwrap_or(0.0)).sum::<f64>() / all
-}
-
-/// Estimates the time left at the speed so far. Returns `None` while too little is done to tell.
-fn left(elapsed: Duration, done: f64) -> Option<Duration> {
-    (done >= 0.02).then(|| elapsed.mul_f64((1.0 - done).max(0.0) / done))
 }
 
 #[cfg(test)]
@@ -156,45 +116,21 @@ mod tests {
 
     #[test]
     fn a_line_shows_what_is_known() {
-        let seconds = Duration::from_secs;
         let mut line = Line {
             name: "building bricks",
-            share: Some(0.439),
+            share: Some(0.5),
             triangles_per_second: 1.24e6,
             spilled: 812 << 20,
-            elapsed: seconds(72),
-            left: Some(seconds(5)),
+            elapsed: Duration::from_secs(72),
+            running: Duration::from_secs(5),
         };
         assert_eq!(
             line.to_string(),
-            "building bricks 43 %, 1.2 M triangles/s, 812 MiB spilled, 1:12, about 0:05 left"
+            "building bricks 50 %, 1,240,000 triangles/s, 812.00 MiB spilled, 00:01:12, about 00:00:05 left in this step"
         );
-        (line.share, line.triangles_per_second, line.spilled, line.left) = (None, 0.0, 0, None);
-        assert_eq!(line.to_string(), "building bricks, 1:12");
-        (line.triangles_per_second, line.spilled) = (45_600.0, 25 << 29);
-        assert_eq!(line.to_string(), "building bricks, 46 k triangles/s, 12.5 GiB spilled, 1:12");
-    }
-
-    #[test]
-    fn the_time_left_shrinks_to_nothing() {
-        let until = |last: Step, share: f64| {
-            done(|step| match step {
-                step if step < last => Some(1.0),
-                step if step == last => Some(share),
-                _ => None,
-            })
-        };
-        assert_eq!((until(Step::Read, 0.0), until(Step::Write, 1.0)), (0.0, 1.0));
-        let mut before = 0.0;
-        for step in Step::ALL {
-            for share in [0.1, 0.5, 1.0] {
-                let now = until(step, share);
-                assert!(now > before, "{step:?} {share}");
-                before = now;
-            }
-        }
-        let minute = Duration::from_secs(60);
-        assert_eq!((left(minute, 0.01), left(minute, 1.0)), (None, Some(Duration::ZERO)));
-        assert_eq!(left(minute, 0.75), Some(Duration::from_secs(20)));
+        (line.share, line.triangles_per_second, line.spilled) = (Some(1.0), 0.0, 0);
+        assert_eq!(line.to_string(), "building bricks 100 %, 00:01:12");
+        line.share = None;
+        assert_eq!(line.to_string(), "building bricks, 00:01:12");
     }
 }

@@ -2,9 +2,10 @@
 
 mod page;
 mod statistics;
+mod text;
 mod whole;
 
-use crate::console::{self, Failure, Record};
+use crate::console::{self, Failure};
 use crate::options::{size, whole};
 use bvh_bake::{FileError, StoredFile};
 use bvh_format::Layout;
@@ -27,27 +28,19 @@ pub(crate) fn run(arguments: &DumpArguments) -> Result<(), Failure> {
             let text = format!("--page: expected a page below {pages}, found {number}");
             return Err(Failure::Usage(text));
         }
-        page::page(&contents, number, arguments.json)
+        page::page(&contents, number)
     } else if let Some(number) = arguments.treelet {
         // The counts are as the file states them, and those of a forged file may overflow.
         let treelets = contents.layout.objects.iter().map(|object| object.record().treelets.get());
         let treelets = treelets.fold(0, u64::saturating_add);
-        let shown = page::treelet(&contents, number, arguments.json).map_err(failed)?;
+        let shown = page::treelet(&contents, number).map_err(failed)?;
         let outside = || format!("--treelet: expected a treelet below {treelets}, found {number}");
         Ok(shown.ok_or_else(|| Failure::Usage(outside()))?)
     } else {
-        whole::file(&path.display().to_string(), &contents, arguments.json)
+        whole::file(&path.display().to_string(), &contents)
     };
-    match shown.map_err(failed)? {
-        Shown::Json(record) => console::json(&record),
-        Shown::Text(text) => console::text(&text),
-    }
-}
-
-/// What is printed.
-enum Shown {
-    Json(Record),
-    Text(String),
+    let record = shown.map_err(failed)?;
+    if arguments.json { console::json(&record) } else { console::text(&text::of(&record)) }
 }
 
 /// A file that is read piece by piece, and its layout.
@@ -78,7 +71,7 @@ Examples:
 
 Treelets are numbered through the whole file, in the order of pages and of the slots in each page.
 
-The file is read piece by piece. That takes about 10 MiB of memory, and one byte per ten thousand bytes of the file. \
+The file is read piece by piece, in about 10 MiB of memory. \
 --max-memory SIZE keeps the process within SIZE; a SIZE that is too small exits with code 4.";
 
 /// What `dump` accepts.

@@ -1,17 +1,18 @@
-//! Statistics of an object's tree by level: counts, and the width of decoded slabs relative to tight ones.
+//! Statistics of an object's tree by level: counts of treelets, children, packets and triangles.
 //!
-//! Links lead to later pages only, so that two passes are enough: forwards for the levels, and backwards for the tight
-//! bounds below each subtree root. Memory holds one page with its leaf block, the levels of the roots, and the bounds of
-//! the roots whose link has not been reached: few, as in the proof of a bake.
+//! Links lead to later pages only, so that one pass is enough. Memory holds one page with its leaf block, and the levels of
+//! roots whose page has not been reached.
 
 use super::Contents;
 use bvh_bake::FileError;
-use bvh_format::bounds::{Inflation, Subtree, visit_bounds};
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
 use bvh_format::treelet::{Child, Links};
 use bvh_format::{FormatError, Rule};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
+
+/// The bytes of memory that the level of a root takes until its page is reached.
+const BYTES_PER_ROOT: usize = 64;
 
 /// The treelets of one level. The root has level 0.
 #[derive(Debug, Clone, Copy, Default)]
@@ -20,19 +21,15 @@ pub(super) struct Level {
     children: u64,
     pub(super) packets: u64,
     triangles: u64,
-    inflation: Inflation,
 }
 
 impl Level {
     pub(super) fn joined(self, other: &Self) -> Self {
-        let mut inflation = self.inflation;
-        inflation.join(&other.inflation);
         Self {
             treelets: self.treelets + other.treelets,
             children: self.children + other.children,
             packets: self.packets + other.packets,
             triangles: self.triangles + other.triangles,
-            inflation,
         }
     }
 
@@ -42,11 +39,6 @@ impl Level {
 
     pub(super) fn mean_triangles(&self) -> f64 {
         mean(self.triangles as f64, self.packets)
-    }
-
-    /// Returns the mean of decoded width over tight width, or 1 if there is nothing to measure.
-    pub(super) fn mean_width(&self) -> f64 {
-        self.inflation.mean_width()
     }
 }
 
@@ -66,7 +58,8 @@ impl Statistics {
     pub(super) fn gather(contents: &Contents, object: &Object) -> Result<Self, FileError> {
         let Contents { file, layout } = contents;
         let mut statistics = Self { levels: Vec::new(), lines: 0, roots: 0 };
-        let mut root_levels = RootLevels::default();
+        // The levels of roots in later pages. The last link to a root counts; only damaged files have several.
+        let mut ahead: BTreeMap<RootRef, usize> = BTreeMap::new();
         for number in object.pages() {
             let bytes = contents.checked(object, number)?;
             let page = bytes.page(object);
@@ -74,39 +67,19 @@ impl Statistics {
             layout.check_leaf_block_of(&layout.read_leaf_block(file, header)?, &page, object)?;
             statistics.lines += header.shape().lines(object.profile()) as u64;
             statistics.roots += u64::from(header.roots);
-            let levels = slot_levels(&page, &root_levels.advance(number, header.roots));
+            let roots = levels_of_roots(&mut ahead, number, header.roots);
+            let levels = slot_levels(&page, &roots);
             for slot in 0..header.treelets {
                 let level = levels[usize::from(slot)];
                 let links = page.links(slot);
                 statistics.count(level, &links);
                 for child in 0..links.children() {
                     if let Child::Remote(link) = links.child(child) {
-                        root_levels.set(page.remote(link), level + 1);
+                        ahead.insert(page.remote(link), level + 1);
                     }
                 }
             }
-            file.require_memory(root_levels.bytes())?;
-        }
-        let slabs = object.profile().directions().slabs();
-        // The bounds of roots whose link has not been reached.
-        let mut below: HashMap<RootRef, Subtree> = HashMap::new();
-        for number in object.pages().rev() {
-            let bytes = contents.checked(object, number)?;
-            let page = bytes.page(object);
-            let levels = slot_levels(&page, &root_levels.retreat(page.header().roots));
-            let leaves = layout.read_leaf_block(file, page.header())?;
-            let known = |to: RootRef| below.get(&to).unwrap_or(Subtree::unknown());
-            let subtrees = visit_bounds(object, &page, leaves.bytes(), known, |bound| {
-                if bound.child.is_some() {
-                    let level = statistics.level(levels[usize::from(bound.slot)]);
-                    level.inflation.add(&bound.decoded, &bound.tight, slabs);
-                }
-                Ok(())
-            })?;
-            for link in 0..page.header().remotes {
-                below.remove(&page.remote(link));
-            }
-            below.extend((0..).map(|root| RootRef::new(number, root)).zip(subtrees));
+            file.require_memory(ahead.len() * BYTES_PER_ROOT)?;
         }
         if statistics.levels.is_empty() {
             let at = layout.page_offset(object.record().first_page.get());
@@ -115,15 +88,11 @@ impl Statistics {
         Ok(statistics)
     }
 
-    fn level(&mut self, level: usize) -> &mut Level {
+    fn count(&mut self, level: usize, links: &Links) {
         if self.levels.len() <= level {
             self.levels.resize(level + 1, Level::default());
         }
-        &mut self.levels[level]
-    }
-
-    fn count(&mut self, level: usize, links: &Links) {
-        let level = self.level(level);
+        let level = &mut self.levels[level];
         level.treelets += 1;
         for child in 0..links.children() {
             level.children += 1;
@@ -153,62 +122,16 @@ fn slot_levels(page: &Page, roots: &[usize]) -> Vec<usize> {
     levels
 }
 
-/// The levels of the roots of all pages up to the current one, and of known roots after it.
-#[derive(Default)]
-struct RootLevels {
-    /// The levels of roots in later pages.
-    ahead: BTreeMap<RootRef, usize>,
-    /// The levels of roots in earlier pages, in order; `DEEP` stands for the next level in `deep`.
-    passed: Vec<u8>,
-    deep: Vec<usize>,
-}
-
-/// Marks a level that is too large for a byte.
-const DEEP: u8 = u8::MAX;
-
-impl RootLevels {
-    /// Notes the level of a root that a link leads to. The last link counts; only damaged files have several.
-    fn set(&mut self, to: RootRef, level: usize) {
-        self.ahead.insert(to, level);
-    }
-
-    /// Advances to the next page and returns the levels of its roots. A root without a link counts as the root of the
-    /// tree.
-    fn advance(&mut self, page: u32, roots: u8) -> Vec<usize> {
-        let mut levels = vec![0; usize::from(roots)];
-        while let Some(first) = self.ahead.first_entry().filter(|first| first.key().page() <= page) {
-            let (to, level) = first.remove_entry();
-            if let Some(of_root) = levels.get_mut(usize::from(to.root())) {
-                *of_root = level;
-            }
+/// Takes out the levels of the roots of a page. A root without a link counts as the root of the tree.
+fn levels_of_roots(ahead: &mut BTreeMap<RootRef, usize>, page: u32, roots: u8) -> Vec<usize> {
+    let mut levels = vec![0; usize::from(roots)];
+    while let Some(first) = ahead.first_entry().filter(|first| first.key().page() <= page) {
+        let (to, level) = first.remove_entry();
+        if let Some(of_root) = levels.get_mut(usize::from(to.root())) {
+            *of_root = level;
         }
-        for &level in &levels {
-            let small = u8::try_from(level).unwrap_or(DEEP);
-            self.passed.push(small);
-            if small == DEEP {
-                self.deep.push(level);
-            }
-        }
-        levels
     }
-
-    /// Goes back by one page and returns the levels of its roots.
-    fn retreat(&mut self, roots: u8) -> Vec<usize> {
-        let mut levels = self.passed.split_off(self.passed.len().saturating_sub(roots.into()));
-        let of_root = |small: u8| match small {
-            DEEP => self.deep.pop().unwrap_or(0),
-            level => level.into(),
-        };
-        levels.reverse();
-        let mut levels: Vec<usize> = levels.into_iter().map(of_root).collect();
-        levels.reverse();
-        levels
-    }
-
-    /// Returns the bytes of memory that the levels of earlier pages take.
-    fn bytes(&self) -> usize {
-        self.passed.len() + self.deep.len() * size_of::<usize>()
-    }
+    levels
 }
 
 #[cfg(test)]
@@ -216,25 +139,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_the_same_in_both_directions() {
-        let mut levels = RootLevels::default();
-        let mut all = Vec::new();
-        for page in 0..100 {
-            for root in 0..page as u8 % 5 {
-                levels.set(RootRef::new(page + 1 + u32::from(root) % 3, root), (page * page) as usize);
-            }
-            let roots = 1 + page as u8 % 4;
-            let passed = levels.advance(page, roots);
-            assert_eq!(passed.len(), usize::from(roots));
-            all.push(passed);
-        }
-        assert_eq!(all[0], [0]);
-        // Page 2 led to roots 0 and 1 of pages 3 and 4.
-        assert_eq!((all[3][0], all[4][0]), (4, 9));
-        assert!(all.iter().flatten().any(|&level| level > 255));
-        for passed in all.into_iter().rev() {
-            assert_eq!(levels.retreat(passed.len() as u8), passed);
-        }
-        assert_eq!(levels.bytes(), 0);
+    fn roots_have_the_level_of_their_link() {
+        let at = RootRef::new;
+        let mut ahead = BTreeMap::from([(at(1, 0), 3), (at(2, 1), 300), (at(2, 9), 7), (at(3, 0), 5)]);
+        assert_eq!(levels_of_roots(&mut ahead, 0, 1), [0]);
+        assert_eq!(levels_of_roots(&mut ahead, 1, 2), [3, 0]);
+        // A root that the page does not have is dropped.
+        assert_eq!(levels_of_roots(&mut ahead, 2, 2), [0, 300]);
+        assert_eq!(ahead.len(), 1);
     }
 }

@@ -1,14 +1,18 @@
-//! How `cbvh report` and the laboratory measure queries: questions, poses, rounds, spreads, tables and plots.
+//! What `cbvh report` and the laboratory of this project share: where a report comes from, and how it is written.
 //!
-//! This library is the part of the command that both programs share. It is not meant for applications, and nothing in
-//! it is stable.
+//! This library is not meant for applications, and nothing in it is stable.
 
-pub mod motions;
 pub mod origin;
-pub mod pairs;
-pub mod pin;
-pub mod plot;
-pub mod poses;
-pub mod rounds;
-pub mod spread;
-pub mod table;
+
+/// Writes reports.
+pub mod table {
+    use serde::Serialize;
+
+    /// Writes a report as one JSON object, with a line feed at the end.
+    ///
+    /// # Errors
+    /// Returns the error of the serializer.
+    pub fn json(report: &impl Serialize) -> Result<String, serde_json::Error> {
+        Ok(serde_json::to_string_pretty(report)? + "\n")
+    }
+}

@@ -48,19 +48,6 @@ pub struct Machine {
     pub is_virtual: bool,
     /// Name and release of the operating system.
     pub system: String,
-    /// The data caches of the first processor, the nearest one first; empty if unknown.
-    pub caches: Vec<Cache>,
-}
-
-/// A cache of the processor.
-#[derive(Debug, Clone, Serialize)]
-pub struct Cache {
-    /// 1 for the nearest.
-    pub level: u64,
-    /// `Data` or `Unified`.
-    pub kind: String,
-    /// Its size.
-    pub bytes: u64,
 }
 
 impl Machine {
@@ -76,43 +63,22 @@ impl Machine {
             (Some(family), Some(model)) => format!("{name}, family {family}, model {model}"),
             _ => name.to_owned(),
         };
-        let kernel = |name: &str| read_to_string(format!("/proc/sys/kernel/{name}")).ok();
-        let system = match (kernel("ostype"), kernel("osrelease")) {
-            (Some(name), Some(release)) => format!("{} {}", name.trim(), release.trim()),
-            _ => std::env::consts::OS.to_owned(),
-        };
+        let release = read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
         Self {
             processor,
             processors: std::thread::available_parallelism().map_or(1, usize::from),
             is_virtual: field("flags").is_some_and(|flags| flags.split(' ').any(|flag| flag == "hypervisor")),
-            system,
-            caches: (0..8).map_while(cache).filter(|cache| cache.kind != "Instruction").collect(),
+            system: format!("{} {}", std::env::consts::OS, release.trim()).trim().to_owned(),
         }
     }
 
     /// Describes the machine in one phrase.
     pub fn text(&self) -> String {
-        let plural = if self.processors == 1 { "" } else { "s" };
-        let kind = if self.is_virtual { " of a virtual machine" } else { "" };
-        let cache = |cache: &Cache| match cache.bytes {
-            bytes @ 0x10_0000.. => format!("L{} {} MiB", cache.level, bytes >> 20),
-            bytes => format!("L{} {} KiB", cache.level, bytes >> 10),
-        };
-        let caches: Vec<String> = self.caches.iter().map(cache).collect();
-        let caches = if caches.is_empty() { "unknown".to_owned() } else { caches.join(", ") };
-        let Self { processor, processors, system, .. } = self;
-        format!("{processor} ({processors} processor{plural}{kind}), {system}, data caches: {caches}")
+        let Self { processor, processors, system, is_virtual } = self;
+        let plural = if *processors == 1 { "" } else { "s" };
+        let kind = if *is_virtual { " of a virtual machine" } else { "" };
+        format!("{processor} ({processors} processor{plural}{kind}), {system}")
     }
-}
-
-/// Returns the cache of this number of the first processor.
-fn cache(index: usize) -> Option<Cache> {
-    let read = |name: &str| {
-        let text = read_to_string(format!("/sys/devices/system/cpu/cpu0/cache/index{index}/{name}"));
-        Some(text.ok()?.trim().to_owned())
-    };
-    let bytes = read("size")?.strip_suffix('K')?.parse::<u64>().ok()? * 1024;
-    Some(Cache { level: read("level")?.parse().ok()?, kind: read("type")?, bytes })
 }
 
 /// Returns the date `days` days after 1970-01-01. The Gregorian calendar repeats every 400 years, or 146097 days, and a year

@@ -1,26 +1,27 @@
 //! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
 //!
 //! `layouts` and `motions` are the two kinds of report. Both make rows of named figures, from which all else is written: a
-//! table, JSON, a drawing and a page for people.
+//! table, JSON, a drawing and a page for people. They stand on `inputs`, `made` poses and motions, and `timing`.
 
+mod inputs;
 mod layouts;
-mod meshes;
+mod made;
 mod motions;
 mod page;
+mod plot;
+mod timing;
+mod ways;
 
 use crate::asking::{self, files};
-use crate::console::{self, Failure, plural, spinner};
-use bvh_bake::Options;
+use crate::console::{self, Failure, Record, plural, spinner};
 use bvh_bake::mesh::Mesh;
+use bvh_bake::{BakeReport, Options};
 use bvh_query::{Backend, Bvh, Querier, QueryError};
 use cbvh_measure::origin::Origin;
-use cbvh_measure::pairs::{self, Pair};
-use cbvh_measure::pin::Pinned;
-use cbvh_measure::plot::{self, Figure};
-use cbvh_measure::poses::diagonal;
-use cbvh_measure::table::{self, Cell};
+use cbvh_measure::table;
 use clap::Args;
-use meshes::{Baked, bake_both};
+use inputs::{Baked, Pair, bake_both};
+use plot::Panel;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -37,7 +38,7 @@ PAIRS is a text file with one pair of meshes per line: NAME A B [FILE[,FILE...]]
 format that bake reads, or .cbvh files, whose triangles are baked again. FILEs have poses or, with --motions, motions, as \
 query and motion read them. File names are relative to the list. For a pair without poses, 60 are made, always the same \
 ones: overlapping, and with gaps of 1e-6, 0.5 %, 1 % and 5 % of A's diagonal. For a pair without motions, 60 are made, \
-too: long ways, short ways, slides and turns on the spot.
+too: long motions, short motions, slides and turns on the spot.
 
 The command writes report.html for people, report.svg with its plots, and report.csv and report.json with the same \
 figures. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
@@ -45,48 +46,47 @@ figures. If an answer is wrong, the exit code is 3 and the files are written nev
 Without --motions, it bakes each pair in every profile with every encoding of triangles, and asks for contact and for \
 distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compared with those of dop14-f32.
 
-With --motions, it bakes each pair as bake does without options, and asks about each motion in 16 ways: by 10, 30, 100, \
-300, 1000, 3000 and 10000 equally spaced poses until one touches, in the order of time and in an order that is spread from \
-the start, and by certified answers, for the first contact and for any. The report says how many of the certified contacts \
+With --motions, it bakes each pair as bake does without options, and asks about each motion in nine ways: by 10, 30, 100, \
+300, 1000, 3000 and 10000 equally spaced poses until one touches, and by certified answers, for the first contact and for \
+any. The report says how many of the certified contacts \
 the samples miss, how late they find the others, and how long each way takes. A sample that touches where the motion is \
 certified free is a wrong answer. Each way asks about all motions of a pair in one round, and in as many \
 further rounds as fit into 10 seconds; report.csv has their number. A pair takes some minutes at most, unless one round of \
 10000 samples takes longer.
 
-Queries run on one thread that is bound to one processor. On a machine that does other work the times include the \
-effects of that work.";
+Queries run on one thread. On a machine that does other work the times include the effects of that work.";
 
 /// What `report` takes.
 #[derive(Debug, Args)]
 #[command(after_help = REPORT_HELP)]
 pub(crate) struct ReportArguments {
     /// The list of the pairs of meshes to report on
-    pub(crate) pairs: PathBuf,
+    pairs: PathBuf,
     /// The folder to write to; made if it does not exist
     #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    out: PathBuf,
     /// The folder of the meshes [default: that of PAIRS]
     #[arg(long, value_name = "DIR")]
-    pub(crate) meshes: Option<PathBuf>,
+    meshes: Option<PathBuf>,
     /// Files of poses for each pair, besides those in PAIRS; %s stands for the pair's name
     #[arg(long, value_name = "FILE[,FILE...]")]
-    pub(crate) poses: Option<String>,
+    poses: Option<String>,
     /// Report on motions instead of layouts. FILEs are files of motions for each pair, besides those in PAIRS; %s stands for
     /// the pair's name
     #[arg(long, value_name = "FILE[,FILE...]", num_args = 0..=1, require_equals = true, conflicts_with = "poses")]
-    pub(crate) motions: Option<Option<String>>,
+    motions: Option<Option<String>>,
     /// The largest number of poses or motions per pair, spread evenly over all; 0 asks all
     #[arg(long, value_name = "N", default_value = "100")]
-    pub(crate) limit: usize,
+    limit: usize,
     /// Rounds in which all layouts, or all ways to ask, take turns
     #[arg(long, value_name = "N", default_value = "7", value_parser = clap::value_parser!(u16).range(1..=1000))]
-    pub(crate) rounds: u16,
+    rounds: u16,
     /// Backend: auto, scalar, avx2 or avx512; auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
-    pub(crate) isa: String,
+    isa: String,
     /// Ask only about ten poses or motions in two rounds: good for trying the command, too few to quote
     #[arg(long, conflicts_with_all = ["limit", "rounds"])]
-    pub(crate) quick: bool,
+    quick: bool,
 }
 
 /// Rounds and items of `--quick`.
@@ -121,50 +121,31 @@ struct Subject<'a> {
     rounds: usize,
 }
 
-/// A row of `report.csv`: its figures with their names. All that is told of it is taken from here.
-type Cells = Vec<(&'static str, Cell)>;
-
-/// Returns a figure of a row, if it was taken.
-fn number(row: &Cells, name: &str) -> Option<f64> {
-    match row.iter().find(|(other, _)| *other == name)?.1 {
-        Cell::Number(value) => Some(value),
-        Cell::Count(count) => Some(count as f64),
-        Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
-        _ => None,
-    }
-}
-
 /// The results of a pair.
 #[derive(Default)]
 struct Measured {
     name: String,
     /// The meshes and the items, in sentences.
     about: String,
-    rows: Vec<Cells>,
+    /// Its record in `report.json`.
+    record: Value,
+    /// All that is told of the pair is taken from its rows in `report.csv`, of which this is the number of the first one.
+    rows: Vec<Record>,
+    first_row: usize,
     /// Wrong answers, one line each.
     wrong: Vec<String>,
     /// Further fields of the pair's record.
     counts: Vec<(&'static str, usize)>,
-    pinned: Option<Pinned>,
     /// What is found, the most important sentence first.
     sentences: Vec<String>,
-    figure: Figure,
-    /// The tables, as HTML.
-    tables: String,
+    panels: Vec<Panel>,
+    tables: Vec<page::Table>,
 }
 
-/// The whole report: where and how it was measured, the pairs, and the rows.
-#[derive(Serialize)]
+/// The whole report: where and how it was measured, and the pairs.
 struct Report {
-    #[serde(flatten)]
     origin: Origin,
     settings: Value,
-    pairs: Vec<Value>,
-    /// Answers that are not what they must be, one line each.
-    wrong: Vec<String>,
-    #[serde(serialize_with = "table::objects")]
-    rows: Vec<Cells>,
-    #[serde(skip)]
     sections: Vec<Measured>,
 }
 
@@ -183,7 +164,7 @@ fn run_kind<T: Clone>(
 ) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.isa)?;
     // All inputs are read before the first pair is measured, so that an error in the last one shows at once.
-    let inputs = read(arguments, &kind, files)?;
+    let inputs = inputs::read(arguments, &kind, files)?;
     let out = &arguments.out;
     std::fs::create_dir_all(out).map_err(|error| {
         Failure::System(format!("{}: expected a folder to write to, found {error}", out.display()))
@@ -193,9 +174,6 @@ fn run_kind<T: Clone>(
     let mut report = Report {
         origin: Origin::of("cbvh report"),
         settings: json!({ "quick": quick, "rounds": rounds, kind.items: limit, "isa": backend.name() }),
-        pairs: Vec::new(),
-        wrong: Vec::new(),
-        rows: Vec::new(),
         sections: Vec::new(),
     };
     let spinner = spinner(false);
@@ -210,13 +188,26 @@ fn run_kind<T: Clone>(
         } else {
             (pair.files.iter().map(|file| files::stem(file)).collect::<Vec<_>>().join(", "), given)
         };
-        let items = pairs::spread_evenly(&all, limit);
+        let items = spread_evenly(&all, limit);
         let subject = Subject { pair: &pair, meshes: &meshes, baked: &baked, backend, rounds };
         let measured = (kind.measure)(&subject, &items)?;
         report.add(&subject, measured, (kind.items, items.len(), &from));
     }
     spinner.finish_and_clear();
-    write(&report, &kind.words, out)
+    report.write(&kind.words, out)
+}
+
+/// Returns at most `count` items, spread evenly over all; 0 returns all.
+fn spread_evenly<T: Clone>(all: &[T], count: usize) -> Vec<T> {
+    if count == 0 || all.len() <= count {
+        return all.to_vec();
+    }
+    (0..count).map(|number| all[number * all.len() / count].clone()).collect()
+}
+
+/// Returns the name of a bake's layout, as tables have it.
+fn layout_of(report: &BakeReport) -> String {
+    format!("{} {}", report.file.profile.name(), report.file.triangle_encoding.name())
 }
 
 impl Report {
@@ -225,90 +216,101 @@ impl Report {
         let Subject { pair, baked, .. } = subject;
         let side = |path: &Path, (bvh, report): &Baked| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let (triangles, diagonal) = (bvh.all().triangles(), diagonal(bvh));
-            let layout = meshes::layout_of(report);
+            let (triangles, diagonal) = (bvh.all().triangles(), made::diagonal(bvh));
+            let layout = layout_of(report);
             (
                 format!("{name}, {triangles} triangles, diagonal {diagonal:.4} mesh units"),
                 json!({ "mesh": name, "triangles": triangles, "diagonal": diagonal, "chosen_layout": layout }),
             )
         };
         let [(about_a, a), (about_b, b)] = [side(&pair.a, &baked[0]), side(&pair.b, &baked[1])];
-        let mut record = json!({
-            "name": pair.name, "a": a, "b": b, items: count, format!("{items}_from"): from, "pinned": of.pinned,
+        of.record = json!({
+            "name": pair.name, "a": a, "b": b, items: count, format!("{items}_from"): from,
         });
-        of.counts.iter().for_each(|(key, count)| record[*key] = json!(count));
-        self.pairs.push(record);
-        self.wrong.append(&mut of.wrong);
-        self.rows.append(&mut of.rows);
+        of.counts.iter().for_each(|(key, count)| of.record[*key] = json!(count));
         of.name.clone_from(&pair.name);
         of.about = format!("A: {about_a}. B: {about_b}. {count} {items} ({from}).");
+        of.first_row = self.sections.iter().map(|section| section.rows.len()).sum();
         self.sections.push(of);
     }
+
+    /// Writes the four files, and prints a summary. Wrong answers are a failure, of which the files tell.
+    fn write(&self, words: &page::Words, out: &Path) -> Result<(), Failure> {
+        /// The content of `report.json`.
+        #[derive(Serialize)]
+        struct Json<'a> {
+            #[serde(flatten)]
+            origin: &'a Origin,
+            settings: &'a Value,
+            pairs: Vec<&'a Value>,
+            wrong: Vec<&'a String>,
+            rows: Vec<&'a Record>,
+        }
+        let sections = &self.sections;
+        let json = Json {
+            origin: &self.origin,
+            settings: &self.settings,
+            pairs: sections.iter().map(|section| &section.record).collect(),
+            wrong: sections.iter().flat_map(|section| &section.wrong).collect(),
+            rows: sections.iter().flat_map(|section| &section.rows).collect(),
+        };
+        let panels: Vec<&[Panel]> = sections.iter().map(|section| &section.panels[..]).collect();
+        for (name, text) in [
+            ("report.csv", csv(&json.rows)),
+            ("report.json", table::json(&json).map_err(|error| Failure::System(error.to_string()))?),
+            ("report.svg", plot::svg(&panels)),
+            ("report.html", page::page(self, words)),
+        ] {
+            files::write_file(&out.join(name), &text)?;
+        }
+        let counted = |count: usize, word| format!("{count} {}", plural(count as u64, word));
+        let mut text = format!(
+            "{}: {}, {}, {}\n",
+            out.join("report.html").display(),
+            counted(sections.len(), "pair"),
+            counted(json.rows.len(), "row"),
+            counted(json.wrong.len(), "wrong answer")
+        );
+        for section in sections {
+            for line in &section.sentences {
+                text += &format!("  {}: {line}\n", section.name);
+            }
+        }
+        console::text(&text)?;
+        match json.wrong.first() {
+            None => Ok(()),
+            Some(first) => Err(Failure::invalid(
+                &out.join("report.json"),
+                format!("expected right answers, found {} wrong; the first: {first}", json.wrong.len()),
+            )),
+        }
+    }
 }
 
-/// A pair with its items, of which there may be none, and its meshes.
-type Input<T> = (Pair, Vec<T>, [Mesh; 2]);
-
-/// Reads the list, and what it names.
-fn read<T>(
-    arguments: &ReportArguments,
-    kind: &Kind<T>,
-    files: Option<&str>,
-) -> Result<Vec<Input<T>>, Failure> {
-    let list: &Path = &arguments.pairs;
-    let bytes = std::fs::read(list).map_err(|error| Failure::from_input(list, &error))?;
-    let pairs = pairs::parse(&bytes, list, arguments.meshes.as_deref(), files)
-        .map_err(|error| Failure::invalid(list, error))?;
-    let items = |pair: &Pair| -> Result<Vec<T>, Failure> {
-        let mut items = Vec::new();
-        for file in &pair.files {
-            files::require_regular(file)?;
-            items.extend((kind.read)(file)?);
-        }
-        Ok(items)
+/// Writes rows as comma-separated values (RFC 4180): a line of names, then one line per row. A figure that was not taken is
+/// absent, never 0 or NaN.
+fn csv(rows: &[&Record]) -> String {
+    let line = |fields: Vec<String>| fields.join(",") + "\n";
+    let quoted = |field: String| {
+        let is_plain = !field.contains([',', '"', '\n', '\r']);
+        if is_plain { field } else { format!("\"{}\"", field.replace('"', "\"\"")) }
     };
-    // Files of items are small, so that they come before the meshes of all pairs.
-    let given = pairs.iter().map(items).collect::<Result<Vec<_>, _>>()?;
-    let with_meshes = pairs.into_iter().zip(given).map(|(pair, given)| {
-        files::require_regular(&pair.a)?;
-        files::require_regular(&pair.b)?;
-        let meshes = [meshes::read(&pair.a)?, meshes::read(&pair.b)?];
-        Ok((pair, given, meshes))
-    });
-    with_meshes.collect()
+    let mut text = rows.first().map_or(String::new(), |row| line(row.names().map(str::to_owned).collect()));
+    rows.iter().for_each(|row| text += &line(row.names().map(|name| quoted(row.text(name))).collect()));
+    text
 }
 
-/// Writes the four files, and prints a summary. Wrong answers are a failure, of which the files tell.
-fn write(report: &Report, words: &page::Words, out: &Path) -> Result<(), Failure> {
-    let figures: Vec<Figure> = report.sections.iter().map(|section| section.figure.clone()).collect();
-    for (name, text) in [
-        ("report.csv", table::csv(&report.rows)),
-        ("report.json", table::json(report).map_err(|error| Failure::System(error.to_string()))?),
-        ("report.svg", plot::svg(&figures)),
-        ("report.html", page::page(report, words)),
-    ] {
-        bvh_bake::write_atomically(&out.join(name), text.as_bytes())
-            .map_err(|error| Failure::System(error.to_string()))?;
-    }
-    let counted = |count: usize, word| format!("{count} {}", plural(count as u64, word));
-    let mut text = format!(
-        "{}: {}, {}, {}\n",
-        out.join("report.html").display(),
-        counted(report.pairs.len(), "pair"),
-        counted(report.rows.len(), "row"),
-        counted(report.wrong.len(), "wrong answer")
-    );
-    for section in &report.sections {
-        for line in &section.sentences {
-            text += &format!("  {}: {line}\n", section.name);
-        }
-    }
-    console::text(&text)?;
-    match report.wrong.first() {
-        None => Ok(()),
-        Some(first) => Err(Failure::invalid(
-            &out.join("report.json"),
-            format!("expected right answers, found {} wrong; the first: {first}", report.wrong.len()),
-        )),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::console::record;
+
+    #[test]
+    fn csv_and_json_hold_the_same_figures_under_the_same_names() {
+        let row = record! { name: "a, \"b\"", none: f64::NAN, of: 0.1, is: true, count: None::<u64> };
+        assert_eq!(csv(&[&row]), "name,none,of,is,count\n\"a, \"\"b\"\"\",,0.1,1,\n");
+        let json: Value = serde_json::from_str(&table::json(&row).unwrap()).unwrap();
+        assert_eq!(json, json!({ "name": "a, \"b\"", "none": null, "of": 0.1, "is": true, "count": null }));
+        assert_eq!((row.number("of"), row.number("is"), row.number("none")), (Some(0.1), Some(1.0), None));
     }
 }

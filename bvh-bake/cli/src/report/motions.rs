@@ -4,77 +4,60 @@
 //! The ways take turns in rounds. Ten thousand samples take thousands of times as long as a certified answer, so each way
 //! asks in the first round, and then in as many more as fit into its share of time.
 
-mod ways;
-
-use super::page::{Column, Words, percent, table};
-use super::{Cells, Kind, Measured, Subject, number};
+use super::page::{Column, Table, Words, figure, micro, percent};
+use super::plot::{Panel, Series};
+use super::timing::{order, take_turn, times};
+use super::ways::{Method, SAMPLES, Said, is_hit, judge};
+use super::{Kind, Measured, Subject, made};
 use crate::asking::files::read_motions;
-use crate::console::{Failure, plural};
+use crate::console::{Failure, Record, plural, record};
 use bvh_query::{Backend, Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError};
-use cbvh_measure::motions::{MADE, mixed};
-use cbvh_measure::pin::pinned;
-use cbvh_measure::plot::{Figure, Line, Look, Mark, Panel};
-use cbvh_measure::rounds::{order, take_turn};
-use cbvh_measure::spread::{Spread, mean_of_rounds};
-use cbvh_measure::table::{self, Cell, micro, whole};
-use ways::{Asker, Method, SAMPLES, Said, is_hit, judge};
 
-pub(super) const KIND: Kind<Motion> =
-    Kind { words: WORDS, items: "motions", read: read_motions, make: mixed, made: MADE, measure };
+pub(super) const KIND: Kind<Motion> = Kind {
+    words: Words {
+        title: "How many samples for these motions?",
+        about: ABOUT,
+        right: RIGHT,
+        methods: METHODS,
+    },
+    items: "motions",
+    read: read_motions,
+    make: made::motions,
+    made: made::MOTIONS,
+    measure,
+};
 
 const ABOUT: &str = "\
-Whether the way of a moving mesh is free is often asked by samples: poses along the way, of which the first that touches \
-ends the question. Samples miss contacts between them, and find others late. cbvh certifies its answers for every moment \
-between start and end. This page tells for each pair of meshes what samples miss, how late they are, and how long they \
-take beside the certified answers.";
+Programs often test a motion by samples: they check poses along the way until one touches. Samples miss contacts between \
+them, and find others late. cbvh certifies its answers for every moment between start and end. This page tells for each pair \
+of meshes what samples miss, how late they are, and how long they take compared with the certified answers.";
 
-/// What is known if no answer is wrong.
 const RIGHT: &str = "\
-No answer contradicts another: no sample touches where a motion is certified free, or before the time until which it is.";
+No answer contradicts another: where a motion is certified free, no sample touches.";
 
 const METHODS: &str = "\
-<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches. A \
-spread order asks about both ends and then in van der Corput's order: halves, quarters, and so on. It finds some contact \
-sooner, but not the first one.</li>
+<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches.</li>
 <li>Certified answers are those of <code>Querier::motion</code>, which finds the first contact, and of \
-<code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided that comes nearer than a millionth of \
-the larger mesh's diagonal without a contact.</li>
-<li>Missed is a certified contact where all samples are free. Late is the time between the moment until which the way is \
-certified free and the contact found, as a fraction of the way, over the contacts that are not missed.</li>
-<li>Times are those of single motions on one thread that is bound to one processor, with the poses of samples made on the \
-way. All ways to ask take turns in rounds, as many as fit into 10 seconds per pair, but at least one; \
-<code>report.csv</code> has their number. A median is taken over the motions of a round and then over the rounds.</li>
+<code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided if the meshes come nearer than a \
+millionth of the larger mesh's diagonal without touching.</li>
+<li>A certified contact is missed if all samples are free. A contact is late by the time between the end of the part that is \
+certified free and the contact found, as a fraction of the motion; only contacts that are not missed count.</li>
+<li>Times are those of single motions on one thread, with the poses of samples made on the way. All ways to ask take turns \
+in rounds, as many as fit into 10 seconds per pair, but at least one; <code>report.csv</code> has their number. A median is \
+taken over the motions of a round and then over the rounds.</li>
 <li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";
-
-const WORDS: Words =
-    Words { title: "How many samples for these motions?", about: ABOUT, right: RIGHT, methods: METHODS };
 
 /// For how long each way asks about the motions of a pair, in seconds, unless one round takes longer.
 const MAX_SECONDS: f64 = 10.0;
 
-/// What is said in one way, and how long that takes.
-#[derive(Debug, Clone, Default)]
-struct Asked {
-    /// By motion.
-    said: Vec<Said>,
-    /// Nanoseconds by round and motion.
-    rounds: Vec<Vec<u64>>,
-}
+/// What is said in one way about each motion, and nanoseconds by round and motion.
+type Asked = (Vec<Said>, Vec<Vec<u64>>);
 
-impl Asked {
-    /// Returns whether one more round like those before fits into the time.
-    fn has_time(&self) -> bool {
-        let spent: u64 = self.rounds.iter().flatten().sum();
-        let count = self.rounds.len() as f64;
-        count == 0.0 || spent as f64 * (1.0 + 1.0 / count) <= MAX_SECONDS * 1e9
-    }
-
-    fn add(&mut self, answers: Vec<(Said, u64)>) {
-        if self.rounds.is_empty() {
-            self.said = answers.iter().map(|&(said, _)| said).collect();
-        }
-        self.rounds.push(answers.into_iter().map(|(_, nanoseconds)| nanoseconds).collect());
-    }
+/// Returns whether one more round like those before fits into the time.
+fn has_time(rounds: &[Vec<u64>]) -> bool {
+    let spent: u64 = rounds.iter().flatten().sum();
+    let count = rounds.len() as f64;
+    count == 0.0 || spent as f64 * (1.0 + 1.0 / count) <= MAX_SECONDS * 1e9
 }
 
 /// Asks in all ways, in up to so many rounds.
@@ -85,17 +68,22 @@ fn ask(
     backend: Backend,
     rounds: usize,
 ) -> Result<Vec<Asked>, QueryError> {
-    let askers: Vec<Asker> = methods.iter().map(|&method| Asker::new(method)).collect();
+    let times: Vec<Vec<f64>> = methods.iter().map(|method| method.times()).collect();
     let mut queriers: Vec<Querier> = methods.iter().map(|_| Querier::with_backend(backend)).collect();
-    let mut all = vec![Asked::default(); methods.len()];
+    let mut all: Vec<Asked> = vec![Asked::default(); methods.len()];
     for round in 0..rounds {
         for number in order(round, methods.len()) {
-            if !all[number].has_time() {
+            let (said, taken) = &mut all[number];
+            if !has_time(taken) {
                 continue;
             }
-            let querier = &mut queriers[number];
-            let answers = take_turn(motions, |motion| askers[number].ask(querier, meshes, motion))?;
-            all[number].add(answers);
+            let (querier, method) = (&mut queriers[number], methods[number]);
+            let (answers, nanoseconds) =
+                take_turn(motions, |motion| method.ask(&times[number], querier, meshes, motion))?;
+            if round == 0 {
+                *said = answers;
+            }
+            taken.push(nanoseconds);
         }
     }
     Ok(all)
@@ -105,51 +93,45 @@ fn ask(
 fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failure> {
     let Subject { pair, baked: [(a, _), (b, _)], backend, rounds, .. } = *subject;
     let methods: Vec<Method> = Method::all().collect();
-    let (pinned, answers) = pinned(|| {
-        let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
-        let certified = motions.iter().map(|motion| querier.motion(a, b, motion, &options));
-        let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>()?;
-        Ok((certified, ask(&methods, [a, b], motions, backend, rounds)?))
-    });
     let failed = |error: QueryError| Failure::Invalid(format!("{}: {error}", pair.name));
-    let (certified, asked) = answers.map_err(failed)?;
-    let (mut rows, mut wrong) = (Vec::new(), Vec::new());
-    for (&method, asked) in methods.iter().zip(&asked) {
-        let (errors, contradictions) = judge(&pair.name, method, &certified, &asked.said);
-        wrong.extend(contradictions);
-        let hits = certified.iter().filter(|answer| is_hit(answer)).count() as u64;
-        let mut cells = vec![
-            ("pair", Cell::text(&pair.name)),
-            ("method", Cell::text(method.name())),
-            ("samples", Cell::count(method.samples().map(u64::from))),
-            ("motions", Cell::Count(certified.len() as u64)),
-            ("hits", Cell::Count(hits)),
-            ("missed", Cell::Count(errors.missed)),
-            ("missed_share", Cell::number((hits > 0).then(|| errors.missed as f64 / hits as f64))),
-            ("late_median", Cell::number(errors.late_median)),
-            ("late_max", Cell::number(errors.late_max)),
-            ("undecided", Cell::count(errors.undecided)),
-            ("rounds", Cell::Count(asked.rounds.len() as u64)),
-        ];
-        let time = Spread::of_rounds(&asked.rounds);
-        cells.extend(table::times(["ns_median", "ns_q1", "ns_q3", "ns_p90"], time));
-        cells.push(("ns_mean", Cell::number(mean_of_rounds(&asked.rounds))));
-        rows.push(cells);
-    }
+    let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
+    let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
+    let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>().map_err(failed)?;
+    let asked = ask(&methods, [a, b], motions, backend, rounds).map_err(failed)?;
     let count = |is: fn(&MotionAnswer) -> bool| certified.iter().filter(|answer| is(answer)).count();
     let free = count(|answer| matches!(answer, MotionAnswer::Free));
     let undecided = count(|answer| matches!(answer, MotionAnswer::Near { .. }));
-    let named: Vec<(String, &Cells)> =
-        methods.iter().zip(&rows).map(|(method, row)| (method.in_words(), row)).collect();
+    let hits = count(is_hit);
+    let (mut rows, mut wrong) = (Vec::new(), Vec::new());
+    for (&method, (said, rounds)) in methods.iter().zip(&asked) {
+        let (errors, contradictions) = judge(&pair.name, method, &certified, said);
+        wrong.extend(contradictions);
+        let nanoseconds: u64 = rounds.iter().flatten().sum();
+        let row = record! {
+            pair: pair.name,
+            method: method.name(),
+            samples: method.samples(),
+            motions: certified.len(),
+            hits: hits,
+            missed: errors.missed,
+            missed_share: (hits > 0).then(|| errors.missed as f64 / hits as f64),
+            late_median: errors.late_median,
+            late_max: errors.late_max,
+            undecided: errors.undecided,
+            rounds: rounds.len(),
+        };
+        let mean = nanoseconds as f64 / (rounds.len() * motions.len()) as f64;
+        rows.push(row.with(times(rounds)).with(record! { ns_mean: mean }));
+    }
     let title = "Errors and times: what each way to ask misses, how late it is with other contacts, how long it takes";
+    let named = methods.iter().map(|method| method.in_words()).zip(0..).collect();
     Ok(Measured {
         sentences: sentences(&methods, &rows, [free, undecided]),
-        figure: figure(&pair.name, &methods, &rows),
-        tables: table(title, &["pair", "method", "samples"], &named, &COLUMNS),
+        panels: panels(&pair.name, &methods, &rows),
+        tables: vec![Table { title: title.to_owned(), columns: &COLUMNS, rows: named }],
         rows,
         wrong,
-        counts: vec![("free", free), ("hits", count(is_hit)), ("undecided", undecided)],
-        pinned,
+        counts: vec![("free", free), ("hits", hits), ("undecided", undecided)],
         ..Measured::default()
     })
 }
@@ -158,27 +140,19 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
 const USUAL_SAMPLES: u32 = 100;
 
 /// Returns the sentences about a pair, the most important one first.
-fn sentences(methods: &[Method], rows: &[Cells], [free, undecided]: [usize; 2]) -> Vec<String> {
+fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2]) -> Vec<String> {
     let row = |method: Method| methods.iter().position(|&other| other == method).map(|place| &rows[place]);
-    let time = |row: &Cells| number(row, "ns_median").unwrap_or_default();
-    let missed = |row: &Cells| number(row, "missed").unwrap_or_default();
-    // How many times as long as the other way, with two digits or more.
-    let ratio = |row: &Cells, other: &Cells| match time(row) / time(other) {
-        ratio @ 10.0.. => whole(ratio),
-        ratio @ 1.0.. => format!("{ratio:.1}"),
-        ratio => format!("{ratio:.2}"),
-    };
+    let time = |row: &Record| row.number("ns_median").unwrap_or_default();
+    let missed = |row: &Record| row.number("missed").unwrap_or_default();
+    // How many times as long as the other way.
+    let ratio = |row: &Record, other: &Record| figure(time(row) / time(other));
     let (Some(motion), Some(is_free)) = (row(Method::Motion), row(Method::IsFree)) else { return Vec::new() };
-    let figure = |name| number(motion, name).unwrap_or_default() as u64;
-    let are = |count: usize| if count == 1 { "is" } else { "are" };
-    let (motions, hits) = (figure("motions"), figure("hits"));
+    let count = |name| motion.number(name).unwrap_or_default() as u64;
+    let (motions, hits) = (count("motions"), count("hits"));
     let mut sentences = vec![format!(
-        "Of {motions} {}, {hits} {}, {free} {} free and {undecided} {} undecided. The median time is {} \u{b5}s for the \
-         certified first contact and {} \u{b5}s for the certified yes or no.",
+        "{motions} {}: {hits} certified hits, {free} free, {undecided} undecided. The median time is {} \u{b5}s for the certified \
+         first contact and {} \u{b5}s for the certified yes or no.",
         plural(motions, "motion"),
-        if hits == 1 { "hits" } else { "hit" },
-        are(free),
-        are(undecided),
         micro(time(motion)),
         micro(time(is_free))
     )];
@@ -186,11 +160,15 @@ fn sentences(methods: &[Method], rows: &[Cells], [free, undecided]: [usize; 2]) 
         sentences.push("There is no contact to miss.".to_owned());
         return sentences;
     }
-    if let Some(usual) = row(Method::Ordered(USUAL_SAMPLES)) {
-        let late = match (number(usual, "late_median"), number(usual, "late_max")) {
+    // The usual number of samples, and the one from which on all miss none.
+    let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
+    let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
+    for samples in [USUAL_SAMPLES, enough.unwrap_or(SAMPLES[SAMPLES.len() - 1])] {
+        let Some(row) = row(Method::Ordered(samples)) else { continue };
+        let late = match (row.number("late_median"), row.number("late_max")) {
             (Some(median), Some(max)) => {
                 format!(
-                    ", find the others {} of the way late in the median and {} at worst,",
+                    ", find the others late by {} of the motion in the median and {} at worst",
                     percent(median),
                     percent(max)
                 )
@@ -198,70 +176,50 @@ fn sentences(methods: &[Method], rows: &[Cells], [free, undecided]: [usize; 2]) 
             _ => String::new(),
         };
         sentences.push(format!(
-            "{USUAL_SAMPLES} samples in the order of time miss {} of {hits} contacts{late} and take {} \u{b5}s, {} times as \
-             long as the certified first contact.",
-            missed(usual),
-            micro(time(usual)),
-            ratio(usual, motion)
+            "{samples} samples miss {} of {hits} contacts{late}, and take {} \u{b5}s, {} times as long as the certified first \
+             contact and {} times as long as the certified yes or no.",
+            missed(row),
+            micro(time(row)),
+            ratio(row, motion),
+            ratio(row, is_free)
         ));
     }
-    // The number of samples from which on all miss none.
-    let misses_none = |&samples: &u32| row(Method::Ordered(samples)).is_some_and(|row| missed(row) == 0.0);
-    let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
-    let samples = enough.unwrap_or(SAMPLES[SAMPLES.len() - 1]);
-    if let (Some(ordered), Some(spread)) = (row(Method::Ordered(samples)), row(Method::Spread(samples))) {
-        let number = whole(samples.into());
-        let lead = match enough {
-            Some(_) => format!("From {number} samples on, none is missed: {number} samples"),
-            None => format!("Even {number} samples miss {}: they", missed(ordered)),
-        };
-        sentences.push(format!(
-            "{lead} take {} \u{b5}s in the order of time, {} times as long as the certified first contact, and {} \u{b5}s \
-             in a spread order, {} times as long as the certified yes or no.",
-            micro(time(ordered)),
-            ratio(ordered, motion),
-            micro(time(spread)),
-            ratio(spread, is_free)
-        ));
-    }
+    sentences.dedup();
     sentences
 }
 
 /// Returns the plots of a pair: time against the share of contacts missed, and against how late the others are found.
-fn figure(pair: &str, methods: &[Method], rows: &[Cells]) -> Figure {
-    let panel = |title: String, x, field: &str| {
-        let y = "median time per motion, \u{b5}s";
-        let mut panel = Panel { title, x, y, lines: Vec::new(), marks: Vec::new(), labels: Vec::new() };
-        for kind in 0..Method::KINDS.len() {
-            let look = Look { kind, is_filled: true };
-            let mut points = Vec::new();
-            for (method, row) in methods.iter().zip(rows).filter(|(method, _)| method.kind() == kind) {
-                let (Some(error), Some(time)) = (number(row, field), number(row, "ns_median")) else {
-                    continue;
-                };
-                points.push((100.0 * error, time / 1000.0));
-                panel.labels.push(((100.0 * error, time / 1000.0), method.in_words()));
-            }
-            panel.marks.extend(points.iter().map(|&at| Mark { at, look }));
-            panel.lines.push(Line { points, look: Some(look) });
+fn panels(pair: &str, methods: &[Method], rows: &[Record]) -> Vec<Panel> {
+    let panel = |title: &str, x, field: &str| {
+        let series = |(kind, [_, name]): (usize, [&'static str; 2])| {
+            let of = methods.iter().zip(rows).filter(|(method, _)| method.kind() == kind);
+            let points = of.filter_map(|(method, row)| {
+                let at = (100.0 * row.number(field)?, row.number("ns_median")? / 1000.0);
+                Some((at, Some(method.in_words())))
+            });
+            Series { name, is_joined: true, points: points.collect() }
+        };
+        let series = Method::KINDS.into_iter().enumerate().map(series).collect();
+        Panel {
+            title: format!("{pair}: time against {title}"),
+            x,
+            y: "median time per motion, \u{b5}s",
+            series,
         }
-        panel
     };
-    let title = |what: &str| format!("{pair}: time against {what}");
-    let missed = panel(title("contacts missed"), "contacts missed, % of the certified ones", "missed_share");
-    let late = panel(title("how late contacts are found"), "late in the median, % of the way", "late_median");
-    let look = |kind| Look { kind, is_filled: true };
-    let legend = Method::KINDS.iter().enumerate().map(|(kind, name)| (look(kind), (*name).to_owned()));
-    Figure { title: pair.to_owned(), legend: legend.collect(), rows: vec![vec![missed, late]] }
+    vec![
+        panel("contacts missed", "contacts missed, % of the certified ones", "missed_share"),
+        panel("how late contacts are found", "late in the median, % of the way", "late_median"),
+    ]
 }
 
 /// The columns of the table.
 const COLUMNS: [Column; 8] = [
-    ("contacts missed", "missed", whole),
+    ("contacts missed", "missed", figure),
     ("share missed", "missed_share", percent),
     ("late, median", "late_median", percent),
     ("late, largest", "late_max", percent),
-    ("undecided", "undecided", whole),
+    ("undecided", "undecided", figure),
     ("median, \u{b5}s", "ns_median", micro),
     ("90 %, \u{b5}s", "ns_p90", micro),
     ("mean, \u{b5}s", "ns_mean", micro),
@@ -274,8 +232,7 @@ mod tests {
     #[test]
     fn rounds_end_with_the_time() {
         let seconds = |seconds: &[u64]| {
-            let rounds = seconds.iter().map(|second| vec![second * 1_000_000_000]).collect();
-            Asked { said: Vec::new(), rounds }.has_time()
+            has_time(&seconds.iter().map(|second| vec![second * 1_000_000_000]).collect::<Vec<_>>())
         };
         assert!(seconds(&[]) && seconds(&[5]) && seconds(&[2, 2, 2, 2]));
         assert!(!seconds(&[6]) && !seconds(&[5, 5]) && !seconds(&[100]));

@@ -2,9 +2,9 @@
 //!
 //! Each figure of a table carries the value that `report.csv` has for it, and the best ones are bold.
 
-use super::{Cells, Report, number};
-use cbvh_measure::plot::{self, escape};
-use std::fmt::Write;
+use super::plot::{self, escape};
+use super::{Measured, Report};
+use crate::console::Record;
 
 const STYLE: &str = "\
 :root { color-scheme: light; } \
@@ -36,54 +36,56 @@ pub(super) struct Words {
 
 /// Returns the page.
 pub(super) fn page(report: &Report, words: &Words) -> String {
+    let Words { title, methods, .. } = words;
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: {0}</title>\n<style>{STYLE}</style>\n\
-         </head>\n<body>\n<h1>{0}</h1>\n",
-        words.title
+         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: {title}</title>\n<style>{STYLE}</style>\n\
+         </head>\n<body>\n<h1>{title}</h1>\n{}",
+        opening(report, words)
     );
-    page += &opening(report, words);
     for section in &report.sections {
         let (name, about) = (escape(&section.name), escape(&section.about));
-        let _ = writeln!(page, "<h2 id=\"{name}\">{name}</h2>\n<p>{about}</p>\n<ul>");
-        for sentence in &section.sentences {
-            let _ = writeln!(page, "<li>{}</li>", escape(sentence));
-        }
-        page += "</ul>\n";
-        page += &plot::svg(std::slice::from_ref(&section.figure));
-        page += &section.tables;
+        page += &format!("<h2 id=\"{name}\">{name}</h2>\n<p>{about}</p>\n{}", list(&section.sentences));
+        page += &plot::svg(&[&section.panels]);
+        section.tables.iter().for_each(|table| page += &table.html(section));
     }
     format!(
-        "{page}<h2 id=\"methods\">How it was measured, and what the figures do not tell</h2>\n<ul>\n{}\n</ul>\n\
-         </body>\n</html>\n",
-        words.methods
+        "{page}<h2 id=\"methods\">How it was measured, and what the figures do not tell</h2>\n<ul>\n{methods}\n</ul>\n\
+         </body>\n</html>\n"
     )
+}
+
+/// Returns a list of sentences.
+fn list<'a>(sentences: impl IntoIterator<Item = &'a String>) -> String {
+    let items = sentences.into_iter().map(|sentence| format!("<li>{}</li>\n", escape(sentence)));
+    format!("<ul>\n{}</ul>\n", items.collect::<String>())
 }
 
 /// Says what the page is about, and whether the answers were right.
 fn opening(report: &Report, words: &Words) -> String {
     let names: Vec<String> =
         report.sections.iter().map(|of| format!("<a href=\"#{0}\">{0}</a>", escape(&of.name))).collect();
+    let origin = &report.origin;
     let mut text = format!(
         "<p>{} Pairs: {}.</p>\n\
          <p>Measured on {} with cbvh {} (format {}), backend {}, one thread, on {}.</p>\n",
         words.about,
         names.join(", "),
-        report.origin.date,
-        report.origin.version,
-        report.origin.format_version,
+        origin.date,
+        origin.version,
+        origin.format_version,
         report.settings["isa"].as_str().unwrap_or_default(),
-        escape(&report.origin.machine.text())
+        escape(&origin.machine.text())
     );
-    if report.wrong.is_empty() {
+    let wrong: Vec<&String> = report.sections.iter().flat_map(|section| &section.wrong).collect();
+    if wrong.is_empty() {
         text += &format!("<p>{}</p>\n", words.right);
     } else {
-        let some: String =
-            report.wrong.iter().take(20).map(|line| format!("<li>{}</li>\n", escape(line))).collect();
         text += &format!(
             "<div class=\"wrong\"><p><strong>{} wrong answers.</strong> Do not rely on any figure here before they \
-             are explained.</p><ul>\n{some}</ul></div>\n",
-            report.wrong.len()
+             are explained.</p>{}</div>\n",
+            wrong.len(),
+            list(wrong.into_iter().take(20))
         );
     }
     for (holds, warning) in [
@@ -91,11 +93,7 @@ fn opening(report: &Report, words: &Words) -> String {
             report.settings["quick"] == true,
             "This was a quick run that asked little in two rounds. Do not quote its figures.",
         ),
-        (report.origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
-        (
-            report.pairs.iter().any(|pair| pair["pinned"].is_null()),
-            "The system did not bind the measuring thread to a processor, so times scatter more.",
-        ),
+        (origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
     ] {
         if holds {
             text += &format!("<p class=\"wrong\">{warning}</p>\n");
@@ -107,60 +105,91 @@ fn opening(report: &Report, words: &Words) -> String {
 /// A column of a table: its head, the name of its figures, and how they are shown.
 pub(super) type Column = (&'static str, &'static str, fn(f64) -> String);
 
-/// Returns a table of rows, each with the text of its first cell. The attributes of a row are its cells named `keys`. Columns
-/// without figures are left out.
-pub(super) fn table(title: &str, keys: &[&str], rows: &[(String, &Cells)], columns: &[Column]) -> String {
-    let figures = |field| rows.iter().filter_map(move |(_, row)| number(row, field));
-    let columns: Vec<&Column> =
-        columns.iter().filter(|(_, field, _)| figures(field).next().is_some()).collect();
-    // If all figures of a column are equal, none is the best.
-    let best =
-        |field| figures(field).reduce(f64::min).filter(|&least| figures(field).any(|figure| figure > least));
-    let heads: String = columns.iter().map(|(head, ..)| format!("<th>{head}</th>")).collect();
-    let mut text = format!(
-        "<h3>{title}</h3>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th></th>{heads}</tr></thead>\n<tbody>\n"
-    );
-    for (name, row) in rows {
-        text += "<tr";
-        for (key, cell) in row.iter().filter(|(key, _)| keys.contains(key)) {
-            let _ = write!(text, " data-{}=\"{}\"", key.replace('_', "-"), escape(&cell.field()));
-        }
-        let _ = write!(text, "><td>{}</td>", escape(name));
-        for &&(_, field, show) in &columns {
-            let Some(value) = number(row, field) else {
-                text += "<td>\u{2013}</td>";
-                continue;
-            };
-            let (left, right) = if best(field) == Some(value) { ("<b>", "</b>") } else { ("", "") };
-            let shown = show(value);
-            let _ =
-                write!(text, "<td data-field=\"{field}\" data-value=\"{value:?}\">{left}{shown}{right}</td>");
-        }
-        text += "</tr>\n";
-    }
-    text + "</tbody></table></div>\n"
+/// A table of some rows of a pair.
+pub(super) struct Table {
+    pub(super) title: String,
+    /// Columns without figures are left out.
+    pub(super) columns: &'static [Column],
+    /// The text of the first cell, and the place of the row among those of the pair.
+    pub(super) rows: Vec<(String, usize)>,
 }
 
-/// Writes a fraction in percent, with two digits.
-pub(super) fn percent(value: f64) -> String {
-    match 100.0 * value {
+impl Table {
+    fn html(&self, section: &Measured) -> String {
+        let rows = || self.rows.iter().map(|&(_, place)| &section.rows[place]);
+        let figures = |field| rows().filter_map(move |row: &Record| row.number(field));
+        let columns: Vec<&Column> =
+            self.columns.iter().filter(|(_, field, _)| figures(field).next().is_some()).collect();
+        let heads: String = columns.iter().map(|(head, ..)| format!("<th>{head}</th>")).collect();
+        let mut text = format!(
+            "<h3>{}</h3>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th></th>{heads}</tr></thead>\n<tbody>\n",
+            self.title
+        );
+        for ((name, place), row) in self.rows.iter().zip(rows()) {
+            // The number of the row in report.csv, from 0.
+            text += &format!("<tr data-row=\"{}\"><td>{}</td>", section.first_row + place, escape(name));
+            for &&(_, field, show) in &columns {
+                text += &match row.number(field) {
+                    None => "<td>\u{2013}</td>".to_owned(),
+                    Some(value) => {
+                        // If all figures of a column are equal, none is the best.
+                        let is_best = figures(field).all(|other| value <= other)
+                            && figures(field).any(|other| value < other);
+                        let (left, right) = if is_best { ("<b>", "</b>") } else { ("", "") };
+                        let shown = show(value);
+                        format!(
+                            "<td data-field=\"{field}\" data-value=\"{value:?}\">{left}{shown}{right}</td>"
+                        )
+                    }
+                };
+            }
+            text += "</tr>\n";
+        }
+        text + "</tbody></table></div>\n"
+    }
+}
+
+/// Writes a number with three digits or more, and 0 and very small ones shortly.
+pub(super) fn figure(value: f64) -> String {
+    match value.abs() {
         0.0 => "0".to_owned(),
-        percent @ 10.0.. => format!("{percent:.0} %"),
-        percent @ 1.0.. => format!("{percent:.1} %"),
-        percent @ 0.001.. => format!("{:.1$} %", percent, (1.0 - percent.log10().floor()) as usize),
-        percent => format!("{percent:.0e} %"),
+        size @ 1e-4..1e9 => {
+            let decimals = (2.0 - size.log10().floor()).max(0.0) as usize;
+            let text = format!("{value:.decimals$}");
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                text
+            }
+        }
+        _ => format!("{value:.1e}"),
     }
 }
 
-pub(super) fn tenths(value: f64) -> String {
-    format!("{value:.1}")
+/// Writes nanoseconds as microseconds.
+pub(super) fn micro(nanoseconds: f64) -> String {
+    figure(nanoseconds / 1000.0)
 }
 
-/// Formats a ratio by its excess over 1.
+/// Writes a fraction in percent.
+pub(super) fn percent(value: f64) -> String {
+    figure(100.0 * value) + if value == 0.0 { "" } else { " %" }
+}
+
+/// Writes a ratio by its excess over 1.
 pub(super) fn excess(value: f64) -> String {
     format!("{:.1} %", 100.0 * (value - 1.0))
 }
 
-pub(super) fn scientific(value: f64) -> String {
-    if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_three_digits() {
+        let figures = [0.0, 123456.0, 99.96, 12.345, 9.996, 1.5, 0.056, 0.01234, 1.26e-7];
+        let shown = ["0", "123456", "100", "12.3", "10", "1.5", "0.056", "0.0123", "1.3e-7"];
+        assert_eq!(figures.map(figure), shown);
+        assert_eq!((percent(0.0), percent(0.25), micro(1500.0)), ("0".into(), "25 %".into(), "1.5".into()));
+    }
 }

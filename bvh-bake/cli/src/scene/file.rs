@@ -1,7 +1,7 @@
 //! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
-use crate::asking::mesh::{How, LoadedMesh, point_out_units};
+use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
 use crate::console::Failure;
 use crate::map::map;
 use crate::options::LayoutArguments;
@@ -33,6 +33,8 @@ pub(super) struct LoadedScene {
     pub(super) triangles: u64,
     /// The seconds of baking meshes and opening files.
     pub(super) build_seconds: f64,
+    /// The number of pairs that were asked about, in all timed frames.
+    pub(super) pairs_asked: u64,
 }
 
 /// Reads a scene file without opening its meshes.
@@ -60,37 +62,32 @@ pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
 /// Divides a line into words, up to a comment. A word in quotes may have spaces and `#`; a backslash before a quote or a
 /// backslash stands for that character.
 fn words(line: &str) -> Result<Vec<String>, String> {
-    let (mut words, mut chars) = (Vec::new(), line.chars().peekable());
-    loop {
-        while chars.next_if(|c| c.is_whitespace()).is_some() {}
-        match chars.peek() {
-            None | Some('#') => return Ok(words),
-            Some('"') => {
-                let mut word = String::new();
-                chars.next();
-                loop {
-                    match chars.next() {
-                        Some('"') => break,
-                        Some('\\') if matches!(chars.peek(), Some('"' | '\\')) => word.extend(chars.next()),
-                        Some(c) => word.push(c),
-                        None => {
-                            return Err(format!(
-                                "expected a quote at the end of a name, found none after {word:?}"
-                            ));
-                        }
+    let (mut words, mut rest) = (Vec::new(), line.trim_start());
+    while !rest.is_empty() && !rest.starts_with('#') {
+        let mut word = String::new();
+        if let Some(quoted) = rest.strip_prefix('"') {
+            let mut chars = quoted.chars();
+            loop {
+                match chars.next() {
+                    Some('"') => break,
+                    Some('\\') if chars.as_str().starts_with(['"', '\\']) => word.extend(chars.next()),
+                    Some(c) => word.push(c),
+                    None => {
+                        return Err(format!(
+                            "expected a quote at the end of a name, found none after {word:?}"
+                        ));
                     }
                 }
-                words.push(word);
             }
-            Some(_) => {
-                let mut word = String::new();
-                while let Some(c) = chars.next_if(|&c| !c.is_whitespace() && c != '#') {
-                    word.push(c);
-                }
-                words.push(word);
-            }
+            rest = chars.as_str();
+        } else {
+            let end = rest.find(|c: char| c.is_whitespace() || c == '#').unwrap_or(rest.len());
+            (word, rest) = (rest[..end].to_owned(), &rest[end..]);
         }
+        words.push(word);
+        rest = rest.trim_start();
     }
+    Ok(words)
 }
 
 impl SceneText {
@@ -181,14 +178,12 @@ pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
     let scene = scene.map_err(|error| Failure::invalid(path, error))?;
-    let records = bvh.objects().iter().map(|object| object.record());
-    // The counts are as the file states them, and those of a forged file may overflow.
-    let counts = records.flat_map(|record| [record.triangles.get(), record.duplicates.get()]);
     Ok(LoadedScene {
         moving: scene.instances().collect(),
         scene,
-        triangles: counts.fold(0, u64::saturating_add),
+        triangles: triangles_of(bvh.objects()),
         build_seconds: start.elapsed().as_secs_f64(),
+        pairs_asked: 0,
     })
 }
 
@@ -205,6 +200,7 @@ pub(super) fn load(
         moving: Vec::new(),
         triangles: 0,
         build_seconds: 0.0,
+        pairs_asked: 0,
     };
     let mut shapes = Vec::new();
     // The smallest and the largest mesh.
@@ -244,15 +240,16 @@ pub(super) fn load(
     Ok(loaded)
 }
 
-/// The poses of the moving instances, and the line that they stand in.
+/// The poses of the moving instances, their number from 1, and the line that they stand in.
 pub(super) struct Frame {
+    pub(super) number: usize,
     pub(super) line: usize,
     pub(super) poses: Vec<Pose>,
 }
 
 /// The only frame of a scene as it stands.
 pub(super) fn as_it_stands() -> Vec<Frame> {
-    vec![Frame { line: 0, poses: Vec::new() }]
+    vec![Frame { number: 1, line: 0, poses: Vec::new() }]
 }
 
 /// Reads the frames of a scene, each with the poses of the moving instances. A scene in which nothing moves has one frame.
@@ -271,33 +268,26 @@ pub(super) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<
             ));
         }
     };
-    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
-    let text = String::from_utf8_lossy(&bytes);
-    let mut frames = Vec::new();
-    for (line, text) in (1..).zip(text.lines()) {
-        let words: Vec<&str> = text.split('#').next().unwrap_or("").split_whitespace().collect();
+    let count = POSE_NUMBERS * moving.len();
+    let none = "expected at least one line of poses, found none";
+    let frames = files::read_lines(path, none, |text| {
+        let words: Vec<&str> = text.split_whitespace().collect();
         if words.is_empty() {
-            continue;
+            return Ok(None);
         }
-        let wrong = |text: String| Failure::invalid(path, format_args!("line {line}: {text}"));
-        if words.len() != POSE_NUMBERS * moving.len() {
-            return Err(wrong(format!(
-                "expected {} numbers, 12 for each of {} moving instances, found {}",
-                POSE_NUMBERS * moving.len(),
-                moving.len(),
-                words.len()
-            )));
+        if words.len() != count {
+            let (many, found) = (moving.len(), words.len());
+            return Err(format!(
+                "expected {count} numbers, 12 for each of {many} moving instances, found {found}"
+            ));
         }
-        let mut frame = Frame { line, poses: Vec::with_capacity(moving.len()) };
-        for (name, words) in moving.iter().zip(words.chunks(POSE_NUMBERS)) {
-            let pose = files::parse_pose(&words.join(" "))
-                .map_err(|text| wrong(format!("instance {name}: {text}")))?;
-            frame.poses.extend(pose);
-        }
-        frames.push(frame);
-    }
-    if frames.is_empty() {
-        return Err(Failure::invalid(path, "expected at least one line of poses, found none"));
-    }
-    Ok(frames)
+        let poses = moving.iter().zip(words.chunks(POSE_NUMBERS)).map(|(name, words)| {
+            let pose =
+                files::parse_pose(&words.join(" ")).map_err(|text| format!("instance {name}: {text}"))?;
+            Ok(pose.unwrap_or(Pose::IDENTITY))
+        });
+        poses.collect::<Result<Vec<Pose>, String>>().map(Some)
+    })?;
+    let numbered = (1..).zip(frames);
+    Ok(numbered.map(|(number, (line, poses))| Frame { number, line, poses }).collect())
 }

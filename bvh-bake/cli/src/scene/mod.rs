@@ -3,19 +3,16 @@
 mod file;
 mod record;
 
-use crate::asking::files::write_file;
 use crate::asking::mesh::is_baked;
+use crate::asking::runner::Run;
 use crate::asking::{self, RunArguments};
-use crate::console::{self, Failure, significant};
+use crate::console::{self, Failure};
 use crate::options::not_negative;
-use bvh_query::{
-    Backend, Pose, Querier, QueryError, QueryStats, Relation, Scene, SceneDistance, SceneError, ScenePair,
-};
-use cbvh_measure::rounds::add;
+use bvh_query::{Backend, Pose, Querier, QueryError, Relation, Scene, SceneDistance, SceneError, ScenePair};
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
+use record::Told;
 use std::path::PathBuf;
-use std::time::Instant;
 
 const HELP: &str = "\
 Examples:
@@ -24,29 +21,34 @@ Examples:
   cbvh scene cell.scene frames.txt --mode within --within 0.05 --jobs 4 --json > answers.jsonl
   cbvh scene factory.cbvh --mode pairs --list
 
-SCENE is a file that cbvh bake --scene made, all of whose instances move, or, without FRAMES, stand where the file says. Or it is a text file, one item per line; # starts a comment. File names are relative to it:
+SCENE is a file made by cbvh bake --scene, or a text file. FRAMES move all instances of a baked scene; without FRAMES they \
+stand where the file says. A text file has one item per line; # starts a comment, and file names are relative to it:
 
   mesh NAME FILE              a mesh file, which is baked in memory first, or a .cbvh file
   instance NAME MESH POSE     a mesh in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: x y z \
 of the position, then x y z w of a unit quaternion
   moving NAME...              the instances that frames move, in the order of their poses
-  allow NAME NAME             two instances that may touch, and are never asked about
+  allow NAME NAME             two instances that may touch; this pair is never asked about
 
-Names and files with spaces are written in quotes: \"left arm\".
+Write names and files with spaces in quotes: \"left arm\".
 
-Each line of FRAMES has 12 numbers for each moving instance. All pairs of which at least one instance moves are asked \
-about, and of a baked scene all pairs whose groups meet. \
-In a scene without moving instances there is one frame, without FRAMES, and all pairs are asked about.
+Each line of FRAMES has 12 numbers for each moving instance. The question is about all pairs in which at least one instance \
+moves; in a baked scene, about all pairs whose groups meet. A text file in which nothing moves takes no FRAMES: it is one \
+frame, and the question is about all its pairs.
 
 One answer is printed per line, in the order of the frames: 0 or 1 (collide), the number of pairs (pairs, within, relation) \
-or the distance of the nearest pair (17 digits; inf if there are no pairs). --list prints for a person which pairs they are, and for distance the distances of all pairs, the nearest first. \
-relation finds the pairs that touch or of which one is inside the other, wholly or in part.
+or the distance of the nearest pair (17 digits; inf if there are no pairs). relation finds the pairs that touch, and those \
+in which one instance is inside the other, wholly or in part. --list prints the pairs for a person; with --mode distance it \
+prints the distances of all pairs, the nearest first.
 
---json prints one object per frame: frame, its number in the file, from 0; collide (true or false), or pairs, each with the \
-names a and b (and relation, as cbvh query numbers it), or of the nearest pair a, b, distance, lower, upper, point_a and \
-point_b in the world, object_a, triangle_a, object_b and triangle_b; the distance is null if there are no pairs. --bench \
-prints one object: what was asked, the times of the frames, and answers_xxh3, which is the same for every --isa and --jobs; \
-it is null if --budget cut the run short. --out writes the lines, each with nanoseconds, which include moving the instances and, with --list, the distances of all pairs.";
+--json prints one object per frame: frame, its number in the file, from 0; and collide (true or false), or pairs, each with \
+the names a and b (and relation, as cbvh query numbers it). With --mode distance it has, for the nearest pair, a, b, \
+distance, lower, upper, point_a and point_b in the world, object_a, triangle_a, object_b and triangle_b; the distance is \
+null if there are no pairs. With --list it also has others, the distances of the other pairs.
+
+--bench prints one object: what was asked, the times of the frames, and answers_xxh3, a hash of the answers, which is the \
+same for every --isa and --jobs. It is null if --budget cut the run short. --out writes the lines, each with its \
+nanoseconds. They include moving the instances and, with --list, the distances of all pairs.";
 
 /// What `scene` accepts.
 #[derive(Debug, Args)]
@@ -125,26 +127,38 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
             Failure::System(format!("--jobs {}: cannot start threads: {error}", arguments.run.jobs))
         })?;
         scene.scene.set_parallel(true);
-        pool.install(|| Run::new(&mut scene, &frames, &question, arguments))
+        pool.install(|| ask(&mut scene, &frames, &question, arguments))
     } else {
-        Run::new(&mut scene, &frames, &question, arguments)
+        ask(&mut scene, &frames, &question, arguments)
     }?;
+    let run = run.map(|answer| Told { scene: &scene, mode: question.mode, answer });
     if let Some(out) = &arguments.out {
-        write_file(out, &record::raw(&run))?;
+        run.write_raw(out)?;
     }
     if arguments.bench {
-        return console::json(&record::bench(arguments, &scene, backend, &question, &run));
+        return console::json(&record::bench(arguments, &scene, backend, &run));
     }
-    let answers = run.answers.iter().map(|(answer, _)| answer);
-    if arguments.run.json {
-        console::lines((0..).zip(answers).map(|(number, answer)| record::json(&scene, number, answer)))
-    } else if arguments.list {
-        console::lines(
-            (1..).zip(answers).map(|(number, answer)| record::list(&scene, &question, number, answer)),
-        )
-    } else {
-        console::lines(answers.map(|answer| significant(answer.value())))
+    if arguments.list && !arguments.run.json {
+        return console::lines((1..).zip(run.answers()).map(|(number, told)| told.list(number)));
     }
+    run.tell(["frame", "frames"], None, arguments.run.json)
+}
+
+/// Asks about all frames in turn.
+fn ask(
+    scene: &mut LoadedScene,
+    frames: &[Frame],
+    question: &Question,
+    arguments: &SceneArguments,
+) -> Result<Run<Answer>, Failure> {
+    let ask = |scene: &mut LoadedScene, frame: &Frame| {
+        question.ask(scene, &frame.poses).map_err(|error| blame(&error, frame, arguments))
+    };
+    let stats = |scene: &mut LoadedScene| {
+        scene.pairs_asked += scene.scene.pairs_asked();
+        scene.scene.stats()
+    };
+    Run::in_turn(scene, frames, ask, stats, &arguments.run)
 }
 
 /// A question with its parameter.
@@ -166,29 +180,12 @@ enum Answer {
     Pairs(Vec<(ScenePair, Option<Relation>)>),
     /// The nearest pair and its distance, with points in the world, `None` if there are no pairs; and with `--list` the
     /// distances of the other pairs, the nearest first.
-    Nearest(Option<SceneDistance>, Vec<(ScenePair, f64)>),
+    Nearest(Option<SceneDistance>, Option<Vec<(ScenePair, f64)>>),
 }
 
 impl Answer {
     fn of(pairs: Vec<ScenePair>) -> Self {
         Self::Pairs(pairs.into_iter().map(|pair| (pair, None)).collect())
-    }
-
-    /// Returns the answer as a number: the distance of no pairs is infinite.
-    fn value(&self) -> f64 {
-        match self {
-            Self::Flag(flag) => f64::from(u8::from(*flag)),
-            Self::Pairs(pairs) => pairs.len() as f64,
-            Self::Nearest(nearest, _) => nearest.map_or(f64::INFINITY, |of| of.nearest.distance),
-        }
-    }
-
-    /// Returns true if a pair touches, is near enough or has anything in common.
-    fn is_positive(&self) -> bool {
-        match self {
-            Self::Nearest(..) => self.value() <= 0.0,
-            _ => self.value() > 0.0,
-        }
     }
 }
 
@@ -203,7 +200,7 @@ impl Question {
                 Err(Failure::Usage("--within requires --mode within (see --help)".into()))
             }
             (mode, within) => {
-                let all_distances = (arguments.list && !arguments.run.json).then_some(backend);
+                let all_distances = arguments.list.then_some(backend);
                 Ok(Self { mode, within: within.unwrap_or(0.0), all_distances })
             }
         }
@@ -222,10 +219,8 @@ impl Question {
             }
             Mode::Distance => {
                 let mut found = scene.distance()?;
-                let others = match self.all_distances {
-                    Some(backend) => others(scene, found.map(|of| of.pair), backend)?,
-                    None => Vec::new(),
-                };
+                let others = |backend| others(scene, found.map(|of| of.pair), backend);
+                let others = self.all_distances.map(others).transpose()?;
                 if let Some(SceneDistance { pair, nearest: distance, .. }) = &mut found {
                     let world = scene.pose(pair.a)?;
                     distance.point_a = world.place(distance.point_a);
@@ -256,60 +251,9 @@ fn others(
     Ok(found)
 }
 
-/// The results of a run.
-struct Run {
-    /// The answers and their nanoseconds, in the order of the frames. There are fewer than frames if the budget ended.
-    answers: Vec<(Answer, u64)>,
-    requested: usize,
-    total_seconds: f64,
-    stats: QueryStats,
-    /// The number of pairs that were asked about.
-    pairs_asked: u64,
-}
-
-impl Run {
-    fn new(
-        scene: &mut LoadedScene,
-        frames: &[Frame],
-        question: &Question,
-        arguments: &SceneArguments,
-    ) -> Result<Self, Failure> {
-        let budget = arguments.run.budget.unwrap_or(f64::INFINITY);
-        let start = Instant::now();
-        for frame in frames.iter().rev().take(arguments.run.warm) {
-            if start.elapsed().as_secs_f64() >= budget / 4.0 {
-                break;
-            }
-            // The timed part meets the same error again, with its frame.
-            let _ = question.ask(scene, &frame.poses);
-        }
-        let mut run = Self {
-            answers: Vec::with_capacity(frames.len()),
-            requested: frames.len(),
-            total_seconds: 0.0,
-            stats: QueryStats::default(),
-            pairs_asked: 0,
-        };
-        let start = Instant::now();
-        for (number, frame) in (1..).zip(frames) {
-            let before = Instant::now();
-            let answer = question.ask(scene, &frame.poses);
-            let nanoseconds = before.elapsed().as_nanos() as u64;
-            let answer = answer.map_err(|error| blame(&error, number, frame.line, arguments))?;
-            run.answers.push((answer, nanoseconds));
-            add(&mut run.stats, scene.scene.stats());
-            run.pairs_asked += scene.scene.pairs_asked();
-            if start.elapsed().as_secs_f64() > budget {
-                break;
-            }
-        }
-        run.total_seconds = start.elapsed().as_secs_f64();
-        Ok(run)
-    }
-}
-
 /// Turns an error about a frame into one of the file that caused it.
-fn blame(error: &SceneError, number: usize, line: usize, arguments: &SceneArguments) -> Failure {
+fn blame(error: &SceneError, frame: &Frame, arguments: &SceneArguments) -> Failure {
+    let Frame { number, line, .. } = frame;
     match error {
         SceneError::Pair { source: QueryError::Budget { .. }, .. } => {
             Failure::Limit(format!("frame {number}: {error}"))

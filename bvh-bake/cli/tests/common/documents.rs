@@ -78,6 +78,22 @@ pub(crate) fn same_figures(csv: &str, rows: &[Value]) {
     }
 }
 
+/// Asserts that the tables of a page have the figures of the rows they name, and returns how many they have.
+#[track_caller]
+pub(crate) fn same_figures_in_page(page: &[Element], rows: &[Value]) -> usize {
+    let (mut row, mut shown) = (&rows[0], 0);
+    for (_, attributes) in page {
+        if let Some(number) = attributes.get("data-row") {
+            row = &rows[number.parse::<usize>().unwrap()];
+        }
+        if let Some(field) = attributes.get("data-field") {
+            assert_eq!(number(row, field), attributes["data-value"].parse().ok(), "{attributes:?}");
+            shown += 1;
+        }
+    }
+    shown
+}
+
 /// Returns the four files: table, page, JSON and drawing.
 pub(crate) fn report_files(directory: &Path, out: &str) -> [String; 4] {
     let out = directory.join(out);

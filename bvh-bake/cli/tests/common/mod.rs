@@ -9,6 +9,49 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// A folder for the files of one test, which is removed at its end.
+pub(crate) struct Place(tempfile::TempDir);
+
+/// Makes a folder for the files of one test.
+pub(crate) fn place() -> Place {
+    Place(tempfile::tempdir().unwrap())
+}
+
+impl std::ops::Deref for Place {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl AsRef<Path> for Place {
+    fn as_ref(&self) -> &Path {
+        self
+    }
+}
+
+/// Reads and writes files by their names in a folder.
+pub(crate) trait Files {
+    /// Writes a file.
+    fn write(&self, name: &str, content: impl AsRef<[u8]>);
+
+    /// Returns the text of a file.
+    fn text(&self, name: &str) -> String;
+}
+
+impl Files for Path {
+    #[track_caller]
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.join(name), content).unwrap();
+    }
+
+    #[track_caller]
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.join(name)).unwrap()
+    }
+}
+
 /// The outcome of a run of the command.
 #[derive(Debug)]
 pub(crate) struct Ended {

@@ -4,9 +4,8 @@
 //! Samples may miss a contact and be late with one. They may not find one where the way is certified free: this would be an
 //! error of the certified answer, or of the query about a pose.
 
+use super::timing::median;
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
-use cbvh_measure::spread::median;
-use cbvh_measure::table::whole;
 
 /// How many poses samplers ask about, with both ends.
 pub(super) const SAMPLES: [u32; 7] = [10, 30, 100, 300, 1_000, 3_000, 10_000];
@@ -16,8 +15,6 @@ pub(super) const SAMPLES: [u32; 7] = [10, 30, 100, 300, 1_000, 3_000, 10_000];
 pub(super) enum Method {
     /// Asks about equally spaced poses in the order of time, until one touches.
     Ordered(u32),
-    /// Asks about the same poses, but first about some that are spread over the whole way.
-    Spread(u32),
     /// [`Querier::motion`], which finds the first hit.
     Motion,
     /// [`Querier::is_free`], which looks for any hit.
@@ -40,99 +37,70 @@ pub(super) enum Said {
 impl Method {
     /// Returns all ways.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let samplers = [Self::Ordered as fn(u32) -> Self, Self::Spread];
-        let sampled = samplers.into_iter().flat_map(|sampler| SAMPLES.map(sampler));
-        sampled.chain([Self::Motion, Self::IsFree])
+        SAMPLES.map(Self::Ordered).into_iter().chain([Self::Motion, Self::IsFree])
     }
 
-    /// What each kind of way is, for people. Ways of a kind differ in the number of samples.
-    pub(super) const KINDS: [&'static str; 4] = [
-        "samples in the order of time",
-        "samples in a spread order",
-        "certified: first contact",
-        "certified: any contact",
+    /// What each kind of way is, in tables and for people. Ways of a kind differ in the number of samples.
+    pub(super) const KINDS: [[&'static str; 2]; 3] = [
+        ["ordered samples", "samples in the order of time"],
+        ["motion", "certified: first contact"],
+        ["is_free", "certified: any contact"],
     ];
 
     /// Returns the place of its kind in [`Self::KINDS`].
     pub(super) fn kind(self) -> usize {
         match self {
             Self::Ordered(_) => 0,
-            Self::Spread(_) => 1,
-            Self::Motion => 2,
-            Self::IsFree => 3,
+            Self::Motion => 1,
+            Self::IsFree => 2,
         }
     }
 
     /// The name in tables.
     pub(super) fn name(self) -> &'static str {
-        ["ordered samples", "spread samples", "motion", "is_free"][self.kind()]
+        Self::KINDS[self.kind()][0]
     }
 
     /// The name for people.
     pub(super) fn in_words(self) -> String {
-        let count = self.samples().map_or(String::new(), |samples| whole(samples.into()) + " ");
-        count + Self::KINDS[self.kind()]
+        let count = self.samples().map_or(String::new(), |samples| format!("{samples} "));
+        count + Self::KINDS[self.kind()][1]
     }
 
     /// Returns the number of samples.
     pub(super) fn samples(self) -> Option<u32> {
         match self {
-            Self::Ordered(samples) | Self::Spread(samples) => Some(samples),
+            Self::Ordered(samples) => Some(samples),
             Self::Motion | Self::IsFree => None,
         }
     }
 
-    /// Returns the times of its samples, in the order in which it asks about them.
-    fn times(self) -> Vec<f64> {
-        let order: Vec<u32> = match self {
-            Self::Ordered(samples) => (0..samples).collect(),
-            Self::Spread(samples) => spread(samples),
-            Self::Motion | Self::IsFree => Vec::new(),
-        };
-        let last = order.len().saturating_sub(1) as f64;
-        order.into_iter().map(|sample| f64::from(sample) / last).collect()
-    }
-}
-
-/// Returns the numbers below `count` in an order that is spread evenly from the start: both ends, and then those between in
-/// van der Corput's order, which is that of their reversed bits.
-fn spread(count: u32) -> Vec<u32> {
-    let Some(last) = count.checked_sub(1).filter(|&last| last > 0) else { return (0..count).collect() };
-    let bits = u32::BITS - last.leading_zeros();
-    let reversed = (0..1u32 << bits).map(|number| number.reverse_bits() >> (u32::BITS - bits));
-    [0, last].into_iter().chain(reversed.filter(|number| (1..last).contains(number))).collect()
-}
-
-/// A way to ask that is ready to be timed.
-pub(super) struct Asker {
-    method: Method,
-    times: Vec<f64>,
-}
-
-impl Asker {
-    pub(super) fn new(method: Method) -> Self {
-        Self { method, times: method.times() }
+    /// Returns the times of its samples, in order.
+    pub(super) fn times(self) -> Vec<f64> {
+        let count = self.samples().unwrap_or(0);
+        (0..count).map(|sample| f64::from(sample) / f64::from(count - 1)).collect()
     }
 
-    /// Asks about a motion. To make the poses of samples is part of the work.
+    /// Asks about a motion at the times of [`Self::times`]. Making the poses of samples is part of the work.
     pub(super) fn ask(
-        &self,
+        self,
+        times: &[f64],
         querier: &mut Querier,
         [a, b]: [&Bvh; 2],
         motion: &Motion,
     ) -> Result<Said, QueryError> {
         let options = MotionOptions::new();
-        match self.method {
-            Method::Motion => Ok(match querier.motion(a, b, motion, &options)? {
+        match self {
+            Self::Motion => Ok(match querier.motion(a, b, motion, &options)? {
                 MotionAnswer::Free => Said::Free,
                 MotionAnswer::Hit { touching_at, .. } => Said::Contact(touching_at),
                 MotionAnswer::Near { .. } => Said::Undecided,
             }),
-            Method::IsFree => {
+            Self::IsFree => {
                 Ok(if querier.is_free(a, b, motion, &options)? { Said::Free } else { Said::NotFree })
             }
-            Method::Ordered(_) | Method::Spread(_) => {
-                for &time in &self.times {
+            Self::Ordered(_) => {
+                for &time in times {
                     if querier.collide(a, b, &motion.pose(time))? {
                         return Ok(Said::Contact(time));
                     }
@@ -222,22 +190,13 @@ mod tests {
     use bvh_query::Pose;
 
     #[test]
-    fn samples_are_the_same_in_either_order() {
+    fn samples_have_both_ends() {
         for samples in SAMPLES {
-            let ordered = Method::Ordered(samples).times();
-            assert_eq!((ordered.len(), ordered[0], *ordered.last().unwrap()), (samples as usize, 0.0, 1.0));
-            assert!(ordered.windows(2).all(|pair| pair[0] < pair[1]));
-            let mut spread = Method::Spread(samples).times();
-            spread.sort_by(f64::total_cmp);
-            assert_eq!(spread, ordered);
+            let times = Method::Ordered(samples).times();
+            assert_eq!((times.len(), times[0], *times.last().unwrap()), (samples as usize, 0.0, 1.0));
+            assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
         }
-    }
-
-    #[test]
-    fn spread_samples_begin_with_halves_and_quarters() {
-        assert_eq!(spread(9), [0, 8, 4, 2, 6, 1, 5, 3, 7]);
-        assert_eq!(spread(10), [0, 9, 8, 4, 2, 6, 1, 5, 3, 7]);
-        assert_eq!((spread(2), spread(1), spread(0)), (vec![0, 1], vec![0], vec![]));
+        assert!(Method::Motion.times().is_empty());
     }
 
     /// Returns the answers about two meshes that meet at a quarter of the time, and about two that part.
@@ -273,10 +232,10 @@ mod tests {
     fn a_contact_where_the_way_is_free_is_wrong() {
         let [hit, free] = certified();
         let wrong = |method, certified, said| judge("pair", method, &[certified], &[said]).1;
-        let sampled = Method::Spread(30);
+        let sampled = Method::Ordered(30);
         assert_eq!(
             wrong(sampled, free, Said::Contact(0.5)),
-            ["pair, 30 spread samples, motion 1: expected a free way, found Contact(0.5)"]
+            ["pair, 30 ordered samples, motion 1: expected a free way, found Contact(0.5)"]
         );
         let early = wrong(sampled, hit, Said::Contact(0.125));
         assert!(early[0].contains("found a contact at 0.125"), "{early:?}");
