@@ -32,7 +32,8 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![bake::bake, bake::bake_files];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
-    functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of, poses::relative_poses];
+    functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];
+    functions![poses::relative_poses, poses::nearest_poses];
     functions![
         probes::closest_points,
         probes::sides,

@@ -197,6 +197,37 @@ impl Scene {
         Self(Mutex::new(self.with(py, |state| state.clone())))
     }
 
+    /// A scene of these instances alone, under the same numbers.
+    fn only(&self, py: Python<'_>, numbers: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
+        let numbers = numbers.as_slice()?.to_vec();
+        self.with(py, |state| {
+            let ids = numbers.iter().map(|&number| state.id(number, "instances"));
+            let mut ids = ids.collect::<PyResult<Vec<_>>>()?;
+            // In the order of the scene, each once.
+            ids.sort_unstable();
+            ids.dedup();
+            let made = bvh_query::Scene::new().map_err(|error| PyValueError::new_err(error.to_string()))?;
+            let mut only = State::new(made);
+            only.parallel = state.parallel;
+            only.scene.set_parallel(state.parallel);
+            for id in ids {
+                let known = (|| {
+                    let (shape, pose) = (state.scene.shape(id)?.clone(), *state.scene.pose(id)?);
+                    match state.scene.name(id)? {
+                        Some(name) => only.scene.add_named(name, shape, pose),
+                        None => only.scene.add(shape, pose),
+                    }
+                })();
+                let added = known.map_err(|error| scene_error(state.refused(error)))?;
+                let number = state.number(id);
+                let mesh = Arc::clone(&state.entry(number, "instances")?.mesh);
+                only.entries.insert(number, Entry { id: added, mesh });
+                only.numbers.insert(added, number);
+            }
+            Ok(Self(Mutex::new(only)))
+        })
+    }
+
     /// Adds `mesh`, which callers know as `known`. A number that is given is that of a scene that this one is made after.
     #[expect(clippy::too_many_arguments, reason = "these are what an instance has")]
     fn add(

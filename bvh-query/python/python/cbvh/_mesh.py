@@ -7,7 +7,7 @@ import os
 from typing import Any, Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
 from ._answers import (
@@ -63,12 +63,47 @@ class Mesh:
     def __repr__(self) -> str:
         place = "in memory" if self._path is None else repr(self._path)
         object = "" if self._object is None else f", object {self._object}"
-        return f"<cbvh.Mesh {place}{object}: {self.triangles} triangles>"
+        return f"<cbvh.Mesh {place}{object}: {self.triangle_count} triangles>"
 
     @property
-    def triangles(self) -> int:
+    def triangle_count(self) -> int:
         """The number of triangles, without exact duplicates."""
-        return self._mesh.triangles()
+        return self._mesh.count()
+
+    @property
+    def triangles(self) -> Floats:
+        """The corners of all triangles as they are stored, in mesh units: shape (T, 3, 3), float64.
+
+        ``mesh.triangles[id]`` are the three corners of the triangle that answers call ``id``, in the order of the input or
+        a cyclic one of it. A duplicate that was left out has the corners of the triangle that is stored for it. Rows of ids
+        that this mesh does not have are NaN: those of other objects of the file, and places in a file without ids that are
+        empty. Each access reads and checks the whole file and makes a new array. ValueError for several objects of a file
+        without ids, whose numbers are not unique.
+        """
+        return self._mesh.corners()
+
+    @property
+    def vertices(self) -> Floats:
+        """The positions of all corners, each once, ascending by x, then y, then z, in mesh units: shape (V, 3), float64.
+
+        Each access costs a sort. To have `faces` as well, `arrays` reads the file once.
+        """
+        return self.arrays()[0]
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Three numbers of `vertices` per triangle, shape (T, 3): ``mesh.vertices[mesh.faces[id]]`` is
+        ``mesh.triangles[id]``. Rows of ids that this mesh does not have are -1."""
+        return self.arrays()[1]
+
+    def arrays(self) -> tuple[Floats, NDArray[np.int64]]:
+        """`vertices` and `faces`, which together are what `bake` takes if the mesh has all ids."""
+        corners = self.triangles
+        is_there = ~np.isnan(corners[:, 0, 0])
+        vertices, numbers = np.unique(corners[is_there].reshape(-1, 3), axis=0, return_inverse=True)
+        faces = np.full((len(corners), 3), -1, np.int64)
+        faces[is_there] = numbers.reshape(-1, 3)
+        return vertices, faces
 
     @property
     def bounds(self) -> Floats:
