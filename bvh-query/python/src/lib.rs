@@ -16,7 +16,6 @@ mod poses;
 mod probes;
 mod scene;
 mod scene_pairs;
-mod scene_probes;
 
 use pyo3::prelude::*;
 
@@ -53,15 +52,6 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_pairs::scene_distance,
         scene_pairs::scene_motion,
         scene_pairs::scene_is_free
-    ];
-    functions![
-        scene_probes::scene_closest_points,
-        scene_probes::scene_sides,
-        scene_probes::scene_signed_distances,
-        scene_probes::scene_first_hits,
-        scene_probes::scene_any_hits,
-        scene_probes::scene_all_hits,
-        scene_probes::scene_segment_hits
     ];
     module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
     module.add("BakeError", module.py().get_type::<errors::BakeError>())?;

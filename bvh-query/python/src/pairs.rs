@@ -125,6 +125,6 @@ pub(crate) fn contacts<'py>(
     let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.contacts(a, b, pose);
     let found = question.ask(|batch, poses| batch.contacts(poses), one)?;
     let py = question.py;
-    let triangles = |rows: &[Contact]| Ok(table(py, rows.iter().map(answers::triangles))?.into_any());
+    let triangles = |rows: &Vec<Contact>| Ok(table(py, rows.iter().map(answers::triangles))?.into_any());
     question.answers().lists(&found, triangles)
 }

@@ -15,8 +15,8 @@ _Pairs = NDArray[np.int64]
 
 # The parts of an answer, in the order of its named tuple.
 _Parts = tuple[Any, ...]
-# Instances, -1 for none, and what is found of each.
-_OfInstances = tuple[Any, _Parts]
+# Instances, -1 for none, or None of a mesh; and what is found of each.
+_OfInstances = tuple[Any | None, _Parts]
 # Two instances and their distance.
 _Nearest = tuple[int, int, _Parts] | None
 # Paths, and whether they are one path alone.
@@ -48,21 +48,14 @@ __all__ = [
     "poses_of",
     "relation",
     "relative_poses",
-    "scene_all_hits",
-    "scene_any_hits",
-    "scene_closest_points",
     "scene_collide",
     "scene_contacts",
     "scene_distance",
-    "scene_first_hits",
     "scene_is_free",
-    "scene_segment_hits",
     "scene_motion",
     "scene_pairs_in_contact",
     "scene_pairs_within",
     "scene_relations",
-    "scene_sides",
-    "scene_signed_distances",
     "scene_within",
     "sides",
     "signed_distances",
@@ -163,23 +156,23 @@ def is_free(
     a: Mesh, b: Mesh, paths: _Ways, clearance: float, tolerance: float | None, parallel: bool
 ) -> Any: ...
 def closest_points(
-    mesh: Mesh, points: ArrayLike, within: float, pose: ArrayLike | None, parallel: bool
-) -> _Parts: ...
-def sides(mesh: Mesh, points: ArrayLike, pose: ArrayLike | None, parallel: bool) -> Any: ...
+    of: Mesh | Scene, points: ArrayLike, within: float, pose: ArrayLike | None, parallel: bool
+) -> _OfInstances: ...
+def sides(of: Mesh | Scene, points: ArrayLike, pose: ArrayLike | None, parallel: bool) -> Any: ...
 def signed_distances(
-    mesh: Mesh, points: ArrayLike, within: float, pose: ArrayLike | None, parallel: bool
+    of: Mesh | Scene, points: ArrayLike, within: float, pose: ArrayLike | None, parallel: bool
 ) -> Any: ...
 def first_hits(
-    mesh: Mesh, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
-) -> _Parts: ...
+    of: Mesh | Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
+) -> _OfInstances: ...
 def any_hits(
-    mesh: Mesh, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
+    of: Mesh | Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
 ) -> Any: ...
 def all_hits(
-    mesh: Mesh, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
+    of: Mesh | Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike, pose: ArrayLike | None, parallel: bool
 ) -> Any: ...
 def segment_hits(
-    mesh: Mesh, starts: ArrayLike, ends: ArrayLike, pose: ArrayLike | None, parallel: bool
+    of: Mesh | Scene, starts: ArrayLike, ends: ArrayLike, pose: ArrayLike | None, parallel: bool
 ) -> Any: ...
 def scene_collide(scene: Scene) -> bool: ...
 def scene_within(scene: Scene, d: float) -> bool: ...
@@ -194,10 +187,3 @@ def scene_motion(
 def scene_is_free(
     scene: Scene, numbers: list[int], paths: list[Any], clearance: float, tolerance: float | None
 ) -> bool: ...
-def scene_closest_points(scene: Scene, points: ArrayLike, within: float) -> _OfInstances: ...
-def scene_sides(scene: Scene, points: ArrayLike) -> Any: ...
-def scene_signed_distances(scene: Scene, points: ArrayLike, within: float) -> Any: ...
-def scene_first_hits(scene: Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike) -> _OfInstances: ...
-def scene_any_hits(scene: Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike) -> Any: ...
-def scene_all_hits(scene: Scene, origins: ArrayLike, directions: ArrayLike, until: ArrayLike) -> Any: ...
-def scene_segment_hits(scene: Scene, starts: ArrayLike, ends: ArrayLike) -> Any: ...

@@ -249,7 +249,7 @@ class Mesh:
         ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
         shape (4, 4); None: they are in the frame of the mesh.
         """
-        return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel))
+        return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel)[1])
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
         """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as int8, shape (N,).
@@ -288,7 +288,7 @@ class Mesh:
         any length are the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
         world).
         """
-        return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel))
+        return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel)[1])
 
     def any_hits(
         self,
