@@ -34,7 +34,7 @@ impl<'py, 'a> Question<'py, 'a> {
     fn ask<T: Send>(
         &self,
         batch: impl Fn(&Batch<'_>, &[Pose]) -> Result<Vec<T>, QueryError> + Send + Sync,
-        one: impl Fn(&mut Querier, Shape<'_>, Shape<'_>, &Pose) -> Result<T, QueryError> + Send + Sync,
+        one: impl Fn(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError> + Send + Sync,
     ) -> PyResult<Vec<T>> {
         let (a, b, poses) = (self.a, self.b, &self.poses.rows);
         // Without poses, too, the other arguments are checked.
@@ -42,7 +42,7 @@ impl<'py, 'a> Question<'py, 'a> {
             let all = Batch::new(a, b).map_err(query_error)?;
             return on_all_cores(self.py, poses, |poses| batch(&all, poses).map_err(query_error));
         }
-        one_by_one(self.py, poses, |querier, pose| one(querier, a, b, pose).map_err(query_error))
+        one_by_one(self.py, poses, |querier, pose| one(querier, [a, b], pose).map_err(query_error))
     }
 
     fn answers(&self) -> Answers<'py> {
@@ -58,8 +58,8 @@ pub(crate) fn collide<'py>(
     parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.collide(a, b, pose);
-    let found = question.ask(|batch, poses| batch.collide(poses), one)?;
+    let found = question
+        .ask(|batch, poses| batch.collide(poses), |querier, [a, b], pose| querier.collide(a, b, pose))?;
     question.answers().values(found.into_iter())
 }
 
@@ -72,8 +72,8 @@ pub(crate) fn within<'py>(
     parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (question, d) = (Question::new(a, b, poses, parallel)?, number(d, "d")?);
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.within(a, b, pose, d);
-    let found = question.ask(|batch, poses| batch.within(poses, d), one)?;
+    let found = question
+        .ask(|batch, poses| batch.within(poses, d), |querier, [a, b], pose| querier.within(a, b, pose, d))?;
     question.answers().values(found.into_iter())
 }
 
@@ -85,8 +85,8 @@ pub(crate) fn relation<'py>(
     parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.relation(a, b, pose);
-    let found = question.ask(|batch, poses| batch.relations(poses), one)?;
+    let found = question
+        .ask(|batch, poses| batch.relations(poses), |querier, [a, b], pose| querier.relation(a, b, pose))?;
     question.answers().values(found.into_iter().map(|relation| relation as u8))
 }
 
@@ -107,10 +107,12 @@ pub(crate) fn distance<'py>(
     if question.parallel && !exact {
         return Err(PyValueError::new_err("parallel: expected False with rel_err or abs_err, found True"));
     }
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| {
-        if exact { querier.distance(a, b, pose) } else { querier.distance_with(a, b, pose, &options) }
-    };
-    let found = question.ask(|batch, poses| batch.distances(poses), one)?;
+    let found = question.ask(
+        |batch, poses| batch.distances(poses),
+        |querier, [a, b], pose| {
+            if exact { querier.distance(a, b, pose) } else { querier.distance_with(a, b, pose, &options) }
+        },
+    )?;
     answers::distances(question.answers(), found.iter().copied().map(Some))
 }
 
@@ -122,8 +124,8 @@ pub(crate) fn contacts<'py>(
     parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(a, b, poses, parallel)?;
-    let one = |querier: &mut Querier, a: Shape<'_>, b: Shape<'_>, pose: &Pose| querier.contacts(a, b, pose);
-    let found = question.ask(|batch, poses| batch.contacts(poses), one)?;
+    let found = question
+        .ask(|batch, poses| batch.contacts(poses), |querier, [a, b], pose| querier.contacts(a, b, pose))?;
     let py = question.py;
     let triangles = |rows: &Vec<Contact>| Ok(table(py, rows.iter().map(answers::triangles))?.into_any());
     question.answers().lists(&found, triangles)

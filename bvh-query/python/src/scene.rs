@@ -135,6 +135,19 @@ impl Scene {
         detached(py, || work(&mut locked(&self.0)))
     }
 
+    /// Looks at an instance or changes it.
+    fn of<T: Send>(
+        &self,
+        py: Python<'_>,
+        number: i64,
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, SceneError> + Send,
+    ) -> PyResult<T> {
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            work(&mut state.scene, id).map_err(|error| scene_error(state.refused(error)))
+        })
+    }
+
     /// Asks a question, and reads the answer while the scene is still as it was.
     pub(crate) fn ask<A: Send, T: Send>(
         &self,
@@ -275,10 +288,7 @@ impl Scene {
     /// Moves an instance to a pose of shape (4, 4).
     fn set_pose(&self, number: i64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
         let (py, pose) = (pose.py(), arguments::pose(pose, "pose")?);
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.set_pose(id, pose).map_err(|error| scene_error(state.refused(error)))
-        })
+        self.of(py, number, |scene, id| scene.set_pose(id, pose))
     }
 
     /// Moves as many instances as there are poses, of shape (N, 4, 4).
@@ -302,18 +312,11 @@ impl Scene {
 
     fn set_groups(&self, py: Python<'_>, number: i64, groups: [u32; 2]) -> PyResult<()> {
         let groups = Groups { member: groups[0], meets: groups[1] };
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.set_groups(id, groups).map_err(|error| scene_error(state.refused(error)))
-        })
+        self.of(py, number, |scene, id| scene.set_groups(id, groups))
     }
 
     fn groups(&self, py: Python<'_>, number: i64) -> PyResult<(u32, u32)> {
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            let groups = state.scene.groups(id).map_err(|error| scene_error(state.refused(error)))?;
-            Ok((groups.member, groups.meets))
-        })
+        self.of(py, number, |scene, id| scene.groups(id).map(|groups| (groups.member, groups.meets)))
     }
 
     fn set_allowed(&self, py: Python<'_>, a: i64, b: i64, allowed: bool) -> PyResult<()> {
@@ -338,10 +341,7 @@ impl Scene {
     }
 
     fn name(&self, py: Python<'_>, number: i64) -> PyResult<Option<String>> {
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            Ok(state.scene.name(id).ok().flatten().map(str::to_owned))
-        })
+        self.of(py, number, |scene, id| Ok(scene.name(id)?.map(str::to_owned)))
     }
 
     /// What callers know of the mesh of an instance.
@@ -377,10 +377,7 @@ impl Scene {
 
     /// The pose of an instance, shape (4, 4).
     fn pose<'py>(&self, py: Python<'py>, number: i64) -> PyResult<Bound<'py, PyAny>> {
-        let found = self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.pose(id).copied().map_err(|_| no_instance("id", number))
-        })?;
+        let found = self.of(py, number, |scene, id| scene.pose(id).copied())?;
         Answers { py, one: true }.poses(&[found])
     }
 
