@@ -9,7 +9,7 @@ import numpy as np
 
 import cbvh
 from cbvh import MotionKind, Relation, Side
-from common import TESTDATA, cube, random_poses, shifts
+from common import TESTDATA, check_errors, cube, random_poses, shifts
 
 
 def read_obj(path):
@@ -134,10 +134,7 @@ class NearestPose(unittest.TestCase):
             ("matrix: row 4", shifts((1, 2, 3))[0].T),
             ("matrix: ", np.full((4, 4), np.nan)),
         ]
-        for message, matrix in cases:
-            with self.subTest(message), self.assertRaises(ValueError) as caught:
-                cbvh.nearest_pose(matrix)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, [(ValueError, message, cbvh.nearest_pose, matrix) for message, matrix in cases])
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 import cbvh
 from cbvh import MotionKind, Relation, Side
 from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
-from common import ask_command, bottom_row, cube, numbers_of, random_poses, shifts
+from common import ask_command, bottom_row, check_errors, cube, numbers_of, random_poses, shifts
 
 
 def read_scene(path, folder):
@@ -363,10 +363,7 @@ class Misuse(unittest.TestCase):
             (FileNotFoundError, "no such.cbvh", cbvh.Scene.open, "no such.cbvh"),
             (cbvh.FormatError, "expected a scene, a file with instances", cbvh.Scene.open, TESTDATA / "ok-plain.cbvh"),
         ]
-        for kind, message, call, *arguments in cases:
-            with self.subTest(message), self.assertRaises(kind) as caught:
-                call(*arguments)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, cases)
         with self.assertRaisesRegex(ValueError, 'name: expected one that no instance has, found "here"'):
             scene.add(mesh, name="here")
         for groups in ({"member": -1}, {"meets": 1 << 32}):
