@@ -10,7 +10,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// A pair of meshes, and the poses of the second in the frame of the first.
+/// What all questions take: two meshes, the poses of the second in the frame of the first, and whether to use all cores.
+#[derive(FromPyObject)]
+pub(crate) struct Asked<'py>(Bound<'py, Mesh>, Bound<'py, Mesh>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+/// What was asked, as it was read.
 struct Question<'py, 'a> {
     py: Python<'py>,
     a: Shape<'a>,
@@ -20,13 +24,9 @@ struct Question<'py, 'a> {
 }
 
 impl<'py, 'a> Question<'py, 'a> {
-    fn new(
-        a: &'a Mesh,
-        b: &'a Mesh,
-        poses: &Bound<'py, PyAny>,
-        parallel: &Bound<'py, PyAny>,
-    ) -> PyResult<Self> {
-        let (a, b, parallel) = (a.shape().shape(), b.shape().shape(), flag(parallel, "parallel")?);
+    fn new(Asked(a, b, poses, parallel): &'a Asked<'py>) -> PyResult<Self> {
+        let (a, b, parallel) =
+            (a.get().shape().shape(), b.get().shape().shape(), flag(parallel, "parallel")?);
         Ok(Self { py: poses.py(), a, b, poses: arguments::poses(poses, "poses")?, parallel })
     }
 
@@ -51,40 +51,24 @@ impl<'py, 'a> Question<'py, 'a> {
 }
 
 #[pyfunction]
-pub(crate) fn collide<'py>(
-    a: &Mesh,
-    b: &Mesh,
-    poses: &Bound<'py, PyAny>,
-    parallel: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(a, b, poses, parallel)?;
+pub(crate) fn collide<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(&asked)?;
     let found = question
         .ask(|batch, poses| batch.collide(poses), |querier, [a, b], pose| querier.collide(a, b, pose))?;
     question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
-pub(crate) fn within<'py>(
-    a: &Mesh,
-    b: &Mesh,
-    poses: &Bound<'py, PyAny>,
-    d: &Bound<'py, PyAny>,
-    parallel: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let (question, d) = (Question::new(a, b, poses, parallel)?, number(d, "d")?);
+pub(crate) fn within<'py>(asked: Asked<'py>, d: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let (question, d) = (Question::new(&asked)?, number(d, "d")?);
     let found = question
         .ask(|batch, poses| batch.within(poses, d), |querier, [a, b], pose| querier.within(a, b, pose, d))?;
     question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
-pub(crate) fn relation<'py>(
-    a: &Mesh,
-    b: &Mesh,
-    poses: &Bound<'py, PyAny>,
-    parallel: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(a, b, poses, parallel)?;
+pub(crate) fn relation<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(&asked)?;
     let found = question
         .ask(|batch, poses| batch.relations(poses), |querier, [a, b], pose| querier.relation(a, b, pose))?;
     question.answers().values(found.into_iter().map(|relation| relation as u8))
@@ -93,14 +77,11 @@ pub(crate) fn relation<'py>(
 /// Allowed errors cannot be combined with all cores.
 #[pyfunction]
 pub(crate) fn distance<'py>(
-    a: &Mesh,
-    b: &Mesh,
-    poses: &Bound<'py, PyAny>,
+    asked: Asked<'py>,
     rel_err: &Bound<'py, PyAny>,
     abs_err: &Bound<'py, PyAny>,
-    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let question = Question::new(a, b, poses, parallel)?;
+    let question = Question::new(&asked)?;
     let (rel_err, abs_err) = (number(rel_err, "rel_err")?, number(abs_err, "abs_err")?);
     let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
     let exact = rel_err == 0.0 && abs_err == 0.0;
@@ -117,13 +98,8 @@ pub(crate) fn distance<'py>(
 }
 
 #[pyfunction]
-pub(crate) fn contacts<'py>(
-    a: &Mesh,
-    b: &Mesh,
-    poses: &Bound<'py, PyAny>,
-    parallel: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(a, b, poses, parallel)?;
+pub(crate) fn contacts<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(&asked)?;
     let found = question
         .ask(|batch, poses| batch.contacts(poses), |querier, [a, b], pose| querier.contacts(a, b, pose))?;
     let py = question.py;

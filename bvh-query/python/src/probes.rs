@@ -14,11 +14,12 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
-/// What a question is about.
+/// What a question is about: a mesh, its pose in the frame of the probes (`None` for the identity) and whether to use all
+/// cores; or a scene, which has its own of both.
 #[derive(FromPyObject)]
 pub(crate) enum Of<'py> {
-    Mesh(Bound<'py, Mesh>),
     Scene(Bound<'py, Scene>),
+    Mesh(Bound<'py, Mesh>, Option<Bound<'py, PyAny>>, Bound<'py, PyAny>),
 }
 
 /// What a question is about, where a mesh stands in the frame of the probes, and the probes.
@@ -34,15 +35,14 @@ struct Question<'py, P> {
 type OfInstance<T> = (Option<InstanceId>, T);
 
 impl<'py, P: Sync> Question<'py, P> {
-    /// `place` is the pose of a mesh, `None` for the identity. A scene has its own poses, and its own choice of cores.
-    fn new(
-        of: Of<'py>,
-        probes: Rows<P>,
-        place: Option<&Bound<'py, PyAny>>,
-        parallel: &Bound<'py, PyAny>,
-    ) -> PyResult<Self> {
-        let (pose, parallel_flag) = (pose_or_identity(place, "pose")?, flag(parallel, "parallel")?);
-        Ok(Self { py: parallel.py(), of, pose, probes, parallel: parallel_flag })
+    fn new(py: Python<'py>, of: Of<'py>, probes: Rows<P>) -> PyResult<Self> {
+        let (pose, parallel) = match &of {
+            Of::Scene(_) => (Pose::IDENTITY, false),
+            Of::Mesh(_, pose, parallel) => {
+                (pose_or_identity(pose.as_ref(), "pose")?, flag(parallel, "parallel")?)
+            }
+        };
+        Ok(Self { py, of, pose, probes, parallel })
     }
 
     /// Asks about all probes without Python's lock: a mesh on all cores or one after the other, and a scene about all of them.
@@ -55,7 +55,7 @@ impl<'py, P: Sync> Question<'py, P> {
     ) -> PyResult<(Option<Vec<i64>>, Vec<T>)> {
         let probes = &self.probes.rows;
         let mesh = match &self.of {
-            Of::Mesh(mesh) => mesh.get(),
+            Of::Mesh(mesh, ..) => mesh.get(),
             Of::Scene(asked) => {
                 let (numbers, found) = asked.get().ask(
                     self.py,
@@ -105,10 +105,8 @@ pub(crate) fn closest_points<'py>(
     of: Of<'py>,
     points: &Bound<'py, PyAny>,
     within: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> Found<'py> {
-    let question = Question::new(of, read_points(points, "points")?, pose, parallel)?;
+    let question = Question::new(points.py(), of, read_points(points, "points")?)?;
     let within = number(within, "within")?;
     let (instances, found): (_, Vec<Option<ClosestPoint>>) = question.ask_of_instances(
         |batch, points| batch.closest_points(points, within),
@@ -124,13 +122,8 @@ pub(crate) fn closest_points<'py>(
 }
 
 #[pyfunction]
-pub(crate) fn sides<'py>(
-    of: Of<'py>,
-    points: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(of, read_points(points, "points")?, pose, parallel)?;
+pub(crate) fn sides<'py>(of: Of<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(points.py(), of, read_points(points, "points")?)?;
     let found = question.ask(
         |batch, points| batch.sides(points),
         |querier, shape, &point| querier.side(shape, point),
@@ -145,10 +138,8 @@ pub(crate) fn signed_distances<'py>(
     of: Of<'py>,
     points: &Bound<'py, PyAny>,
     within: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(of, read_points(points, "points")?, pose, parallel)?;
+    let question = Question::new(points.py(), of, read_points(points, "points")?)?;
     let within = number(within, "within")?;
     let found = question.ask(
         |batch, points| batch.signed_distances(points, within),
@@ -195,10 +186,8 @@ pub(crate) fn first_hits<'py>(
     origins: &Bound<'py, PyAny>,
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> Found<'py> {
-    let question = Question::new(of, rays(origins, directions, until)?, pose, parallel)?;
+    let question = Question::new(origins.py(), of, rays(origins, directions, until)?)?;
     let (instances, found) = question.ask_of_instances(
         |batch, rays| batch.first_hits(rays),
         |querier, shape, ray| querier.first_hit(shape, ray),
@@ -215,10 +204,8 @@ pub(crate) fn any_hits<'py>(
     origins: &Bound<'py, PyAny>,
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(of, rays(origins, directions, until)?, pose, parallel)?;
+    let question = Question::new(origins.py(), of, rays(origins, directions, until)?)?;
     let found = question.ask(
         |batch, rays| batch.any_hits(rays),
         |querier, shape, ray| querier.any_hit(shape, ray),
@@ -234,8 +221,6 @@ pub(crate) fn all_hits<'py>(
     origins: &Bound<'py, PyAny>,
     directions: &Bound<'py, PyAny>,
     until: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let rays = rays(origins, directions, until)?;
     let (py, one) = (origins.py(), rays.one);
@@ -255,7 +240,7 @@ pub(crate) fn all_hits<'py>(
             (along_one.values(numbers.iter().copied())?, hits).into_bound_py_any(py)
         });
     }
-    let question = Question::new(of, rays, pose, parallel)?;
+    let question = Question::new(py, of, rays)?;
     let found = question.ask(
         |batch, rays| batch.all_hits(rays),
         |querier, shape, ray| querier.all_hits(shape, ray),
@@ -276,10 +261,8 @@ pub(crate) fn segment_hits<'py>(
     of: Of<'py>,
     starts: &Bound<'py, PyAny>,
     ends: &Bound<'py, PyAny>,
-    pose: Option<&Bound<'py, PyAny>>,
-    parallel: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(of, segments(starts, ends)?, pose, parallel)?;
+    let question = Question::new(starts.py(), of, segments(starts, ends)?)?;
     let found = question.ask(
         |batch, segments| batch.segment_hits(segments),
         |querier, shape, &[start, end]| querier.segment_hit(shape, start, end),

@@ -155,14 +155,14 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.collide(self._mesh, _other(other), poses, parallel)
+        return _cbvh.collide((self._mesh, _other(other), poses, parallel))
 
     def within(self, other: Mesh, poses: ArrayLike, d: float, *, parallel: bool = False) -> Any:
         """Are they at most ``d`` mesh units apart? Exact: bool, or an array of bool of shape (N,).
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.within(self._mesh, _other(other), poses, d, parallel)
+        return _cbvh.within((self._mesh, _other(other), poses, parallel), d)
 
     def distance(
         self,
@@ -179,7 +179,7 @@ class Mesh:
         ``abs_err`` let the answer exceed the least distance by a fraction of it or by a length, which saves time;
         ``lower`` is what is certain. They cannot be combined with ``parallel``.
         """
-        return Distance(*_cbvh.distance(self._mesh, _other(other), poses, rel_err, abs_err, parallel))
+        return Distance(*_cbvh.distance((self._mesh, _other(other), poses, parallel), rel_err, abs_err))
 
     def relation(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers as uint8, shape
@@ -187,7 +187,7 @@ class Mesh:
 
         ``poses``: of ``other``, mesh B, in the frame of this mesh, A (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return named(Relation, _cbvh.relation(self._mesh, _other(other), poses, parallel))
+        return named(Relation, _cbvh.relation((self._mesh, _other(other), poses, parallel)))
 
     def contacts(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """All pairs of triangles that touch, exactly, in ascending order.
@@ -197,7 +197,7 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.contacts(self._mesh, _other(other), poses, parallel)
+        return _cbvh.contacts((self._mesh, _other(other), poses, parallel))
 
     def motion(
         self,
@@ -249,14 +249,14 @@ class Mesh:
         ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
         shape (4, 4); None: they are in the frame of the mesh.
         """
-        return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel)[1])
+        return ClosestPoint(*_cbvh.closest_points((self._mesh, pose, parallel), points, within)[1])
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
         """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as int8, shape (N,).
 
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return named(Side, _cbvh.sides(self._mesh, points, pose, parallel))
+        return named(Side, _cbvh.sides((self._mesh, pose, parallel), points))
 
     def signed_distances(
         self,
@@ -271,7 +271,7 @@ class Mesh:
         NaN where the mesh has no inside, because it is not closed, and where the surface is farther than ``within``.
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return _cbvh.signed_distances(self._mesh, points, within, pose, parallel)
+        return _cbvh.signed_distances((self._mesh, pose, parallel), points, within)
 
     def first_hits(
         self,
@@ -288,7 +288,7 @@ class Mesh:
         any length are the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
         world).
         """
-        return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel)[1])
+        return RayHit(*_cbvh.first_hits((self._mesh, pose, parallel), origins, directions, until)[1])
 
     def any_hits(
         self,
@@ -301,7 +301,7 @@ class Mesh:
     ) -> Any:
         """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of
         `first_hits`."""
-        return _cbvh.any_hits(self._mesh, origins, directions, until, pose, parallel)
+        return _cbvh.any_hits((self._mesh, pose, parallel), origins, directions, until)
 
     def all_hits(
         self,
@@ -317,7 +317,7 @@ class Mesh:
 
         Arguments are those of `first_hits`.
         """
-        found = _cbvh.all_hits(self._mesh, origins, directions, until, pose, parallel)
+        found = _cbvh.all_hits((self._mesh, pose, parallel), origins, directions, until)
         return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)
 
     def segment_hits(
@@ -327,7 +327,7 @@ class Mesh:
 
         ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
         """
-        return _cbvh.segment_hits(self._mesh, starts, ends, pose, parallel)
+        return _cbvh.segment_hits((self._mesh, pose, parallel), starts, ends)
 
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:

@@ -344,7 +344,7 @@ class Scene:
         at all.
         """
         scene = self._scene if instances is None else self._scene.only(self._ids(instances, "instances"))
-        found_of, found = _cbvh.closest_points(scene, points, within, None, False)
+        found_of, found = _cbvh.closest_points(scene, points, within)
         return SceneClosestPoint(found_of, ClosestPoint(*found))
 
     def sides(self, points: ArrayLike) -> Any:
@@ -354,7 +354,7 @@ class Scene:
         INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no
         inside.
         """
-        return named(Side, _cbvh.sides(self._scene, points, None, False))
+        return named(Side, _cbvh.sides(self._scene, points))
 
     def signed_distances(self, points: ArrayLike, *, within: float = np.inf) -> Any:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
@@ -362,27 +362,27 @@ class Scene:
 
         NaN where the side is UNDEFINED, and where no instance is within ``within``.
         """
-        return _cbvh.signed_distances(self._scene, points, within, None, False)
+        return _cbvh.signed_distances(self._scene, points, within)
 
     def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
         """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""
-        return _hits(_cbvh.first_hits(self._scene, origins, directions, until, None, False))
+        return _hits(_cbvh.first_hits(self._scene, origins, directions, until))
 
     def any_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """Whether rays in the world hit any instance, exactly: bool, or an array of shape (N,)."""
-        return _cbvh.any_hits(self._scene, origins, directions, until, None, False)
+        return _cbvh.any_hits(self._scene, origins, directions, until)
 
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
 
         Each parameter occurs once, however many instances are hit at exactly that.
         """
-        found = _cbvh.all_hits(self._scene, origins, directions, until, None, False)
+        found = _cbvh.all_hits(self._scene, origins, directions, until)
         return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)
 
     def segment_hits(self, starts: ArrayLike, ends: ArrayLike) -> Any:
         """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
-        return _cbvh.segment_hits(self._scene, starts, ends, None, False)
+        return _cbvh.segment_hits(self._scene, starts, ends)
 
     def motion(
         self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
