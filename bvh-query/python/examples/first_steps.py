@@ -16,7 +16,7 @@ with tempfile.TemporaryDirectory() as folder:
     # Bake once; the second time, nothing is done. Mapped files need no memory of their own.
     walls = cbvh.bake_files(TESTDATA / "fclenv.obj", f"{folder}/walls.cbvh")
     robot = cbvh.bake_files(TESTDATA / "fclrob.obj", f"{folder}/robot.cbvh")
-    print(f"{walls.triangles} triangles of walls, {robot.triangles} of the robot")
+    print(f"{walls.triangle_count} triangles of walls, {robot.triangle_count} of the robot")
 
     # Poses of the robot in the frame of the walls (body to world): a rotation and a translation in mesh units.
     poses = np.tile(np.eye(4), (1000, 1, 1))

@@ -58,15 +58,15 @@ impl<'py> Answers<'py> {
     /// What `make` makes of the rows that each question found, or a list of that.
     pub(crate) fn lists<T>(
         self,
-        of: &[Vec<T>],
-        make: impl Fn(&[T]) -> PyResult<Bound<'py, PyAny>>,
+        of: &[T],
+        make: impl Fn(&T) -> PyResult<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         if self.one
             && let Some(rows) = of.first()
         {
             return make(rows);
         }
-        let lists = of.iter().map(|rows| make(rows)).collect::<PyResult<Vec<_>>>()?;
+        let lists = of.iter().map(make).collect::<PyResult<Vec<_>>>()?;
         Ok(PyList::new(self.py, lists)?.into_any())
     }
 }

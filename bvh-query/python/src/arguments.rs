@@ -4,7 +4,7 @@
 //! copy: another thread may change an array while a question runs, and numpy fills large arrays without the lock.
 
 use crate::errors::pose_error;
-use bvh_query::{Pose, with_default_floats};
+use bvh_query::{Pose, PoseError, with_default_floats};
 use numpy::npyffi::NPY_ORDER;
 use numpy::{
     PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -193,11 +193,19 @@ fn kind(value: &Bound<'_, PyAny>) -> String {
 
 /// Reads poses: an array of shape (4, 4) or (N, 4, 4).
 pub(crate) fn poses(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Rows<Pose>> {
+    many_matrices(value, name, pose_of)
+}
+
+/// Reads matrices of shape (4, 4) or (N, 4, 4), and makes a pose of each.
+pub(crate) fn many_matrices(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    make: impl Fn(&[[f64; 4]; 4]) -> Result<Pose, PoseError>,
+) -> PyResult<Rows<Pose>> {
     let array = numbers(value, name)?;
     let one = expect_rows(&array, name, &[4, 4])?;
-    Rows::read(array.as_slice()?.as_chunks::<16>().0, one, name, |matrix, place| {
-        pose_of(matrix).map_err(|error| pose_error(&place(), error))
-    })
+    let matrices = array.as_slice()?.as_chunks::<4>().0.as_chunks::<4>().0;
+    Rows::read(matrices, one, name, |matrix, place| make(matrix).map_err(|error| pose_error(&place(), error)))
 }
 
 /// Reads poses of shape (N, 4, 4).
@@ -209,7 +217,7 @@ pub(crate) fn many_poses(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<P
 /// Reads a pose of shape (4, 4).
 pub(crate) fn pose(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Pose> {
     let array = numbers(value, name)?;
-    let matrix = array.as_slice()?.first_chunk().filter(|_| array.shape() == [4, 4]);
+    let matrix = array.as_slice()?.as_chunks::<4>().0.first_chunk().filter(|_| array.shape() == [4, 4]);
     let matrix = matrix.ok_or_else(|| shape_error(name, "(4, 4)", array.shape()))?;
     pose_of(matrix).map_err(|error| pose_error(name, error))
 }
@@ -219,9 +227,8 @@ pub(crate) fn pose_or_identity(value: Option<&Bound<'_, PyAny>>, name: &str) -> 
     value.map_or(Ok(Pose::IDENTITY), |value| pose(value, name))
 }
 
-fn pose_of(matrix: &[f64; 16]) -> Result<Pose, bvh_query::PoseError> {
-    let row = |row: usize| [0, 1, 2, 3].map(|column| matrix[4 * row + column]);
-    with_default_floats(|_| Pose::from_matrix(&[0, 1, 2, 3].map(row)))
+fn pose_of(matrix: &[[f64; 4]; 4]) -> Result<Pose, PoseError> {
+    with_default_floats(|_| Pose::from_matrix(matrix))
 }
 
 /// Expects one row of a shape or many, and returns whether it is one.

@@ -24,8 +24,8 @@ fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr 
     match source.raw_os_error() {
         // With its number, `OSError` picks the class.
         Some(number) => {
-            let text = source.to_string();
-            let text = text.split(" (os error").next().unwrap_or_default().to_owned();
+            let text = Python::attach(|py| py.import("os")?.call_method1("strerror", (number,))?.extract());
+            let text: String = text.unwrap_or(message);
             PyOSError::new_err((number, text, path.as_os_str().to_owned()))
         }
         None => PyOSError::new_err(message),

@@ -16,7 +16,6 @@ mod poses;
 mod probes;
 mod scene;
 mod scene_pairs;
-mod scene_probes;
 
 use pyo3::prelude::*;
 
@@ -32,7 +31,8 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![bake::bake, bake::bake_files];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
-    functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of, poses::relative_poses];
+    functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];
+    functions![poses::relative_poses, poses::nearest_poses];
     functions![
         probes::closest_points,
         probes::sides,
@@ -52,15 +52,6 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_pairs::scene_distance,
         scene_pairs::scene_motion,
         scene_pairs::scene_is_free
-    ];
-    functions![
-        scene_probes::scene_closest_points,
-        scene_probes::scene_sides,
-        scene_probes::scene_signed_distances,
-        scene_probes::scene_first_hits,
-        scene_probes::scene_any_hits,
-        scene_probes::scene_all_hits,
-        scene_probes::scene_segment_hits
     ];
     module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
     module.add("BakeError", module.py().get_type::<errors::BakeError>())?;

@@ -205,12 +205,30 @@ impl Called {
             let found = self.object.bind(py).call_method1("sagitta", (radius, t0, t1))?;
             let place = || format!("path.sagitta({radius:?}, {t0:?}, {t1:?})");
             let length = number(&found, &place())?;
-            if length >= 0.0 {
-                return Ok(length);
+            let refused = |expected: String| {
+                Err(PyValueError::new_err(format!("{}: expected {expected}, found {length:?}", place())))
+            };
+            if length.is_nan() || length < 0.0 {
+                return refused("a length of at least 0".to_owned());
             }
-            let message = format!("{}: expected a length of at least 0, found {length:?}", place());
-            Err(PyValueError::new_err(message))
+            if length == f64::INFINITY && t1 - t0 <= SHORTEST {
+                return refused("a finite length, at least where so little time passes".to_owned());
+            }
+            Ok(length)
         })
+    }
+
+    /// Refuses a sagitta that what the path itself says of the middle of the interval contradicts.
+    fn check_middle(&self, length: f64, radius: f64, t0: f64, t1: f64) -> PyResult<f64> {
+        let [start, middle, end] = [t0, t0 + (t1 - t0) / 2.0, t1].map(|t| self.pose(t));
+        let shown = least_departure(&start, &middle, &end, radius);
+        if shown <= length {
+            return Ok(length);
+        }
+        let place = format!("path.sagitta({radius:?}, {t0:?}, {t1:?})");
+        let shown =
+            format!("at least {shown:?}, by which path.pose departs in the middle from a straight path");
+        Err(PyValueError::new_err(format!("{place}: expected {shown}, found {length:?}")))
     }
 
     /// Ends the question.
@@ -241,8 +259,34 @@ impl RigidPath for Called {
     }
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
-        self.ask_sagitta(radius, t0, t1).unwrap_or_else(|error| self.end(error))
+        let length = self.ask_sagitta(radius, t0, t1);
+        let checked = length.and_then(|length| self.check_middle(length, radius, t0, t1));
+        checked.unwrap_or_else(|error| self.end(error))
     }
+}
+
+/// The shortest interval that a question asks about, as a part of the time. Where nothing is known of it, there is no answer.
+const SHORTEST: f64 = 1.0 / (1u64 << 46) as f64;
+
+/// The roundings of [`least_departure`], as a fraction of the magnitudes: sums of at most twelve terms, of a few roundings of
+/// 2^-53 each.
+const ROUNDING: f64 = 1.0 / (1u64 << 47) as f64;
+
+/// Returns how far a point at most `radius` from the origin of the body's frame certainly is, in the middle pose, from the
+/// middle of where it is in the other two, in mesh units. It looks at the origin and at six points on the axes.
+fn least_departure(start: &Pose, middle: &Pose, end: &Pose, radius: f64) -> f64 {
+    let off = |s: f64, m: f64, e: f64| m - (s / 2.0 + e / 2.0);
+    let (s, m, e) = (start.translation(), middle.translation(), end.translation());
+    let moved = [0, 1, 2].map(|k| off(s[k], m[k], e[k]));
+    let (r, q, p) = (start.rotation(), middle.rotation(), end.rotation());
+    let length = |side: f64, axis: usize| {
+        let along = |k: usize| moved[k] + side * off(r[k][axis], q[k][axis], p[k][axis]);
+        [0, 1, 2].map(|k| along(k).powi(2)).iter().sum::<f64>().sqrt()
+    };
+    let sides = [0.0, radius, -radius];
+    let most = sides.iter().flat_map(|&side| (0..3).map(move |axis| length(side, axis))).fold(0.0, f64::max);
+    let translations = [s, m, e].as_flattened().iter().map(|x| x.abs()).sum::<f64>();
+    (most - ROUNDING * (translations + 3.0 * radius)).max(0.0)
 }
 
 /// A path of either kind.

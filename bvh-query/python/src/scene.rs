@@ -135,6 +135,19 @@ impl Scene {
         detached(py, || work(&mut locked(&self.0)))
     }
 
+    /// Looks at an instance or changes it.
+    fn of<T: Send>(
+        &self,
+        py: Python<'_>,
+        number: i64,
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, SceneError> + Send,
+    ) -> PyResult<T> {
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            work(&mut state.scene, id).map_err(|error| scene_error(state.refused(error)))
+        })
+    }
+
     /// Asks a question, and reads the answer while the scene is still as it was.
     pub(crate) fn ask<A: Send, T: Send>(
         &self,
@@ -198,6 +211,37 @@ impl Scene {
         Self(Mutex::new(self.with(py, |state| state.clone())))
     }
 
+    /// A scene of these instances alone, under the same numbers.
+    fn only(&self, py: Python<'_>, numbers: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
+        let numbers = numbers.as_slice()?.to_vec();
+        self.with(py, |state| {
+            let ids = numbers.iter().map(|&number| state.id(number, "instances"));
+            let mut ids = ids.collect::<PyResult<Vec<_>>>()?;
+            // In the order of the scene, each once.
+            ids.sort_unstable();
+            ids.dedup();
+            let made = bvh_query::Scene::new().map_err(|error| PyValueError::new_err(error.to_string()))?;
+            let mut only = State::new(made);
+            only.parallel = state.parallel;
+            only.scene.set_parallel(state.parallel);
+            for id in ids {
+                let known = (|| {
+                    let (shape, pose) = (state.scene.shape(id)?.clone(), *state.scene.pose(id)?);
+                    match state.scene.name(id)? {
+                        Some(name) => only.scene.add_named(name, shape, pose),
+                        None => only.scene.add(shape, pose),
+                    }
+                })();
+                let added = known.map_err(|error| scene_error(state.refused(error)))?;
+                let number = state.number(id);
+                let mesh = Arc::clone(&state.entry(number, "instances")?.mesh);
+                only.entries.insert(number, Entry { id: added, mesh });
+                only.numbers.insert(added, number);
+            }
+            Ok(Self(Mutex::new(only)))
+        })
+    }
+
     /// Adds `mesh`, which callers know as `known`. A number that is given is that of a scene that this one is made after.
     #[expect(clippy::too_many_arguments, reason = "these are what an instance has")]
     fn add(
@@ -245,10 +289,7 @@ impl Scene {
     /// Moves an instance to a pose of shape (4, 4).
     fn set_pose(&self, number: i64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
         let (py, pose) = (pose.py(), arguments::pose(pose, "pose")?);
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.set_pose(id, pose).map_err(|error| scene_error(state.refused(error)))
-        })
+        self.of(py, number, |scene, id| scene.set_pose(id, pose))
     }
 
     /// Moves as many instances as there are poses, of shape (N, 4, 4).
@@ -272,18 +313,11 @@ impl Scene {
 
     fn set_groups(&self, py: Python<'_>, number: i64, groups: [u32; 2]) -> PyResult<()> {
         let groups = Groups { member: groups[0], meets: groups[1] };
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.set_groups(id, groups).map_err(|error| scene_error(state.refused(error)))
-        })
+        self.of(py, number, |scene, id| scene.set_groups(id, groups))
     }
 
     fn groups(&self, py: Python<'_>, number: i64) -> PyResult<(u32, u32)> {
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            let groups = state.scene.groups(id).map_err(|error| scene_error(state.refused(error)))?;
-            Ok((groups.member, groups.meets))
-        })
+        self.of(py, number, |scene, id| scene.groups(id).map(|groups| (groups.member, groups.meets)))
     }
 
     fn set_allowed(&self, py: Python<'_>, a: i64, b: i64, allowed: bool) -> PyResult<()> {
@@ -308,10 +342,7 @@ impl Scene {
     }
 
     fn name(&self, py: Python<'_>, number: i64) -> PyResult<Option<String>> {
-        self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            Ok(state.scene.name(id).ok().flatten().map(str::to_owned))
-        })
+        self.of(py, number, |scene, id| Ok(scene.name(id)?.map(str::to_owned)))
     }
 
     /// What callers know of the mesh of an instance.
@@ -347,10 +378,7 @@ impl Scene {
 
     /// The pose of an instance, shape (4, 4).
     fn pose<'py>(&self, py: Python<'py>, number: i64) -> PyResult<Bound<'py, PyAny>> {
-        let found = self.with(py, |state| {
-            let id = state.id(number, "id")?;
-            state.scene.pose(id).copied().map_err(|_| no_instance("id", number))
-        })?;
+        let found = self.of(py, number, |scene, id| scene.pose(id).copied())?;
         Answers { py, one: true }.poses(&[found])
     }
 

@@ -57,6 +57,14 @@ def bottom_row(rows):
     return poses
 
 
+def check_errors(test, cases):
+    """Checks that each call, with its arguments, raises the exception, and that its message has the words."""
+    for kind, words, call, *arguments in cases:
+        with test.subTest(words), test.assertRaises(kind) as caught:
+            call(*arguments)
+        test.assertIn(words, str(caught.exception))
+
+
 def numbers_of(path, limit=None):
     """The rows of a text file of numbers, without what follows a #."""
     rows = []

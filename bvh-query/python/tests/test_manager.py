@@ -9,7 +9,7 @@ import numpy as np
 
 import cbvh
 from cbvh import manager as module
-from common import cube, random_poses, shifts
+from common import check_errors, cube, random_poses, shifts
 
 
 def solid(size=1.0):
@@ -167,10 +167,7 @@ class Manager(unittest.TestCase):
             (ValueError, "vertices: expected shape (V, 3)", manager.in_collision_single, flat),
             (TypeError, "other_manager: expected a cbvh.CollisionManager, found int", manager.in_collision_other, 3),
         ]
-        for kind, message, call, *arguments in cases:
-            with self.subTest(message), self.assertRaises(kind) as caught:
-                call(*arguments)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, cases)
         # Nothing was added.
         self.assertEqual(manager.in_collision_internal(return_names=True), (False, set()))
         self.assertEqual(manager.min_distance_internal(), np.inf)

@@ -3,6 +3,7 @@
 import concurrent.futures
 import pathlib
 import pickle
+import re
 import tempfile
 import threading
 import unittest
@@ -12,7 +13,7 @@ import numpy as np
 import cbvh
 from cbvh import MotionKind
 from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
-from common import ask_command, bottom_row, cube, numbers_of, random_poses, shifts, turns
+from common import ask_command, bottom_row, check_errors, cube, numbers_of, random_poses, shifts, turns
 
 
 class Line:
@@ -202,10 +203,7 @@ class Ways(unittest.TestCase):
             (ValueError, "motion[0]: expected one path, found 2 motions", self.cube.is_free, self.cube, [several]),
             (TypeError, "other: expected a cbvh.Mesh, found Motion", self.cube.motion, motion, motion),
         ]
-        for kind, message, call, *arguments in cases:
-            with self.subTest(message), self.assertRaises(kind) as caught:
-                call(*arguments)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, cases)
         for keyword, number in (("clearance", -1.0), ("clearance", np.nan), ("tolerance", 0.0), ("tolerance", np.inf)):
             with self.assertRaisesRegex(ValueError, f"{keyword}: expected a finite length"):
                 self.cube.motion(self.cube, motion, **{keyword: number})
@@ -265,10 +263,57 @@ class OwnPaths(unittest.TestCase):
             (TypeError, "path.sagitta(", path(lambda t: far + 0, lambda *_: "x")),
             (TypeError, "positional argument", path(lambda t: far, lambda: 0.0)),
         ]
-        for kind, message, own in cases:
-            with self.subTest(message), self.assertRaises(kind) as caught:
-                self.cube.motion(self.cube, own)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, [(kind, message, self.cube.motion, self.cube, own) for kind, message, own in cases])
+
+    def test_a_sagitta_that_the_middle_contradicts_is_refused(self):
+        radius = np.sqrt(0.75)
+
+        class Says(Line):
+            def sagitta(self, radius, t0, t1):
+                return self.times * super().sagitta(radius, t0, t1)
+
+        class Spins:
+            """A turn about the origin, whose middle departs by the rotation alone."""
+
+            times = 1.0
+
+            def pose(self, t):
+                pose = turns(2, t)[0]
+                pose[0, 3] = 2.0
+                return pose
+
+            def sagitta(self, radius, t0, t1):
+                return self.times * radius * (1 - np.cos((t1 - t0) / 2)) + 1e-12
+
+        for path, ratio in ((Says(-5, 10, 12), 1.0), (Spins(), 1.0)):
+            for path.times, is_enough in ((ratio, True), (0.9 * ratio, False)):
+                for ask in (self.cube.motion, self.cube.is_free):
+                    if is_enough:
+                        ask(self.cube, path)
+                        continue
+                    with self.assertRaisesRegex(ValueError, r"path.sagitta\(.*: expected at least .* in the middle"):
+                        ask(self.cube, path)
+        # The number is how far the middle departs, as numpy has it, of the radius that the question asks about.
+        path = Spins()
+        path.times = 0.0
+        with self.assertRaises(ValueError) as caught:
+            self.cube.is_free(self.cube, path)
+        asked, t0, t1, least = map(float, re.match(
+            r"path.sagitta\((.*), (.*), (.*)\): expected at least (.*), by", str(caught.exception)).groups())
+        self.assertTrue(radius <= asked < 1.001 * radius)
+        off = path.pose((t0 + t1) / 2) - (path.pose(t0) + path.pose(t1)) / 2
+        self.assertAlmostEqual(least, asked * np.linalg.norm(off[:3, 0]), places=12)
+
+    def test_a_path_of_which_nothing_is_known_is_refused(self):
+        path = type("Path", (Line,), {"sagitta": lambda *_: np.inf})(-5, 10, 12)
+        scene = cbvh.Scene()
+        scene.add(self.cube)
+        moving = scene.add(self.cube)
+        asks = [lambda: self.cube.motion(self.cube, path), lambda: self.cube.is_free(self.cube, path)]
+        asks += [lambda: scene.motion({moving: path}), lambda: scene.is_free({moving: path})]
+        for ask in asks:
+            with self.assertRaisesRegex(ValueError, r"path.sagitta\(.*: expected a finite length"):
+                ask()
 
     def test_a_way_back_is_answered_as_the_way_there(self):
         class Back:

@@ -88,7 +88,7 @@ class Geometry(unittest.TestCase):
             self.assertEqual(self.cube.collide(self.cube, array).tolist(), [True, False, True])
         vertices, faces = cube()
         for dtype in (np.int8, np.int64, np.uint16):
-            self.assertEqual(cbvh.bake(vertices, np.array(faces, dtype)).triangles, 12)
+            self.assertEqual(cbvh.bake(vertices, np.array(faces, dtype)).triangle_count, 12)
 
 
 @unittest.skipUnless(COMMAND, WITHOUT_COMMAND)

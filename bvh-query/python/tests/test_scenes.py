@@ -14,7 +14,7 @@ import numpy as np
 import cbvh
 from cbvh import MotionKind, Relation, Side
 from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
-from common import ask_command, bottom_row, cube, numbers_of, random_poses, shifts
+from common import ask_command, bottom_row, check_errors, cube, numbers_of, random_poses, shifts
 
 
 def read_scene(path, folder):
@@ -118,13 +118,77 @@ class Pairs(unittest.TestCase):
         self.assertEqual(added, [30, 31])
         self.check(scene)
 
+    def test_distances_of_pairs_are_those_of_meshes(self):
+        scene = self.scene(1)
+        asked = Asked(scene)
+        for parallel in (False, True):
+            found = scene.distances(parallel=parallel)
+            self.assertEqual(found.pairs.tolist(), [[a, b] for a, b, *_ in asked.pairs])
+            poses = [cbvh.relative(scene.pose(a), scene.pose(b)) for a, b, *_ in asked.pairs]
+            expected = [a.distance(b, pose) for (_, _, a, b, _), pose in zip(asked.pairs, poses)]
+            for part, values in zip(found.nearest, zip(*expected)):
+                np.testing.assert_array_equal(part, np.array(values))
+        near = scene.distances(within=0.5)
+        chosen = found.nearest.distance <= 0.5
+        np.testing.assert_array_equal(near.pairs, found.pairs[chosen])
+        np.testing.assert_array_equal(near.nearest.point_b, found.nearest.point_b[chosen])
+        # In the order given, named or not, asked about or not.
+        some = scene.distances([["part 3", "part 1"], [0, 1]])
+        self.assertEqual(some.pairs.tolist(), [[3, 1], [0, 1]])
+        of = [scene.mesh(a).distance(scene.mesh(b), cbvh.relative(scene.pose(a), scene.pose(b))) for a, b in some.pairs]
+        self.assertEqual(some.nearest.distance.tolist(), [one.distance for one in of])
+        for none in (scene.distances(np.zeros((0, 2), int)), scene.distances([]), cbvh.Scene().distances()):
+            self.assertEqual((none.pairs.shape, none.nearest.point_a.shape), ((0, 2), (0, 3)))
+            self.assertEqual(none.nearest.triangle_a.dtype, np.uint32)
+
+    def test_closest_points_of_some_instances(self):
+        scene = self.scene(7)
+        points = np.random.default_rng(8).uniform(-4, 4, (100, 3))
+        some = [9, 2, 20, 2]
+        distances = {number: scene.mesh(number).closest_points(points, pose=scene.pose(number)).distance for number in some}
+        least = np.min(list(distances.values()), axis=0)
+        for scene.parallel in (False, True):
+            found = scene.closest_points(points, instances=["part 9", 2, 20, 2])
+            self.assertEqual(set(found.instance), {2, 9, 20})
+            np.testing.assert_array_equal(found.closest.distance, least)
+            of = [distances[number][place] for place, number in enumerate(found.instance.tolist())]
+            np.testing.assert_array_equal(of, least)
+            near = scene.closest_points(points, instances=some, within=0.5)
+            np.testing.assert_array_equal(near.instance >= 0, least <= 0.5)
+        whole = scene.closest_points(points, instances=list(scene))
+        np.testing.assert_array_equal(whole.closest.distance, scene.closest_points(points).closest.distance)
+        self.assertEqual(scene.closest_points(points[0], instances=[]).instance, -1)
+
+    def test_names_stand_for_instances(self):
+        named, numbered = cbvh.Scene(), cbvh.Scene()
+        for scene in (named, numbered):
+            for name, pose in zip("abc", random_poses(9, 3, 2.0)):
+                scene.add(self.meshes[0], pose, name=name)
+        poses = random_poses(10, 3, 2.0)
+        for scene, (a, b, c) in ((named, "abc"), (numbered, range(3))):
+            scene.set_pose(a, poses[0])
+            scene.set_poses([c, b], poses[1:])
+            scene.set_groups(b, member=3)
+            scene.set_allowed(a, c)
+            self.assertEqual((scene.name(a), scene.groups(b), scene.mesh(c)), ("a", (3, 0xFFFFFFFF), self.meshes[0]))
+        np.testing.assert_array_equal(named.poses(["a", "b", "c"]), numbered.poses())
+        np.testing.assert_array_equal(named.poses(np.array(["b", "a"])), numbered.poses([1, 0]))
+        np.testing.assert_array_equal(named.pose("c"), numbered.pose(2))
+        self.assertEqual(named.allowed().tolist(), numbered.allowed().tolist())
+        way = cbvh.Motion.between(poses[0], poses[1])
+        self.assertEqual(repr(named.motion({"a": way})), repr(numbered.motion({0: way})))
+        self.assertEqual(named.is_free({"a": way}), numbered.is_free({0: way}))
+        named.remove("b")
+        self.assertEqual(list(named), [0, 2])
+
     def test_instances_are_what_was_added(self):
         scene = cbvh.Scene()
         poses = random_poses(4, 3, 2.0)
         a = scene.add(self.meshes[0], poses[0], name="a")
         b = scene.add(self.meshes[1], name="b", member=1, meets=2)
         c = scene.add(self.meshes[0], poses[2])
-        self.assertEqual((list(scene), len(scene), a in scene, 7 in scene, "a" in scene), ([a, b, c], 3, True, False, False))
+        self.assertEqual((list(scene), len(scene), a in scene, 7 in scene, "a" in scene, "x" in scene),
+                         ([a, b, c], 3, True, False, True, False))
         self.assertEqual([scene.name(number) for number in scene], ["a", "b", None])
         self.assertEqual((scene.find("b"), scene.find("c")), (b, None))
         self.assertEqual((scene.groups(a), scene.groups(b)), ((0xFFFFFFFF, 0xFFFFFFFF), (1, 2)))
@@ -270,7 +334,17 @@ class Misuse(unittest.TestCase):
             (TypeError, "name: expected a str, found int", scene.find, 5),
             (TypeError, "d: expected a number, found str", scene.within, "x"),
             (TypeError, "clearance: expected a number, found str", lambda: scene.motion({here: motion}, clearance="x")),
-            (TypeError, "id: expected the number of an instance, found str", scene.remove, "here"),
+            (TypeError, "id: expected the number or the name of an instance, found float", scene.remove, 1.5),
+            (KeyError, "id: expected an instance of the scene, found 'gone'", scene.remove, "gone"),
+            (KeyError, "paths: expected an instance of the scene, found 'gone'", scene.motion, {"gone": motion}),
+            (ValueError, "paths: expected one path per instance", scene.motion, {"here": motion, here: motion}),
+            (KeyError, "ids: expected an instance of the scene, found 'gone'", scene.poses, ["here", "gone"]),
+            (KeyError, "instances: expected an instance of the scene, found 'gone'",
+             lambda: scene.closest_points([0, 0, 0], instances=["gone"])),
+            (KeyError, f"instances: {stale}", lambda: scene.closest_points([0, 0, 0], instances=[gone])),
+            (ValueError, "pairs: expected numbers or names of instances of shape (N, 2)", scene.distances, [here]),
+            (ValueError, "within: expected None beside pairs", lambda: scene.distances([[here, here]], within=1)),
+            (KeyError, "pairs: expected an instance of the scene, found 'gone'", scene.distances, [["here", "gone"]]),
             (TypeError, "mesh: expected a cbvh.Mesh, found str", scene.add, "mesh"),
             (ValueError, "pose: expected shape (4, 4)", scene.add, mesh, one[:3]),
             (ValueError, "pose: expected a rotation within 2^-23 of orthonormal", scene.add, mesh, skewed),
@@ -278,7 +352,9 @@ class Misuse(unittest.TestCase):
             (ValueError, 'instance "here": expected a rotation within 2^-23', scene.set_pose, here, skewed),
             (ValueError, "poses[1]: expected a rotation", scene.set_poses, [here, here], [one, np.diag([2.0, 2, 2, 1])]),
             (ValueError, "poses: expected as many as ids, 1, found 2", scene.set_poses, [here], [one, one]),
-            (ValueError, "ids: expected integers of shape (N,)", scene.set_poses, [0.5], [one]),
+            (ValueError, "ids: expected numbers or names of instances of shape (N,)", scene.set_poses, [[here]], [one]),
+            (ValueError, "found dtype float64 of shape (1,)", scene.poses, np.array([0.5])),
+            (TypeError, "ids: expected the number or the name of an instance, found float", scene.poses, [0.5]),
             (ValueError, "d: expected a finite distance of at least 0, found -1", scene.within, -1),
             (ValueError, "d: expected a finite distance of at least 0, found NaN", scene.pairs_within, np.nan),
             (ValueError, "points: expected shape (3,) or (N, 3)", scene.sides, [0, 0]),
@@ -287,10 +363,7 @@ class Misuse(unittest.TestCase):
             (FileNotFoundError, "no such.cbvh", cbvh.Scene.open, "no such.cbvh"),
             (cbvh.FormatError, "expected a scene, a file with instances", cbvh.Scene.open, TESTDATA / "ok-plain.cbvh"),
         ]
-        for kind, message, call, *arguments in cases:
-            with self.subTest(message), self.assertRaises(kind) as caught:
-                call(*arguments)
-            self.assertIn(message, str(caught.exception))
+        check_errors(self, cases)
         with self.assertRaisesRegex(ValueError, 'name: expected one that no instance has, found "here"'):
             scene.add(mesh, name="here")
         for groups in ({"member": -1}, {"meets": 1 << 32}):

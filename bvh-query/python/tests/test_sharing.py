@@ -158,7 +158,7 @@ class Sharing(unittest.TestCase):
         self.assertIs(copy.copy(mesh), mesh)
         self.assertIs(copy.deepcopy({"mesh": [mesh]})["mesh"][0], mesh)
         for held in (bytearray(mesh.tobytes()), memoryview(mesh.tobytes())):
-            self.assertEqual(cbvh.Mesh.from_bytes(held).triangles, 12)
+            self.assertEqual(cbvh.Mesh.from_bytes(held).triangle_count, 12)
 
     @unittest.skipUnless(hasattr(signal, "setitimer"), "this system has no timers that signal")
     def test_signals_end_questions(self):

@@ -14,7 +14,8 @@ False
 **Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a
 point ``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the
 frame of the first one. Rotations must be rigid to within 2^-20, those of scenes and of `relative` to within 2^-23, as
-matrices with eight digits after the point are.
+matrices with eight digits after the point are; `nearest_pose` makes a pose of one that is
+less.
 
 **Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are ways of a body.
 `Mesh.motion` and `Mesh.is_free` tell whether a way is free, certainly at every moment. **Scenes** are many placed
@@ -44,6 +45,7 @@ from ._answers import (
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
+    SceneDistances,
     SceneMotionAnswer,
     SceneRayHit,
     SceneRelations,
@@ -53,7 +55,7 @@ from ._baking import bake, bake_files
 from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
-from ._poses import pose, relative
+from ._poses import nearest_pose, pose, relative
 from ._scene import Scene, _scene_of
 from .manager import CollisionManager
 
@@ -75,12 +77,14 @@ __all__ = [
     "SceneClosestPoint",
     "SceneContacts",
     "SceneDistance",
+    "SceneDistances",
     "SceneMotionAnswer",
     "SceneRayHit",
     "SceneRelations",
     "Side",
     "bake",
     "bake_files",
+    "nearest_pose",
     "open",
     "pose",
     "relative",

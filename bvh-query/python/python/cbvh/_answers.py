@@ -1,7 +1,7 @@
 """What questions answer with: enumerations and named tuples of numbers and arrays."""
 
 import enum
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class Relation(enum.IntEnum):
+class _Named(enum.IntEnum):
+    """A number with a name, which it is printed as. It equals the number."""
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Relation(_Named):
     """How two meshes lie.
 
     - ``TOUCHING``: their surfaces have a point in common.
@@ -28,7 +35,7 @@ class Relation(enum.IntEnum):
     UNDEFINED = 5
 
 
-class Side(enum.IntEnum):
+class Side(_Named):
     """Where a point is with regard to a mesh.
 
     - ``OUTSIDE``, ``ON``, ``INSIDE``: the point is outside, on the surface, or inside.
@@ -41,7 +48,7 @@ class Side(enum.IntEnum):
     UNDEFINED = 2
 
 
-class MotionKind(enum.IntEnum):
+class MotionKind(_Named):
     """Whether a way is free.
 
     - ``FREE``: at no time are the meshes within the clearance.
@@ -82,7 +89,7 @@ class Distance(NamedTuple):
 class MotionAnswer(NamedTuple):
     """Whether a way is free, and where it ends if it is not. After N questions, each field has N elements or rows.
 
-    - ``kind``: a `MotionKind` or, of N, their numbers as uint8, shape (N,).
+    - ``kind``: a `MotionKind` or, of N, their numbers as uint8, shape (N,), printed as names.
     - ``free_until``: before this time, from 0 to 1, the meshes certainly are not within the clearance. 1 where the
       way is free.
     - ``at``: of a hit, a time at which they are, the earliest one found; of NEAR, that of the first undecided pose;
@@ -144,7 +151,7 @@ class SceneRelations(NamedTuple):
     """Pairs of instances, and how they lie.
 
     - ``pairs``: numbers of instances, A and B, shape (K, 2).
-    - ``relations``: numbers of `Relation`, shape (K,).
+    - ``relations``: numbers of `Relation` as uint8, shape (K,), printed as names.
     """
 
     pairs: NDArray[np.int64]
@@ -172,6 +179,17 @@ class SceneDistance(NamedTuple):
 
     a: int
     b: int
+    nearest: Distance
+
+
+class SceneDistances(NamedTuple):
+    """Pairs of instances, and how far apart they are.
+
+    - ``pairs``: numbers of instances, A and B, shape (K, 2).
+    - ``nearest``: the answers of `Mesh.distance`, arrays of K elements or rows, with points in A's frame.
+    """
+
+    pairs: NDArray[np.int64]
     nearest: Distance
 
 
@@ -215,9 +233,54 @@ class SceneRayHit(NamedTuple):
     hit: RayHit
 
 
-Number = TypeVar("Number", bound=enum.IntEnum)
+class _Names(np.ndarray[Any, np.dtype[Any]]):
+    """An array of numbers that have names: it prints them, and its elements are members of the enumeration. All that is
+    computed from it is an array as any other."""
+
+    kind: ClassVar[type[_Named]]
+
+    def __getitem__(self, key: Any) -> Any:
+        found = super().__getitem__(key)
+        return self.kind(int(found)) if isinstance(found, np.integer) else found
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
+        def plain(value: Any) -> Any:
+            return value.view(np.ndarray) if isinstance(value, _Names) else value
+
+        if "out" in keywords:
+            keywords["out"] = tuple(map(plain, keywords["out"]))
+        return getattr(ufunc, method)(*map(plain, inputs), **keywords)
+
+    def _printed(self) -> str:
+        members = {int(member): member.name for member in self.kind}
+        numbers = self.view(np.ndarray)
+        if numbers.dtype.kind not in "iu":
+            return np.array2string(numbers, separator=", ")
+        names: Any = {"int_kind": lambda number: members.get(int(number), str(number))}
+        return np.array2string(numbers, separator=", ", formatter=names)
+
+    def __str__(self) -> str:
+        return self._printed()
+
+    def __repr__(self) -> str:
+        return f"{self.kind.__name__}({self._printed()})"
 
 
-def named(kind: type[Number], found: Any) -> Any:
-    """The name of a number, or the numbers of N answers as they are."""
-    return kind(found) if type(found) is int else found
+class _Relations(_Names):
+    kind = Relation
+
+
+class _Sides(_Names):
+    kind = Side
+
+
+class _MotionKinds(_Names):
+    kind = MotionKind
+
+
+_ARRAYS: dict[type[_Named], type[_Names]] = {Relation: _Relations, Side: _Sides, MotionKind: _MotionKinds}
+
+
+def named(kind: type[_Named], found: Any) -> Any:
+    """The name of a number, or an array of the numbers of N answers that prints their names."""
+    return kind(found) if type(found) is int else found.view(_ARRAYS[kind])

@@ -7,7 +7,7 @@ import os
 from typing import Any, Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
 from ._answers import (
@@ -63,12 +63,47 @@ class Mesh:
     def __repr__(self) -> str:
         place = "in memory" if self._path is None else repr(self._path)
         object = "" if self._object is None else f", object {self._object}"
-        return f"<cbvh.Mesh {place}{object}: {self.triangles} triangles>"
+        return f"<cbvh.Mesh {place}{object}: {self.triangle_count} triangles>"
 
     @property
-    def triangles(self) -> int:
+    def triangle_count(self) -> int:
         """The number of triangles, without exact duplicates."""
-        return self._mesh.triangles()
+        return self._mesh.count()
+
+    @property
+    def triangles(self) -> Floats:
+        """The corners of all triangles as they are stored, in mesh units: shape (T, 3, 3), float64.
+
+        ``mesh.triangles[id]`` are the three corners of the triangle that answers call ``id``, in the order of the input or
+        a cyclic one of it. A duplicate that was left out has the corners of the triangle that is stored for it. Rows of ids
+        that this mesh does not have are NaN: those of other objects of the file, and places in a file without ids that are
+        empty. Each access reads and checks the whole file and makes a new array. ValueError for several objects of a file
+        without ids, whose numbers are not unique.
+        """
+        return self._mesh.corners()
+
+    @property
+    def vertices(self) -> Floats:
+        """The positions of all corners, each once, ascending by x, then y, then z, in mesh units: shape (V, 3), float64.
+
+        Each access costs a sort. To have `faces` as well, `arrays` reads the file once.
+        """
+        return self.arrays()[0]
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Three numbers of `vertices` per triangle, shape (T, 3): ``mesh.vertices[mesh.faces[id]]`` is
+        ``mesh.triangles[id]``. Rows of ids that this mesh does not have are -1."""
+        return self.arrays()[1]
+
+    def arrays(self) -> tuple[Floats, NDArray[np.int64]]:
+        """`vertices` and `faces`, which together are what `bake` takes if the mesh has all ids."""
+        corners = self.triangles
+        is_there = ~np.isnan(corners[:, 0, 0])
+        vertices, numbers = np.unique(corners[is_there].reshape(-1, 3), axis=0, return_inverse=True)
+        faces = np.full((len(corners), 3), -1, np.int64)
+        faces[is_there] = numbers.reshape(-1, 3)
+        return vertices, faces
 
     @property
     def bounds(self) -> Floats:
@@ -120,14 +155,14 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.collide(self._mesh, _other(other), poses, parallel)
+        return _cbvh.collide((self._mesh, _other(other), poses, parallel))
 
     def within(self, other: Mesh, poses: ArrayLike, d: float, *, parallel: bool = False) -> Any:
         """Are they at most ``d`` mesh units apart? Exact: bool, or an array of bool of shape (N,).
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.within(self._mesh, _other(other), poses, d, parallel)
+        return _cbvh.within((self._mesh, _other(other), poses, parallel), d)
 
     def distance(
         self,
@@ -144,7 +179,7 @@ class Mesh:
         ``abs_err`` let the answer exceed the least distance by a fraction of it or by a length, which saves time;
         ``lower`` is what is certain. They cannot be combined with ``parallel``.
         """
-        return Distance(*_cbvh.distance(self._mesh, _other(other), poses, rel_err, abs_err, parallel))
+        return Distance(*_cbvh.distance((self._mesh, _other(other), poses, parallel), rel_err, abs_err))
 
     def relation(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do they touch and, if not, is one inside the other? A `Relation`, or an array of their numbers as uint8, shape
@@ -152,7 +187,7 @@ class Mesh:
 
         ``poses``: of ``other``, mesh B, in the frame of this mesh, A (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return named(Relation, _cbvh.relation(self._mesh, _other(other), poses, parallel))
+        return named(Relation, _cbvh.relation((self._mesh, _other(other), poses, parallel)))
 
     def contacts(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """All pairs of triangles that touch, exactly, in ascending order.
@@ -162,7 +197,7 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4).
         """
-        return _cbvh.contacts(self._mesh, _other(other), poses, parallel)
+        return _cbvh.contacts((self._mesh, _other(other), poses, parallel))
 
     def motion(
         self,
@@ -214,14 +249,14 @@ class Mesh:
         ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
         shape (4, 4); None: they are in the frame of the mesh.
         """
-        return ClosestPoint(*_cbvh.closest_points(self._mesh, points, within, pose, parallel))
+        return ClosestPoint(*_cbvh.closest_points((self._mesh, pose, parallel), points, within)[1])
 
     def sides(self, points: ArrayLike, *, pose: ArrayLike | None = None, parallel: bool = False) -> Any:
         """Which side of the surface each point is on, exactly: a `Side`, or an array of their numbers as int8, shape (N,).
 
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return named(Side, _cbvh.sides(self._mesh, points, pose, parallel))
+        return named(Side, _cbvh.sides((self._mesh, pose, parallel), points))
 
     def signed_distances(
         self,
@@ -236,7 +271,7 @@ class Mesh:
         NaN where the mesh has no inside, because it is not closed, and where the surface is farther than ``within``.
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return _cbvh.signed_distances(self._mesh, points, within, pose, parallel)
+        return _cbvh.signed_distances((self._mesh, pose, parallel), points, within)
 
     def first_hits(
         self,
@@ -253,7 +288,7 @@ class Mesh:
         any length are the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
         world).
         """
-        return RayHit(*_cbvh.first_hits(self._mesh, origins, directions, until, pose, parallel))
+        return RayHit(*_cbvh.first_hits((self._mesh, pose, parallel), origins, directions, until)[1])
 
     def any_hits(
         self,
@@ -266,7 +301,7 @@ class Mesh:
     ) -> Any:
         """Whether rays hit the surface, exactly: bool, or an array of shape (N,). Arguments are those of
         `first_hits`."""
-        return _cbvh.any_hits(self._mesh, origins, directions, until, pose, parallel)
+        return _cbvh.any_hits((self._mesh, pose, parallel), origins, directions, until)
 
     def all_hits(
         self,
@@ -282,7 +317,7 @@ class Mesh:
 
         Arguments are those of `first_hits`.
         """
-        found = _cbvh.all_hits(self._mesh, origins, directions, until, pose, parallel)
+        found = _cbvh.all_hits((self._mesh, pose, parallel), origins, directions, until)
         return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)
 
     def segment_hits(
@@ -292,7 +327,7 @@ class Mesh:
 
         ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
         """
-        return _cbvh.segment_hits(self._mesh, starts, ends, pose, parallel)
+        return _cbvh.segment_hits((self._mesh, pose, parallel), starts, ends)
 
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:

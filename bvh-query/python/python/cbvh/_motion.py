@@ -30,7 +30,8 @@ class Path(Protocol):
         ``t0`` to ``t1``, from where it would be if it went straight, at a constant rate, from its place at ``t0`` to
         that at ``t1``: at most an eighth of the greatest acceleration times the square of the time. It must hold for
         poses as computed, with all rounding. Answers are only as certain as this bound, and the smaller it is, the less
-        work they take. Infinity says that nothing is known; on every interval, the question ends with an error.
+        work they take. Infinity says that nothing is known; on every interval, the question ends with a ValueError. So does a
+        bound that is smaller than what `pose` shows in the middle of the interval.
         """
 
 

@@ -16,9 +16,11 @@ from ._answers import (
     Floats,
     MotionKind,
     RayHit,
+    Relation,
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
+    SceneDistances,
     SceneMotionAnswer,
     SceneRayHit,
     SceneRelations,
@@ -29,17 +31,6 @@ from ._mesh import Mesh
 from ._motion import Path, read_path
 
 ALL_GROUPS = 0xFFFF_FFFF
-
-
-def _number(value: Any, name: str) -> int:
-    """The number of an instance."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name}: expected the number of an instance, found {type(value).__name__}") from None
-    if not 0 <= number < 2**63:
-        raise KeyError(f"{name}: expected an instance of the scene, found {number}")
-    return number
 
 
 def _groups(value: Any, name: str) -> int:
@@ -57,7 +48,8 @@ class Scene:
     """Many placed meshes, and questions over all pairs that are asked about.
 
     An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given
-    again: of an instance that was removed, it is a KeyError. Iterating over a scene gives the numbers of its instances,
+    again: of an instance that was removed, it is a KeyError. Wherever an instance is asked for, its name will do, if it has
+    one; answers have numbers. Iterating over a scene gives the numbers of its instances,
     in their order, and of a pair the one that comes first is A. A question is over each pair of instances whose groups
     meet and whose contact is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the
     pose of B in A's frame, to the bit.
@@ -145,35 +137,35 @@ class Scene:
         groups = [_groups(member, "member"), _groups(meets, "meets")]
         return self._scene.add(mesh._mesh, mesh, pose, name, groups, None)
 
-    def remove(self, id: int) -> None:
+    def remove(self, id: int | str) -> None:
         """Removes an instance, and its permissions to touch others."""
-        self._scene.remove(_number(id, "id"))
+        self._scene.remove(self._number(id, "id"))
 
-    def set_pose(self, id: int, pose: ArrayLike) -> None:
+    def set_pose(self, id: int | str, pose: ArrayLike) -> None:
         """Moves an instance. ``pose`` (body to world) has shape (4, 4), and must be rigid to within 2^-23."""
-        self._scene.set_pose(_number(id, "id"), pose)
+        self._scene.set_pose(self._number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
-        """Moves many instances: ``ids`` of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). Of an instance that is
+        """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). Of an instance that is
         given twice, the last pose counts. If an argument is wrong, none has moved."""
         self._scene.set_poses(self._ids(ids), poses)
 
-    def set_groups(self, id: int, *, member: int | None = None, meets: int | None = None) -> None:
+    def set_groups(self, id: int | str, *, member: int | None = None, meets: int | None = None) -> None:
         """Puts an instance into groups: see `add`. None leaves them as they are."""
-        number = _number(id, "id")
+        number = self._number(id, "id")
         known = self._scene.groups(number)
         groups = [_groups(known[0] if member is None else member, "member")]
         groups.append(_groups(known[1] if meets is None else meets, "meets"))
         self._scene.set_groups(number, groups)
 
-    def groups(self, id: int) -> tuple[int, int]:
+    def groups(self, id: int | str) -> tuple[int, int]:
         """The groups that an instance is in, and those that it meets."""
-        return self._scene.groups(_number(id, "id"))
+        return self._scene.groups(self._number(id, "id"))
 
-    def set_allowed(self, a: int, b: int, allowed: bool = True) -> None:
+    def set_allowed(self, a: int | str, b: int | str, allowed: bool = True) -> None:
         """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a
         robot."""
-        self._scene.set_allowed(_number(a, "a"), _number(b, "b"), bool(allowed))
+        self._scene.set_allowed(self._number(a, "a"), self._number(b, "b"), bool(allowed))
 
     def allowed(self) -> NDArray[np.int64]:
         """The pairs that may touch, shape (K, 2)."""
@@ -185,28 +177,51 @@ class Scene:
             raise TypeError(f"name: expected a str, found {type(name).__name__}")
         return self._scene.find(name)
 
-    def name(self, id: int) -> str | None:
+    def name(self, id: int | str) -> str | None:
         """The name of an instance, or None."""
-        return self._scene.name(_number(id, "id"))
+        return self._scene.name(self._number(id, "id"))
 
-    def mesh(self, id: int) -> Mesh:
+    def mesh(self, id: int | str) -> Mesh:
         """The mesh of an instance."""
-        found: Mesh = self._scene.mesh(_number(id, "id"))
+        found: Mesh = self._scene.mesh(self._number(id, "id"))
         return found
 
-    def pose(self, id: int) -> Floats:
+    def pose(self, id: int | str) -> Floats:
         """The pose of an instance (body to world), shape (4, 4)."""
-        return self._scene.pose(_number(id, "id"))
+        return self._scene.pose(self._number(id, "id"))
 
     def poses(self, ids: ArrayLike | None = None) -> Floats:
         """The poses (body to world) of instances, shape (N, 4, 4); of all, in their order, if ``ids`` is None."""
         return self._scene.poses(self._scene.ids() if ids is None else self._ids(ids))
 
-    def _ids(self, ids: ArrayLike) -> NDArray[np.int64]:
-        array = np.asarray(ids)
-        if array.ndim != 1 or array.size > 0 and array.dtype.kind not in "iu":
-            raise ValueError(f"ids: expected integers of shape (N,), found dtype {array.dtype} of shape {array.shape}")
-        return np.require(array, np.int64, ["C", "ALIGNED"])
+    def _number(self, value: Any, name: str) -> int:
+        """The number of an instance, given by number or name."""
+        if isinstance(value, str):
+            found = self._scene.find(value)
+            if found is None:
+                raise KeyError(f"{name}: expected an instance of the scene, found {value!r}")
+            return found
+        try:
+            number = operator.index(value)
+        except TypeError:
+            expected = "expected the number or the name of an instance"
+            raise TypeError(f"{name}: {expected}, found {type(value).__name__}") from None
+        if not 0 <= number < 2**63:
+            raise KeyError(f"{name}: expected an instance of the scene, found {number}")
+        return number
+
+    def _ids(self, ids: Any, name: str = "ids", shape: tuple[int, ...] = ()) -> NDArray[np.int64]:
+        """Numbers of instances, given by numbers or names, of shape (N,) and what each row has besides."""
+        array = np.asarray(ids, None if isinstance(ids, np.ndarray) else object)
+        if array.ndim == 1 + len(shape) and array.shape[1:] == shape or array.size == 0 and array.ndim == 1:
+            if array.dtype.kind in "iu":
+                return np.require(array, np.int64, ["C", "ALIGNED"])
+            if array.dtype.kind in "OU":
+                numbers = [self._number(value, name) for value in array.ravel().tolist()]
+                return np.array(numbers, np.int64).reshape(-1, *shape)
+        expected = f"(N, {shape[0]})" if shape else "(N,)"
+        found = f"found dtype {array.dtype} of shape {array.shape}"
+        raise ValueError(f"{name}: expected numbers or names of instances of shape {expected}, {found}")
 
     def __len__(self) -> int:
         return self._scene.count()
@@ -215,6 +230,8 @@ class Scene:
         return iter(self._scene.ids().tolist())
 
     def __contains__(self, id: object) -> bool:
+        if isinstance(id, str):
+            return self._scene.find(id) is not None
         return isinstance(id, (int, np.integer)) and 0 <= int(id) < 2**63 and self._scene.has(int(id))
 
     def __bool__(self) -> bool:
@@ -258,7 +275,8 @@ class Scene:
 
     def relations(self) -> SceneRelations:
         """All pairs that touch, or of which one is inside the other, wholly or in part, and how they lie."""
-        return SceneRelations(*_cbvh.scene_relations(self._scene))
+        pairs, relations = _cbvh.scene_relations(self._scene)
+        return SceneRelations(pairs, named(Relation, relations))
 
     def contacts(self) -> SceneContacts:
         """All pairs of triangles that touch, exactly."""
@@ -268,13 +286,66 @@ class Scene:
         """The nearest pair and its distance, or None if there are no pairs. Points are in A's frame."""
         return _nearest(_cbvh.scene_distance(self._scene))
 
-    def closest_points(self, points: ArrayLike, *, within: float = np.inf) -> SceneClosestPoint:
-        """The points of all instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
+    def distances(
+        self, pairs: ArrayLike | None = None, *, within: float | None = None, parallel: bool = False
+    ) -> SceneDistances:
+        """How far apart pairs of instances are, each pair on its own: with certified bounds and closest points.
 
-        ``within``: look no farther, in mesh units.
+        ``pairs``: numbers or names of instances, shape (K, 2), whether they are asked about or not; None: all pairs that are
+        asked about, in their order or, with ``within``, those at most so many mesh units apart. Each answer is that of
+        `Mesh.distance` for the pose of B in A's frame, to the bit. Without either argument the cost grows with the square of
+        the number of instances.
         """
-        instances, found = _cbvh.scene_closest_points(self._scene, points, within)
-        return SceneClosestPoint(instances, ClosestPoint(*found))
+        if pairs is not None and within is not None:
+            raise ValueError("within: expected None beside pairs, found a distance")
+        # Nobody moves a copy while it is read.
+        scene = self.copy()
+        if pairs is not None:
+            rows = scene._ids(pairs, "pairs", (2,)).reshape(-1, 2)
+        else:
+            rows = scene._asked() if within is None else scene.pairs_within(within)
+        places, of_rows = np.unique(rows, return_inverse=True)
+        of_rows = of_rows.reshape(rows.shape)
+        poses, meshes = scene.poses(places), [scene.mesh(number) for number in places.tolist()]
+        relative_poses = _cbvh.relative_poses(poses[of_rows[:, 0]], poses[of_rows[:, 1]])
+        # One question per pair of meshes, of which a scene has few.
+        numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
+        kinds = np.array([numbers[mesh] for mesh in meshes], np.int64)[of_rows]
+        floats, ids, count = np.float64, np.uint32, len(rows)
+        parts = [np.zeros(count, floats) for _ in range(3)] + [np.zeros((count, 3), floats) for _ in range(2)]
+        parts += [np.zeros(count, ids) for _ in range(4)]
+        for a, b in np.unique(kinds, axis=0).tolist():
+            chosen = np.flatnonzero((kinds == [a, b]).all(axis=1))
+            mesh_a, mesh_b = list(numbers)[a], list(numbers)[b]
+            for part, found in zip(parts, mesh_a.distance(mesh_b, relative_poses[chosen], parallel=parallel)):
+                part[chosen] = found
+        return SceneDistances(rows, Distance(*parts))
+
+    def _asked(self) -> NDArray[np.int64]:
+        """All pairs that are asked about, in their order, shape (K, 2)."""
+        numbers = self._scene.ids()
+        groups = np.array([self._scene.groups(number) for number in numbers.tolist()], np.int64).reshape(-1, 2)
+        allowed = {(min(pair), max(pair)) for pair in self.allowed().tolist()}
+        pairs: list[tuple[int, int]] = []
+        for place, (member, meets) in enumerate(groups.tolist()):
+            others = groups[place + 1 :]
+            does = (others[:, 1] & member != 0) & (others[:, 0] & meets != 0)
+            a = int(numbers[place])
+            found = numbers[place + 1 :][does].tolist()
+            pairs += [(a, b) for b in found if (min(a, b), max(a, b)) not in allowed]
+        return np.array(pairs, np.int64).reshape(-1, 2)
+
+    def closest_points(
+        self, points: ArrayLike, *, within: float = np.inf, instances: ArrayLike | None = None
+    ) -> SceneClosestPoint:
+        """The points of instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
+
+        ``within``: look no farther, in mesh units. ``instances``: look at these alone, numbers or names of shape (K,); None:
+        at all.
+        """
+        scene = self._scene if instances is None else self._scene.only(self._ids(instances, "instances"))
+        found_of, found = _cbvh.closest_points(scene, points, within)
+        return SceneClosestPoint(found_of, ClosestPoint(*found))
 
     def sides(self, points: ArrayLike) -> Any:
         """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers,
@@ -283,7 +354,7 @@ class Scene:
         INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no
         inside.
         """
-        return named(Side, _cbvh.scene_sides(self._scene, points))
+        return named(Side, _cbvh.sides(self._scene, points))
 
     def signed_distances(self, points: ArrayLike, *, within: float = np.inf) -> Any:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
@@ -291,30 +362,30 @@ class Scene:
 
         NaN where the side is UNDEFINED, and where no instance is within ``within``.
         """
-        return _cbvh.scene_signed_distances(self._scene, points, within)
+        return _cbvh.signed_distances(self._scene, points, within)
 
     def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
         """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""
-        return _hits(_cbvh.scene_first_hits(self._scene, origins, directions, until))
+        return _hits(_cbvh.first_hits(self._scene, origins, directions, until))
 
     def any_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """Whether rays in the world hit any instance, exactly: bool, or an array of shape (N,)."""
-        return _cbvh.scene_any_hits(self._scene, origins, directions, until)
+        return _cbvh.any_hits(self._scene, origins, directions, until)
 
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
 
         Each parameter occurs once, however many instances are hit at exactly that.
         """
-        found = _cbvh.scene_all_hits(self._scene, origins, directions, until)
+        found = _cbvh.all_hits(self._scene, origins, directions, until)
         return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)
 
     def segment_hits(self, starts: ArrayLike, ends: ArrayLike) -> Any:
         """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
-        return _cbvh.scene_segment_hits(self._scene, starts, ends)
+        return _cbvh.segment_hits(self._scene, starts, ends)
 
     def motion(
-        self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
+        self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
     ) -> SceneMotionAnswer:
         """Are the ways of some instances free, while they move in the world at the same time and the rest stands still?
 
@@ -322,16 +393,26 @@ class Scene:
         Asked about are all pairs of which one moves. ``clearance`` and ``tolerance`` are those of `Mesh.motion`. Where
         a moving instance stands now does not matter, and it stays there.
         """
-        numbers, ways = _ways(paths)
+        numbers, ways = self._ways(paths)
         kind, until, at, nearest = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
         return SceneMotionAnswer(MotionKind(kind), until, at, _nearest(nearest))
 
     def is_free(
-        self, paths: Mapping[int, Path], *, clearance: float = 0.0, tolerance: float | None = None
+        self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
     ) -> bool:
         """Whether `motion` answers FREE, which takes less time to find out. Arguments are those of `motion`."""
-        numbers, ways = _ways(paths)
+        numbers, ways = self._ways(paths)
         return _cbvh.scene_is_free(self._scene, numbers, ways, clearance, tolerance)
+
+    def _ways(self, paths: Mapping[int | str, Path]) -> tuple[list[int], list[Any]]:
+        """The numbers of instances, and their paths as the compiled module takes them."""
+        if not isinstance(paths, Mapping):
+            raise TypeError(f"paths: expected a mapping of instances to paths, found {type(paths).__name__}")
+        items = list(paths.items())
+        numbers = [self._number(number, "paths") for number, _ in items]
+        if len(set(numbers)) < len(numbers):
+            raise ValueError("paths: expected one path per instance, found two for one")
+        return numbers, [read_path(path, f"paths[{number!r}]") for number, path in items]
 
 
 def _hits(found: tuple[Any, tuple[Any, ...]]) -> SceneRayHit:
@@ -345,15 +426,6 @@ def _nearest(found: tuple[int, int, tuple[Any, ...]] | None) -> SceneDistance | 
         return None
     a, b, distance = found
     return SceneDistance(a, b, Distance(*distance))
-
-
-def _ways(paths: Mapping[int, Path]) -> tuple[list[int], list[Any]]:
-    """The numbers of instances, and their paths as the compiled module takes them."""
-    if not isinstance(paths, Mapping):
-        raise TypeError(f"paths: expected a mapping of numbers of instances to paths, found {type(paths).__name__}")
-    items = list(paths.items())
-    numbers = [_number(number, "paths") for number, _ in items]
-    return numbers, [read_path(path, f"paths[{number!r}]") for number, path in items]
 
 
 def _scene_of(
