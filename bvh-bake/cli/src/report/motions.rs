@@ -95,7 +95,7 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
     let methods: Vec<Method> = Method::all().collect();
     let failed = |error: QueryError| Failure::Invalid(format!("{}: {error}", pair.name));
     let (mut querier, options) = (Querier::with_backend(backend), MotionOptions::new());
-    let certified = motions.iter().map(|motion| querier.motion(&**a, &**b, motion, &options));
+    let certified = motions.iter().map(|motion| querier.motion(a, b, motion, &options));
     let certified = certified.collect::<Result<Vec<MotionAnswer>, QueryError>>().map_err(failed)?;
     let asked = ask(&methods, [a, b], motions, backend, rounds).map_err(failed)?;
     let count = |is: fn(&MotionAnswer) -> bool| certified.iter().filter(|answer| is(answer)).count();
