@@ -86,8 +86,8 @@ fn some_slab(random: &mut Random, profile: Profile) -> usize {
 }
 
 /// Loosens each file as `edit` does, and asks about what comes out. A file that `edit` leaves as it is does not count, nor one
-/// that breaks a rule, such as one with an anchor beyond the child that leads to it.
-fn search(seed: u64, edit: impl Fn(&mut Random, &[u8]) -> Vec<u8>) {
+/// that breaks a rule, which only some edits may do.
+fn search(seed: u64, may_break_rules: bool, edit: impl Fn(&mut Random, &[u8]) -> Vec<u8>) {
     let random = &mut Random::new(seed);
     let mut queriers = queriers();
     let mut asked = 0;
@@ -96,7 +96,7 @@ fn search(seed: u64, edit: impl Fn(&mut Random, &[u8]) -> Vec<u8>) {
         for _ in 0..rounds(1) {
             let bytes = edit(random, &file);
             match prove(&bytes) {
-                Err(_) => {}
+                Err(error) => assert!(may_break_rules, "{error}"),
                 Ok(()) if bytes == file => {}
                 Ok(()) => {
                     let other = Other::new(random);
@@ -107,7 +107,8 @@ fn search(seed: u64, edit: impl Fn(&mut Random, &[u8]) -> Vec<u8>) {
             }
         }
     }
-    assert!(2 * asked >= Profile::ALL.len(), "{asked} files asked");
+    let least = if may_break_rules { Profile::ALL.len() / 2 } else { Profile::ALL.len() };
+    assert!(asked >= least, "{asked} files asked");
 }
 
 fn profile(bytes: &[u8]) -> Profile {
@@ -181,7 +182,7 @@ fn an_anchor_beyond_the_child_that_leads_to_it_is_refused() {
 
 #[test]
 fn slabs_of_the_root_and_of_all_nodes() {
-    search(2, |random, file| {
+    search(2, true, |random, file| {
         let (slab, to, some) = (some_slab(random, profile(file)), far(random), random.bits());
         // Some of the roots below, and all nodes below these, keep their ends.
         with_wide_slab(file, slab, to > 0.0, to.abs(), |(page, root)| {
@@ -193,12 +194,12 @@ fn slabs_of_the_root_and_of_all_nodes() {
 /// Ends of any slabs, turning slabs and units of f16 residuals, by any factor.
 #[test]
 fn any_bounds_of_any_nodes() {
-    search(3, |random, file| loosened(file, random).unwrap());
+    search(3, true, |random, file| loosened(file, random).unwrap());
 }
 
 #[test]
 fn boxes_of_records() {
-    search(4, |random, file| {
+    search(4, false, |random, file| {
         let record = |record: &mut ObjectRecord| {
             for _ in 0..1 + random.below(3) {
                 let (axis, to) = (random.below(3), far(random));
@@ -212,7 +213,7 @@ fn boxes_of_records() {
 
 #[test]
 fn spheres_of_records() {
-    search(5, |random, file| {
+    search(5, false, |random, file| {
         let (axis, by) = (random.below(3), far(random));
         rewritten(file, |record| move_sphere(record, axis, by), |_, _| ()).unwrap()
     });
@@ -220,7 +221,7 @@ fn spheres_of_records() {
 
 #[test]
 fn lanes_without_triangles() {
-    search(6, |random, file| {
+    search(6, false, |random, file| {
         let mut bytes = file.to_vec();
         fill_unused_lanes(&mut bytes, far(random));
         bytes
