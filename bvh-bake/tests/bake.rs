@@ -6,13 +6,14 @@ use bvh_bake::{BakeReport, Effort, Options, prove_bounds, to_bytes, to_bytes_wit
 use bvh_format::checksum::checksum;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::{TriangleEncoding, decode_packet};
-use bvh_format::page::{PAGE, Page};
+use bvh_format::object::ObjectRecord;
+use bvh_format::page::{PAGE, Page, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_format::validate::{packets, validate};
 use bvh_format::{Layout, Rule};
 use cbvh_testkit::ball::ball;
-use cbvh_testkit::loosen::Loosened;
+use cbvh_testkit::loosen::{Node, move_sphere, remote_roots, rewritten, widen};
 use cbvh_testkit::seal::{seal, section};
 use cbvh_testkit::{Random, Triangle};
 use std::path::Path;
@@ -312,21 +313,26 @@ fn a_tightened_anchor_fails_the_proof() {
 fn the_proof_refuses_a_sphere_or_an_anchor_that_is_wrong() {
     let (good, _) =
         to_bytes(&mesh(&soup(900, 10)), &options(Profile::Dop26U8Wide, TriangleEncoding::Packed)).unwrap();
-    let broken = |edit: &dyn Fn(&mut Loosened)| {
-        let mut file = Loosened::of(&good);
-        edit(&mut file);
-        let bytes = file.sealed();
+    let broken = |record: &dyn Fn(&mut ObjectRecord), node: &dyn Fn(&Node, &mut TightBound)| {
+        let bytes = rewritten(&good, record, node).unwrap();
         prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).err().map(|error| error.rule)
     };
-    assert_eq!(broken(&|file| file.sphere(1, 1e-3)), None);
-    assert_eq!(broken(&|file| file.shrink_sphere(0.999)), Some(Rule::BoundContains));
+    let radius = |by: f32| {
+        broken(&|record| record.sphere_radius = (record.sphere_radius.get() * by).into(), &|_, _| ())
+    };
+    assert_eq!(broken(&|record| move_sphere(record, 1, 1e-3), &|_, _| ()), None);
+    assert_eq!(radius(0.999), Some(Rule::BoundContains));
     // The sphere is as small as its centre allows.
-    assert_eq!(broken(&|file| file.shrink_sphere(0.999999)), Some(Rule::BoundContains));
-    let roots = Loosened::of(&good).remote_roots();
+    assert_eq!(radius(0.999999), Some(Rule::BoundContains));
+    let roots = remote_roots(&good);
     assert!(roots.len() > 2);
     for &root in &roots {
-        for (slab, end) in [(0, 1e3f32), (4, -1e3), (12, 1e30)] {
-            let error = broken(&|file| file.slab(root, slab, end.min(0.0), end.max(0.0)));
+        for (slab, upper, end) in [(0, true, 1e3f32), (4, false, 1e3), (12, true, 1e30)] {
+            let error = broken(&|_| (), &|node, bound| {
+                if node.root == root {
+                    widen(&mut bound.kdop, slab, upper, end);
+                }
+            });
             assert_eq!(error, Some(Rule::Nested), "root {root:?}, slab {slab}");
         }
     }

@@ -10,17 +10,18 @@ use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes, verify};
 use bvh_format::validate::validate;
 use bvh_query::{Bvh, Pose, QueryError};
+use cbvh_testkit::damage::damage;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::forge::{Input, forge};
-use cbvh_testkit::seal::{put, seal_blocks, seal_header, seal_pages, seal_sections};
-use common::asked::{Answers, ask, place_in_file, victims};
+use cbvh_testkit::seal::{seal_blocks, seal_header, seal_pages, seal_sections};
+use common::asked::{Answers, ask, victims};
 use common::shapes::sphere;
 use common::{Random, mesh, queriers, random_pose, translation};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// The number of files in an everyday run.
-const FILES: u64 = 6000;
+const FILES: u64 = 8000;
 
 /// The checksums that are corrected after the damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,64 +49,6 @@ impl Seal {
         }
         if self == Self::Header || self == Self::All {
             seal_header(bytes);
-        }
-    }
-}
-
-/// Damages a file in one of these ways. `other` is a second valid file.
-fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) -> &'static str {
-    let at = place_in_file(bytes, random);
-    match random.below(6) {
-        0 => {
-            for _ in 0..1 + random.below(3) {
-                let at = place_in_file(bytes, random);
-                bytes[at] ^= 1 << random.below(8);
-            }
-            "flipped"
-        }
-        1 => {
-            let values: [u32; 8] =
-                [0, 1, u32::MAX, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x8000_0000, 0x7f7f_ffff];
-            let at = (at & !3).min(bytes.len() - 4);
-            put(bytes, at, &values[random.below(8)].to_le_bytes());
-            "limit"
-        }
-        2 => {
-            // A stretch of another file replaces bytes, at the same place or at any place.
-            let most = 2 << random.below(13);
-            let length = (1 + random.below(most)).min(bytes.len() - at);
-            let from = if random.below(2) == 0 { at } else { place_in_file(other, random) };
-            let stretch = &other[from.min(other.len())..(from + length).min(other.len())];
-            put(bytes, at, stretch);
-            "spliced"
-        }
-        3 => {
-            match random.below(3) {
-                0 => bytes.truncate(random.below(bytes.len())),
-                1 => bytes.truncate(4096 * random.below(bytes.len() / 4096)),
-                _ => bytes.extend((0..random.below(5000)).map(|i| i as u8)),
-            }
-            "truncated"
-        }
-        4 => {
-            // A page, line or word replaces another one.
-            let unit = [4096, 64, 8][random.below(3)];
-            let (to, from) = (at / unit * unit, place_in_file(bytes, random) / unit * unit);
-            let length = unit.min(bytes.len() - to).min(bytes.len() - from);
-            bytes.copy_within(from..from + length, to);
-            "doubled"
-        }
-        _ => {
-            // A page, line or byte is inserted or removed, and everything after it moves.
-            let unit = [4096, 64, 1][random.below(3)];
-            let end = (at + unit).min(bytes.len());
-            if random.below(2) == 0 {
-                bytes.drain(at..end);
-            } else {
-                let more = bytes[at..end].to_vec();
-                bytes.splice(at..at, more);
-            }
-            "moved"
         }
     }
 }

@@ -76,7 +76,7 @@ fn check_pair(name: &str, mesh_a: &str, mesh_b: &str) {
         let text = std::fs::read_to_string(path).unwrap();
         // One file of a1hand has 99 poses.
         assert!(text.lines().count() >= 99);
-        for (number, line) in text.lines().enumerate().step_by(step(5)) {
+        for (number, line) in text.lines().enumerate().step_by(step(20)) {
             let (numbers, label) = line.split_once('#').unwrap();
             let label: f64 = label.trim().strip_prefix("dist ").unwrap().parse().unwrap();
             let pose = pose(numbers);

@@ -1,7 +1,7 @@
 //! Scales the searches of the tests: random searches, damaged files, long enumerations.
 //!
 //! Each search states the amount for everyday use. The environment variable `CBVH_TEST_DEPTH` multiplies all amounts:
-//! `.ci/run` sets it to 10, and a person who hunts for a rare error sets more.
+//! `.ci/full` sets it to 4 for the searches, and a person who hunts for a rare error sets more.
 
 /// Returns the number of rounds to run: `everyday` times `CBVH_TEST_DEPTH`, at least one.
 ///

@@ -7,6 +7,7 @@
 //! out, so their tests run in this repository only.
 
 pub mod ball;
+pub mod damage;
 pub mod depth;
 pub mod exact;
 pub mod forge;

@@ -1,195 +1,262 @@
-//! Makes bounds of a file looser than they need to be, by any amount: every rule but the one that an edit is about still
-//! holds, and so must every answer.
+//! Writes the bounds of a file again, with any changes: anchors, slabs, turning slabs, the sphere and the unit of f16
+//! residuals. Triangles and the shape of the tree stay as they are, so that where bounds become looser, answers must stay, too.
 
-use crate::seal::{put, seal, section};
+use crate::Random;
+use crate::seal::{put, put_together, section, take_apart};
 use bvh_format::Layout;
+use bvh_format::bounds::{Bound, Subtree, visit_bounds};
+use bvh_format::decode::decode_child;
+use bvh_format::kdop::Kdop;
 use bvh_format::leaf::TriangleEncoding;
-use bvh_format::page::{PAGE_HEADER_BYTES, Page};
-use bvh_format::profile::{Encoding, Profile};
-use bvh_format::slabs::row;
-use bvh_format::treelet::SHORT_TREELET_BYTES;
-use bvh_format::turning::TurningDirection;
+use bvh_format::object::{ObjectRecord, write_objects};
+use bvh_format::page::{PAGE, Page, PageWriter, RootRef, TightBound};
+use bvh_format::profile::Encoding;
+use bvh_format::treelet::Child;
+use std::collections::BTreeMap;
+use zerocopy::IntoBytes;
 
-/// A file under change. Checksums are corrected at the end.
-pub struct Loosened {
-    /// The bytes of the file.
-    pub bytes: Vec<u8>,
-    layout: Layout,
+/// A node whose bound is written.
+pub struct Node {
+    /// The page and the number of a subtree root; for other nodes, those of the root that they are below.
+    pub root: (u32, u8),
+    /// Whether it is a subtree root.
+    pub is_root: bool,
+    /// What must contain it: its parent or, for a root, the child that links to it. The root of the object has none.
+    pub limit: Option<Kdop>,
 }
 
-/// A subtree root: the page and the number of the root in it.
-pub type Root = (u32, u8);
-
-impl Loosened {
-    /// Starts from a valid file of one object.
-    ///
-    /// # Panics
-    /// Panics if the file breaks a rule that is checked when a file is opened.
-    pub fn of(bytes: &[u8]) -> Self {
-        Self { bytes: bytes.to_vec(), layout: Layout::read(bytes).expect("a valid file") }
-    }
-
-    /// Returns the file with correct checksums.
-    pub fn sealed(mut self) -> Vec<u8> {
-        seal(&mut self.bytes);
-        self.bytes
-    }
-
-    /// Returns the object's profile.
-    pub fn profile(&self) -> Profile {
-        self.layout.objects[0].profile()
-    }
-
-    /// Returns the subtree roots that remote links lead to.
-    pub fn remote_roots(&self) -> Vec<Root> {
-        let roots = |page: u32| (0..self.page(page).header().roots).map(move |root| (page, root));
-        (0..self.layout.page_count()).flat_map(roots).skip(1).collect()
-    }
-
-    /// Moves an end of a slab of an anchor outward to `end`, if that is further out: the upper one, or the lower one.
-    pub fn anchor(&mut self, (page, root): Root, slab: usize, upper: bool, end: f32) {
-        let profile = self.profile();
-        let number = if upper { profile.directions().slabs() + slab } else { slab };
-        let at = PAGE_HEADER_BYTES + usize::from(root) * profile.anchor_bytes() + 4 * number;
-        self.outward(self.layout.page_offset(page) as usize + at, upper, end);
-    }
-
-    /// Moves the ends of a slab of a subtree root outward to `lo` and `hi`, and lets the slab of each node from the root's page
-    /// on reach as far as that of the node's own root. Turning slabs, which are measured from the box, go if that side changes.
-    /// Ends that are stored as they are follow no anchor: they change only for the root of the object, all anchors with them.
-    pub fn slab(&mut self, from: Root, slab: usize, lo: f32, hi: f32) {
-        self.anchor(from, slab, false, lo);
-        self.anchor(from, slab, true, hi);
-        let profile = self.profile();
-        let root = self.page(from.0).anchor_slabs(from.1);
-        let (lo, hi) = (root.lo[row(slab)], root.hi[row(slab)]);
-        if profile.encoding() == Encoding::F32 {
-            if from != (0, 0) {
-                return;
-            }
-            for root in self.remote_roots() {
-                self.anchor(root, slab, false, lo);
-                self.anchor(root, slab, true, hi);
-            }
-        }
-        for page in from.0..self.layout.page_count() {
-            let view = self.page(page);
-            let slots: Vec<_> = (0..view.header().treelets)
-                .map(|slot| (view.treelet_at(slot), view.treelet(slot).len(), view.links(slot).children()))
-                .collect();
-            for (at, length, children) in slots {
-                let at = self.layout.page_offset(page) as usize + at;
-                for child in 0..children {
-                    let is_short = length == SHORT_TREELET_BYTES;
-                    for (byte, bytes) in code_bytes(profile, is_short, child, slab, [lo, hi]) {
-                        put(&mut self.bytes, at + byte, &bytes);
-                    }
-                    if profile.has_turning_slabs() && slab < 3 && self.turns_towards(at + child, slab) {
-                        for byte in [28, 92, 56, 120] {
-                            put(&mut self.bytes, at + byte + child, &[0]);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Returns whether the turning slab of a child leads along an axis at all; else it does not depend on the box there.
-    fn turns_towards(&self, child_at: usize, axis: usize) -> bool {
-        let (a, b) = (self.bytes[child_at + 56], self.bytes[child_at + 120]);
-        TurningDirection { a, b }.vector()[axis] != 0.0
-    }
-
-    /// Moves an end of the record's box outward to `end`, if that is further out.
-    pub fn bounding_box(&mut self, axis: usize, upper: bool, end: f32) {
-        let at = self.record() + 32 + 4 * (3 * usize::from(upper) + axis);
-        self.outward(at, upper, end);
-    }
-
-    /// Moves the sphere's centre to `by` away along an axis, and makes the sphere larger by so much and a little more.
-    pub fn sphere(&mut self, axis: usize, by: f32) {
-        let at = [self.record() + 136 + 4 * axis, self.record() + 148];
-        let centre = self.f32_at(at[0]) + by;
-        put(&mut self.bytes, at[0], &centre.to_le_bytes());
-        let radius = (self.f32_at(at[1]) + centre.abs() + by.abs()) * 1.000001;
-        put(&mut self.bytes, at[1], &radius.to_le_bytes());
-    }
-
-    /// Multiplies the sphere's radius, which does not loosen it.
-    pub fn shrink_sphere(&mut self, by: f32) {
-        let at = self.record() + 148;
-        let radius = self.f32_at(at) * by;
-        put(&mut self.bytes, at, &radius.to_le_bytes());
-    }
-
-    /// Fills the lanes of leaf packets that hold no triangle with a coordinate. Only plain packets have room for it; returns how
-    /// many lanes were filled.
-    pub fn unused_lanes(&mut self, coordinate: f32) -> usize {
-        if self.layout.objects[0].triangle_encoding() != TriangleEncoding::F32 {
-            return 0;
-        }
-        let mut filled = 0;
-        for page in 0..self.layout.page_count() {
-            let view = self.page(page);
-            let block = self.layout.leaf_block(&self.bytes, view.header());
-            let at = block.as_ptr() as usize - self.bytes.as_ptr() as usize;
-            let packets: Vec<_> = bvh_format::validate::packets(&view).collect();
-            for (packet, triangles) in packets {
-                for lane in triangles..4 {
-                    for value in 0..9 {
-                        let place = at + 144 * usize::from(packet) + 16 * value + 4 * lane;
-                        put(&mut self.bytes, place, &coordinate.to_le_bytes());
-                    }
-                    filled += 1;
-                }
-            }
-        }
-        filled
-    }
-
-    fn page(&self, number: u32) -> Page<'_> {
-        Page::new(self.layout.page_bytes(&self.bytes, number).expect("a page"), self.profile())
-    }
-
-    /// The byte at which the object's record starts.
-    fn record(&self) -> usize {
-        section(&self.bytes, 1).start + 16
-    }
-
-    fn f32_at(&self, at: usize) -> f32 {
-        f32::from_le_bytes([self.bytes[at], self.bytes[at + 1], self.bytes[at + 2], self.bytes[at + 3]])
-    }
-
-    fn outward(&mut self, at: usize, upper: bool, end: f32) {
-        let now = self.f32_at(at);
-        let end = if upper { now.max(end) } else { now.min(end) };
-        put(&mut self.bytes, at, &end.to_le_bytes());
-    }
+/// Returns an end of a slab, upwards positive: the upper one, or the negated lower one.
+pub fn end(bound: &Kdop, slab: usize, upper: bool) -> f32 {
+    if upper { bound.hi[slab] } else { -bound.lo[slab] }
 }
 
-/// Returns the bytes of a treelet that make a child's slab as wide as the treelet's, whose ends are `ends`: codes of 0.
-fn code_bytes(
-    profile: Profile,
-    is_short: bool,
-    child: usize,
-    slab: usize,
-    ends: [f32; 2],
-) -> Vec<(usize, Vec<u8>)> {
-    let (row, width) = (row(slab), profile.width());
-    let half = if is_short { SHORT_TREELET_BYTES } else { profile.treelet_bytes() } / 2;
-    if is_short || profile.encoding() == Encoding::U4 || width == 8 {
-        let column = if width == 8 { (child / 4) * half + child % 4 } else { child };
-        let lo = 4 * row + column;
-        let has_one_byte = is_short || profile.encoding() == Encoding::U4;
-        let hi = if has_one_byte { lo } else { lo + half / 2 };
-        return vec![(lo, vec![0]), (hi, vec![0])];
-    }
-    let size = match profile.encoding() {
-        Encoding::F16 => 2,
-        Encoding::F32 => 4,
-        _ => 1,
+/// Moves an end of a slab outward to `to`, upwards positive, if that is further out.
+pub fn widen(bound: &mut Kdop, slab: usize, upper: bool, to: f32) {
+    let to = end(bound, slab, upper).max(to);
+    if upper { bound.hi[slab] = to } else { bound.lo[slab] = -to }
+}
+
+/// Returns the subtree roots of a file of one object that remote links lead to.
+///
+/// # Panics
+/// Panics if the file breaks a rule that is checked when a file is opened.
+pub fn remote_roots(bytes: &[u8]) -> Vec<(u32, u8)> {
+    let layout = Layout::read(bytes).expect("a valid file");
+    let profile = layout.objects[0].profile();
+    let roots = |page: u32| {
+        let bytes = layout.page_bytes(bytes, page).expect("a page");
+        (0..Page::new(bytes, profile).header().roots).map(move |root| (page, root))
     };
-    let at = (row * width + child) * size;
-    let bytes = |end: f32| if size == 4 { end.to_le_bytes().to_vec() } else { vec![0; size] };
-    vec![(at, bytes(ends[0])), (at + half, bytes(ends[1]))]
+    (0..layout.page_count()).flat_map(roots).skip(1).collect()
+}
+
+/// Returns the file with its record and then all of its bounds edited, and with correct checksums. The bounds given to `node`
+/// are as tight as they can be. Ends beyond the parent are cut off where they are stored relative to it. Returns `None` if the
+/// file is not one of a single valid object.
+pub fn rewritten(
+    bytes: &[u8],
+    record: impl FnOnce(&mut ObjectRecord),
+    mut node: impl FnMut(&Node, &mut TightBound),
+) -> Option<Vec<u8>> {
+    let layout = Layout::read(bytes).ok()?;
+    let [object] = &layout.objects[..] else { return None };
+    let (profile, slabs) = (object.profile(), object.profile().directions().slabs());
+    let mut edited = *object.record();
+    record(&mut edited);
+    let scale = 2f32.powi(edited.f16_exponent.get());
+    let mut sections = take_apart(bytes);
+    sections[0].2 = write_objects(&[(object.name().to_owned(), edited)]);
+
+    let pages = edited.pages.get();
+    let page = |number: u32| Some(Page::new(layout.page_bytes(bytes, number)?, profile));
+    let mut subtrees: BTreeMap<(u32, u8), Subtree> = BTreeMap::new();
+    for number in (0..pages).rev() {
+        let page = page(number)?;
+        let below = |to: RootRef| subtrees.get(&(to.page(), to.root())).unwrap_or(Subtree::unknown());
+        let block = layout.leaf_block(bytes, page.header());
+        let found = visit_bounds(object, &page, block, below, |_| Ok(())).ok()?;
+        subtrees.extend((0..).zip(found).map(|(root, subtree)| ((number, root), subtree)));
+    }
+    let subtree = |to: RootRef| subtrees.get(&(to.page(), to.root())).unwrap_or(Subtree::unknown());
+    // The slabs decoded for the child that links to a root.
+    let mut linking: BTreeMap<(u32, u8), Kdop> = BTreeMap::new();
+    for number in 0..pages {
+        let page = page(number)?;
+        let (header, leaf_block) = (page.header(), layout.leaf_block(bytes, page.header()));
+        let mut children = BTreeMap::new();
+        let mut roots = Vec::new();
+        visit_bounds(object, &page, leaf_block, subtree, |bound: Bound| {
+            match bound.child {
+                None => roots.push(bound.tight),
+                Some(child) => _ = children.insert((bound.slot, child), (bound.tight, bound.turning)),
+            }
+            Ok(())
+        })
+        .ok()?;
+        let mut writer = PageWriter::new(profile, scale, header.shape());
+        // The bounds of the slots, and the roots that they are below.
+        let mut given: BTreeMap<u8, (Kdop, u8)> = BTreeMap::new();
+        for (root, kdop) in (0..).zip(roots) {
+            let limit = linking.get(&(number, root)).copied();
+            let mut bound = TightBound { kdop, turning: None };
+            node(&Node { root: (number, root), is_root: true, limit }, &mut bound);
+            let (parent, link) = page.anchor_parent(root);
+            writer.root(&bound.kdop, (parent != u32::MAX).then_some((parent, link)));
+            given.insert(root, (bound.kdop, root));
+        }
+        for slot in 0..header.treelets {
+            writer.begin_treelet();
+            let links = page.links(slot);
+            for child in 0..links.children() {
+                let (kdop, turning) = *children.get(&(slot, child))?;
+                let (parent, root) = *given.get(&slot)?;
+                let mut bound = TightBound { kdop, turning };
+                node(&Node { root: (number, root), is_root: false, limit: Some(parent) }, &mut bound);
+                if profile.encoding() != Encoding::F32 {
+                    for slab in 0..slabs {
+                        bound.kdop.hi[slab] = bound.kdop.hi[slab].min(parent.hi[slab]);
+                        bound.kdop.lo[slab] = bound.kdop.lo[slab].max(parent.lo[slab]);
+                    }
+                }
+                match links.child(child) {
+                    Child::Treelet(below) => {
+                        let is_short = below >= header.treelets - header.short;
+                        if is_short {
+                            writer.short_treelet(&bound)
+                        } else {
+                            writer.treelet(&bound)
+                        }
+                        given.insert(below, (bound.kdop, root));
+                    }
+                    Child::Remote(link) => writer.remote(&bound, page.remote(link)),
+                    // The blocks stay, so any triangles do here.
+                    Child::Leaf { triangles, .. } => {
+                        writer.leaf(&bound, (0..triangles).map(|_| ([[0.0; 3]; 3], 0)))
+                    }
+                    Child::Empty => return None,
+                }
+            }
+        }
+        let mut written = writer.finish(object.triangle_encoding(), false).bytes;
+        written[..64].copy_from_slice(header.as_bytes());
+        // Decodes from the roots on, to learn what is decoded for remote children.
+        let page = Page::new(&written, profile);
+        let mut decoded: BTreeMap<u8, _> =
+            (0..header.roots).map(|root| (root, page.anchor_slabs(root))).collect();
+        for slot in 0..header.treelets {
+            let links = page.links(slot);
+            for child in 0..links.children() {
+                let node = decode_child(profile, scale, page.treelet(slot), child, decoded.get(&slot)?);
+                match links.child(child) {
+                    Child::Treelet(below) => _ = decoded.insert(below, node),
+                    Child::Remote(link) => {
+                        let to = page.remote(link);
+                        linking.insert((to.page(), to.root()), node.to_kdop(slabs));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let nodes = sections.iter_mut().find(|section| section.0 == 2)?;
+        nodes.2[PAGE * number as usize..][..PAGE].copy_from_slice(&written[..]);
+    }
+    Some(put_together(&sections))
+}
+
+/// Moves the sphere's centre to `by` away along an axis, and makes the sphere larger by so much and a little more.
+pub fn move_sphere(record: &mut ObjectRecord, axis: usize, by: f32) {
+    let centre = record.sphere_centre[axis].get() + by;
+    record.sphere_centre[axis] = centre.into();
+    record.sphere_radius = ((record.sphere_radius.get() + centre.abs() + by.abs()) * 1.000001).into();
+}
+
+/// Fills the lanes of leaf packets that hold no triangle with a coordinate, and corrects the checksums. Only plain packets have
+/// room for it; returns how many lanes were filled.
+///
+/// # Panics
+/// Panics if the file breaks a rule that is checked when a file is opened.
+pub fn fill_unused_lanes(bytes: &mut [u8], coordinate: f32) -> usize {
+    let layout = Layout::read(bytes).expect("a valid file");
+    if layout.objects[0].triangle_encoding() != TriangleEncoding::F32 {
+        return 0;
+    }
+    let (profile, leaves) = (layout.objects[0].profile(), section(bytes, 3).start);
+    let mut places = Vec::new();
+    for page in 0..layout.page_count() {
+        let page = Page::new(layout.page_bytes(bytes, page).expect("a page"), profile);
+        let at = leaves + page.header().leaf_bytes().start;
+        for (packet, triangles) in bvh_format::validate::packets(&page) {
+            let lanes = (triangles..4).map(|lane| at + 144 * usize::from(packet) + 4 * lane);
+            places.extend(lanes);
+        }
+    }
+    for &place in &places {
+        (0..9).for_each(|value| put(bytes, place + 16 * value, &coordinate.to_le_bytes()));
+    }
+    crate::seal::seal(bytes);
+    places.len()
+}
+
+/// Returns a file of one object in which any bounds are looser by any factor, or `None` if the file is not one of a single
+/// valid object.
+pub fn loosened(bytes: &[u8], random: &mut Random) -> Option<Vec<u8>> {
+    let layout = Layout::read(bytes).ok()?;
+    let object = layout.objects.first()?;
+    let (encoding, slabs) = (object.profile().encoding(), object.profile().directions().slabs());
+    let record = object.record();
+    let size =
+        (0..3).fold(f32::MIN_POSITIVE, |size, k| size.max(record.box_hi[k].get() - record.box_lo[k].get()));
+    // One end of so many is loose, of anchors and of children.
+    let of_roots = [1, 2, 4, 26, 60][random.below(5)];
+    let of_children = [1, 2, 4, 60, usize::MAX, usize::MAX][random.below(6)];
+    let far = size * 2f32.powi(random.below(100) as i32 - 20);
+    // Whether anchors of remote roots may exceed the child that links to them, and `f32` slabs their parents.
+    let is_free = random.below(2) == 0;
+    let sphere =
+        (random.below(4) == 0).then(|| (size * 2f32.powi(random.below(60) as i32 - 20), random.below(3)));
+    let exponent = if random.below(2) == 0 { random.below(24) as i32 } else { 0 };
+    let edit = |record: &mut ObjectRecord| {
+        if let Some((more, axis)) = sphere {
+            record.sphere_radius = (record.sphere_radius.get() + more).min(1e30).into();
+            record.sphere_centre[axis] = (record.sphere_centre[axis].get() + more / 4.0).min(1e30).into();
+        }
+        if encoding == Encoding::F16 {
+            record.f16_exponent = (record.f16_exponent.get() + exponent).min(112).into();
+        }
+    };
+    rewritten(bytes, edit, |node, bound| {
+        let is_free = is_free && (node.is_root || encoding == Encoding::F32);
+        let limit = node.limit.as_ref().filter(|_| !is_free);
+        loosen(&mut bound.kdop, limit, slabs, far, if node.is_root { of_roots } else { of_children }, random);
+        bound.turning = bound.turning.filter(|_| random.below(8) != 0).map(|mut slab| {
+            let more = size * 2f32.powi(random.below(40) as i32 - 35);
+            if random.below(of_children) == 0 {
+                (slab.lo, slab.hi) = (slab.lo - more, slab.hi + more);
+            }
+            slab
+        });
+    })
+}
+
+/// Moves one end in `one_in` outward: anywhere up to the limit, or up to `far` outside.
+fn loosen(
+    bound: &mut Kdop,
+    limit: Option<&Kdop>,
+    slabs: usize,
+    far: f32,
+    one_in: usize,
+    random: &mut Random,
+) {
+    const MOST: f32 = 1e35;
+    for slab in 0..slabs {
+        for upper in [false, true] {
+            if random.below(one_in) != 0 {
+                continue;
+            }
+            let now = end(bound, slab, upper);
+            let share = [1.0, 1.0, 0.5, 2f32.powi(-(random.below(60) as i32))][random.below(4)];
+            let to = limit.map_or((now + far).min(MOST), |limit| end(limit, slab, upper));
+            widen(bound, slab, upper, if share == 1.0 { to } else { (now + (to - now) * share).min(to) });
+        }
+    }
 }

@@ -4,6 +4,9 @@
 //! each measures and how long it takes.
 
 mod arguments;
+/// What the tests of queries share: oracles, and all questions about a file of any bytes.
+#[path = "../../tests/common/mod.rs"]
+mod common;
 mod hard;
 mod output;
 mod search;

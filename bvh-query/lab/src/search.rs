@@ -6,7 +6,6 @@
 
 mod files;
 mod hostile;
-mod loosen;
 mod motions;
 mod pairs;
 mod probes;

@@ -1,14 +1,13 @@
 //! Asks a file of any bytes every query, and provides the valid files that tests damage.
 
 use super::shapes::{dirty, soup};
-use super::{Random, mesh, options};
+use super::{mesh, options};
 use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
     Bvh, ClosestPoint, Contact, Distance, Pose, Querier, QueryError, Ray, RayHit, Relation, Side,
 };
-use cbvh_testkit::seal::section;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -27,55 +26,79 @@ pub(crate) struct Answers {
     pub(crate) segment: Result<bool, QueryError>,
 }
 
+/// The largest number of contacts that is visited, because a forged file may have any number of equal triangles.
+pub(crate) const MAX_CONTACTS: usize = 20_000;
+
 impl Answers {
-    /// Returns whether any answer was refused. That a file does not state what is closed is no refusal.
+    /// Returns an error that refuses a file, if there is one. That a file does not state what is closed is no refusal.
+    pub(crate) fn refusal(&self) -> Option<&QueryError> {
+        let errors = [
+            self.collide.as_ref().err(),
+            self.contacts.as_ref().err(),
+            self.distance.as_ref().err(),
+            self.within.as_ref().err(),
+            self.relation.as_ref().err(),
+            self.closest.as_ref().err(),
+            self.side.as_ref().err(),
+            self.hits.as_ref().err(),
+            self.segment.as_ref().err(),
+        ];
+        errors.into_iter().flatten().find(|error| **error != QueryError::NoTopology)
+    }
+
+    /// Returns whether any answer was refused.
     pub(crate) fn is_refused(&self) -> bool {
-        let is_told =
-            |error: Option<&QueryError>| error.is_some_and(|error| *error != QueryError::NoTopology);
-        let of_pairs = self.collide.is_err() || self.contacts.is_err() || self.distance.is_err();
-        let of_probes = self.closest.is_err() || self.hits.is_err() || self.segment.is_err();
-        let of_sides = is_told(self.side.as_ref().err()) || is_told(self.relation.as_ref().err());
-        of_pairs || of_probes || of_sides || self.within.is_err()
+        self.refusal().is_some()
     }
 
     /// Returns whether each answer either was refused or is that of the undamaged file.
     pub(crate) fn are_refused_or(&self, other: &Self) -> bool {
-        (self.collide.is_err() || self.collide == other.collide)
-            && (self.distance.is_err() || self.distance == other.distance)
-            && (self.within.is_err() || self.within == other.within)
-            && (self.contacts.is_err() || self.contacts == other.contacts)
-            && (self.relation.is_err() || self.relation == other.relation)
-            && (self.closest.is_err() || self.closest == other.closest)
-            && (self.side.is_err() || self.side == other.side)
-            && (self.hits.is_err() || self.hits == other.hits)
-            && (self.segment.is_err() || self.segment == other.segment)
+        fn holds<T: PartialEq>(one: &Result<T, QueryError>, other: &Result<T, QueryError>) -> bool {
+            one.is_err() || one == other
+        }
+        holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
+            && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
+            && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
+            && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
+            // The limit of `within` is the distance, which may have been refused.
+            && (self.distance.is_err() || holds(&self.within, &other.within))
     }
-}
 
-/// Asks every query with the file as A and as B. Visits at most some thousand contacts, because a forged file may
-/// have any number of equal triangles.
-pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) -> Option<[Answers; 2]> {
-    let bvh = Bvh::from_bytes(bytes.to_vec()).ok()?;
-    let mut ask = |a: &Bvh, b: &Bvh| {
+    /// Asks every query about two meshes in a pose, and about a point and a segment from it, with `probed` in its place.
+    pub(crate) fn of(
+        querier: &mut Querier,
+        (a, b, pose): (&Bvh, &Bvh, &Pose),
+        (probed, place): (&Bvh, &Pose),
+        [point, end]: [[f64; 3]; 2],
+    ) -> Self {
         let mut contacts = Vec::new();
         let visited = querier.visit_contacts(a, b, pose, |contact| {
             contacts.push(contact);
-            if contacts.len() < 5000 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if contacts.len() < MAX_CONTACTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         contacts.sort_unstable();
-        let (at, point) = (b.all().at(pose), [0.25, -0.5, 0.125]);
-        Answers {
+        let at = probed.all().at(place);
+        let distance = querier.distance(a, b, pose);
+        let limit = distance.as_ref().map_or(0.25, |answer| answer.distance);
+        Self {
             collide: querier.collide(a, b, pose),
             contacts: visited.map(|_| contacts),
-            distance: querier.distance(a, b, pose),
-            within: querier.within(a, b, pose, 0.25),
+            within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),
+            distance,
             relation: querier.relation(a, b, pose),
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
-            segment: querier.segment_hit(at, point, [0.1, 0.2, -0.3]),
+            segment: querier.segment_hit(at, point, end),
         }
-    };
+    }
+}
+
+/// Asks every query with the file as A and as B.
+pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) -> Option<[Answers; 2]> {
+    let bvh = Bvh::from_bytes(bytes.to_vec()).ok()?;
+    let segment = [[0.25, -0.5, 0.125], [0.1, 0.2, -0.3]];
+    let mut ask = |a: &Bvh, b: &Bvh| Answers::of(querier, (a, b, pose), (b, pose), segment);
     Some([ask(&bvh, good), ask(good, &bvh)])
 }
 
@@ -90,14 +113,4 @@ pub(crate) fn victims() -> Vec<Vec<u8>> {
         files.push(to_bytes(&mesh, &options(profile, TriangleEncoding::Packed)).unwrap().0);
     }
     files
-}
-
-/// Returns a place in a file of any bytes, more often one that is in use: near the start of a page or of a section.
-pub(crate) fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
-    let start = match random.below(3) {
-        0 => section(bytes, 1 + random.below(8) as u32).start,
-        _ => 4096 * random.below(bytes.len().div_ceil(4096)),
-    };
-    let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
-    (start + within).min(bytes.len() - 1)
 }

@@ -6,24 +6,24 @@
 //! file that was there before. A file with damage that no checksum hides is refused, or answered as before. Any other
 //! file may be answered with anything, but soon and without a panic.
 
-use super::files::{Layout as Baked, bake, stored};
-use super::loosen::loosened;
-use super::pairs::{place_all, queriers, truth};
+use super::files::{Layout as Baked, bake};
+use super::pairs::truth;
 use super::record::{Counts, Finding, Forged};
 use super::shrink::Case;
-use super::stars::{Stars, rotation};
+use super::stars::Stars;
 use crate::Failure;
+use crate::common::asked::{Answers, MAX_CONTACTS};
+use crate::common::{corners, placed, queriers, rotation, stored};
 use bvh_format::bounds::{Subtree, check_bounds, check_box};
 use bvh_format::page::{Page, RootRef};
 use bvh_format::validate::validate;
-use bvh_query::{
-    Bvh, ClosestPoint, Contact, Distance, Pose, Querier, QueryError, Ray, RayHit, Relation, Side,
-};
+use bvh_query::{Bvh, Pose, Querier, RayHit, Relation};
+use cbvh_testkit::damage::damage;
 use cbvh_testkit::forge::{Input, forge};
-use cbvh_testkit::seal::{put, seal, seal_blocks, seal_header, seal_pages, section};
+use cbvh_testkit::loosen::loosened;
+use cbvh_testkit::seal::{put, seal, seal_blocks, seal_header, seal_pages};
 use cbvh_testkit::{Random, Triangle};
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
@@ -35,23 +35,8 @@ const BUDGET: u64 = 20_000;
 const VALID_BUDGET: u64 = 10_000_000;
 /// All questions about one file take milliseconds.
 const MAX_SECONDS: Duration = Duration::from_secs(20);
-const MAX_CONTACTS: usize = 20_000;
 /// Findings of a round; shrinking each takes seconds.
 const MAX_FINDINGS: usize = 2;
-
-/// The answers to all questions about a file and another one.
-#[derive(Debug, Clone, PartialEq)]
-struct Answers {
-    collide: Result<bool, QueryError>,
-    contacts: Result<Vec<Contact>, QueryError>,
-    distance: Result<Distance, QueryError>,
-    within: Result<bool, QueryError>,
-    relation: Result<Relation, QueryError>,
-    closest: Result<Option<ClosestPoint>, QueryError>,
-    side: Result<Side, QueryError>,
-    hits: Result<Vec<RayHit>, QueryError>,
-    segment: Result<bool, QueryError>,
-}
 
 /// What a file is asked with: the other file, the pose, and which of both is A.
 struct Scene<'a> {
@@ -65,89 +50,39 @@ struct Scene<'a> {
 impl Scene<'_> {
     fn ask(&self, querier: &mut Querier, file: &Bvh) -> Answers {
         let (a, b) = if self.is_a { (file, self.good) } else { (self.good, file) };
-        let (pose, point, at) = (self.pose, self.point, file.all().at(&Pose::IDENTITY));
-        let mut contacts = Vec::new();
-        let visited = querier.visit_contacts(a, b, pose, |contact| {
-            contacts.push(contact);
-            if contacts.len() < MAX_CONTACTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-        });
-        contacts.sort_unstable();
-        let distance = querier.distance(a, b, pose);
-        let limit = distance.as_ref().map_or(1.0, |answer| answer.distance);
-        Answers {
-            collide: querier.collide(a, b, pose),
-            contacts: visited.map(|_| contacts),
-            distance,
-            within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),
-            relation: querier.relation(a, b, pose),
-            closest: querier.closest_point(at, point, f64::INFINITY),
-            side: querier.side(at, point),
-            hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
-            segment: querier.segment_hit(at, point, point.map(|x| -x)),
-        }
+        let segment = [self.point, self.point.map(|x| -x)];
+        Answers::of(querier, (a, b, self.pose), (file, &Pose::IDENTITY), segment)
     }
 }
 
-impl Answers {
-    /// Returns the errors of an answer that mean that a file was refused.
-    fn refusal(&self) -> Option<&QueryError> {
-        let errors = [
-            self.collide.as_ref().err(),
-            self.contacts.as_ref().err(),
-            self.distance.as_ref().err(),
-            self.within.as_ref().err(),
-            self.relation.as_ref().err(),
-            self.closest.as_ref().err(),
-            self.side.as_ref().err(),
-            self.hits.as_ref().err(),
-            self.segment.as_ref().err(),
-        ];
-        errors.into_iter().flatten().find(|error| **error != QueryError::NoTopology)
-    }
-
-    /// Returns whether each answer was refused or is that of the file before.
-    fn are_refused_or(&self, other: &Self) -> bool {
-        fn holds<T: PartialEq>(one: &Result<T, QueryError>, other: &Result<T, QueryError>) -> bool {
-            one.is_err() || one == other
-        }
-        holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
-            && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
-            && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
-            && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
-            // The limit of `within` is the distance, which may have been refused.
-            && (self.distance.is_err() || holds(&self.within, &other.within))
-    }
-
-    /// Returns what contradicts the answers of a file with the same triangles in another tree, where ties may be
-    /// broken otherwise.
-    fn contradiction(&self, other: &Self) -> Option<&'static str> {
-        let apart = |one: [f64; 2], other: [f64; 2]| one[0] > other[1] || other[0] > one[1];
-        let interval = |answers: &Self| answers.distance.as_ref().ok().map(|d| [d.lower, d.upper]);
-        let closest =
-            |answers: &Self| answers.closest.as_ref().ok().and_then(|c| c.map(|c| [c.lower, c.upper]));
-        let differ = |one: Option<[f64; 2]>, other: Option<[f64; 2]>| match (one, other) {
-            (Some(one), Some(other)) => apart(one, other),
-            (one, other) => one.is_some() != other.is_some(),
-        };
-        let hit = |hits: &Vec<RayHit>| {
-            let mut hits: Vec<_> = hits.iter().map(|hit| (hit.object, hit.triangle)).collect();
-            hits.sort_unstable();
-            hits
-        };
-        let is_undefined = |answers: &Self| answers.relation == Ok(Relation::Undefined);
-        let cases = [
-            ("collide", self.collide != other.collide),
-            ("contacts", self.contacts != other.contacts),
-            ("distance", differ(interval(self), interval(other))),
-            // Nothing is known about an open object whose box or sphere, which may be loose, meets that of another.
-            ("relation", self.relation != other.relation && !is_undefined(self) && !is_undefined(other)),
-            ("closest point", differ(closest(self), closest(other))),
-            ("side", self.side != other.side),
-            ("hits", self.hits.as_ref().map(hit) != other.hits.as_ref().map(hit)),
-            ("segment", self.segment != other.segment),
-        ];
-        cases.into_iter().find(|case| case.1).map(|case| case.0)
-    }
+/// Returns what contradicts the answers of a file with the same triangles in another tree, where ties may be broken
+/// otherwise.
+fn contradiction(answers: &Answers, other: &Answers) -> Option<&'static str> {
+    let apart = |one: [f64; 2], other: [f64; 2]| one[0] > other[1] || other[0] > one[1];
+    let interval = |of: &Answers| of.distance.as_ref().ok().map(|d| [d.lower, d.upper]);
+    let closest = |of: &Answers| of.closest.as_ref().ok().and_then(|c| c.map(|c| [c.lower, c.upper]));
+    let differ = |one: Option<[f64; 2]>, other: Option<[f64; 2]>| match (one, other) {
+        (Some(one), Some(other)) => apart(one, other),
+        (one, other) => one.is_some() != other.is_some(),
+    };
+    let hit = |hits: &Vec<RayHit>| {
+        let mut hits: Vec<_> = hits.iter().map(|hit| (hit.object, hit.triangle)).collect();
+        hits.sort_unstable();
+        hits
+    };
+    let is_undefined = |of: &Answers| of.relation == Ok(Relation::Undefined);
+    let cases = [
+        ("collide", answers.collide != other.collide),
+        ("contacts", answers.contacts != other.contacts),
+        ("distance", differ(interval(answers), interval(other))),
+        // Nothing is known about an open object whose box or sphere, which may be loose, meets that of another.
+        ("relation", answers.relation != other.relation && !is_undefined(answers) && !is_undefined(other)),
+        ("closest point", differ(closest(answers), closest(other))),
+        ("side", answers.side != other.side),
+        ("hits", answers.hits.as_ref().map(hit) != other.hits.as_ref().map(hit)),
+        ("segment", answers.segment != other.segment),
+    ];
+    cases.into_iter().find(|case| case.1).map(|case| case.0)
 }
 
 /// How a file was forged.
@@ -231,8 +166,8 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
     let (parts, poses) = ([meshes.part(0), meshes.part(1)], meshes.poses(&mut random));
     let files = [baked(&meshes.sides[0], 0)?, baked(&meshes.sides[1], 1)?];
     let goods = [Bvh::from_bytes(baked(&parts[0], 0)?)?, Bvh::from_bytes(baked(&parts[1], 1)?)?];
-    let stored = goods.each_ref().map(|good| stored(good).into_iter().map(|(_, _, t)| t).collect::<Vec<_>>());
-    let mut queriers = queriers();
+    let stored = goods.each_ref().map(|good| corners(&stored(good)));
+    let mut all = queriers();
     let scene = |side: usize, pose| Scene {
         good: &goods[1 - side],
         triangles: &stored[1 - side],
@@ -243,26 +178,23 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
     let mut before = Vec::new();
     for side in [0, 1] {
         let file = Bvh::from_bytes(files[side].clone())?;
-        before.push(
-            poses.iter().map(|pose| scene(side, pose).ask(&mut queriers[0], &file)).collect::<Vec<_>>(),
-        );
+        before.push(poses.iter().map(|pose| scene(side, pose).ask(&mut all[0], &file)).collect::<Vec<_>>());
     }
     let mut findings = Vec::new();
     for _ in 0..FILES {
-        let (side, number, backend) =
-            (random.below(2), random.below(poses.len()), random.below(queriers.len()));
+        let (side, number, backend) = (random.below(2), random.below(poses.len()), random.below(all.len()));
         let way =
             [Way::Loose, Way::Loose, Way::Sealed, Way::Sealed, Way::Plain, Way::MadeUp][random.below(6)];
         let (scene, before) = (scene(side, &poses[number]), &before[side][number]);
         let Some(bytes) = forged(&files[side], &files[1 - side], way, &mut random) else { continue };
         counts.add("files", 1);
-        let Some(wrong) = judged(&bytes, way, &scene, before, &mut queriers, backend, counts) else {
+        let Some(wrong) = judged(&bytes, way, &scene, before, &mut all, backend, counts) else {
             continue;
         };
         let mut ask = |bytes: &[u8]| {
             // Nothing is kept of a querier that panicked.
-            let mut queriers = super::pairs::queriers();
-            judged(bytes, way, &scene, before, &mut queriers, backend, &mut Counts::default())
+            let mut all = queriers();
+            judged(bytes, way, &scene, before, &mut all, backend, &mut Counts::default())
         };
         let (bytes, wrong) = shrunk(bytes, &files[side], wrong, way, &mut ask);
         let mut sides = meshes.sides.clone();
@@ -274,7 +206,7 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
             rotation: *poses[number].rotation(),
             translation: poses[number].translation(),
             layouts: layouts.clone(),
-            backend: queriers[backend].backend().name().into(),
+            backend: all[backend].backend().name().into(),
         };
         let hex = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         let file = Some(Forged { is_a: side == 0, hex });
@@ -282,7 +214,7 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
         if findings.len() >= MAX_FINDINGS {
             break;
         }
-        queriers = super::pairs::queriers();
+        all = queriers();
     }
     Ok(findings)
 }
@@ -303,7 +235,9 @@ fn forged(bytes: &[u8], other: &[u8], way: Way, random: &mut Random) -> Option<V
             // The whole head of another file hides itself by its checksums.
             let other = if way == Way::Plain { bytes } else { other };
             let mut bytes = bytes.to_vec();
-            (0..1 + random.below(3)).for_each(|_| damage(&mut bytes, other, random));
+            for _ in 0..1 + random.below(3) {
+                damage(&mut bytes, other, random);
+            }
             if way == Way::Sealed && bytes.len() >= 64 {
                 match random.below(8) {
                     0 => seal_header(&mut bytes),
@@ -316,54 +250,6 @@ fn forged(bytes: &[u8], other: &[u8], way: Way, random: &mut Random) -> Option<V
             }
             Some(bytes)
         }
-    }
-}
-
-/// Changes some bytes, mostly of structures.
-fn damage(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
-    if bytes.len() < 4096 {
-        return;
-    }
-    let place = |bytes: &[u8], random: &mut Random| {
-        let start = match random.below(3) {
-            0 => section(bytes, 1 + random.below(8) as u32).start,
-            1 => section(bytes, 2).start + 64,
-            _ => 4096 * random.below(bytes.len().div_ceil(4096)),
-        };
-        let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
-        (start + within).min(bytes.len() - 4)
-    };
-    let at = place(bytes, random);
-    match random.below(8) {
-        0 | 1 => bytes[at] ^= 1 << random.below(8),
-        2 => bytes[at] = random.bits() as u8,
-        3 => {
-            let values: [u32; 8] =
-                [0, 1, u32::MAX, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x8000_0000, 0x7f7f_ffff];
-            put(bytes, at & !3, &values[random.below(8)].to_le_bytes());
-        }
-        4 => {
-            // A number of f32 grows or shrinks by a power of two.
-            let exponent = (random.below(64) as u32) << 23;
-            let word = u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[(at & !3) + i]));
-            put(bytes, at & !3, &(word.wrapping_add(exponent)).to_le_bytes());
-        }
-        5 => {
-            let length = random.below(128).min(bytes.len() - at);
-            let from = random.below(bytes.len() - length);
-            bytes.copy_within(from..from + length, at);
-        }
-        6 => {
-            let length = random.below(512).min(bytes.len() - at).min(other.len());
-            let from = if random.below(2) == 0 {
-                at.min(other.len() - length)
-            } else {
-                random.below(other.len() - length + 1)
-            };
-            put(bytes, at, &other[from..from + length]);
-        }
-        _ if random.below(4) == 0 => bytes.truncate(at),
-        _ => bytes[at] = bytes[at].wrapping_add(1),
     }
 }
 
@@ -428,18 +314,18 @@ fn judge(
         }
     }
     if way == Way::Loose
-        && let Some(what) = answers.contradiction(before)
+        && let Some(what) = contradiction(&answers, before)
     {
         return Some(format!("loose bounds change: {what}"));
     }
     let stored = stored(&bvh);
-    let triangles: Vec<_> = stored.iter().map(|stored| stored.2).collect();
+    let triangles = corners(&stored);
     let (a, b) =
         if scene.is_a { (&triangles[..], scene.triangles) } else { (scene.triangles, &triangles[..]) };
-    let pairs = truth(a, &place_all(b, scene.pose), [a.len().max(1), b.len().max(1)], &mut Counts::default());
+    let pairs = truth(a, &placed(b, scene.pose), [a.len().max(1), b.len().max(1)], &mut Counts::default());
     let contact = |(i, j): (u32, u32)| {
         let own = &stored[if scene.is_a { i } else { j } as usize];
-        if scene.is_a { (own.0, own.1, 0, j) } else { (0, i, own.0, own.1) }
+        if scene.is_a { (own.object, own.id, 0, j) } else { (0, i, own.object, own.id) }
     };
     let mut expected: Vec<_> = pairs.into_iter().map(contact).collect();
     expected.sort_unstable();

@@ -6,10 +6,11 @@
 //! motions with their slow definition; a search along the way is faster, so that more ways are asked about.
 
 use super::files::{Layout, bake};
-use super::pairs::{place_all, queriers, truth};
+use super::pairs::truth;
 use super::record::{Counts, Finding};
 use super::stars::Stars;
 use crate::Failure;
+use crate::common::{placed, queriers};
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Pose, QueryError, RigidPath};
 use cbvh_testkit::Random;
 
@@ -45,8 +46,8 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
         let (Ok(from), Ok(to)) = (end(&mut random), end(&mut random)) else { continue };
         let Ok(way) = Motion::between(&from, &to) else { continue };
         let contacts = |t: f64| {
-            let placed = place_all(&stars.b, &way.pose(t));
-            !truth(&stars.a, &placed, stars.sizes, &mut Counts::default()).is_empty()
+            let b = placed(&stars.b, &way.pose(t));
+            !truth(&stars.a, &b, stars.sizes, &mut Counts::default()).is_empty()
         };
         let options = MotionOptions::new().tolerance([None, Some(size * 1e-4)][random.below(2)]);
         let mut first = None;

@@ -7,11 +7,12 @@
 //! A pair is *near the boundary* if moving B by [`ROUNDINGS`] of the largest magnitude in the pose parts the pair, or if
 //! the pair is apart by no more than that. One pair of a star in [`SAMPLE`] is tested for that, in exact arithmetic.
 
-use super::files::{Layout, bake, stored};
+use super::files::{Layout, bake};
 use super::record::{Counts, Finding};
 use super::shrink::{Case, shrunk};
 use super::stars::Stars;
 use crate::Failure;
+use crate::common::{Stored, placed, queriers, stored};
 use bvh_query::{Backend, Bvh, Contact, Pose, Querier, QueryError};
 use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
@@ -45,9 +46,9 @@ pub(super) fn round(seed: u64, contacts: Contacts, counts: &mut Counts) -> Resul
             counts.add("refused poses", 1);
             continue;
         };
-        let placed = place_all(&stars.b, &pose);
-        let truth = truth(&stars.a, &placed, stars.sizes, counts);
-        sample(&stars, &placed, &pose, &truth, &mut random, counts);
+        let in_a = placed(&stars.b, &pose);
+        let truth = truth(&stars.a, &in_a, stars.sizes, counts);
+        sample(&stars, &in_a, &pose, &truth, &mut random, counts);
         let depth = match number % 16 {
             5 => Depth::All,
             1 | 6 | 11 => Depth::Collide,
@@ -55,7 +56,7 @@ pub(super) fn round(seed: u64, contacts: Contacts, counts: &mut Counts) -> Resul
         };
         for querier in &mut queriers {
             counts.add("queries", depth.queries());
-            let asked = Asked { a: &a, b: &b, pose: &pose, placed: [&stars.a, &placed], truth: &truth };
+            let asked = Asked { a: &a, b: &b, pose: &pose, placed: [&stars.a, &in_a], truth: &truth };
             if let Some(wrong) = asked.wrong(querier, contacts, depth) {
                 let case = Case {
                     a: stars.a.clone(),
@@ -84,24 +85,19 @@ pub(super) fn round(seed: u64, contacts: Contacts, counts: &mut Counts) -> Resul
 pub(super) fn ask_again(case: &Case, contacts: Contacts) -> Option<String> {
     let (a, b) = (open(&case.a, &case.layouts[0]).ok()?, open(&case.b, &case.layouts[1]).ok()?);
     let pose = Pose::new(case.rotation, case.translation).ok()?;
-    let placed = place_all(&case.b, &pose);
-    let truth = truth(&case.a, &placed, [case.a.len(), case.b.len()], &mut Counts::default());
+    let in_a = placed(&case.b, &pose);
+    let truth = truth(&case.a, &in_a, [case.a.len(), case.b.len()], &mut Counts::default());
     let mut querier = Querier::with_backend(Backend::from_name(&case.backend).ok()?);
-    let asked = Asked { a: &a, b: &b, pose: &pose, placed: [&case.a, &placed], truth: &truth };
+    let asked = Asked { a: &a, b: &b, pose: &pose, placed: [&case.a, &in_a], truth: &truth };
     asked.wrong(&mut querier, contacts, Depth::All)
-}
-
-pub(super) fn queriers() -> Vec<Querier> {
-    let here = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    here.map(Querier::with_backend).collect()
 }
 
 /// Bakes triangles without loss, which the stored ones prove.
 fn open(triangles: &[Triangle], layout: &Layout) -> Result<Bvh, Failure> {
     let bvh = Bvh::from_bytes(bake(triangles, &layout.options())?)?;
     let stored = stored(&bvh);
-    let same = |(number, (_, id, corners)): (usize, &(u32, u32, Triangle))| {
-        *id as usize == number && sorted(corners) == sorted(&triangles[number])
+    let same = |(number, stored): (usize, &Stored)| {
+        stored.id as usize == number && sorted(&stored.corners) == sorted(&triangles[number])
     };
     match stored.iter().enumerate().find(|stored| !same(*stored)) {
         None if stored.len() == triangles.len() => Ok(bvh),
@@ -117,13 +113,6 @@ fn sorted(t: &Triangle) -> Triangle {
     let mut t = t.map(|p| p.map(|x| x + 0.0));
     t.sort_by(|p, q| p.partial_cmp(q).unwrap_or(std::cmp::Ordering::Equal));
     t
-}
-
-/// Places corners by the formula of `spec/numerics.md`, section 1.
-pub(super) fn place_all(triangles: &[Triangle], pose: &Pose) -> Vec<Triangle> {
-    let (r, t) = (pose.rotation(), pose.translation());
-    let place = |[x, y, z]: [f64; 3]| [0, 1, 2].map(|k| ((r[k][0] * x + r[k][1] * y) + r[k][2] * z) + t[k]);
-    triangles.iter().map(|corners| corners.map(place)).collect()
 }
 
 /// Returns the pose of the construction, or one whose numbers are moved by a few roundings. The pose may be refused.

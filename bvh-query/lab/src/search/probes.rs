@@ -4,10 +4,10 @@
 //! point is a triangle whose corners are the same, and a segment one with two such corners.
 
 use super::files::{Layout, bake};
-use super::pairs::{place_all, queriers};
 use super::record::{Counts, Finding};
 use super::stars::Stars;
 use crate::Failure;
+use crate::common::{placed, queriers};
 use bvh_query::{Bvh, Pose, Querier, QueryError};
 use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
@@ -23,10 +23,10 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
     let stars = Stars::new(&mut random);
     let file = Bvh::from_bytes(bake(&stars.a, &Layout::random(&mut random, 2).options())?)?;
     let pose = Pose::new(stars.rotation, stars.translation)?;
-    let placed = place_all(&stars.b, &pose);
+    let b = placed(&stars.b, &pose);
     let mut findings = Vec::new();
     for number in 0..PROBES {
-        let [p, q, _] = placed[random.below(placed.len())];
+        let [p, q, _] = b[random.below(b.len())];
         let is_met = |probe: Triangle| {
             let probe = Boxed::new(probe);
             stars.a.iter().any(|t| intersect(&Boxed::new(*t), &probe, &mut Decided::default()))

@@ -10,6 +10,7 @@
 //! arithmetic of placing then move each placed corner by a few roundings of its own. Other rotations round B's corners to
 //! `f32`, so the pose brings the centre of a single star to its place.
 
+use crate::common::rotation;
 use cbvh_testkit::{Random, Triangle};
 
 type Integer = [i64; 3];
@@ -215,13 +216,4 @@ impl Star {
         }
         t
     }
-}
-
-/// Returns the rows of the rotation of a unit quaternion (x, y, z, w).
-pub(super) fn rotation([x, y, z, w]: [f64; 4]) -> [[f64; 3]; 3] {
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
 }
