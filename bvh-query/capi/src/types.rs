@@ -26,6 +26,25 @@ macro_rules! handles {
 }
 handles!(MeshHandle, QuerierHandle, TrackerHandle, PathHandle, SceneHandle, Instance);
 
+/// Makes the row of an answer, which has the fields of the first list, and `NONE`, the row where there is no answer. A
+/// field of the second list has a value of its own, and another one after `=>` where there is an answer.
+macro_rules! row {
+    ($row:ident from $answer:ident { $($field:ident: $none:expr),* }
+        and { $($other:ident: $without:expr $(=> $with:expr)?),* }) => {
+        impl $row {
+            const NONE: Self = Self { $($field: $none,)* $($other: $without),* };
+        }
+
+        impl From<$answer> for $row {
+            fn from(of: $answer) -> Self {
+                Self { $($field: of.$field,)* $($other: row!($without $(=> $with)?)),* }
+            }
+        }
+    };
+    ($without:expr => $with:expr) => { $with };
+    ($without:expr) => { $without };
+}
+
 /// `cbvh_pose`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -74,36 +93,17 @@ pub struct DistanceRow {
     pub(crate) triangle_b: u32,
 }
 
-impl DistanceRow {
-    /// Where there is no distance: NaN and 0.
-    const NONE: Self = Self {
-        distance: f64::NAN,
-        lower: f64::NAN,
-        upper: f64::NAN,
-        point_a: [f64::NAN; 3],
-        point_b: [f64::NAN; 3],
-        object_a: 0,
-        triangle_a: 0,
-        object_b: 0,
-        triangle_b: 0,
-    };
-}
-
-impl From<Distance> for DistanceRow {
-    fn from(of: Distance) -> Self {
-        Self {
-            distance: of.distance,
-            lower: of.lower,
-            upper: of.upper,
-            point_a: of.point_a,
-            point_b: of.point_b,
-            object_a: of.object_a,
-            triangle_a: of.triangle_a,
-            object_b: of.object_b,
-            triangle_b: of.triangle_b,
-        }
-    }
-}
+row!(DistanceRow from Distance {
+    distance: f64::NAN,
+    lower: f64::NAN,
+    upper: f64::NAN,
+    point_a: [f64::NAN; 3],
+    point_b: [f64::NAN; 3],
+    object_a: 0,
+    triangle_a: 0,
+    object_b: 0,
+    triangle_b: 0
+} and {});
 
 /// `cbvh_distance_options`.
 #[derive(Clone, Copy)]
@@ -211,34 +211,14 @@ const NO_INSTANCE: Instance = Instance { id: 0 };
 /// `CBVH_SIDE_NOT_ASKED`.
 pub(crate) const SIDE_NOT_ASKED: i32 = 3;
 
-impl ClosestRow {
-    const NONE: Self = Self {
-        distance: f64::NAN,
-        lower: f64::NAN,
-        upper: f64::NAN,
-        point: [f64::NAN; 3],
-        instance: NO_INSTANCE,
-        object: 0,
-        triangle: 0,
-        found: 0,
-        side: SIDE_NOT_ASKED,
-    };
-}
-
-impl From<ClosestPoint> for ClosestRow {
-    fn from(of: ClosestPoint) -> Self {
-        Self {
-            distance: of.distance,
-            lower: of.lower,
-            upper: of.upper,
-            point: of.point,
-            object: of.object,
-            triangle: of.triangle,
-            found: 1,
-            ..Self::NONE
-        }
-    }
-}
+row!(ClosestRow from ClosestPoint {
+    distance: f64::NAN,
+    lower: f64::NAN,
+    upper: f64::NAN,
+    point: [f64::NAN; 3],
+    object: 0,
+    triangle: 0
+} and { instance: NO_INSTANCE, found: 0 => 1, side: SIDE_NOT_ASKED });
 
 impl From<Option<ClosestPoint>> for ClosestRow {
     fn from(of: Option<ClosestPoint>) -> Self {
@@ -306,34 +286,14 @@ pub struct HitRow {
     pub(crate) reserved: i32,
 }
 
-impl HitRow {
-    const NONE: Self = Self {
-        t: f64::NAN,
-        lower: f64::NAN,
-        upper: f64::NAN,
-        point: [f64::NAN; 3],
-        instance: NO_INSTANCE,
-        object: 0,
-        triangle: 0,
-        found: 0,
-        reserved: 0,
-    };
-}
-
-impl From<RayHit> for HitRow {
-    fn from(of: RayHit) -> Self {
-        Self {
-            t: of.t,
-            lower: of.lower,
-            upper: of.upper,
-            point: of.point,
-            object: of.object,
-            triangle: of.triangle,
-            found: 1,
-            ..Self::NONE
-        }
-    }
-}
+row!(HitRow from RayHit {
+    t: f64::NAN,
+    lower: f64::NAN,
+    upper: f64::NAN,
+    point: [f64::NAN; 3],
+    object: 0,
+    triangle: 0
+} and { instance: NO_INSTANCE, found: 0 => 1, reserved: 0 });
 
 impl From<SceneRayHit> for HitRow {
     fn from(of: SceneRayHit) -> Self {
@@ -377,42 +337,38 @@ impl MotionRow {
     };
 }
 
+impl MotionRow {
+    fn ended(outcome: i32, free_until: f64, at: f64, nearest: Distance) -> Self {
+        Self { outcome, free_until, at, nearest: nearest.into(), ..Self::FREE }
+    }
+
+    fn of(self, pair: ScenePair) -> Self {
+        Self { instance_a: pair.a.into(), instance_b: pair.b.into(), ..self }
+    }
+}
+
 impl From<MotionAnswer> for MotionRow {
     fn from(of: MotionAnswer) -> Self {
-        let ended = |outcome, free_until, at, nearest: Distance| Self {
-            outcome,
-            free_until,
-            at,
-            nearest: nearest.into(),
-            ..Self::FREE
-        };
         match of {
             MotionAnswer::Free => Self::FREE,
             MotionAnswer::Hit { free_until, touching_at, nearest } => {
-                ended(HIT, free_until, touching_at, nearest)
+                Self::ended(HIT, free_until, touching_at, nearest)
             }
-            MotionAnswer::Near { free_until, at, nearest } => ended(NEAR, free_until, at, nearest),
+            MotionAnswer::Near { free_until, at, nearest } => Self::ended(NEAR, free_until, at, nearest),
         }
     }
 }
 
 impl From<SceneMotionAnswer> for MotionRow {
     fn from(of: SceneMotionAnswer) -> Self {
-        let ended = |outcome, free_until, at, of: SceneDistance| Self {
-            outcome,
-            free_until,
-            at,
-            instance_a: of.pair.a.into(),
-            instance_b: of.pair.b.into(),
-            nearest: of.nearest.into(),
-            ..Self::FREE
-        };
         match of {
             SceneMotionAnswer::Free => Self::FREE,
             SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
-                ended(HIT, free_until, touching_at, nearest)
+                Self::ended(HIT, free_until, touching_at, nearest.nearest).of(nearest.pair)
             }
-            SceneMotionAnswer::Near { free_until, at, nearest } => ended(NEAR, free_until, at, nearest),
+            SceneMotionAnswer::Near { free_until, at, nearest } => {
+                Self::ended(NEAR, free_until, at, nearest.nearest).of(nearest.pair)
+            }
         }
     }
 }
