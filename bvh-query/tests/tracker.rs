@@ -7,7 +7,8 @@ use bvh_bake::mesh::Mesh;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier, Shape, Tracker};
-use common::asked::{place_in_file, victims};
+use cbvh_testkit::damage::place_in_file;
+use common::asked::victims;
 use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
 use common::{Random, Triangle, bake, mesh, options, queriers, rotation, translation};
 

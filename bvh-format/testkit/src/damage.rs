@@ -4,7 +4,7 @@ use crate::Random;
 use crate::seal::{put, section};
 
 /// Returns a place in a file of any bytes, more often one that is in use: near the start of a page or of a section.
-fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
+pub fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
     let start = match random.below(4) {
         0 => section(bytes, 1 + random.below(8) as u32).start,
         1 => section(bytes, 2).start + 64,
