@@ -150,15 +150,24 @@ def seal(data, sums=ALL):
     store(32, xxh3_64(data[:head]))
 
 
-def verdict(data, bounds=False):
-    """Returns the number of the broken rule, or 0 for a valid file. `bounds` adds the rules of *verify*."""
+def broken_by(check, *arguments):
+    """Returns the number of the rule that a check finds broken, or 0."""
     try:
-        file = rules.validate(bytes(data))
-        if bounds:
-            rules.verify(file)
+        check(*arguments)
     except rules.Broken as broken:
         return broken.rule
     return 0
+
+
+def verdict(data, bounds=False):
+    """Returns the number of the rule that a file breaks, or 0. `bounds` adds the rules of *verify*."""
+
+    def check():
+        file = rules.validate(bytes(data))
+        if bounds:
+            rules.verify(file)
+
+    return broken_by(check)
 
 
 def verdict_of_command(command, path, *meshes):

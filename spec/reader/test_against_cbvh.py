@@ -31,6 +31,7 @@ ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 TESTDATA = os.path.join(ROOT, "testdata")
 SHARED = os.path.join(ROOT, "..", "shared")
 ROBOT, ROOM = (os.path.join(TESTDATA, name) for name in ("fclrob.obj", "fclenv.obj"))
+GOLDEN = "everything", "plain", "profiles", "scene", "topology"
 ORDERS = list(itertools.permutations(range(3)))
 
 
@@ -124,6 +125,30 @@ class AgainstCbvh(unittest.TestCase):
         path = os.path.join(self.folder, name)
         run("bake", mesh, "-o", path, "--profile", profile, "--triangles", triangles, "--jobs", 1, "-q", *options)
         return path
+
+    def written(self, name, data):
+        path = os.path.join(self.folder, name)
+        with open(path, "wb") as stream:
+            stream.write(data)
+        return path
+
+    def agreed(self, data, *meshes):
+        """The rule that both readers find broken in these bytes, or 0. With meshes, *verify* compares them, too."""
+        ours = mutate.verdict(data, bounds=bool(meshes))
+        self.assertEqual(ours, mutate.verdict_of_command(COMMAND, self.written("agreed.cbvh", data), *meshes))
+        return ours
+
+    def agreed_bounds(self, file, changes):
+        """The rules found broken after changes of a file baked from ROOM, each given as bytes by their places."""
+        found = set()
+        for change in changes:
+            data = bytearray(file.data)
+            for at, values in change.items():
+                data[at : at + len(values)] = values
+            mutate.seal(data)
+            with self.subTest(change=change):
+                found.add(self.agreed(data, ROOM))
+        return found
 
     def shared(self, *names):
         path = os.path.join(SHARED, *names)
@@ -303,12 +328,6 @@ class AgainstCbvh(unittest.TestCase):
         self.assertNotIn(cbvh.IDS, file.sections)
         self.check_facts(file, path)
 
-    def written(self, name, data):
-        path = os.path.join(self.folder, name)
-        with open(path, "wb") as stream:
-            stream.write(data)
-        return path
-
     def test_instances(self):
         scene = os.path.join(TESTDATA, "ok-scene.cbvh")
         self.check_facts(load(scene), scene)
@@ -337,10 +356,7 @@ class AgainstCbvh(unittest.TestCase):
             scales = [self.chance.choice((2.0**-24, -(2.0**-24), 0)) - 2.0**-49 for _ in range(3)]
             change = np.diag(scales) + self.chance.choice((0, 0, 1e-12, 2.0**-25)) * random_rotation(self.chance)
             rotation = (np.eye(3) + change) @ random_rotation(self.chance)
-            scene = with_section(data, instances({"rotation": rotation}))
-            ours = mutate.verdict(scene)
-            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, self.written("near.cbvh", scene)), rotation)
-            verdicts.add(ours)
+            verdicts.add(self.agreed(with_section(data, instances({"rotation": rotation}))))
         self.assertEqual(verdicts, {0, 42})
 
     def test_bounds_of_coordinates_that_cancel(self):
@@ -361,25 +377,17 @@ class AgainstCbvh(unittest.TestCase):
                     places = [page.treelet_at(slot) + first + child for first in page.layout.turning]
                     (there if codes[slot, child].any() else absent).append(places)
         self.assertGreater(len(there), 100)
-        broken = set()
+        changes = []
         for number in range(60):
-            data = bytearray(file.data)
             # The first children without one are near the root, so that R39 is reached.
             places = self.chance.choice(there) if number % 2 else absent[number // 2]
             if number % 4 == 1:
                 at = self.chance.choice(places)
-                data[at] = (data[at] + self.chance.choice((-1, 1, 1, 2, 5))) % 256
+                changes.append({at: bytes([(file.data[at] + self.chance.choice((-1, 1, 1, 2, 5))) % 256])})
             else:
-                for at in places:
-                    data[at] = self.chance.choice((0, 1, 127, self.chance.randrange(256)))
-            mutate.seal(data)
-            forged = os.path.join(self.folder, "forged.cbvh")
-            with open(forged, "wb") as stream:
-                stream.write(data)
-            ours = mutate.verdict(data, bounds=True)
-            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), places)
-            broken.add(ours)
-        self.assertEqual(broken, {0, 35, 39})
+                codes = [self.chance.choice((0, 1, 127, self.chance.randrange(256))) for _ in places]
+                changes.append({at: bytes([code]) for at, code in zip(places, codes)})
+        self.assertEqual(self.agreed_bounds(file, changes), {0, 35, 39})
 
     def test_codes_of_short_treelets(self):
         """Changes codes of one short treelet each: `cbvh verify` and this reader find the same rule broken."""
@@ -388,25 +396,17 @@ class AgainstCbvh(unittest.TestCase):
             file = load(path)
             pages = [page for page in file.objects[0].pages_read if page.short]
             self.assertGreater(len(pages), 0)
-            broken = set()
+            changes = []
             for _ in range(40):
-                data, page = bytearray(file.data), self.chance.choice(pages)
+                page = self.chance.choice(pages)
                 slot = self.chance.randrange(page.first_short, page.treelets)
                 places = cbvh.places_of_short_codes(page.layout)[: page.children(slot)]
                 at = page.treelet_at(slot) + int(self.chance.choice(places.ravel()))
-                lo, hi = data[at] & 15, data[at] >> 4
-                change = self.chance.choice((-1, 1))
-                if self.chance.random() < 0.5:
-                    lo = min(max(lo + change, 0), 15)
-                else:
-                    hi = min(max(hi + change, 0), 15)
-                data[at] = lo | hi << 4
-                mutate.seal(data)
-                ours = mutate.verdict(data, bounds=True)
-                forged = self.written("forged.cbvh", data)
-                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), (page.number, slot))
-                broken.add(ours)
-            self.assertEqual(broken, {0, 35})
+                codes = [file.data[at] & 15, file.data[at] >> 4]
+                end = self.chance.randrange(2)
+                codes[end] = min(max(codes[end] + self.chance.choice((-1, 1)), 0), 15)
+                changes.append({at: bytes([codes[0] | codes[1] << 4])})
+            self.assertEqual(self.agreed_bounds(file, changes), {0, 35})
 
     def test_anchors_and_spheres(self):
         """Changes an end of an anchor or the sphere each: `cbvh verify` and this reader find the same rule broken."""
@@ -414,9 +414,8 @@ class AgainstCbvh(unittest.TestCase):
             file = load(self.bake(ROOM, profile, "packed"))
             one = file.objects[0]
             anchors = [(page, root) for page in one.pages_read[1:] for root in range(page.roots)]
-            broken = set()
+            changes = []
             for _ in range(20):
-                data = bytearray(file.data)
                 if self.chance.random() < 0.25:
                     at = one.place("sphere_radius")
                     factor = self.chance.choice((0.99, 1.0, 1.5))
@@ -424,14 +423,8 @@ class AgainstCbvh(unittest.TestCase):
                     page, root = self.chance.choice(anchors)
                     at = page.anchor_at(root) + 4 * self.chance.randrange(2 * page.layout.slabs)
                     factor = self.chance.choice((0.9, 1.1, 1e9))
-                value = np.frombuffer(data, "<f4", 1, at)[0] * np.float32(factor)
-                data[at : at + 4] = value.tobytes()
-                mutate.seal(data)
-                ours = mutate.verdict(data, bounds=True)
-                forged = self.written("forged.cbvh", data)
-                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, forged, ROOM), at)
-                broken.add(ours)
-            self.assertLessEqual({35, 49}, broken)
+                changes.append({at: (np.frombuffer(file.data, "<f4", 1, at)[0] * np.float32(factor)).tobytes()})
+            self.assertLessEqual({35, 49}, self.agreed_bounds(file, changes))
 
     def test_limit_of_turning_slabs(self):
         """R39 depends on the greatest number of triangles that occurs, and comes after R35 in a later page."""
@@ -473,12 +466,8 @@ class AgainstCbvh(unittest.TestCase):
                 at = page.leaf_block_at() + cbvh.F32_PACKET_BYTES * int(packet) + 4 * int(lane)
                 data[at : at + 4] = np.float32(9e9).tobytes()
         mutate.seal(data)
-        path = os.path.join(self.folder, "lanes.cbvh")
-        with open(path, "wb") as stream:
-            stream.write(data)
         self.assertNotEqual(data, file.data)
-        self.assertEqual(mutate.verdict(data, bounds=True), 0)
-        self.assertEqual(mutate.verdict_of_command(COMMAND, path, ROOM), 0)
+        self.assertEqual(self.agreed(data, ROOM), 0)
 
     def test_larger_meshes(self):
         for name in ("piano", "apartment"):
@@ -487,50 +476,48 @@ class AgainstCbvh(unittest.TestCase):
                 self.check_bake(self.bake(mesh, profile, triangles), mesh)
 
     def test_damaged_files(self):
-        names = "everything", "plain", "profiles", "scene", "topology"
-        meshes = [os.path.join(TESTDATA, f"ok-{name}.cbvh") for name in names]
-        for profile, triangles in (
-            ("dop14-u8", "f32"),
-            ("dop6-f16", "packed"),
-            ("dop14-f32", "quantized"),
-            ("dop26-u4", "f32"),
-            ("dop26-u8-wide", "packed"),
-            ("dop14-u8", "packed"),
-            ("dop6-u8", "quantized"),
-        ):
-            meshes += [self.bake(mesh, profile, triangles) for mesh in (ROBOT, ROOM)]
+        """Compares verdicts on mutants: of each group of files, the part to damage, how many of CBVH_MUTANTS to make, the
+        seed, and the rules that they must break if CBVH_MUTANTS is at least 1000.
+        """
         count = int(os.environ.get("CBVH_MUTANTS", "1000"))
-        broken, different = mutate.compare(COMMAND, count, 3, meshes, self.folder)
-        self.assertEqual(different, [])
-        self.assertGreater(len(broken), min(count // 20, 20))
-
-    def test_damaged_heads(self):
-        """Damages the header and the section table, and cuts files off in them."""
-        names = "ok-plain", "ok-everything", "ok-scene", "ok-topology"
-        meshes = [os.path.join(TESTDATA, f"{name}.cbvh") for name in names]
-        for seed, only in ((11, "head"), (12, "offsets")):
-            count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 2
-            broken, different = mutate.compare(COMMAND, count, seed, meshes, self.folder, only=only)
-            self.assertEqual(different, [])
-            if count >= 500:
-                self.assertLessEqual({4, 5, 7, 8, 9} if only == "offsets" else {2, 4, 5, 6, 7, 8, 9}, set(broken))
+        golden = {name: os.path.join(TESTDATA, f"ok-{name}.cbvh") for name in GOLDEN}
+        heads = [path for name, path in golden.items() if name != "profiles"]
+        layouts = [("dop14-u8", "f32"), ("dop6-f16", "packed"), ("dop14-f32", "quantized"), ("dop26-u4", "f32")]
+        layouts += [("dop26-u8-wide", "packed"), ("dop14-u8", "packed"), ("dop6-u8", "quantized")]
+        whole = [self.bake(mesh, *layout) for layout in layouts for mesh in (ROBOT, ROOM)]
+        short = [
+            self.bake(mesh, profile, "packed", *options)
+            for mesh, profile in itertools.product((ROBOT, ROOM), ("dop14-u8", "dop6-u8"))
+            for options in ((), ("--no-ids",))
+        ]
+        layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop26-u4", "f32")
+        full = [self.bake(ROOM, *layout) for layout in layouts]
+        ids = [golden["everything"], self.bake(ROBOT, "dop14-u8", "packed")]
+        for files, only, part, seed, expected in (
+            ([*golden.values(), *whole], "", 1, 3, set()),
+            (heads, "head", 2, 11, {2, 4, 5, 6, 7, 8, 9}),
+            (heads, "offsets", 2, 12, {4, 5, 7, 8, 9}),
+            (ids, "id", 2, 5, {0, 31, 32, 33}),
+            (short, "short", 1, 9, {0, 17, 21, 22, 24, 25}),
+            # Files in which no treelet is short, or can be.
+            (full, "short counts", 4, 10, {17, 18, 25}),
+            (full, "links", 4, 10, {0, 21, 22, 24}),
+        ):
+            with self.subTest(only=only):
+                broken, different = mutate.compare(COMMAND, count // part, seed, files, self.folder, only=only)
+                self.assertEqual(different, [])
+                if count >= 1000:
+                    self.assertLessEqual(expected, set(broken))
+                if not only:
+                    self.assertGreater(len(broken), min(count // 20, 20))
 
     def test_short_files(self):
         for name in ("ok-plain", "ok-everything", "bad-R02-major-5"):
             with open(os.path.join(TESTDATA, f"{name}.cbvh"), "rb") as stream:
                 data = stream.read()
             for length in (*range(0, 64 + 32 * 8, 7), 63, 64, 159, 160, 255, 256):
-                path = self.written("short.cbvh", data[:length])
-                ours = mutate.verdict(data[:length])
-                self.assertEqual(ours, mutate.verdict_of_command(COMMAND, path), (name, length))
-
-    def test_damaged_ids(self):
-        meshes = [os.path.join(TESTDATA, "ok-everything.cbvh"), self.bake(ROBOT, "dop14-u8", "packed")]
-        count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 2
-        broken, different = mutate.compare(COMMAND, count, 5, meshes, self.folder, only="id")
-        self.assertEqual(different, [])
-        if count >= 100:
-            self.assertLessEqual({0, 31, 32, 33}, set(broken))
+                with self.subTest(name=name, length=length):
+                    self.agreed(data[:length])
 
     def test_random_pages(self):
         """Trees of all profiles drawn at random. A number in the page's header or in a treelet is changed in most."""
@@ -552,36 +539,10 @@ class AgainstCbvh(unittest.TestCase):
                 tree.data[at : at + size] = (word % (1 << 8 * size)).to_bytes(size, "little")
             # The page above has a link to the first root.
             data = with_pages(base, [Tree(profile, [[2]]).data, tree.data, bytes(cbvh.PAGE)], profile)
-            ours = mutate.verdict(data)
-            path = self.written("tree.cbvh", data)
-            self.assertEqual(ours, mutate.verdict_of_command(COMMAND, path), (profile, kinds, short, roots, number))
-            broken.add(ours)
+            with self.subTest(profile=profile, kinds=kinds, short=short, roots=roots, number=number):
+                broken.add(self.agreed(data))
         if count >= 250:
             self.assertLessEqual({17, 21, 22, 23, 24, 25, 28}, broken)
-
-    def test_damaged_short_treelets(self):
-        """Damages short treelets, the links to them and the counts in headers."""
-        meshes = [
-            self.bake(mesh, profile, "packed", *options)
-            for mesh, profile in itertools.product((ROBOT, ROOM), ("dop14-u8", "dop6-u8"))
-            for options in ((), ("--no-ids",))
-        ]
-        count = int(os.environ.get("CBVH_MUTANTS", "1000"))
-        broken, different = mutate.compare(COMMAND, count, 9, meshes, self.folder, only="short")
-        self.assertEqual(different, [])
-        if count >= 500:
-            self.assertLessEqual({0, 17, 21, 22, 24, 25}, set(broken))
-
-    def test_damaged_files_without_short_treelets(self):
-        """Damages counts and links of files in which no treelet is short, or can be."""
-        layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop26-u4", "f32")
-        meshes = [self.bake(ROOM, *layout) for layout in layouts]
-        for only, expected in (("short counts", {17, 18, 25}), ("links", {0, 21, 22, 24})):
-            count = int(os.environ.get("CBVH_MUTANTS", "1000")) // 4
-            broken, different = mutate.compare(COMMAND, count, 10, meshes, self.folder, only=only)
-            self.assertEqual(different, [])
-            if count >= 200:
-                self.assertLessEqual(expected, set(broken))
 
 
 def random_rotation(chance):
