@@ -262,7 +262,7 @@ template <class Ask> std::vector<bool> choices(std::size_t count, Ask ask) {
     return std::vector<bool>(found.get(), found.get() + count);
 }
 
-/// The room for a list of which nothing is known.
+/// The number of entries to make room for before the length of a list is known.
 inline constexpr std::size_t few = 64;
 
 /// Asks for a list, and once more where it is longer than there is room for. That takes twice the time, so that there

@@ -7,13 +7,13 @@
 //! file may be answered with anything, but soon and without a panic.
 
 use super::files::{Layout as Baked, bake};
-use super::pairs::truth;
+use super::pairs::{queriers, truth};
 use super::record::{Counts, Finding, Forged};
 use super::shrink::Case;
 use super::stars::Stars;
 use crate::Failure;
 use crate::common::asked::{Answers, MAX_CONTACTS};
-use crate::common::{corners, placed, queriers, rotation, stored};
+use crate::common::{corners, placed, rotation, stored};
 use bvh_format::bounds::{Subtree, check_bounds, check_box};
 use bvh_format::page::{Page, RootRef};
 use bvh_format::validate::validate;

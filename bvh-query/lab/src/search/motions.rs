@@ -6,11 +6,12 @@
 //! motions with their slow definition; a search along the way is faster, so that more ways are asked about.
 
 use super::files::{Layout, bake};
+use super::pairs::queriers;
 use super::pairs::truth;
 use super::record::{Counts, Finding};
 use super::stars::Stars;
 use crate::Failure;
-use crate::common::{placed, queriers};
+use crate::common::placed;
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Pose, QueryError, RigidPath};
 use cbvh_testkit::Random;
 

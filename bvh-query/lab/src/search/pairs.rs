@@ -12,7 +12,7 @@ use super::record::{Counts, Finding};
 use super::shrink::{Case, shrunk};
 use super::stars::Stars;
 use crate::Failure;
-use crate::common::{Stored, placed, queriers, stored};
+use crate::common::{Stored, placed, stored};
 use bvh_query::{Backend, Bvh, Contact, Pose, Querier, QueryError};
 use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
@@ -90,6 +90,12 @@ pub(super) fn ask_again(case: &Case, contacts: Contacts) -> Option<String> {
     let mut querier = Querier::with_backend(Backend::from_name(&case.backend).ok()?);
     let asked = Asked { a: &a, b: &b, pose: &pose, placed: [&case.a, &in_a], truth: &truth };
     asked.wrong(&mut querier, contacts, Depth::All)
+}
+
+/// Returns a querier for each backend that this CPU has.
+pub(super) fn queriers() -> Vec<Querier> {
+    let here = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+    here.map(Querier::with_backend).collect()
 }
 
 /// Bakes triangles without loss, which the stored ones prove.

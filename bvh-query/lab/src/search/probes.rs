@@ -4,10 +4,11 @@
 //! point is a triangle whose corners are the same, and a segment one with two such corners.
 
 use super::files::{Layout, bake};
+use super::pairs::queriers;
 use super::record::{Counts, Finding};
 use super::stars::Stars;
 use crate::Failure;
-use crate::common::{placed, queriers};
+use crate::common::placed;
 use bvh_query::{Bvh, Pose, Querier, QueryError};
 use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};

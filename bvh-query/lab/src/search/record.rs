@@ -125,7 +125,7 @@ impl Counts {
 impl Session {
     pub(super) fn new(threads: usize) -> Self {
         let origin = Origin::of("cbvh-lab search");
-        let backends = crate::common::queriers();
+        let backends = super::pairs::queriers();
         Self {
             date: origin.date,
             commit: option_env!("CBVH_COMMIT").unwrap_or("not named").to_owned(),
