@@ -76,7 +76,7 @@ pub unsafe extern "C" fn cbvh_scene_open(file: *const c_char, scene: *mut SceneH
         check_regular(&file)?;
         // SAFETY: the header asks that nobody changes a mapped file.
         let bvh = unsafe { Bvh::map(&file) }?;
-        Scene::of_file(bvh).map_err(|error| Failure::from(error).at(&file.display().to_string()))
+        Scene::of_file(bvh).map_err(|error| Failure::from(error).at(file.display().to_string()))
     };
     // SAFETY: the header asks for it.
     unsafe { make("scene", scene, made) }
