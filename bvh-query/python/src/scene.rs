@@ -179,8 +179,8 @@ impl Scene {
     fn open(py: Python<'_>, path: PathBuf, mesh: Bound<'_, PyAny>) -> PyResult<Self> {
         let damaged = |error: String| FormatError::new_err(format!("{}: {error}", path.display()));
         let (bvh, scene) = detached(py, || {
-            let bvh = // SAFETY: the documentation of `Scene.open` asks for it.
-            unsafe { Bvh::map(&path) }.map_err(open_error)?;
+            // SAFETY: the documentation of `Scene.open` asks that nobody changes the file.
+            let bvh = unsafe { Bvh::map(&path) }.map_err(open_error)?;
             let scene = bvh_query::Scene::of_file(bvh.clone());
             Ok::<_, PyErr>((bvh, scene.map_err(|error| damaged(error.to_string()))?))
         })?;
