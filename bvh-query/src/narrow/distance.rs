@@ -120,9 +120,9 @@ impl Foot {
     }
 }
 
-/// A candidate for the closest pair of points.
+/// The feet of two features: the closest points, if no other feet are closer.
 #[derive(Clone, Copy)]
-struct Candidate {
+struct Feet {
     squared: f64,
     foot_a: Foot,
     foot_b: Foot,
@@ -185,7 +185,7 @@ impl Differences {
 
     /// Returns the closest of all candidates. Ties go to the first, so that the result is a function of the input.
     #[inline(always)]
-    fn closest(&self) -> Candidate {
+    fn closest(&self) -> Feet {
         let mut squared = [f64::INFINITY; CANDIDATES];
         let lines = Lines::new(self);
         lines.corners(&mut squared);
@@ -205,14 +205,14 @@ impl Differences {
             36..39 => (faces[0].foot(column), Foot::corner(column)),
             _ => (Foot::corner(column), faces[1].foot(column)),
         };
-        Candidate { squared: least, foot_a, foot_b }
+        Feet { squared: least, foot_a, foot_b }
     }
 
     /// Returns the direction in which the triangles are most likely separated: the one between the closest points.
     ///
     /// For a face or two edges it returns the normal instead, which stays accurate however small the gap is.
     #[inline(always)]
-    fn direction(&self, closest: &Candidate) -> Point {
+    fn direction(&self, closest: &Feet) -> Point {
         let (a, b) = (&closest.foot_a, &closest.foot_b);
         if a.across != 0.0 {
             perpendicular_normal(self.edges_a[a.corner], self.edges_a[(a.corner + 2) % 3])
@@ -230,7 +230,7 @@ impl Differences {
 
     /// The vectors whose sum leads from the first foot to the second.
     #[inline(always)]
-    fn terms(&self, closest: &Candidate) -> [Point; 5] {
+    fn terms(&self, closest: &Feet) -> [Point; 5] {
         let (a, b) = (&closest.foot_a, &closest.foot_b);
         let [along_a, across_a] = a.offsets(&self.edges_a);
         let [along_b, across_b] = b.offsets(&self.edges_b);
@@ -239,7 +239,7 @@ impl Differences {
 
     /// The vector from the first foot to the second.
     #[inline(always)]
-    fn between(&self, closest: &Candidate) -> Point {
+    fn between(&self, closest: &Feet) -> Point {
         self.terms(closest).into_iter().fold([0.0; 3], |sum, term| add_scaled(sum, 1.0, term))
     }
 
@@ -250,7 +250,7 @@ impl Differences {
     /// each other term (edge and product) and one for each of the two additions of terms that aren't zero:
     /// less than five roundings of the sum of magnitudes. Square, sum and root add less than four, relative.
     #[inline(always)]
-    fn length(&self, closest: &Candidate) -> (f64, f64) {
+    fn length(&self, closest: &Feet) -> (f64, f64) {
         let sum = self.between(closest);
         let magnitude: f64 = self.terms(closest).iter().flatten().map(|x| x.abs()).sum();
         let length = dot(sum, sum).sqrt();
@@ -299,7 +299,7 @@ impl Differences {
     /// triangle, the gap, and the gap's component perpendicular to each edge.
     #[cold]
     #[inline(never)]
-    fn widest(&self, closest: &Candidate) -> f64 {
+    fn widest(&self, closest: &Feet) -> f64 {
         let (a, b) = (&self.edges_a, &self.edges_b);
         let gap = self.between(closest);
         let mut widest = self.separation(gap);
@@ -468,7 +468,7 @@ impl Differences {
 /// Where the triangles touch or overlap in a plane, the closest feet are such a point. Where an edge pierces a face,
 /// the closest feet are apart, and the crossing is computed. The result is the point closest to the other triangle.
 #[cold]
-fn common_point(a: &Triangle, b: &Triangle, differences: &Differences, closest: &Candidate) -> Point {
+fn common_point(a: &Triangle, b: &Triangle, differences: &Differences, closest: &Feet) -> Point {
     let swapped = differences.swapped();
     let unit = differences.unit;
     let mut best = closest.squared;

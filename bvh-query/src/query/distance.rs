@@ -74,6 +74,9 @@ impl Querier {
     }
 
     /// Returns the closest pair of triangles within the limit of `search`; of touching meshes, the first contact.
+    ///
+    /// Which contact the search meets depends on the backend, because its order follows bounds of distances. The answer
+    /// must not depend on it, so a second walk, for contact only, names the pair.
     pub(super) fn nearest(
         &mut self,
         a: Shape<'_>,

@@ -4,8 +4,8 @@
 //! instructions without a branch.
 
 use crate::isa::Isa;
-use crate::traverse::frames::{Entry, Tested};
 use crate::traverse::node_cache::ChildRef;
+use crate::traverse::pending::{Entry, Tested};
 
 /// Pairs of leaf packets in the order in which they were met.
 #[derive(Default)]

@@ -2,12 +2,13 @@
 
 pub(crate) mod align;
 pub(crate) mod decode;
-pub(crate) mod frames;
 pub(crate) mod large_leaf;
 pub(crate) mod leaf_pairs;
 pub(crate) mod line_filter;
 pub(crate) mod node_cache;
 pub(crate) mod node_filter;
+pub(crate) mod pending;
+mod per_node;
 pub(crate) mod placement;
 pub(crate) mod point_filter;
 pub(crate) mod probe_walk;

@@ -68,20 +68,24 @@ pub(crate) struct NodeFilter {
     reach_b: Reach,
 }
 
-impl NodeFilter {
+impl Default for NodeFilter {
     /// An empty test, before the first pose is prepared.
-    pub(crate) const NONE: Self = Self {
-        alignment: Alignment::NONE,
-        end: Alignment::NONE,
-        inverse: Alignment::NONE,
-        looks_along_b: false,
-        placement: Placement::NONE,
-        set_a: DirectionSet::Dop6,
-        set_b: DirectionSet::Dop6,
-        reach_a: Reach { ends: 0.0, coordinates: 0.0 },
-        reach_b: Reach { ends: 0.0, coordinates: 0.0 },
-    };
+    fn default() -> Self {
+        Self {
+            alignment: Alignment::NONE,
+            end: Alignment::NONE,
+            inverse: Alignment::NONE,
+            looks_along_b: false,
+            placement: Placement::NONE,
+            set_a: DirectionSet::Dop6,
+            set_b: DirectionSet::Dop6,
+            reach_a: Reach { ends: 0.0, coordinates: 0.0 },
+            reach_b: Reach { ends: 0.0, coordinates: 0.0 },
+        }
+    }
+}
 
+impl NodeFilter {
     /// Prepares a pose.
     #[inline(always)]
     pub(crate) fn prepare<I: Isa>(

@@ -2,16 +2,16 @@
 //!
 //! ```text
 //! stack := [the root]
-//! while frame := top(stack):
-//!     child := nearest child of the frame that is left; if none or bound(child) > limit: pop, next
+//! while level := top(stack):
+//!     child := nearest child of the level that is left; if none or bound(child) > limit: pop, next
 //!     decode the children of the child, and bound where the probe meets them
 //!     visitor.leaves(leaf packets among them within the limit)
-//!     push the others within the limit as a frame, if there are any
+//!     push the others within the limit as a level, if there are any
 //! ```
 //!
-//! Unlike a pair walk, it meets each node once, so it decodes nodes where it needs them, into the frames of its stack, and
+//! Unlike a pair walk, it meets each node once, so it decodes nodes where it needs them, into the levels of its stack, and
 //! keeps none. Lanes are slabs and children, so that one probe fills them ([`crate::traverse::point_filter`],
-//! [`crate::traverse::line_filter`]). The walk ends because a file is a tree, and has at most one frame for each level.
+//! [`crate::traverse::line_filter`]). The walk ends because a file is a tree, and has no more levels than that.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -38,7 +38,7 @@ pub(crate) trait ProbeVisitor {
 /// The children of an opened node.
 #[derive(Clone)]
 #[repr(C, align(64))]
-struct ProbeFrame {
+struct PendingChildren {
     groups: [Group; 2],
     /// Of the inner children that are left; `GONE` for the others.
     bounds: [f32; 8],
@@ -62,7 +62,7 @@ static HIDDEN: [[f32; 4]; 16] = {
     hidden
 };
 
-impl ProbeFrame {
+impl PendingChildren {
     const EMPTY: Self = Self { groups: [Group::ZERO; 2], bounds: [GONE; 8], links: Links::NONE, page: 0 };
 
     /// Removes the nearest child that is left, if its bound is at most `limit`.
@@ -92,13 +92,13 @@ impl ProbeFrame {
 /// The stack of a walk, kept from one walk to the next.
 #[derive(Default)]
 pub(crate) struct ProbeStack {
-    frames: Vec<ProbeFrame>,
-    /// The file and the first page of the object whose root the first frame holds.
+    levels: Vec<PendingChildren>,
+    /// The file and the first page of the object whose root the first level holds.
     of: Option<(u64, u32)>,
 }
 
-/// Frames made at once.
-const FRAMES: usize = 16;
+/// Levels made at once.
+const LEVELS: usize = 16;
 
 impl ProbeStack {
     /// Puts the root of an object on an empty stack.
@@ -107,15 +107,15 @@ impl ProbeStack {
         let page = object.record().first_page.get();
         if self.of != Some((bvh.identity(), page)) {
             let slabs = bvh.page(object, page)?.anchor_slabs(0);
-            if self.frames.is_empty() {
-                self.frames.resize(FRAMES, ProbeFrame::EMPTY);
+            if self.levels.is_empty() {
+                self.levels.resize(LEVELS, PendingChildren::EMPTY);
             }
-            let root = &mut self.frames[0];
+            let root = &mut self.levels[0];
             root.groups[0] = spread(isa, &slabs);
             (root.links, root.page) = (Links { kinds: 1, ..Links::NONE }, page);
             self.of = Some((bvh.identity(), page));
         }
-        self.frames[0].bounds[0] = 0.0;
+        self.levels[0].bounds[0] = 0.0;
         Ok(())
     }
 }
@@ -140,12 +140,12 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
         let (parts, max_nodes) = (object.profile().groups(), max_nodes(object));
         let (mut opened, mut depth) = (0, 1);
         while depth > 0 {
-            if depth == stack.frames.len() {
-                stack.frames.resize(depth + FRAMES, ProbeFrame::EMPTY);
+            if depth == stack.levels.len() {
+                stack.levels.resize(depth + LEVELS, PendingChildren::EMPTY);
             }
-            let (above, below) = stack.frames.split_at_mut(depth);
-            let (frame, next) = (&mut above[depth - 1], &mut below[0]);
-            let Some(child) = frame.take_nearest(parts, visitor.limit()) else {
+            let (above, below) = stack.levels.split_at_mut(depth);
+            let (level, next) = (&mut above[depth - 1], &mut below[0]);
+            let Some(child) = level.take_nearest(parts, visitor.limit()) else {
                 depth -= 1;
                 continue;
             };
@@ -153,7 +153,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
             if opened == max_nodes {
                 return Err(too_many(bvh, object, max_nodes));
             }
-            let from = (&frame.groups, &frame.links, frame.page);
+            let from = (&level.groups, &level.links, level.page);
             let Some(Opened { links, page, .. }) =
                 open_child(isa, (bvh, object), from, child, &mut next.groups)?
             else {

@@ -22,9 +22,10 @@ use crate::traverse::placement::Placement;
 use bvh_format::quantize::STEP_U8;
 use bvh_format::slabs::Group;
 use bvh_format::turning::{BIAS, TurningCodes};
+use bytemuck::Zeroable;
 
 /// Four rows of four children.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 #[repr(C, align(64))]
 struct Rows([f32; 16]);
 
@@ -43,7 +44,7 @@ impl Rows {
 }
 
 /// The boxes and turning slabs of four children, in the frame of their object.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 pub(crate) struct TurningGroup {
     /// The centre of the box; in the last row the middle of the slab along its direction, from that centre.
     centre: Rows,
@@ -54,19 +55,13 @@ pub(crate) struct TurningGroup {
 }
 
 /// What the other side sees of four children.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Seen {
     direction: Rows,
     centre: Rows,
 }
 
-impl Seen {
-    pub(crate) const NONE: Self = Self { direction: Rows::ZERO, centre: Rows::ZERO };
-}
-
 impl TurningGroup {
-    pub(crate) const NONE: Self = Self { centre: Rows::ZERO, half: Rows::ZERO, direction: Rows::ZERO };
-
     /// Decodes the turning slabs of four children, given their fixed slabs.
     #[inline(always)]
     pub(crate) fn decode<I: Isa>(&mut self, isa: I, codes: &TurningCodes, group: &Group) {
@@ -461,7 +456,7 @@ mod tests {
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> TurningGroup {
-            let mut decoded = TurningGroup::NONE;
+            let mut decoded = TurningGroup::zeroed();
             decoded.decode(isa, self.0, self.1);
             decoded
         }
@@ -536,7 +531,7 @@ mod tests {
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
-            let mut decoded = [TurningGroup::NONE; 2];
+            let mut decoded = [TurningGroup::zeroed(); 2];
             for side in 0..2 {
                 let page = Page::new(&self.nodes[side].page.bytes, PROFILE);
                 let (mut parent, mut group) = (Group::of_one(&page.anchor_slabs(0)), Group::ZERO);
@@ -545,7 +540,7 @@ mod tests {
                 let codes = TurningCodes::read(page.treelet(0).first_chunk().expect("128 bytes"));
                 decoded[side].decode(isa, &codes, &parent);
             }
-            let (mut seen_a, mut seen_b) = (Seen::NONE, Seen::NONE);
+            let (mut seen_a, mut seen_b) = (Seen::zeroed(), Seen::zeroed());
             self.test.see_a(isa, &decoded[0], &mut seen_a);
             self.test.see_b(isa, &decoded[1], &mut seen_b);
             let mut bounds = [f32::NEG_INFINITY; 16];

@@ -4,9 +4,10 @@
 //! kept too few pairs apart leaves some tests out. Answers do not depend on it.
 
 use crate::isa::{Isa, Task};
-use crate::traverse::frames::Tested;
-use crate::traverse::node_cache::{CachedNode, NodeCache};
+use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_filter::{Measure, NodeFilter};
+use crate::traverse::pending::Tested;
+use crate::traverse::per_node::PerNode;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_filter::{Seen, SlabFilter, TurningGroup};
 
@@ -26,12 +27,14 @@ const FIRST_PAUSE: u32 = 24;
 /// The slab test of the walk under way, and what it needs of opened nodes.
 #[derive(Default)]
 pub(crate) struct SlabMemory {
-    nodes_a: Vec<NodeSlabs>,
-    nodes_b: Vec<NodeSlabs>,
+    /// The turning slabs of opened nodes, of A and of B.
+    groups: [PerNode<TurningGroup>; 2],
+    /// What the other side sees of them in this walk.
+    seen: [PerNode<Seen>; 2],
     test: Option<Box<SlabFilter>>,
     /// The walk for which `test` was prepared.
     prepared: u64,
-    /// Numbers walks, from 1.
+    /// The number of the walk under way.
     walk: u64,
     /// Whether the profiles of both sides have turning slabs.
     applies: bool,
@@ -44,9 +47,9 @@ pub(crate) struct SlabMemory {
 }
 
 impl SlabMemory {
-    /// Starts a walk.
-    pub(crate) fn start(&mut self, pair: &ObjectPair<'_>) {
-        self.walk += 1;
+    /// Starts a walk, which has a number of its own.
+    pub(crate) fn start(&mut self, walk: u64, pair: &ObjectPair<'_>) {
+        self.walk = walk;
         self.applies =
             pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
         (self.pause, self.balance, self.next_pause) = (NODE_TESTS_BEFORE_SLABS, 0, FIRST_PAUSE);
@@ -64,41 +67,6 @@ impl SlabMemory {
         self.pause = self.pause.saturating_sub(1);
         due && self.applies
     }
-}
-
-/// Turning slabs of an opened node, and what the other side sees of them.
-#[derive(Clone, Copy)]
-struct NodeSlabs {
-    group: TurningGroup,
-    seen: Seen,
-    /// The generation of nodes for which `group` was computed, and the walk for which `seen` was; 0 for none.
-    generation: u64,
-    walk: u64,
-}
-
-impl NodeSlabs {
-    const NONE: Self = Self { group: TurningGroup::NONE, seen: Seen::NONE, generation: 0, walk: 0 };
-
-    #[inline(always)]
-    fn decode<I: Isa>(&mut self, isa: I, node: &CachedNode, generation: u64) {
-        if self.generation != generation {
-            (self.generation, self.walk) = (generation, 0);
-            self.group.decode(isa, &node.turning, &node.groups[0]);
-        }
-    }
-}
-
-#[inline(always)]
-fn of(nodes: &mut Vec<NodeSlabs>, node: usize) -> &mut NodeSlabs {
-    if nodes.len() <= node {
-        grow(nodes, node);
-    }
-    &mut nodes[node]
-}
-
-#[cold]
-fn grow(nodes: &mut Vec<NodeSlabs>, node: usize) {
-    nodes.resize(node + 64, NodeSlabs::NONE);
 }
 
 /// Tests pairs that a node test has left along their turning slabs, and returns the lanes that are left.
@@ -128,18 +96,24 @@ impl Task for TestSlabs<'_> {
             memory.prepared = memory.walk;
             prepare(test, node_filter);
         }
-        let (a, b) = (of(&mut memory.nodes_a, number_a), of(&mut memory.nodes_b, number_b));
-        a.decode(isa, node_a, cache_a.generation());
-        b.decode(isa, node_b, cache_b.generation());
-        if a.walk != memory.walk {
-            a.walk = memory.walk;
-            test.see_a(isa, &a.group, &mut a.seen);
+        let ([groups_a, groups_b], [seen_a, seen_b]) = (&mut memory.groups, &mut memory.seen);
+        let (group_a, is_known) = groups_a.of(number_a, cache_a.generation());
+        if !is_known {
+            group_a.decode(isa, &node_a.turning, &node_a.groups[0]);
         }
-        if b.walk != memory.walk {
-            b.walk = memory.walk;
-            test.see_b(isa, &b.group, &mut b.seen);
+        let (group_b, is_known) = groups_b.of(number_b, cache_b.generation());
+        if !is_known {
+            group_b.decode(isa, &node_b.turning, &node_b.groups[0]);
         }
-        let (a, b) = ((&a.group, &a.seen), (&b.group, &b.seen));
+        let (seen_a, is_known) = seen_a.of(number_a, memory.walk);
+        if !is_known {
+            test.see_a(isa, group_a, seen_a);
+        }
+        let (seen_b, is_known) = seen_b.of(number_b, memory.walk);
+        if !is_known {
+            test.see_b(isa, group_b, seen_b);
+        }
+        let (a, b) = ((&*group_a, &*seen_a), (&*group_b, &*seen_b));
         let left = mask & test.run(isa, measure, a, b, limit, &mut tested.bounds);
         let apart = (mask & !left).count_ones() as i32;
         memory.balance += TESTS_SAVED_PER_PAIR * apart - 1;

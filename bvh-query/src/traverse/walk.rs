@@ -19,19 +19,22 @@
 //! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
 //! visited twice, except those of the first dive, and there are at most (nodes of A) * (nodes of B).
 //!
-//! Memory: each entry that is popped depth-first leaves at most four frames on the stack, one per node test, and those
-//! above it are one level deeper in A or in B. So there are at most 4 * (depth of A + depth of B) frames. A tree is no
+//! Memory: each entry that is popped depth-first leaves at most four node tests on the stack, and those
+//! above it are one level deeper in A or in B. So there are at most 4 * (depth of A + depth of B) tests. A tree is no
 //! deeper than its number of treelets. Nothing recurses.
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
-use crate::traverse::frames::Entry;
-use crate::traverse::node_cache::{CachedNode, ChildRef};
+use crate::traverse::large_leaf::LargeLeaves;
+use crate::traverse::leaf_pairs::LeafPairs;
+use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
+use crate::traverse::pending::{Entry, PendingTests};
+use crate::traverse::per_node::PerNode;
 use crate::traverse::placement::ObjectPair;
-use crate::traverse::slab_memory::TestSlabs;
-use crate::traverse::walk_memory::WalkMemory;
+use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
+use crate::traverse::walk_memory::{Budget, WalkMemory};
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -88,7 +91,7 @@ enum Phase {
     DepthFirst,
 }
 
-/// The most frames in the list before the walk goes on depth-first: as many as are searched in the time of a node test.
+/// The most tests in the list before the walk goes on depth-first: as many as are searched in the time of a node test.
 /// Answers do not depend on it.
 const MAX_LISTED_TESTS: usize = 256;
 
@@ -107,6 +110,29 @@ const NODE_TESTS_BEFORE_B_DIRECTIONS: u64 = 16;
 /// end before; bounding four triangles takes as long as two or three visits.
 const NODE_TESTS_BEFORE_TRIANGLE_BOUNDS: u64 = 128;
 
+/// The memory of pair walks, kept from one to the next.
+#[derive(Default)]
+pub(super) struct PairMemory {
+    node_filter: Box<NodeFilter>,
+    nodes_a: NodeCache,
+    nodes_b: NodeCache,
+    /// The groups of A's opened nodes along B's directions, computed when they are first needed.
+    aligned_a: PerNode<[Group; 2]>,
+    /// The groups of B's opened nodes along A's directions.
+    aligned_b: PerNode<[Group; 2]>,
+    /// The test along turning slabs.
+    slabs: SlabMemory,
+    /// Depth-first: the pairs that node tests left.
+    stack: PendingTests,
+    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
+    leaf_pairs: LeafPairs,
+    /// Best-first: the entry of least bound is next.
+    list: PendingTests,
+    large_leaves: LargeLeaves,
+    /// The number of the walk under way, or of the last one.
+    walk: u64,
+}
+
 /// Visits all pairs of leaf packets that may be within the visitor's limit. Returns the number of node tests.
 #[inline(always)]
 pub(crate) fn traverse<I: Isa, W: Visitor>(
@@ -115,117 +141,32 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     memory: &mut WalkMemory,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    let mut node_filter = memory.node_filter.take().unwrap_or_else(|| Box::new(NodeFilter::NONE));
-    let tests = walk(isa, pair, memory, &mut node_filter, visitor);
-    memory.node_filter = Some(node_filter);
-    tests
+    let (memory, budget) = memory.pair_walk();
+    memory.start(isa, &pair, W::SWEEPS)?;
+    let order = visitor.order();
+    let phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
+    let mut walk =
+        PairWalk { pair, memory, budget, visitor, limit: 0.0, witness: None, order, phase, tests: 0 };
+    walk.follow_visitor();
+    if walk.visit_all(isa)?.is_continue() {
+        isa.run(Finish(&mut *walk.visitor))?;
+    }
+    Ok(walk.tests)
 }
 
-#[inline(always)]
-fn walk<I: Isa, W: Visitor>(
-    isa: I,
-    pair: ObjectPair<'_>,
-    memory: &mut WalkMemory,
-    node_filter: &mut NodeFilter,
-    visitor: &mut W,
-) -> Result<u64, QueryError> {
-    memory.stack.clear();
-    memory.leaf_pairs.clear();
-    memory.list.clear();
-    memory.large_leaves.start();
-    memory.aligned_a.start();
-    memory.aligned_b.start();
-    let reach_a = memory.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
-    let reach_b = memory.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
-    memory.slabs.start(&pair);
-    node_filter.prepare(isa, &pair, (reach_a, reach_b));
-    if W::SWEEPS {
-        // What else bounds a pair knows of one placement only.
-        node_filter.prepare_end(isa, pair.end);
-        memory.slabs.stop();
-    }
-    let mut witness: Option<Witness> = None;
-    node_filter.update_witness(&mut witness, visitor.witness());
-    let (mut tests, mut leaves) = (0, 0);
-    let order = visitor.order();
-    let mut phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
-    memory.stack.push_one(Entry::ROOTS);
-    if phase == Phase::Dive {
-        // What follows the dive starts at the roots again.
-        memory.list.push_one(Entry::ROOTS);
-    }
-    loop {
-        if memory.leaf_pairs.len() >= LEAF_PAIRS_PER_BATCH
-            || memory.stack.is_empty() && memory.leaf_pairs.len() > 0
-        {
-            if memory.visit_leaf_pairs(isa, visitor)?.is_break() {
-                return Ok(tests);
-            }
-            node_filter.update_witness(&mut witness, visitor.witness());
-        }
-        let next = match memory.stack.pop(isa) {
-            Some(next) if next.bound > visitor.limit() => continue,
-            Some(next) => next,
-            None => {
-                if phase == Phase::Dive {
-                    // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
-                    phase = Phase::BestFirst;
-                }
-                match memory.list.pop_least(isa) {
-                    Some(least) if least.bound <= visitor.limit() => least,
-                    // If there is one, it is the least bound of all.
-                    _ => break,
-                }
-            }
-        };
-        memory.visit()?;
-        if let Some(leaves_of_pair) = memory.leaf_pair(next) {
-            let at_once = phase != Phase::DepthFirst;
-            if isa.run(VisitLeaves { visitor, leaves: leaves_of_pair, at_once })?.is_break() {
-                return Ok(tests);
-            }
-            node_filter.update_witness(&mut witness, visitor.witness());
-            leaves += u32::from(phase == Phase::BestFirst);
-            if matches!(order, Order::Best { leaves: enough } if phase == Phase::BestFirst && leaves >= enough)
-            {
-                phase = Phase::DepthFirst;
-                memory.list_to_stack();
-            }
-            continue;
-        }
-        let WalkMemory { nodes_a, nodes_b, large_leaves, .. } = memory;
-        if !W::SWEEPS
-            && tests >= NODE_TESTS_BEFORE_TRIANGLE_BOUNDS
-            && large_leaves.are_beyond(
-                &pair,
-                (nodes_a, nodes_b),
-                node_filter.reaches(),
-                next,
-                visitor.limit(),
-            )?
-        {
-            continue;
-        }
-        if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
-            node_filter.look_along_b(isa);
-        }
-        let sides = memory.open::<I, W>(isa, &pair, node_filter, next)?;
-        tests += memory.push_children(
-            isa,
-            W::MEASURE,
-            node_filter,
-            &witness,
-            &sides,
-            visitor.limit(),
-            (phase, order),
-        );
-        if phase == Phase::BestFirst && memory.list.len() > MAX_LISTED_TESTS {
-            phase = Phase::DepthFirst;
-            memory.list_to_stack();
-        }
-    }
-    isa.run(Finish(visitor))?;
-    Ok(tests)
+/// A walk of two objects.
+struct PairWalk<'a, 'p, W> {
+    pair: ObjectPair<'p>,
+    memory: &'a mut PairMemory,
+    budget: &'a mut Budget,
+    visitor: &'a mut W,
+    /// What the visitor said last.
+    limit: f32,
+    witness: Option<Witness>,
+    order: Order,
+    phase: Phase,
+    /// The number of node tests.
+    tests: u64,
 }
 
 /// Opened nodes of A and B whose children meet. If a node was not opened, its parent stands for it, and only this one child
@@ -283,11 +224,12 @@ impl Task for AlignA<'_> {
     }
 }
 
-/// Aligns an opened node of B to A's directions.
+/// Aligns an opened node of B to A's directions. Of sweeps, it joins the slabs in both placements.
 struct AlignB<'a> {
     node_filter: &'a NodeFilter,
     node: &'a CachedNode,
     to: &'a mut [Group; 2],
+    sweeps: bool,
 }
 
 impl Task for AlignB<'_> {
@@ -296,57 +238,35 @@ impl Task for AlignB<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         for part in 0..self.node.count.div_ceil(4) {
-            self.node_filter.align_b(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
-        }
-    }
-}
-
-/// Aligns an opened node of B in both placements to A's directions, and joins the slabs.
-struct AlignBothEnds<'a> {
-    node_filter: &'a NodeFilter,
-    node: &'a CachedNode,
-    to: &'a mut [Group; 2],
-}
-
-impl Task for AlignBothEnds<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        for part in 0..self.node.count.div_ceil(4) {
-            self.node_filter.align_b_at_both_ends(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
-        }
-    }
-}
-
-impl WalkMemory {
-    /// Goes on depth-first with the frames of the list, the least bound next. The stack is empty.
-    fn list_to_stack(&mut self) {
-        self.list.nearest_last();
-        std::mem::swap(&mut self.list, &mut self.stack);
-    }
-
-    /// Visits the pairs of leaf packets that have been collected.
-    #[inline(always)]
-    fn visit_leaf_pairs<I: Isa, W: Visitor>(
-        &mut self,
-        isa: I,
-        visitor: &mut W,
-    ) -> Result<ControlFlow<()>, QueryError> {
-        for at in 0..self.leaf_pairs.len() {
-            let next = self.leaf_pairs.get(at);
-            if next.bound > visitor.limit() {
-                continue;
-            }
-            self.visit()?;
-            if let Some(leaves) = self.leaf_pair(next)
-                && isa.run(VisitLeaves { visitor, leaves, at_once: false })?.is_break()
-            {
-                return Ok(ControlFlow::Break(()));
+            let (group, to) = (&self.node.groups[part & 1], &mut self.to[part & 1]);
+            if self.sweeps {
+                self.node_filter.align_b_at_both_ends(isa, group, to);
+            } else {
+                self.node_filter.align_b(isa, group, to);
             }
         }
+    }
+}
+
+impl PairMemory {
+    /// Starts a walk.
+    #[inline(always)]
+    fn start<I: Isa>(&mut self, isa: I, pair: &ObjectPair<'_>, sweeps: bool) -> Result<(), QueryError> {
+        self.walk += 1;
+        self.stack.clear();
         self.leaf_pairs.clear();
-        Ok(ControlFlow::Continue(()))
+        self.list.clear();
+        self.large_leaves.start();
+        let reach_a = self.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
+        let reach_b = self.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+        self.slabs.start(self.walk, pair);
+        self.node_filter.prepare(isa, pair, (reach_a, reach_b));
+        if sweeps {
+            // What else bounds a pair knows of one placement only.
+            self.node_filter.prepare_end(isa, pair.end);
+            self.slabs.stop();
+        }
+        Ok(())
     }
 
     /// Returns both leaf packets, if the entry is a pair of them.
@@ -356,17 +276,134 @@ impl WalkMemory {
         let b = self.nodes_b.get(entry.b.node()).leaf(entry.b.child())?;
         Some((a, b))
     }
+}
+
+impl<W: Visitor> PairWalk<'_, '_, W> {
+    /// Visits pairs until none is left or the visitor breaks.
+    #[inline(always)]
+    fn visit_all<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
+        let mut best_first_leaves = 0;
+        self.memory.stack.push_one(Entry::ROOTS);
+        if self.phase == Phase::Dive {
+            // What follows the dive starts at the roots again.
+            self.memory.list.push_one(Entry::ROOTS);
+        }
+        loop {
+            let waiting = self.memory.leaf_pairs.len();
+            if (waiting >= LEAF_PAIRS_PER_BATCH || waiting > 0 && self.memory.stack.is_empty())
+                && self.visit_leaf_pairs(isa)?.is_break()
+            {
+                return Ok(ControlFlow::Break(()));
+            }
+            let next = match self.memory.stack.pop(isa) {
+                Some(next) if next.bound > self.limit => continue,
+                Some(next) => next,
+                None => match self.least_listed(isa) {
+                    Some(least) => least,
+                    None => return Ok(ControlFlow::Continue(())),
+                },
+            };
+            self.budget.visit()?;
+            if let Some(leaves) = self.memory.leaf_pair(next) {
+                if self.visit_leaves(isa, leaves, self.phase != Phase::DepthFirst)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+                if self.phase == Phase::BestFirst {
+                    best_first_leaves += 1;
+                    if matches!(self.order, Order::Best { leaves } if best_first_leaves >= leaves) {
+                        self.go_on_depth_first();
+                    }
+                }
+                continue;
+            }
+            if self.is_beyond_large_leaf(next)? {
+                continue;
+            }
+            let sides = self.open(isa, next)?;
+            self.push_children(isa, &sides);
+            if self.phase == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
+                self.go_on_depth_first();
+            }
+        }
+    }
+
+    /// Takes the pair of least bound from the list, if it is within the limit. The stack is empty.
+    #[inline(always)]
+    fn least_listed<I: Isa>(&mut self, isa: I) -> Option<Entry> {
+        if self.phase == Phase::Dive {
+            // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
+            self.phase = Phase::BestFirst;
+        }
+        // If there is one, it is the least bound of all.
+        self.memory.list.pop_least(isa).filter(|least| least.bound <= self.limit)
+    }
+
+    /// Goes on depth-first with the tests of the list, the least bound next. The stack is empty.
+    fn go_on_depth_first(&mut self) {
+        self.phase = Phase::DepthFirst;
+        let PairMemory { stack, list, .. } = &mut *self.memory;
+        list.nearest_last();
+        std::mem::swap(list, stack);
+    }
+
+    /// Adopts what the visitor says now.
+    #[inline(always)]
+    fn follow_visitor(&mut self) {
+        self.limit = self.visitor.limit();
+        self.memory.node_filter.update_witness(&mut self.witness, self.visitor.witness());
+    }
+
+    /// Visits two leaf packets.
+    #[inline(always)]
+    fn visit_leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        leaves: (LeafPacket, LeafPacket),
+        at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        let flow = isa.run(VisitLeaves { visitor: &mut *self.visitor, leaves, at_once })?;
+        self.follow_visitor();
+        Ok(flow)
+    }
+
+    /// Visits the pairs of leaf packets that have been collected.
+    #[inline(always)]
+    fn visit_leaf_pairs<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
+        for at in 0..self.memory.leaf_pairs.len() {
+            let next = self.memory.leaf_pairs.get(at);
+            if next.bound > self.limit {
+                continue;
+            }
+            self.budget.visit()?;
+            if let Some(leaves) = self.memory.leaf_pair(next)
+                && self.visit_leaves(isa, leaves, false)?.is_break()
+            {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        self.memory.leaf_pairs.clear();
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// Returns whether an entry is a leaf packet whose triangles are beyond the limit of a much smaller node.
+    #[inline(always)]
+    fn is_beyond_large_leaf(&mut self, entry: Entry) -> Result<bool, QueryError> {
+        if W::SWEEPS || self.tests < NODE_TESTS_BEFORE_TRIANGLE_BOUNDS {
+            return Ok(false);
+        }
+        let PairMemory { node_filter, nodes_a, nodes_b, large_leaves, .. } = &mut *self.memory;
+        large_leaves.are_beyond(&self.pair, (nodes_a, nodes_b), node_filter.reaches(), entry, self.limit)
+    }
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
-    fn open<I: Isa, W: Visitor>(
-        &mut self,
-        isa: I,
-        pair: &ObjectPair<'_>,
-        node_filter: &NodeFilter,
-        entry: Entry,
-    ) -> Result<Sides, QueryError> {
-        let (node_a, node_b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
+    fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<Sides, QueryError> {
+        let (pair, tests) = (&self.pair, self.tests);
+        let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, walk, .. } = &mut *self.memory;
+        if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
+            node_filter.look_along_b(isa);
+        }
+        let (node_a, node_b) = (nodes_a.get(entry.a.node()), nodes_b.get(entry.b.node()));
         let (child_a, child_b) = (entry.a.child(), entry.b.child());
         let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
         let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
@@ -380,62 +417,69 @@ impl WalkMemory {
         // In a forged file both comparisons may hold: one node is opened in any case.
         let b_is_small = extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b && !a_is_small;
         if !leaf_a && (leaf_b || !a_is_small) {
-            let number = self.nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            let number = nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
             (sides.node_a, sides.only_a) = (number, None);
         }
         if !leaf_b && (leaf_a || !b_is_small) {
-            let number = self.nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            let number = nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             (sides.node_b, sides.only_b) = (number, None);
-            let (to, is_aligned) = self.aligned_b.of(number);
+            let (to, is_aligned) = aligned_b.of(number, *walk);
             if !is_aligned {
-                let node = self.nodes_b.get(number);
-                if W::SWEEPS {
-                    isa.run(AlignBothEnds { node_filter, node, to });
-                } else {
-                    isa.run(AlignB { node_filter, node, to });
-                }
+                let node = nodes_b.get(number);
+                isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
             }
         }
         Ok(sides)
     }
 
-    /// Tests all pairs of children and keeps those within the limit. Returns the number of tests.
+    /// Tests all pairs of children and keeps those within the limit.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "inlined at one place")]
-    fn push_children<I: Isa>(
-        &mut self,
-        isa: I,
-        measure: Measure,
-        node_filter: &NodeFilter,
-        witness: &Option<Witness>,
-        sides: &Sides,
-        limit: f32,
-        (phase, order): (Phase, Order),
-    ) -> u64 {
-        let first_frame = self.stack.len();
-        let (side_a, side_b) = (self.nodes_a.get(sides.node_a), self.nodes_b.get(sides.node_b));
-        let (aligned_b, is_aligned) = self.aligned_b.of(sides.node_b);
-        // It was when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
-        debug_assert!(is_aligned, "node {} of B was not aligned in this walk", sides.node_b);
-        let mut tests = 0;
+    fn push_children<I: Isa>(&mut self, isa: I, sides: &Sides) {
+        let (measure, limit, phase, order) = (W::MEASURE, self.limit, self.phase, self.order);
+        let witness = &self.witness;
+        let PairMemory {
+            node_filter,
+            nodes_a,
+            nodes_b,
+            aligned_a,
+            aligned_b,
+            slabs,
+            stack,
+            leaf_pairs,
+            list,
+            walk,
+            ..
+        } = &mut *self.memory;
+        let node_filter = &**node_filter;
+        let first_new = stack.len();
+        let (side_a, side_b) = (nodes_a.get(sides.node_a), nodes_b.get(sides.node_b));
+        // It was computed when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
+        let aligned_b = aligned_b.get(sides.node_b);
         let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
         while part_a < end_a {
             let (mut part_b, end_b) = parts(sides.only_b, side_b.count);
             while part_b < end_b {
-                let tested = if phase == Phase::BestFirst { self.list.room() } else { self.stack.room() };
+                let tested = if phase == Phase::BestFirst { list.room() } else { stack.room() };
                 tested.a = ChildRef::new(sides.node_a, 4 * part_a);
                 tested.b = ChildRef::new(sides.node_b, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
                 let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
                 mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
                 mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
-                if mask != 0 && self.slabs.are_due() {
-                    let memory = &mut self.slabs;
-                    let nodes = ((&self.nodes_a, sides.node_a), (&self.nodes_b, sides.node_b));
-                    mask = isa.run(TestSlabs { memory, node_filter, measure, nodes, limit, tested, mask });
+                if mask != 0 && slabs.are_due() {
+                    let nodes = ((&*nodes_a, sides.node_a), (&*nodes_b, sides.node_b));
+                    mask = isa.run(TestSlabs {
+                        memory: slabs,
+                        node_filter,
+                        measure,
+                        nodes,
+                        limit,
+                        tested,
+                        mask,
+                    });
                 }
                 if mask != 0 && node_filter.looks_along_b() {
-                    let (to, is_aligned) = self.aligned_a.of(sides.node_a);
+                    let (to, is_aligned) = aligned_a.of(sides.node_a, *walk);
                     if !is_aligned {
                         isa.run(AlignA { node_filter, node: side_a, to });
                     }
@@ -444,7 +488,7 @@ impl WalkMemory {
                 }
                 if phase == Phase::DepthFirst {
                     let leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
-                    self.leaf_pairs.append(isa, tested, mask & leaves);
+                    leaf_pairs.append(isa, tested, mask & leaves);
                     mask &= !leaves;
                 }
                 let first = match order {
@@ -452,19 +496,18 @@ impl WalkMemory {
                     _ => isa.least(&tested.bounds, mask),
                 };
                 match phase {
-                    Phase::DepthFirst => self.stack.push(mask, first),
-                    Phase::BestFirst => self.list.push(mask, first),
-                    Phase::Dive => self.stack.push(mask & 1u16.unbounded_shl(first), first),
+                    Phase::DepthFirst => stack.push(mask, first),
+                    Phase::BestFirst => list.push(mask, first),
+                    Phase::Dive => stack.push(mask & 1u16.unbounded_shl(first), first),
                 }
-                tests += 1;
+                self.tests += 1;
                 part_b += 1;
             }
             part_a += 1;
         }
         if phase == Phase::Dive {
-            self.stack.keep_nearest(first_frame);
+            stack.keep_nearest(first_new);
         }
-        tests
     }
 }
 

@@ -2,15 +2,9 @@
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::traverse::frames::Frames;
-use crate::traverse::large_leaf::LargeLeaves;
-use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::NodeCache;
-use crate::traverse::node_filter::NodeFilter;
 use crate::traverse::probe_walk::{ProbeStack, ProbeVisitor, ProbeWalk};
-use crate::traverse::slab_memory::SlabMemory;
+use crate::traverse::walk::PairMemory;
 use bvh_format::object::Object;
-use bvh_format::slabs::Group;
 
 /// The number of visits that a look ahead may make beyond those of the query: they cost less than finding out whether
 /// they pay.
@@ -19,23 +13,7 @@ const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
 /// What walks need, and how many visits are left to a query.
 #[derive(Default)]
 pub(crate) struct WalkMemory {
-    /// Taken out while a walk is under way.
-    pub(super) node_filter: Option<Box<NodeFilter>>,
-    pub(super) nodes_a: NodeCache,
-    pub(super) nodes_b: NodeCache,
-    /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    pub(super) aligned_a: Aligned,
-    /// The groups of B's opened nodes along A's directions.
-    pub(super) aligned_b: Aligned,
-    /// The test along turning slabs.
-    pub(super) slabs: SlabMemory,
-    /// Depth-first: the pairs that node tests left.
-    pub(super) stack: Frames,
-    /// Depth-first: pairs of leaf packets, visited several at a time in the order in which they came.
-    pub(super) leaf_pairs: LeafPairs,
-    /// Best-first: the entry of least bound is next.
-    pub(super) list: Frames,
-    pub(super) large_leaves: LargeLeaves,
+    pairs: PairMemory,
     probes: ProbeStack,
     budget: Budget,
 }
@@ -110,6 +88,11 @@ impl WalkMemory {
         &self.budget
     }
 
+    /// Returns the memory of pair walks, and the budget.
+    pub(super) fn pair_walk(&mut self) -> (&mut PairMemory, &mut Budget) {
+        (&mut self.pairs, &mut self.budget)
+    }
+
     /// Returns a walk of one object for a probe.
     pub(crate) fn probe_walk<'a, V: ProbeVisitor>(
         &'a mut self,
@@ -137,41 +120,5 @@ impl WalkMemory {
     /// Counts some visits.
     pub(crate) fn charge(&mut self, visits: u64) -> Result<(), QueryError> {
         self.budget.charge(visits)
-    }
-}
-
-/// The groups of opened nodes along the directions of the other side, by the number of the node.
-#[derive(Default)]
-pub(super) struct Aligned {
-    groups: Vec<[Group; 2]>,
-    /// The walk for which each was computed; 0 for none.
-    walks: Vec<u32>,
-    walk: u32,
-}
-
-impl Aligned {
-    /// Forgets all groups, before a walk.
-    pub(super) fn start(&mut self) {
-        self.walk = self.walk.wrapping_add(1);
-        if self.walk == 0 {
-            self.walks.fill(0);
-            self.walk = 1;
-        }
-    }
-
-    /// Returns the groups of a node, and whether they have been computed. If not, the caller computes them.
-    #[inline(always)]
-    pub(super) fn of(&mut self, node: usize) -> (&mut [Group; 2], bool) {
-        if self.walks.len() <= node {
-            self.grow(node);
-        }
-        let known = std::mem::replace(&mut self.walks[node], self.walk) == self.walk;
-        (&mut self.groups[node], known)
-    }
-
-    #[cold]
-    fn grow(&mut self, node: usize) {
-        self.groups.resize(node + 64, [Group::ZERO; 2]);
-        self.walks.resize(node + 64, 0);
     }
 }

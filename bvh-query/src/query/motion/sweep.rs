@@ -46,7 +46,7 @@ impl Querier {
         let mut visitor = Swept {
             packets: &mut self.packets,
             packets_at_end: &mut self.at_end.packets,
-            candidates: Candidates {
+            candidates: SweptCandidates {
                 placed: [placed.moved(&sweep.start, &start), placed.moved(&sweep.end, &end)],
                 queues: [&mut self.queue, &mut self.at_end.queue],
                 sweep,
@@ -69,11 +69,11 @@ struct Swept<'a> {
     /// Of A, and of B at the start of the interval.
     packets: &'a mut [PlacedPackets; 2],
     packets_at_end: &'a mut PlacedPackets,
-    candidates: Candidates<'a>,
+    candidates: SweptCandidates<'a>,
 }
 
 /// Looks at pairs of triangles, 16 at a time, and keeps those that the interval does not set apart.
-struct Candidates<'a> {
+struct SweptCandidates<'a> {
     /// With B at the start of the interval and at its end.
     placed: [PlacedPair<'a>; 2],
     queues: [&'a mut TriangleQueue; 2],
@@ -94,7 +94,7 @@ pub(super) struct Room {
     pub(super) packet_tests: u64,
 }
 
-impl Candidates<'_> {
+impl SweptCandidates<'_> {
     fn is_full(&self) -> bool {
         self.found.len() > self.room.pairs || self.stats.packet_tests > self.room.packet_tests
     }

@@ -1,8 +1,8 @@
-//! The pairs that a walk has still to visit, in one frame per node test.
+//! The pairs that a walk has still to visit, kept by the node test that left them.
 //!
-//! A test writes its 16 bounds straight into a frame, and the frame marks the pairs that are left in a mask. So pairs are
-//! neither moved nor sorted, and no branch depends on how many there are. Depth-first, the last frame is next;
-//! best-first, the frame with the least bound.
+//! A test writes its 16 bounds straight into the list, and a mask marks the pairs that are left. So pairs are neither
+//! moved nor sorted, and no branch depends on how many there are. Depth-first, the last test is next; best-first, the test
+//! with the least bound.
 
 use crate::isa::Isa;
 use crate::traverse::node_cache::ChildRef;
@@ -44,7 +44,7 @@ impl Tested {
 
 /// A test and the pairs of it that are left. There is at least one.
 #[derive(Clone, Copy)]
-struct Frame {
+struct PendingTest {
     tested: Tested,
     /// The lanes of the pairs that are left.
     left: u16,
@@ -52,7 +52,7 @@ struct Frame {
     next: u32,
 }
 
-impl Frame {
+impl PendingTest {
     /// Returns the bound of the next pair.
     #[inline(always)]
     fn bound(&self) -> f32 {
@@ -60,15 +60,15 @@ impl Frame {
     }
 }
 
-/// The frames of the tests that still have pairs.
+/// The tests that still have pairs to visit.
 #[derive(Default)]
-pub(crate) struct Frames {
-    /// At least one longer than `len`, once a frame has been asked for.
-    frames: Vec<Frame>,
+pub(crate) struct PendingTests {
+    /// At least one longer than `len`, once room has been asked for.
+    tests: Vec<PendingTest>,
     len: usize,
 }
 
-impl Frames {
+impl PendingTests {
     pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
@@ -78,25 +78,25 @@ impl Frames {
         self.len == 0
     }
 
-    /// Returns room for the next test. `push` makes a frame of it.
+    /// Returns room for the next test. `push` keeps it.
     #[inline(always)]
     pub(crate) fn room(&mut self) -> &mut Tested {
-        if self.frames.len() <= self.len {
+        if self.tests.len() <= self.len {
             self.grow();
         }
-        &mut self.frames[self.len].tested
+        &mut self.tests[self.len].tested
     }
 
     #[cold]
     fn grow(&mut self) {
-        self.frames.resize(2 * self.len + 64, Frame { tested: Tested::NONE, left: 0, next: 0 });
+        self.tests.resize(2 * self.len + 64, PendingTest { tested: Tested::NONE, left: 0, next: 0 });
     }
 
-    /// Makes a frame of the test in `room`, unless no pairs are left. The pair in lane `first` comes first.
+    /// Keeps the test in `room`, unless no pairs are left. The pair in lane `first` comes first.
     #[inline(always)]
     pub(crate) fn push(&mut self, left: u16, first: u32) {
-        if let Some(frame) = self.frames.get_mut(self.len) {
-            (frame.left, frame.next) = (left, first);
+        if let Some(test) = self.tests.get_mut(self.len) {
+            (test.left, test.next) = (left, first);
             self.len += usize::from(left != 0);
         }
     }
@@ -109,50 +109,50 @@ impl Frames {
         self.push(1, 0);
     }
 
-    /// Takes the next pair of the last frame, and finds the nearest of those that are left: nothing waits for that before
+    /// Takes the next pair of the last test, and finds the nearest of those that are left: nothing waits for that before
     /// the next pair is taken.
     #[inline(always)]
     pub(crate) fn pop<I: Isa>(&mut self, isa: I) -> Option<Entry> {
         let last = self.len.checked_sub(1)?;
-        let frame = &mut self.frames[last];
-        let entry = frame.tested.entry(frame.next);
-        frame.left &= !(1 << (frame.next & 15));
-        frame.next = isa.least(&frame.tested.bounds, frame.left);
-        self.len -= usize::from(frame.left == 0);
+        let test = &mut self.tests[last];
+        let entry = test.tested.entry(test.next);
+        test.left &= !(1 << (test.next & 15));
+        test.next = isa.least(&test.tested.bounds, test.left);
+        self.len -= usize::from(test.left == 0);
         Some(entry)
     }
 
-    /// Takes the pair of least bound, if each frame's next pair is its nearest. The order of the frames changes.
+    /// Takes the pair of least bound, if each test's next pair is its nearest. The order of the tests changes.
     #[inline(always)]
     pub(crate) fn pop_least<I: Isa>(&mut self, isa: I) -> Option<Entry> {
         self.nearest_last();
         self.pop(isa)
     }
 
-    /// Moves the frame whose next pair has the least bound to the end.
+    /// Moves the test whose next pair has the least bound to the end.
     #[inline(always)]
     pub(crate) fn nearest_last(&mut self) {
         let Some(last) = self.len.checked_sub(1) else { return };
-        let (mut place, mut least) = (last, self.frames[last].bound());
-        for (at, frame) in self.frames[..last].iter().enumerate() {
-            let bound = frame.bound();
+        let (mut place, mut least) = (last, self.tests[last].bound());
+        for (at, test) in self.tests[..last].iter().enumerate() {
+            let bound = test.bound();
             (place, least) = if bound < least { (at, bound) } else { (place, least) };
         }
-        self.frames.swap(place, last);
+        self.tests.swap(place, last);
     }
 
-    /// Returns the number of frames.
+    /// Returns the number of tests.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    /// Leaves, of the frames from `start` on, only the one whose next pair has the least bound.
+    /// Leaves, of the tests from `start` on, only the one whose next pair has the least bound.
     #[inline(always)]
     pub(crate) fn keep_nearest(&mut self, start: usize) {
         for at in start + 1..self.len {
-            if self.frames[at].bound() < self.frames[start].bound() {
-                self.frames.swap(start, at);
+            if self.tests[at].bound() < self.tests[start].bound() {
+                self.tests.swap(start, at);
             }
         }
         self.len = self.len.min(start + 1);
