@@ -1,7 +1,7 @@
 //! An opened `.cbvh` file: its bytes, its objects, and which of its pages have been checked.
 
 use crate::error::{OpenError, QueryError};
-use crate::file::mapped::{self, ReadAhead};
+use crate::file::memory;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
@@ -76,10 +76,10 @@ impl AsRef<[u8]> for MapOwner {
 }
 
 impl Bvh {
-    /// Opens a file that is mapped. `read_ahead` is what the system was told about it.
-    pub(super) fn of_map(path: &Path, map: Mmap, read_ahead: ReadAhead) -> Result<Self, OpenError> {
+    /// Opens a file that is mapped. If it is `sparse`, the system reads no more of it than it is asked for.
+    pub(super) fn of_map(path: &Path, map: Mmap, sparse: bool) -> Result<Self, OpenError> {
         let map = Arc::new(map);
-        let advised = (read_ahead == ReadAhead::Sparse).then(|| map.clone());
+        let advised = sparse.then(|| map.clone());
         let opened = Self::new(Bytes::from_owner(MapOwner(map)), advised);
         opened.map_err(|source| OpenError::format(path, source))
     }
@@ -94,7 +94,7 @@ impl Bvh {
     /// break a rule of the format.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        let bytes = mapped::read(path).map_err(|source| OpenError::io(path, source))?;
+        let bytes = memory::read(path).map_err(|source| OpenError::io(path, source))?;
         Self::new(Bytes::from_owner(bytes), None).map_err(|source| OpenError::format(path, source))
     }
 
@@ -109,7 +109,7 @@ impl Bvh {
     /// The rule that the header or the object table breaks.
     pub fn from_bytes(bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, FormatError> {
         let slice = bytes.as_ref();
-        let copy = (slice.len() >= MIN_LARGE_PAGES_BYTES).then(|| mapped::copy(slice).ok()).flatten();
+        let copy = (slice.len() >= MIN_LARGE_PAGES_BYTES).then(|| memory::copy(slice).ok()).flatten();
         Self::new(copy.map_or_else(|| Bytes::from_owner(bytes), Bytes::from_owner), None)
     }
 
@@ -268,13 +268,13 @@ impl Bvh {
         Ok(())
     }
 
-    /// Tells the system which block is about to be checked, if the file was opened with [`ReadAhead::Sparse`].
+    /// Tells the system which block is about to be checked, if the file was opened with `ReadAhead::Sparse`.
     fn will_need(&self, block: &[u8]) {
         if let Some(map) = &self.0.advised
             && !block.is_empty()
         {
             let start = block.as_ptr() as usize - map.as_ptr() as usize;
-            mapped::will_need(map, start..start + block.len());
+            memory::will_need(map, start..start + block.len());
         }
     }
 

@@ -1,14 +1,13 @@
-//! Read-only memory maps, of files and of copies of files: the one place where the bytes of a file become memory.
+//! Maps files where they are.
 //!
 //! Mapping is `unsafe`, as in other libraries: [`Bvh::map`] states what its caller has to promise.
 
 use crate::error::OpenError;
 use crate::file::bvh::Bvh;
 use crate::file::files::Files;
-use memmap2::{Mmap, MmapMut};
+use memmap2::Mmap;
 use std::fs::{File, Metadata};
-use std::io::{self, Read};
-use std::ops::Range;
+use std::io;
 use std::path::Path;
 
 /// How the system reads a mapped file from its disk.
@@ -66,7 +65,7 @@ impl Bvh {
         let path = path.as_ref();
         // SAFETY: the caller vouches for the same.
         let map = unsafe { map(path, read_ahead) }.map_err(|source| OpenError::io(path, source))?;
-        Self::of_map(path, map, read_ahead)
+        Self::of_map(path, map, read_ahead == ReadAhead::Sparse)
     }
 }
 
@@ -110,42 +109,4 @@ fn require_mappable(metadata: &Metadata) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));
     }
     if metadata.is_file() { Ok(()) } else { Err(io::Error::other("not a regular file")) }
-}
-
-/// Asks the system to read a part of a map, all of which is about to be needed.
-pub(crate) fn will_need(map: &Mmap, part: Range<usize>) {
-    // What is wrong with the hint shows when the bytes are read.
-    #[cfg(unix)]
-    let _ = map.advise_range(memmap2::Advice::WillNeed, part.start, part.len());
-}
-
-/// Reads a whole file into anonymous memory.
-pub(crate) fn read(path: &Path) -> io::Result<Mmap> {
-    let mut file = File::open(path)?;
-    let metadata = file.metadata()?;
-    if !metadata.is_file() {
-        // A pipe does not tell its length.
-        return copy(&std::fs::read(path)?);
-    }
-    let length = usize::try_from(metadata.len()).map_err(|_| io::Error::from(io::ErrorKind::FileTooLarge))?;
-    let mut memory = memory(length)?;
-    file.read_exact(&mut memory)?;
-    memory.make_read_only()
-}
-
-/// Copies bytes into anonymous memory.
-pub(crate) fn copy(bytes: &[u8]) -> io::Result<Mmap> {
-    let mut memory = memory(bytes.len())?;
-    memory.copy_from_slice(bytes);
-    memory.make_read_only()
-}
-
-/// Maps anonymous memory, in large pages where the system has them: a query touches a few cache lines in each of many
-/// pages, and each page costs an address translation.
-fn memory(length: usize) -> io::Result<MmapMut> {
-    let memory = MmapMut::map_anon(length)?;
-    // A kernel without large pages refuses the hint; the memory serves as well.
-    #[cfg(target_os = "linux")]
-    let _ = memory.advise(memmap2::Advice::HugePage);
-    Ok(memory)
 }
