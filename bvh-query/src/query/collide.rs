@@ -61,7 +61,7 @@ impl Querier {
         &mut self,
         placed: &PlacedPair<'_>,
     ) -> Result<Option<TrianglePair>, QueryError> {
-        self.memory.visit()?;
+        self.memory.budget.visit()?;
         if surely_apart(&placed.pair) {
             return Ok(None);
         }

@@ -78,14 +78,14 @@ impl Querier {
         placed: &PlacedPair<'_>,
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<Option<TrianglePair>, QueryError> {
-        self.memory.visit()?;
+        self.memory.budget.visit()?;
         if surely_apart(&placed.pair) {
             return Ok(None);
         }
         self.queue.clear();
         self.packets.iter_mut().for_each(PlacedPackets::start);
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
-        let budget = *self.memory.budget();
+        let budget = self.memory.budget;
         let mut contacts = 0;
         let mut count = |contact| {
             if contacts == budget.left() {
@@ -111,7 +111,7 @@ impl Querier {
         let tests = self.backend.run(task)?;
         let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
-        self.memory.charge(contacts)?;
+        self.memory.budget.charge(contacts)?;
         Ok(found)
     }
 }

@@ -133,7 +133,7 @@ impl Querier {
         search: &mut Search,
     ) -> Result<(), QueryError> {
         each_pair(a, b, pose, |placed| {
-            self.memory.visit()?;
+            self.memory.budget.visit()?;
             let gap = sphere_gap(placed.pair.placement, placed.pair.object_a, placed.pair.object_b);
             if gap > f64::from(search.limit()) {
                 return Ok(None);

@@ -139,6 +139,7 @@ impl<W: Visitor> Task for Walk<'_, W> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        traverse(isa, self.pair, self.memory, self.visitor)
+        let WalkMemory { pairs, budget, .. } = self.memory;
+        traverse(isa, self.pair, pairs, budget, self.visitor)
     }
 }

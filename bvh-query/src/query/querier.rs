@@ -8,7 +8,8 @@ use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::search::BoundedPair;
-use crate::traverse::walk_memory::{Budget, WalkMemory};
+use crate::traverse::budget::Budget;
+use crate::traverse::walk_memory::WalkMemory;
 
 /// Asks questions about two meshes.
 ///
@@ -107,17 +108,17 @@ impl Querier {
 
     /// Returns how many visits the last query made.
     pub(crate) fn visits(&self) -> u64 {
-        self.memory.budget().made()
+        self.memory.budget.made()
     }
 
     /// Charges a visit that is made outside of queries, by what puts them together.
     pub(crate) fn charge_visit(&mut self) -> Result<(), QueryError> {
-        self.memory.visit()
+        self.memory.budget.visit()
     }
 
     /// Charges a look at each object of a shape. The first one comes with the question.
     pub(super) fn look_at_objects(&mut self, shape: Shape<'_>) -> Result<(), QueryError> {
-        self.memory.charge(shape.objects().len().saturating_sub(1) as u64)
+        self.memory.budget.charge(shape.objects().len().saturating_sub(1) as u64)
     }
 
     /// Returns the backend in use.
@@ -139,6 +140,6 @@ impl Querier {
     pub(crate) fn start(&mut self) {
         self.stats = QueryStats::default();
         self.questions += 1;
-        self.memory.start(self.budget);
+        self.memory.budget = self.budget;
     }
 }

@@ -268,7 +268,7 @@ impl Tracker {
         }
         let room = beyond + LOOK_AHEAD_MOTIONS * moved;
         let mut search = Search::new(DistanceOptions::default(), room);
-        querier.memory.allow_as_much_again();
+        querier.memory.budget.allow_as_much_again();
         if querier.search(a, b, pose, &mut search).is_ok() && !search.done {
             self.bounds = Some(DistanceBounds { pose: *pose, lower: room, upper: f64::INFINITY });
             self.waited = 0;

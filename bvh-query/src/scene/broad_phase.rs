@@ -14,7 +14,7 @@
 use crate::error::QueryError;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
-use crate::traverse::walk_memory::Budget;
+use crate::traverse::budget::Budget;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;

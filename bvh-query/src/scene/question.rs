@@ -10,7 +10,7 @@ use crate::query::tracker::Tracker;
 use crate::scene::broad_phase::NearestFirst;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::{Scene, SceneError};
-use crate::traverse::walk_memory::Budget;
+use crate::traverse::budget::Budget;
 use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -4,7 +4,7 @@ use crate::error::QueryError;
 use crate::isa::Backend;
 use crate::query::answers::QueryStats;
 use crate::query::querier::Querier;
-use crate::traverse::walk_memory::Budget;
+use crate::traverse::budget::Budget;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};

@@ -1,6 +1,7 @@
 //! Walks two trees together, or one for a probe: decoding, re-alignment, node tests, order of visits.
 
 pub(crate) mod align;
+pub(crate) mod budget;
 pub(crate) mod decode;
 pub(crate) mod large_leaf;
 pub(crate) mod leaf_pairs;

@@ -26,6 +26,7 @@
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Task};
+use crate::traverse::budget::Budget;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
@@ -34,7 +35,6 @@ use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerNode;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
-use crate::traverse::walk_memory::{Budget, WalkMemory};
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -112,7 +112,7 @@ const NODE_TESTS_BEFORE_TRIANGLE_BOUNDS: u64 = 128;
 
 /// The memory of pair walks, kept from one to the next.
 #[derive(Default)]
-pub(super) struct PairMemory {
+pub(crate) struct PairMemory {
     node_filter: Box<NodeFilter>,
     nodes_a: NodeCache,
     nodes_b: NodeCache,
@@ -138,10 +138,10 @@ pub(super) struct PairMemory {
 pub(crate) fn traverse<I: Isa, W: Visitor>(
     isa: I,
     pair: ObjectPair<'_>,
-    memory: &mut WalkMemory,
+    memory: &mut PairMemory,
+    budget: &mut Budget,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    let (memory, budget) = memory.pair_walk();
     memory.start(isa, &pair, W::SWEEPS)?;
     let order = visitor.order();
     let phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };

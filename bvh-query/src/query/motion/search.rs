@@ -197,7 +197,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     /// Returns the middle of a stretch of time, which is charged: it takes a look at each object of B.
     fn middle(&mut self, stretch: &Stretch) -> Result<Middle, QueryError> {
-        self.querier.memory.charge(self.question.b.objects().len() as u64)?;
+        self.querier.memory.budget.charge(self.question.b.objects().len() as u64)?;
         Ok(self.question.middle(stretch))
     }
 
@@ -379,7 +379,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                 Kept::new(found)
             }
         };
-        self.querier.memory.visit()?;
+        self.querier.memory.budget.visit()?;
         // One pair that is not apart suffices. It is the first one to look at in both halves; those before it are apart all
         // the time, and those behind it are not looked at yet.
         Ok(Some(self.querier.leave_out(&sweep, pairs)))

@@ -34,7 +34,7 @@ impl Querier {
         found: &mut Vec<SweptPair>,
         room: Room,
     ) -> Result<bool, QueryError> {
-        self.memory.visit()?;
+        self.memory.budget.visit()?;
         let ObjectPair { object_a, object_b, .. } = placed.pair;
         let start = Placement::new(&sweep.start, object_a, object_b);
         let end = Placement::new(&sweep.end, object_a, object_b);

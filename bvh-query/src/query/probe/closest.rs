@@ -86,7 +86,7 @@ impl Querier {
             settled_lower: f64::INFINITY,
         };
         for index in 0..placed.shape.objects().len() {
-            self.memory.visit()?;
+            self.memory.budget.visit()?;
             let (memory, bounded) = (&mut self.memory, &mut self.bounded_triangles);
             let (tests, stats) =
                 self.backend.run(SearchObject { search: &mut search, placed, index, memory, bounded })?;

@@ -93,7 +93,7 @@ impl Querier {
         question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
         for (index, object) in placed.shape.objects().iter().enumerate() {
-            self.memory.visit()?;
+            self.memory.budget.visit()?;
             let into = IntoObject::new(placed.pose.as_ref(), object);
             self.ask_line_of_object(placed, index, &into, question)?;
         }

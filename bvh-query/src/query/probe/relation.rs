@@ -67,7 +67,7 @@ impl Querier {
             let topology = bvh.topology(mesh.shape.first() + index)?;
             let mut is_known = true;
             for other in 0..container.shape.objects().len() {
-                self.memory.visit()?;
+                self.memory.budget.visit()?;
                 let number = container.shape.first() + other;
                 is_known &= container.shape.bvh().topology(number)?.closed || !may_contain(index, other);
             }

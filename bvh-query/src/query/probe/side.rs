@@ -74,7 +74,7 @@ impl Querier {
     ) -> Result<Side, QueryError> {
         let (mut undefined, mut winding) = (false, 0);
         for (index, object) in placed.shape.objects().iter().enumerate() {
-            self.memory.visit()?;
+            self.memory.budget.visit()?;
             let into = IntoObject::new(placed.pose.as_ref(), object);
             let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
             undefined |= !topology.closed && open == OpenObject::Undefined;
