@@ -10,6 +10,37 @@
 //! round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters
 //! with derived error bounds.
 
+/// Calls intrinsics whose features the token of a backend stands for.
+#[cfg(target_arch = "x86_64")]
+macro_rules! with_features {
+    ($body:expr) => {
+        // SAFETY: a value of the backend's types exists only if `detect` has found the CPU to have all features that these
+        // intrinsics need. Loads and stores go through references to arrays of exactly their size, or to parts of such
+        // arrays, and need no alignment.
+        unsafe { $body }
+    };
+}
+
+/// Defines methods of `Lanes` by an intrinsic each, for lanes in one register, `(0)`, or in two, `(0, 1)`.
+#[cfg(target_arch = "x86_64")]
+macro_rules! by_intrinsics {
+    ($registers:tt $($name:ident($($other:ident),*) $intrinsic:ident;)+) => {
+        $(by_intrinsics!(@ $registers $name($($other),*) $intrinsic);)+
+    };
+    (@ (0) $name:ident($($other:ident),*) $intrinsic:ident) => {
+        #[inline(always)]
+        fn $name(self, $($other: Self),*) -> Self {
+            Self(with_features!($intrinsic(self.0, $($other.0),*)))
+        }
+    };
+    (@ (0, 1) $name:ident($($other:ident),*) $intrinsic:ident) => {
+        #[inline(always)]
+        fn $name(self, $($other: Self),*) -> Self {
+            with_features!(Self($intrinsic(self.0, $($other.0),*), $intrinsic(self.1, $($other.1),*)))
+        }
+    };
+}
+
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
 pub(crate) mod avx2;

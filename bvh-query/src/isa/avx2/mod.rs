@@ -42,52 +42,20 @@ fn run_with_features<T: Task>(isa: Avx2, task: T) -> T::Output {
     task.run(isa)
 }
 
-/// Calls intrinsics whose features the token stands for.
-macro_rules! with_features {
-    ($body:expr) => {
-        // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
-        // all features that these intrinsics need. Loads and stores go through references to
-        // arrays of exactly their size, or to halves of such arrays, and need no alignment.
-        unsafe { $body }
-    };
-}
-
 impl Lanes for Y {
     type Mask = Y;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm256_add_ps(self.0, other.0)), with_features!(_mm256_add_ps(self.1, other.1)))
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(with_features!(_mm256_sub_ps(self.0, other.0)), with_features!(_mm256_sub_ps(self.1, other.1)))
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(with_features!(_mm256_mul_ps(self.0, other.0)), with_features!(_mm256_mul_ps(self.1, other.1)))
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(with_features!(_mm256_div_ps(self.0, other.0)), with_features!(_mm256_div_ps(self.1, other.1)))
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(
-            with_features!(_mm256_fmadd_ps(self.0, factor.0, term.0)),
-            with_features!(_mm256_fmadd_ps(self.1, factor.1, term.1)),
-        )
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(
-            with_features!(_mm256_fnmadd_ps(self.0, factor.0, term.0)),
-            with_features!(_mm256_fnmadd_ps(self.1, factor.1, term.1)),
-        )
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(with_features!(_mm256_sqrt_ps(self.0)), with_features!(_mm256_sqrt_ps(self.1)))
+    by_intrinsics! {
+        (0, 1)
+        add(other) _mm256_add_ps;
+        sub(other) _mm256_sub_ps;
+        mul(other) _mm256_mul_ps;
+        div(other) _mm256_div_ps;
+        mul_add(factor, term) _mm256_fmadd_ps;
+        neg_mul_add(factor, term) _mm256_fnmadd_ps;
+        sqrt() _mm256_sqrt_ps;
+        min(other) _mm256_min_ps;
+        max(other) _mm256_max_ps;
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -95,14 +63,6 @@ impl Lanes for Y {
             let sign = _mm256_set1_ps(-0.0);
             Self(_mm256_andnot_ps(sign, self.0), _mm256_andnot_ps(sign, self.1))
         })
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self(with_features!(_mm256_min_ps(self.0, other.0)), with_features!(_mm256_min_ps(self.1, other.1)))
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self(with_features!(_mm256_max_ps(self.0, other.0)), with_features!(_mm256_max_ps(self.1, other.1)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> Y {
@@ -131,45 +91,21 @@ impl Lanes for Y {
 impl Lanes for X {
     type Mask = X;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm_add_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(with_features!(_mm_sub_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(with_features!(_mm_mul_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(with_features!(_mm_div_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm_fmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm_fnmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(with_features!(_mm_sqrt_ps(self.0)))
+    by_intrinsics! {
+        (0)
+        add(other) _mm_add_ps;
+        sub(other) _mm_sub_ps;
+        mul(other) _mm_mul_ps;
+        div(other) _mm_div_ps;
+        mul_add(factor, term) _mm_fmadd_ps;
+        neg_mul_add(factor, term) _mm_fnmadd_ps;
+        sqrt() _mm_sqrt_ps;
+        min(other) _mm_min_ps;
+        max(other) _mm_max_ps;
     }
     #[inline(always)]
     fn abs(self) -> Self {
         Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self(with_features!(_mm_min_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self(with_features!(_mm_max_ps(self.0, other.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> X {

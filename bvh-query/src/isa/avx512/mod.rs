@@ -47,58 +47,24 @@ fn run_with_features<T: Task>(isa: Avx512, task: T) -> T::Output {
     task.run(isa)
 }
 
-/// Calls intrinsics whose features the token stands for.
-macro_rules! with_features {
-    ($body:expr) => {
-        // SAFETY: a value of this backend's types exists only if `detect` has found the CPU to have
-        // all features that these intrinsics need. Loads and stores go through references to
-        // arrays of exactly their size and need no alignment.
-        unsafe { $body }
-    };
-}
-
 impl Lanes for Z {
     type Mask = __mmask16;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm512_add_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(with_features!(_mm512_sub_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(with_features!(_mm512_mul_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(with_features!(_mm512_div_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm512_fnmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(with_features!(_mm512_sqrt_ps(self.0)))
+    by_intrinsics! {
+        (0)
+        add(other) _mm512_add_ps;
+        sub(other) _mm512_sub_ps;
+        mul(other) _mm512_mul_ps;
+        div(other) _mm512_div_ps;
+        mul_add(factor, term) _mm512_fmadd_ps;
+        neg_mul_add(factor, term) _mm512_fnmadd_ps;
+        sqrt() _mm512_sqrt_ps;
+        min(other) _mm512_min_ps;
+        max(other) _mm512_max_ps;
     }
     #[inline(always)]
     fn abs(self) -> Self {
         Self(with_features!(_mm512_abs_ps(self.0)))
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self(with_features!(_mm512_min_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self(with_features!(_mm512_max_ps(self.0, other.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> __mmask16 {
@@ -121,45 +87,21 @@ impl Lanes for Z {
 impl Lanes for X {
     type Mask = __mmask8;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(with_features!(_mm_add_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(with_features!(_mm_sub_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(with_features!(_mm_mul_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(with_features!(_mm_div_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm_fmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(with_features!(_mm_fnmadd_ps(self.0, factor.0, term.0)))
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(with_features!(_mm_sqrt_ps(self.0)))
+    by_intrinsics! {
+        (0)
+        add(other) _mm_add_ps;
+        sub(other) _mm_sub_ps;
+        mul(other) _mm_mul_ps;
+        div(other) _mm_div_ps;
+        mul_add(factor, term) _mm_fmadd_ps;
+        neg_mul_add(factor, term) _mm_fnmadd_ps;
+        sqrt() _mm_sqrt_ps;
+        min(other) _mm_min_ps;
+        max(other) _mm_max_ps;
     }
     #[inline(always)]
     fn abs(self) -> Self {
         Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self(with_features!(_mm_min_ps(self.0, other.0)))
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self(with_features!(_mm_max_ps(self.0, other.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> __mmask8 {
