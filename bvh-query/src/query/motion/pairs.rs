@@ -1,5 +1,5 @@
-//! A few pairs of triangles during a stretch of time: which of them it sets apart, whether any is within a distance, and when
-//! that may first be.
+//! A few pairs of triangles during an interval of time: which of them are apart all the time, whether any is within a
+//! distance, and when that may first be.
 
 use crate::isa::{Isa, Task};
 use crate::motion::RigidPath;
@@ -23,7 +23,7 @@ pub(super) struct SweptPair {
     pub(super) b: Triangle,
 }
 
-/// Pairs of triangles, shared by stretches. Those before the first one are known to be apart.
+/// Pairs of triangles, shared by intervals. Those before `first` are known to be apart.
 #[derive(Clone)]
 pub(super) struct Kept {
     pairs: Rc<[SweptPair]>,
@@ -67,7 +67,7 @@ impl Sweep {
         }
     }
 
-    /// Returns whether a direction sets the triangles apart, in either sense.
+    /// Returns whether a direction separates the triangles, in either sense.
     #[inline(always)]
     fn is_apart_along(&self, x: Point, a: &Triangle, ends: &[Triangle; 2]) -> bool {
         let along = |corner: &Point| dot(x, *corner);
@@ -168,8 +168,8 @@ impl Task for AnyWithin<'_> {
     }
 }
 
-/// Guesses when pairs come within the clearance: from where B is, it goes on until the closest points would meet if they kept
-/// to the chords of their ways.
+/// Guesses when pairs come within the clearance. From each pose of B, it goes on to the time at which the closest
+/// points would meet if they moved on the chords of their paths.
 struct ContactTime<'a> {
     path: &'a dyn RigidPath,
     clearance: f64,

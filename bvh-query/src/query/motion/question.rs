@@ -1,5 +1,5 @@
-//! What stays the same while time is searched, and what is asked of a stretch of time: how far B is from its middle, and how
-//! far apart parts have to be at both ends.
+//! The part of a question that stays the same while time is searched, and its limits for an interval of time: how far B
+//! moves from the middle, and how far apart parts must be at both ends.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -88,8 +88,8 @@ impl<'a> Question<'a> {
         Middle { at, pose, reach }
     }
 
-    /// Returns how far apart parts have to be at both ends of a stretch to be left out: farther than the clearance and an
-    /// eighth of the tolerance all the time, which is as far as any cell reaches.
+    /// Returns how far apart parts must be at both ends of an interval to be left out. They are then farther apart than
+    /// the clearance and an eighth of the tolerance all the time, which is as far as any cell reaches.
     pub(super) fn limit(&self, stretch: &Stretch) -> f64 {
         let [t0, t1] = stretch.times;
         let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
@@ -98,7 +98,7 @@ impl<'a> Question<'a> {
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
     }
 
-    /// Returns the sagitta of the path. A number of a user's path that is none leaves nothing certain.
+    /// Returns the sagitta of the path. If a user's path returns an invalid number, it counts as infinite.
     fn sagitta(&self, t0: f64, t1: f64) -> f64 {
         let sagitta = self.path.sagitta(self.radius, t0, t1);
         if sagitta >= 0.0 { sagitta } else { f64::INFINITY }

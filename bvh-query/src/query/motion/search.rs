@@ -28,11 +28,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The most pairs of triangles that are kept from stretch to stretch.
 const MOST_PAIRS: usize = 24;
-/// The most pairs of packets that the first walk looks at; each halving allows eight times as many. A long stretch in which
-/// much is near is given up early, and a short one has to be looked through in the end.
+/// The most pairs of packets that the first walk tests; each halving allows eight times as many. A walk of a long
+/// interval in which many packets are near is given up early. In a short interval, all of them must be tested in the
+/// end.
 const FIRST_PACKET_TESTS: u64 = 12;
-/// A stretch that ends within the clearance is swept when B moves by less than this fraction of the larger object's
-/// diagonal: few pairs of triangles are likely to be left.
+/// An interval that ends within the clearance is swept if B moves by less than this fraction of the larger object's
+/// diagonal. Few pairs of triangles are likely to be left then.
 const FINE: f64 = 1.0 / 4096.0;
 /// The search guesses no time of contact in a stretch in which B moves by less than this many times the tolerance. Guessing
 /// would take as many steps as the stretch has cells.
@@ -58,9 +59,10 @@ pub(super) enum Outcome {
 struct Interval {
     stretch: Stretch,
     depth: u32,
-    /// Whether the end is within the clearance, if that is known: then nothing sets the meshes apart all the time.
+    /// Whether the end is within the clearance, if that is known. If it is, no sweep can separate the meshes all the
+    /// time.
     ends_within: Option<bool>,
-    /// Among which all pairs of triangles are that are not apart all the time, if they are few.
+    /// If there are few, pairs of triangles that include all pairs that are not apart all the time.
     pairs: Option<Kept>,
 }
 
@@ -256,8 +258,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Goes down to the cell of a contact, at a time if one is given, else from where there is none to where there is, until
-    /// B moves little. Adds that cell and the intervals beside the way.
+    /// Descends to the cell of a contact and adds it, with the intervals left on the way down. If a time is given, the
+    /// cell is the one at that time. Otherwise it halves between a time without contact and one with it, until B moves
+    /// little.
     fn descend(
         &mut self,
         mut interval: Interval,
@@ -291,7 +294,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         self.pass(passed, &contact, todo)
     }
 
-    /// Adds those of some adjoining intervals before a contact that are not set apart, in the order of time.
+    /// Adds those of some adjoining intervals before a contact that a sweep does not clear, in the order of time.
     fn pass(
         &mut self,
         passed: Vec<Interval>,
@@ -357,8 +360,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         ])
     }
 
-    /// Returns pairs of triangles, among which are all that may come within the clearance during an interval, unless there are
-    /// many. If there are any, the first one may.
+    /// Returns pairs of triangles that include all that may come within the clearance during an interval, or `None` if
+    /// there are many. If the list is not empty, its first pair may do so.
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
         let [start, end] = interval.stretch.poses;
