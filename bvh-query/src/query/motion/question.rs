@@ -29,19 +29,19 @@ pub(super) struct Question<'a> {
     radius_a: f64,
 }
 
-/// A stretch of time, and where B is at its ends.
+/// An interval of time, and the poses of B at its ends.
 #[derive(Clone, Copy)]
 pub(super) struct Stretch {
     pub(super) times: [f64; 2],
     pub(super) poses: [Pose; 2],
 }
 
-/// The middle of a stretch of time.
+/// The middle of an interval of time.
 #[derive(Clone, Copy)]
 pub(super) struct Middle {
     pub(super) at: f64,
     pub(super) pose: Pose,
-    /// How far any vertex of B is at most from where it is now, during the stretch.
+    /// How far any vertex of B is at most from its place in the middle, during the interval.
     pub(super) reach: f64,
 }
 
@@ -73,12 +73,12 @@ impl<'a> Question<'a> {
         }
     }
 
-    /// Returns the stretch between two times.
+    /// Returns the interval between two times.
     pub(super) fn stretch(&self, t0: f64, t1: f64) -> Stretch {
         Stretch { times: [t0, t1], poses: [self.path.pose(t0), self.path.pose(t1)] }
     }
 
-    /// Returns the middle of a stretch.
+    /// Returns the middle of an interval.
     pub(super) fn middle(&self, stretch: &Stretch) -> Middle {
         let [t0, t1] = stretch.times;
         let at = t0 + (t1 - t0) / 2.0;

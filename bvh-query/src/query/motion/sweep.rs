@@ -73,7 +73,7 @@ struct Swept<'a> {
     candidates: SweptCandidates<'a>,
 }
 
-/// Looks at pairs of triangles, 16 at a time, and keeps those that the interval does not set apart.
+/// Tests pairs of triangles, 16 at a time, and keeps those that are not certainly apart during the interval.
 struct SweptCandidates<'a> {
     /// With B at the start of the interval and at its end.
     placed: [PlacedPair<'a>; 2],
