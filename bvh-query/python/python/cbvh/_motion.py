@@ -24,14 +24,17 @@ class Path(Protocol):
         the bit."""
 
     def sagitta(self, radius: float, t0: float, t1: float, /) -> float:
-        """A bound, in mesh units, of how far the path departs from a straight one between two times.
+        """A bound, in mesh units, of how far the path departs from a straight line between two times.
 
-        That is how far any point at most ``radius`` mesh units from the origin of the body's frame is, at any time from
-        ``t0`` to ``t1``, from where it would be if it went straight, at a constant rate, from its place at ``t0`` to
-        that at ``t1``: at most an eighth of the greatest acceleration times the square of the time. It must hold for
-        poses as computed, with all rounding. Answers are only as certain as this bound, and the smaller it is, the less
-        work they take. Infinity says that nothing is known; on every interval, the question ends with a ValueError. So does a
-        bound that is smaller than what `pose` shows in the middle of the interval.
+        Take any point that moves with the body and is at most ``radius`` mesh units from the origin of its frame.
+        Compare it with a point that moves on a straight line, at a constant speed, from its place at ``t0`` to its
+        place at ``t1``. The bound must be no less than the distance between the two at any time from ``t0`` to ``t1``.
+        An eighth of the greatest acceleration times the square of the time is enough.
+
+        The bound must hold for poses as computed, with all rounding. Answers are only as certain as this bound, and the
+        smaller it is, the less work they take. Infinity means that nothing is known; if it is returned for every
+        interval, the question ends with a ValueError. The question also ends with a ValueError if `pose` departs
+        further in the middle of an interval.
         """
 
 
