@@ -1,4 +1,4 @@
-//! Paths: the library's own motions and polylines, and paths that Python code answers for.
+//! Paths: the motions and polylines of the library, and paths that Python code defines.
 
 use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};

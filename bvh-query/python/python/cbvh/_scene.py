@@ -1,4 +1,4 @@
-"""Scenes: many placed meshes, and questions over all pairs of them that matter."""
+"""Scenes: many placed meshes, and questions over all pairs of them that may meet."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def _groups(value: Any, name: str) -> int:
 
 
 class Scene:
-    """Many placed meshes, and questions over all pairs that are asked about.
+    """Many placed meshes, and questions over all pairs that may meet.
 
     An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given
-    again: of an instance that was removed, it is a KeyError. Wherever an instance is asked for, its name will do, if it has
-    one; answers have numbers. Iterating over a scene gives the numbers of its instances,
-    in their order, and of a pair the one that comes first is A. A question is over each pair of instances whose groups
-    meet and whose contact is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the
-    pose of B in A's frame, to the bit.
+    again. The number of an instance that was removed raises KeyError. Arguments may name an instance by its name
+    instead, if it has one; answers have numbers. Iterating over a scene gives the numbers of its instances in their
+    order. The first instance of a pair is A. A question is about all pairs of instances whose groups meet and whose
+    contact is not allowed. Answers are in the order of the pairs, and each is that of `Mesh` for the pose of B in A's
+    frame, to the bit.
 
-    **Threads** may share a scene: a question waits until the one before is answered, and other threads of Python run
+    **Threads** may share a scene: a question waits until the previous one is answered, and other threads of Python run
     meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers.
-    Pickling keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone,
-    each once. What is added later may have another place in the order than in the scene that was pickled.
+    Pickling keeps instances, numbers, names, poses, groups and allowed pairs. Each mesh is pickled once, as by itself.
+    An instance that is added later may have another place in the order than in the scene that was pickled.
 
     >>> import cbvh, numpy as np
     >>> vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -81,7 +81,7 @@ class Scene:
 
     @staticmethod
     def open(path: str | os.PathLike[str]) -> Scene:
-        """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the
+        """Opens a file of ``cbvh bake --scene``: its instances, in their order. Reads only its tables, whatever its
         size. The file is mapped, and its bytes must not change while it is open: see `cbvh.open`."""
         name = os.fsdecode(path)
         whole = os.path.abspath(name)
@@ -90,7 +90,7 @@ class Scene:
         return scene
 
     def copy(self) -> Scene:
-        """A scene of the same instances, under the same numbers. Meshes are shared."""
+        """A scene with the same instances and numbers. Meshes are shared."""
         other = Scene.__new__(Scene)
         other._scene = self._scene.copy()
         return other
@@ -126,9 +126,9 @@ class Scene:
     ) -> int:
         """Adds an instance, and returns its number.
 
-        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: one
-        that no other instance has. ``member`` are the groups that the instance is in, ``meets`` those it is asked about
-        with, a bit for each of 32: two instances are asked about if each is in a group that the other meets.
+        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: a
+        name that no other instance has. ``member`` are the groups that the instance is in, and ``meets`` those that it
+        meets, one bit for each of 32. Questions are about two instances if each is in a group that the other meets.
         """
         if not isinstance(mesh, Mesh):
             raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
@@ -146,8 +146,8 @@ class Scene:
         self._scene.set_pose(self._number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
-        """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). Of an instance that is
-        given twice, the last pose counts. If an argument is wrong, none has moved."""
+        """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4).
+        If an instance is given twice, the last pose counts. If an argument is wrong, no instance moves."""
         self._scene.set_poses(self._ids(ids), poses)
 
     def set_groups(self, id: int | str, *, member: int | None = None, meets: int | None = None) -> None:
