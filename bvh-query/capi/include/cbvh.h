@@ -431,7 +431,7 @@ cbvh_status cbvh_path_reach(cbvh_mesh b, cbvh_path path, double t0, double t1, d
 /* What counts as a hit, and how exactly time is searched. */
 typedef struct cbvh_motion_options {
     size_t size;
-    /* The distance at which meshes count as hitting each other; 0 for contact. Finite, at least 0. */
+    /* Meshes that are at most this far apart count as a hit; 0 for contact. Finite, at least 0. */
     double clearance;
     /* The width of the undecided range beyond the clearance: if B comes that near and is no hit, the answer may be near. 0
      * for a millionth of the diagonal of the larger object's box. A smaller tolerance costs more. */

@@ -213,10 +213,10 @@ class Mesh:
 
         ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`). For N motions at once, or N paths in a
         list or another iterable, the answer has arrays of N elements. The answer is certain at every moment, not only
-        at samples. ``clearance``: the distance at which meshes count as hitting each other, in mesh units.
-        ``tolerance``: the width of the undecided range beyond the clearance, in mesh units; if the meshes come that
-        near and do not hit, the answer may be NEAR. None: a millionth of the diagonal of the larger object's box.
-        ``parallel`` has no effect if a path is your own.
+        at samples. ``clearance``: meshes that are at most this far apart, in mesh units, count as a hit. ``tolerance``:
+        the width of the undecided range beyond the clearance, in mesh units; if the meshes come that near and do not
+        hit, the answer may be NEAR. None: a millionth of the diagonal of the larger object's box. ``parallel`` has no
+        effect if a path is your own.
         """
         paths = read_paths(motion)
         found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)

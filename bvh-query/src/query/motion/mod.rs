@@ -38,7 +38,7 @@ use search::{Outcome, TimeSearch};
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct MotionOptions {
-    /// The distance, in mesh units, at which meshes count as hitting each other; 0 for contact.
+    /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact.
     pub clearance: f64,
     /// The width of the undecided range beyond the clearance, in mesh units. If B comes that near and is no hit, the
     /// answer may be [`MotionAnswer::Near`]. `None` stands for a millionth of the diagonal of the larger object's box.
