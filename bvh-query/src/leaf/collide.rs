@@ -1,8 +1,8 @@
-//! Which of 16 triangle pairs are apart, and which intersect: separating axes in two stages.
+//! Finds which of 16 triangle pairs are apart and which intersect, by separating axes in two stages.
 //!
-//! Stage one looks at the two face planes of each pair of a packet pair and settles most of them.
-//! The remaining pairs are queued, so that stage two, the nine cross products of edges, has full lanes.
-//! Axes are not normalised. What the two stages leave undecided goes to exact arithmetic.
+//! Stage one tests the two face planes of each pair of triangles and decides most pairs. The remaining pairs are
+//! queued, so that stage two, the nine cross products of edges, has full lanes. Axes are not normalised. Pairs that
+//! neither stage decides go to exact arithmetic.
 //!
 //! A pair is apart if its projections on one axis certainly are. It intersects if its projections on all eleven axes
 //! certainly overlap in more than a point: corners of either triangle are then strictly on both sides of the other's

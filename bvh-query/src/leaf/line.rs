@@ -1,7 +1,8 @@
 //! Which triangles of up to four packets a line may cross.
 //!
-//! A line with direction w passes an edge from a to b on the side that the sign of w · (a × b) tells, as seen from a point of
-//! the line: see [`crate::narrow::Ray`]. Two opposite signs that are certain show that it misses the triangle.
+//! The sign of w · (a × b) tells on which side a line with direction w passes an edge from a to b, where a and b are
+//! seen from a point of the line: see [`crate::narrow::Ray`]. Two opposite signs that are certain show that the line
+//! misses the triangle.
 //!
 //! Error: a point of the line near the packets is the origin, in the frame of [`crate::leaf::point`]. Let m bound the coordinates
 //! of a triangle there, and u = 2^-24. A coordinate is off by at most d = 2u m + e, with e what [`LocalPoint`] charges; a

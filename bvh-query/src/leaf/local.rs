@@ -1,8 +1,8 @@
 //! Brings a packet of A and a packet of B into one local frame, with a bound on the error.
 //!
-//! It has the directions and the unit of [`LocalFrame`], and the first corner of A's packet as its origin. The packets'
-//! offset from each other is computed in f64: what remains for f32 is as small as the packets and their distance, and so
-//! is its rounding.
+//! The frame has the directions and the unit of [`LocalFrame`], and the first corner of A's packet as its origin. The
+//! offset between the packets is computed in f64. The numbers in f32 are therefore only as large as the packets and
+//! their distance, and so their rounding errors are small.
 //!
 //! With u = 2^-24, w the corners of B relative to its packet's first corner, |w| <= m_b, c the offset,
 //! |c| <= m_c, |a| <= m_a: a corner of A is off by u m_a (one rounded difference); a corner R w + c of B
