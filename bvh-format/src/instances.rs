@@ -27,7 +27,7 @@ pub struct InstanceRecord {
     pub object: U32,
     /// The groups that the instance is in.
     pub member: U32,
-    /// The groups that it is asked about with.
+    /// The groups that it meets: it is tested against their instances.
     pub meets: U32,
     /// Zero.
     pub reserved: [u8; 12],
@@ -48,7 +48,7 @@ pub struct Instance {
     pub object: u32,
     /// The groups that the instance is in, one bit per group.
     pub member: u32,
-    /// The groups that it is asked about with, one bit per group.
+    /// The groups that it meets, one bit per group: it is tested against their instances.
     pub meets: u32,
     /// The rows of the rotation R.
     pub rotation: [[f64; 3]; 3],

@@ -46,7 +46,7 @@ const TRIAL_COUNT: usize = 400;
 
 /// The least numbers of triangles below the nodes of trials, which take turns.
 const TRIAL_SIZES: [usize; 3] = [1, 8, 64];
-/// A node that has so many times more triangles than wanted is not taken, but its child.
+/// A node with more than this many times the wanted number of triangles is not taken; the node below it is.
 const MAX_EXCESS: usize = 4;
 
 /// The width of all profiles among which the choice is open.

@@ -82,7 +82,7 @@ impl Unit {
     }
 }
 
-/// The coordinate that is so many units: a product of two `f64`, rounded to `f32`.
+/// Returns the coordinate that is `integer` units: a product of two `f64`, rounded to `f32`.
 #[inline(always)]
 pub(super) fn in_units(integer: i32, unit: f64) -> f32 {
     (f64::from(integer) * unit) as f32

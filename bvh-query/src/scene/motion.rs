@@ -189,8 +189,8 @@ impl Scene {
         Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })
     }
 
-    /// Calls `visit` with the pairs that may come within the clearance, so many at a time as are known, until it breaks. Those
-    /// of a piece are in the order in which their boxes come near each other.
+    /// Calls `visit` with the pairs that may come within the clearance, until `visit` breaks: in several calls if there
+    /// are many. The pairs of a call are in the order in which their boxes come near each other.
     fn each_piece_of_encounters(
         &self,
         ways: &Ways<'_>,

@@ -160,7 +160,7 @@ impl Scene {
     }
 }
 
-/// A scene that is asked about a probe.
+/// A question about a probe to a whole scene.
 struct Asked<'a> {
     scene: &'a Scene,
     querier: &'a mut Querier,

@@ -388,8 +388,8 @@ impl Scene {
         Ok(all)
     }
 
-    /// Starts a question, and calls `visit` with the pairs asked about whose boxes are at most `limit` apart, in ascending
-    /// order, so many at a time as are known, until it breaks.
+    /// Starts a question, and calls `visit` with the tested pairs whose boxes are at most `limit` apart, until `visit`
+    /// breaks. The pairs come in ascending order, in several calls if there are many.
     fn each_piece(
         &mut self,
         limit: f64,
@@ -406,8 +406,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Returns the next pairs asked about whose boxes are at most `limit` apart, in any order: all of them, unless they are too
-    /// many. Each piece comes before the next one in the order of the pairs.
+    /// Returns the next tested pairs whose boxes are at most `limit` apart, in any order. These are all pairs, unless
+    /// there are too many for one piece. All pairs of a piece precede those of the next piece.
     fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
         let mut near_pairs = Vec::new();
         let places = self.instances.len() as u32;

@@ -94,7 +94,7 @@ const QUICK: (usize, usize) = (2, 10);
 /// The number of items that are made for a pair without any.
 const MADE: usize = 60;
 
-/// Makes so many items for two meshes.
+/// Makes a number of items for two meshes.
 type Make<T> = fn(&mut Querier, &Bvh, &Bvh, usize) -> Result<Vec<T>, QueryError>;
 
 /// What one kind of report has that the other does not. Its items are poses or motions.
@@ -211,7 +211,7 @@ fn layout_of(report: &BakeReport) -> String {
 }
 
 impl Report {
-    /// Adds the results of a pair, which was asked about so many items of this name and origin.
+    /// Adds the results of a pair for `count` items of this name and origin.
     fn add(&mut self, subject: &Subject<'_>, mut of: Measured, (items, count, from): (&str, usize, &str)) {
         let Subject { pair, baked, .. } = subject;
         let side = |path: &Path, (bvh, report): &Baked| {

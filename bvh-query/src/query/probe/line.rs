@@ -45,7 +45,7 @@ impl Line {
     }
 }
 
-/// What is asked about a line.
+/// A question about a line.
 pub(crate) trait LineQuestion {
     fn line(&self) -> Line;
 
