@@ -2,8 +2,9 @@
 //!
 //! The width of a slab along a fixed direction shrinks only with the length of a curved patch. The width of a slab
 //! along the patch's own normal shrinks with the square of the length. Such a slab takes four bytes in the rows that
-//! fixed slabs of [`Profile::Dop26U8Wide`] leave empty: two for the direction, and one for each end, counted inward
-//! from the reach of the child's own decoded box along the direction. Four zero bytes mean that there is none.
+//! fixed slabs of [`Profile::Dop26U8Wide`] leave empty: two for the direction, and one for each end. The ends are
+//! counted inward from the reach of the child's own decoded box along the direction. Four zero bytes mean that there is
+//! none.
 //!
 //! The direction is a hemi-octahedral code (Cigolle et al., "A Survey of Efficient Representations for Independent Unit
 //! Vectors", JCGT 2014): two integers that name a point of the unfolded half octahedron. It is an integer vector divided by

@@ -40,9 +40,10 @@ impl Bvh {
     ///   `cbvh bake` replaces its output in this way.
     /// - *Truncated*, by whatever process: on Unix the first access beyond the new end sends SIGBUS, which ends this process.
     ///   There is no error to catch.
-    /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not change.
-    ///   Queries are written so that they do not depend on that assumption: they take file bytes as numbers of which each
-    ///   value is valid, they check each index they compute from them, and a walk is bounded by counts that were read once.
+    /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not
+    ///   change. Queries are written so that they do not depend on that assumption. They read file bytes only as
+    ///   numbers for which every value is valid. They check each index that they compute from them. Counts that were
+    ///   read once bound each walk.
     ///
     /// A file with damaged or forged bytes may be mapped. [`Bvh::read`] copies a file and needs no promise.
     ///

@@ -6,12 +6,11 @@
 //! projections is a lower bound for any line, and the distance itself if the guess was right. Intersecting triangles
 //! give no gap. Degenerate triangles are not special.
 //!
-//! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the
-//! distance of two within 4 e. Combinations and projections of coordinates of magnitude r or less
-//! round by at most 16u r. Products of coordinates that are dust in the local frame underflow. Those with a
-//! direction of length 1 lose less than 2^-140, which is charged; a guess whose square is below 2^-100 is not
-//! certified but taken as 0 to 2^-50, and above that all that underflows is less than 2^-95 of a length that
-//! `r` is not far below.
+//! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the distance of two
+//! within 4 e. Combinations and projections of coordinates of magnitude r or less round by at most 16u r. Products of
+//! coordinates that are dust in the local frame underflow. Those with a direction of length 1 lose less than 2^-140,
+//! which is charged. A guess whose square is below 2^-100 is not certified but taken as 0 to 2^-50. Above that, all
+//! that underflows is less than 2^-95 of a length that `r` is not far below.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, repeat, tile};

@@ -131,8 +131,9 @@ impl Motion {
         })
     }
 
-    /// Returns a screw motion from `start`: a rotation by `angle` radians, any number of turns, about the axis through `point`
-    /// with `direction` (of any length), in A's frame, and a shift by `shift` mesh units along it.
+    /// Returns a screw motion from `start`: a rotation about an axis, and a shift along it. The axis goes through
+    /// `point` in `direction` (of any length), both in A's frame. The rotation is by `angle` radians, which may be many
+    /// turns. The shift is by `shift` mesh units.
     ///
     /// # Errors
     /// [`MotionError::Number`] if a number is not finite or the direction has length 0, [`MotionError::Pose`] if the

@@ -78,8 +78,8 @@ impl AxisRay {
 
     /// Returns a number with the sign of the side on which the moved ray passes an edge whose line the ray meets.
     ///
-    /// The area that p and q span with a point x is (q - p) × (x - p): along the first of the axes in the plane it grows with
-    /// the edge's second component, negated, and along the second with the first.
+    /// The area that p and q span with a point x is (q - p) × (x - p). Its derivative along the first axis of the plane
+    /// is the negated second component of the edge; along the second axis, it is the first component.
     fn side_of_moved(&self, (p, q): (Point, Point)) -> f64 {
         let (first, second) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         if p[second] == q[second] { q[first] - p[first] } else { p[second] - q[second] }
