@@ -56,12 +56,13 @@ pub struct Options {
     /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
     /// their files.
     pub split_objects: bool,
-    /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF files become
-    /// instances, and so do the objects of other files. Each object then gets a tree of its own.
+    /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF files
+    /// and the objects of other files become instances. Each object then gets its own tree.
     pub scene: bool,
     /// Whether the original triangle numbers are kept.
     pub ids: bool,
-    /// Whether children get turning slabs, where the profile has room for them. Answers are the same, and files as large.
+    /// Whether children get turning slabs, if the profile has room for them. Answers and the size of files are the
+    /// same.
     pub turning_slabs: bool,
     /// Whether the file states which objects are closed, with a triangle of each component. Questions about what is
     /// inside a mesh need it. It takes less than 0.01 bytes per triangle, unless a mesh has many components or duplicates.

@@ -2,8 +2,8 @@
 //!
 //! A stage goes through its triangles in several passes, each of which takes about the same share of the stage's time.
 //! Progress is counted in such passes, one part or batch of pages at a time, in relaxed atomic sums. The bake does not
-//! depend on them. While it runs, counters that are read together may be of slightly different moments; when it has
-//! ended, they are exact.
+//! depend on them. While the bake runs, counters that are read together may be from slightly different moments. When it
+//! has ended, they are exact.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

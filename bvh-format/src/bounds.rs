@@ -36,7 +36,7 @@ pub struct Bound<'a> {
     pub patch: Option<&'a [Packet]>,
 }
 
-/// What is below a subtree root.
+/// The part of the tree below a subtree root.
 #[derive(Debug, Clone)]
 pub struct Subtree {
     /// The slabs of the root's anchor.
@@ -51,7 +51,8 @@ pub struct Subtree {
 }
 
 impl Subtree {
-    /// A subtree of which nothing is known.
+    /// Returns a stand-in for a subtree that has not been visited. Its bounds are empty, and its number of triangles
+    /// exceeds every limit.
     pub fn unknown() -> &'static Self {
         static UNKNOWN: Subtree =
             Subtree { anchor: Kdop::EMPTY, kdop: Kdop::EMPTY, triangles: usize::MAX, packets: Vec::new() };
@@ -59,7 +60,7 @@ impl Subtree {
     }
 }
 
-/// The packets of all subtrees of a page that are small enough for a turning slab, those of each subtree together.
+/// The packets of all subtrees of a page that are small enough for a turning slab. Those of one subtree are adjacent.
 struct Patches {
     packets: Vec<Packet>,
     /// Per slot, where its packets start, if they are kept.
@@ -274,9 +275,9 @@ pub fn check_box(layout: &Layout, object: &Object, root: &Subtree) -> Result<(),
 pub struct Inflation {
     /// The nodes that have been counted.
     pub nodes: u64,
-    /// The sum over nodes of: decoded width / tight width, as the mean over slabs.
+    /// The sum over nodes of the mean, over their slabs, of decoded width / tight width.
     pub width: f64,
-    /// The sum over nodes of: decoded width / tight width, as the product over the sides of the box.
+    /// The sum over nodes of the product, over the sides of their boxes, of decoded width / tight width.
     pub volume: f64,
 }
 

@@ -7,7 +7,7 @@ pub fn checksum(bytes: &[u8]) -> u64 {
     xxh3::xxh3_64(bytes)
 }
 
-/// Computes the same checksum of bytes that come in pieces.
+/// Computes the same checksum from bytes that arrive in pieces.
 #[derive(Default)]
 pub struct Hasher(xxh3::Xxh3);
 

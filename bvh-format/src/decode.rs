@@ -1,6 +1,6 @@
 //! The scalar reference decoder of treelets.
 //!
-//! It is written as section 8 of `spec/format.md` reads, and it is the oracle for every vector backend.
+//! It follows section 8 of `spec/format.md` step by step, and it is the oracle for every vector backend.
 
 use crate::page::Page;
 use crate::profile::{Encoding, Profile};

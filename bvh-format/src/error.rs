@@ -1,4 +1,4 @@
-//! What is wrong with a file: the rule it breaks, the place, what was expected, what was found, and what helps.
+//! The error of a faulty file: the rule it breaks, the place, what was expected, what was found, and the remedy.
 
 use crate::rule::Rule;
 

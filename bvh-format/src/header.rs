@@ -9,7 +9,7 @@ use std::ops::Range;
 use zerocopy::byteorder::little_endian::{U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-/// The first eight bytes of a file. Transfers in text mode damage the high bit or the line ends, and so show.
+/// The first eight bytes of a file. A transfer in text mode changes the high bit or the line ends, and is so detected.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
 /// The major version. 0 stands for the release candidates of version 1.0.
 pub const MAJOR: u16 = 0;
@@ -121,8 +121,8 @@ impl SectionKind {
         self != Self::Provenance
     }
 
-    /// The sections of this kind start at multiples of so many bytes: pages are mapped as they are, and the vectors of the
-    /// other sections lie in lines.
+    /// The alignment of sections of this kind, in bytes. Pages are mapped as they are. In other sections, vectors must
+    /// not straddle lines.
     pub fn alignment(self) -> usize {
         if self == Self::Nodes { PAGE } else { LINE }
     }

@@ -1,9 +1,9 @@
 //! The id block of a page: the number that each triangle of each packet has in the input.
 //!
-//! Neighbours in the tree often are neighbours in the input. The least id of a packet is therefore an offset from the
-//! least one of its group of eight packets, and the other ids of the packet are offsets from that, each of as few bits as
-//! the group or the packet needs. A table at the front of the block leads to the groups, so that an id is found without
-//! reading those before it. Section 12 of `spec/format.md` says where each bit stands.
+//! Neighbours in the tree often are neighbours in the input. The least id of a packet is therefore stored as an offset
+//! from the least id of its group of eight packets. The other ids of the packet are offsets from the packet's least id.
+//! Each offset has as few bits as its group or packet needs. A table at the front of the block leads to the groups, so
+//! a reader finds an id without reading those before it. Section 12 of `spec/format.md` says where each bit stands.
 
 use crate::bits::{BitWriter, bit_width, load_bits, read_bits};
 use crate::leaf::PACKET;

@@ -1,7 +1,6 @@
 //! The instances section: a head, one record per instance, and the names of the instances.
 //!
-//! An instance is an object that stands somewhere in the world. Section 3.1 of `spec/format.md` says where each byte
-//! stands.
+//! An instance is an object with a pose in the world. Section 3.1 of `spec/format.md` states the place of each byte.
 
 use crate::error::{FormatError, ensure};
 use crate::rule::Rule;
@@ -28,7 +27,7 @@ pub struct InstanceRecord {
     pub object: U32,
     /// The groups that the instance is in.
     pub member: U32,
-    /// The groups that it is asked about with.
+    /// The groups that it meets: it is tested against their instances.
     pub meets: U32,
     /// Zero.
     pub reserved: [u8; 12],
@@ -40,7 +39,7 @@ pub struct InstanceRecord {
 
 const _: () = assert!(size_of::<InstanceRecord>() == 128);
 
-/// An object that stands in the world. A point `x` of the object, in mesh units, stands at `R x + t`.
+/// An object with a pose in the world. A point `x` of the object, in mesh units, is at `R x + t`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
     /// The name. Several instances may have an empty one; all others differ.
@@ -49,7 +48,7 @@ pub struct Instance {
     pub object: u32,
     /// The groups that the instance is in, one bit per group.
     pub member: u32,
-    /// The groups that it is asked about with, one bit per group.
+    /// The groups that it meets, one bit per group: it is tested against their instances.
     pub meets: u32,
     /// The rows of the rotation R.
     pub rotation: [[f64; 3]; 3],
@@ -58,7 +57,7 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// Returns an instance without a name that stands where its object is, in all groups.
+    /// Returns an instance without a name, with the identity pose and in all groups.
     pub fn of_object(object: u32) -> Self {
         Self {
             name: String::new(),
@@ -70,7 +69,8 @@ impl Instance {
         }
     }
 
-    /// Returns what is wrong with the pose and the number that is, or `None` if it is rigid and within the limits.
+    /// Returns what is wrong with the pose, and the faulty number. Returns `None` if the pose is rigid and within the
+    /// limits.
     pub fn pose_fault(&self) -> Option<(&'static str, f64)> {
         let numbers = self.rotation.as_flattened().iter().chain(&self.translation);
         if let Some(&found) = numbers.clone().find(|number| !number.is_finite()) {
@@ -88,7 +88,7 @@ impl Instance {
     }
 }
 
-/// Returns how far `R R^T` is from a multiple of I: its largest entry, or NaN.
+/// Returns how far `R R^T` is from a multiple of I: the largest entry of the difference, or NaN.
 pub fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
     let mut worst = 0.0f64;
     for i in 0..3 {
@@ -139,7 +139,7 @@ pub fn write_instances(instances: &[Instance]) -> Vec<u8> {
     section
 }
 
-/// Reads the instances section, which starts at byte `at` of a file of so many objects.
+/// Reads the instances section, which starts at byte `at` of a file with this number of objects.
 ///
 /// # Errors
 /// The first of rules 40 to 43 that does not hold.

@@ -1,8 +1,8 @@
 //! Fixed directions, and the k-DOPs over them that bound triangles.
 //!
 //! All direction sets are prefixes of one list of 13 integer vectors, so they nest: 3 axes, then 4 cube diagonals, then
-//! 6 face diagonals give k = 6, 14 and 26. Directions are *not* normalised: a slab along `(1, 1, 1)` bounds `x + y + z`.
-//! That keeps projections free of products.
+//! 6 face diagonals give k = 6, 14 and 26. Directions are *not* normalised: a slab along `(1, 1, 1)` bounds
+//! `x + y + z`. Projections therefore need no products.
 //!
 //! A k-DOP is a pair of `f32` ends per direction, rounded outward: along each direction, the true extent of the geometry
 //! lies within `[lo, hi]`.
@@ -28,8 +28,8 @@ pub const DIRECTIONS: [[i8; 3]; 13] = [
 
 /// The directions along which a node is bounded; k counts both ends of each slab.
 ///
-/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that whoever must do
-/// something for each set does not compile until a new one is dealt with.
+/// The list is part of the major version of the format. It is not marked as non-exhaustive: code that has a case for
+/// each set does not compile until it has one for a new set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum DirectionSet {
     /// 3 slabs: an axis-aligned box.

@@ -45,7 +45,8 @@ impl Layout {
         Self::read_from(bytes)
     }
 
-    /// Does the same for a file whose bytes are read piece by piece: first its head, then the object section.
+    /// Does the same as [`Layout::read`] for a file whose bytes are read piece by piece: first its head, then the
+    /// object section.
     ///
     /// # Errors
     /// The errors of [`Layout::read`], and those of the source.

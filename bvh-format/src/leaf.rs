@@ -1,9 +1,9 @@
 //! Leaf packets of up to four triangles in lane order, and the block of all packets of a page.
 //!
 //! A block has one of two forms. `F32` holds plain lanes, 144 bytes per packet: corner by corner, axis by axis, four
-//! lanes. `Packed` (and `Quantized`, which holds the same bytes after the baker has moved the vertices to a grid) holds
-//! the distinct vertices of the page once, and for each packet which of them its corners are: see [`PackedHead`].
-//! Lanes beyond a packet's triangles repeat its last triangle. A block fills whole lines of 64 bytes.
+//! lanes. `Packed` holds each distinct vertex of the page once, and states for each packet which vertices its corners
+//! are: see [`PackedHead`]. `Quantized` has the same form, after the baker has moved the vertices to a grid. Lanes
+//! beyond a packet's triangles repeat its last triangle. A block fills whole lines of 64 bytes.
 
 mod encode;
 mod packed;
@@ -24,8 +24,8 @@ pub const LINE: usize = 64;
 
 /// How the triangles of an object are stored.
 ///
-/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that whoever must do
-/// something for each encoding does not compile until a new one is dealt with.
+/// The list is part of the major version of the format. It is not marked as non-exhaustive: code that has a case for
+/// each encoding does not compile until it has one for a new encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum TriangleEncoding {
@@ -65,7 +65,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// A packet of zeros: room for another one.
+    /// A packet of zeros, to be overwritten.
     pub const NONE: Self = Self { corners: [[[0.0; PACKET]; 3]; 3] };
 
     /// Makes a packet of one to four triangles. Lanes beyond them repeat the last triangle.
@@ -88,8 +88,8 @@ impl Packet {
         Kdop::of_lanes(&self.filled(triangles).corners, slabs)
     }
 
-    /// The packet with the last of the first `triangles` lanes in all lanes beyond: a file from elsewhere may hold anything
-    /// there.
+    /// Returns the packet in which all lanes beyond the first `triangles` repeat the last of these. A file from
+    /// elsewhere may hold anything there.
     #[inline]
     pub(crate) fn filled(&self, triangles: usize) -> Self {
         let mut packet = *self;
@@ -111,8 +111,8 @@ impl Packet {
 
 /// Makes the leaf block of a page, in whole lines.
 ///
-/// `order` has the number of each packet once, such that neighbours in space are near each other. Vertices are stored in
-/// the order in which these packets have them, so that a reader finds those of a packet in few lines.
+/// `order` has the number of each packet once, with neighbours in space near each other. Vertices are stored in the
+/// order in which these packets first use them, so that the vertices of a packet are in few lines.
 pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet], order: &[u16]) -> Vec<u8> {
     debug_assert_eq!(packets.len(), order.len());
     let mut block = match encoding {

@@ -1,13 +1,13 @@
 //! The `.cbvh` file format: bounding volume hierarchies of triangle meshes, in treelets of 32 to 256 bytes.
 //!
-//! This crate knows the bytes: where each one stands, how it is written and read, and which rules it obeys. It builds no
-//! trees and answers no questions about them. Most applications need only its siblings: `bvh-bake` makes `.cbvh` files
-//! from meshes, and `bvh-query` maps them and answers collision and distance queries. Both stand on this crate. Use it
-//! yourself to inspect files, to check them, or to write another baker, viewer or query.
+//! This crate defines the bytes of a file: the place of each, how it is written and read, and the rules that it obeys.
+//! It builds no trees and answers no questions about them. Most applications need only its siblings: `bvh-bake` makes
+//! `.cbvh` files from meshes, and `bvh-query` maps them and answers collision and distance queries. Both build on this
+//! crate. Use it directly to inspect files, to check them, or to write another baker, viewer or query.
 //!
 //! The normative text is `spec/format.md`. A test compares its tables with the types here.
 //!
-//! # The way through a file
+//! # How a file is read
 //!
 //! ```text
 //! bytes ─ header, sections ─ objects ─ Layout ┬ Page ─ anchors, Links ─ decode ─ slabs
@@ -22,7 +22,7 @@
 //!    child is: in the same page, in a later page, or a packet of triangles.
 //! 4. [`decode::decode_child`] turns the bounds of a child into [slabs], given the slabs of its parent.
 //! 5. The [leaf] block of a page holds its triangles, and the [ids] block their numbers in the input.
-//! 6. A file may also say where its objects stand ([instances]), and which of them are closed ([topology]).
+//! 6. A file may also state where its objects stand ([instances]), and which of them are closed ([topology]).
 //!
 //! [`validate::validate`] checks a whole file against all [rules](Rule) but R35, and [`bounds::check_bounds`] proves that
 //! bounds contain their triangles (R35). A breach is a [`FormatError`]: it names the rule, the byte, what was expected,
@@ -33,7 +33,7 @@
 //!
 //! # Example
 //!
-//! This lists the objects of a file. The program `examples/inspect.rs` goes on from here, and walks the trees.
+//! This lists the objects of a file. The program `examples/inspect.rs` also walks the trees.
 //!
 //! ```
 //! use bvh_format::Layout;

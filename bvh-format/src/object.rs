@@ -97,8 +97,8 @@ impl Object {
         self.record.origin.map(|value| value.get())
     }
 
-    /// The lower and the upper corner of the axis-aligned box of all stored vertices, in mesh units. The box is exact,
-    /// and flat along an axis on which all vertices have the same coordinate.
+    /// The lower and the upper corner of the axis-aligned box of all stored vertices, in mesh units. The box is exact.
+    /// It is flat along an axis on which all vertices have the same coordinate.
     pub fn bounding_box(&self) -> [[f64; 3]; 2] {
         let origin = self.origin();
         let corner = |v: [F32; 3]| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis].get()));
@@ -119,8 +119,9 @@ impl Object {
         (centre, if moved > 0.0 { (radius + moved).next_up() } else { radius })
     }
 
-    /// Returns whether the sphere of the record contains all corners of packets, as rule 35 asks. Differences, squares and
-    /// sums are rounded to nearest in `f64`, without overflow or underflow: a corner outside is within 2^-50 of the radius.
+    /// Returns whether the sphere of the record contains all corners of packets, as rule 35 requires. Differences,
+    /// squares and sums are rounded to nearest in `f64`, without overflow or underflow. A corner may therefore be
+    /// outside by 2^-50 of the radius.
     pub fn sphere_contains<'a>(&self, packets: impl IntoIterator<Item = &'a Packet>) -> bool {
         let [a, b, c] = self.record.sphere_centre.map(|c| f64::from(c.get()));
         let radius = f64::from(self.record.sphere_radius.get());
@@ -159,7 +160,7 @@ impl Object {
         first..first + self.record.pages.get()
     }
 
-    /// The record of the object table, for those who need its bytes or the numbers that have no accessor.
+    /// The record of the object table, with its bytes and the numbers that have no accessor.
     #[inline]
     pub fn record(&self) -> &ObjectRecord {
         &self.record

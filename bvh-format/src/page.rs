@@ -5,10 +5,10 @@
 //! them, [`PagePatcher`] changes the numbers in pages that have been written, and [`check_page`] decides whether a page
 //! may be read. They share the constants and the shape in this file.
 //!
-//! Treelet slots are numbered breadth-first. The slots of the roots come first, in the order of the anchors; then follow
-//! the child treelets of slot 0, of slot 1, and so on. Leaf packets and remote links are numbered in the same order, so
-//! a treelet stores only the number of its first child of each kind. Short treelets have the last slots, in the same
-//! order. [`check_page`] demands this order, and with it no slot, packet or link can be reached twice.
+//! Treelet slots are numbered breadth-first. The slots of the roots come first, in the order of the anchors; then
+//! follow the child treelets of slot 0, of slot 1, and so on. Leaf packets and remote links are numbered in the same
+//! order, so a treelet stores only the number of its first child of each kind. Short treelets have the last slots, in
+//! the same order. [`check_page`] requires this order, which ensures that no slot, packet or link can be reached twice.
 
 mod check;
 mod patcher;
@@ -151,7 +151,7 @@ pub struct Anchor {
     pub parent_link: u8,
 }
 
-/// How many roots, remote links and treelets a page has: all that decides where its parts stand.
+/// The numbers of roots, remote links and treelets of a page, which determine the places of its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PageShape {
     /// Subtree roots, which are among the treelets.
@@ -209,7 +209,7 @@ pub struct PagePlace {
 }
 
 impl PagePlace {
-    /// The place of the next page, if a page with this header stands at this place.
+    /// The place of the page that follows a page with this header at this place.
     pub fn behind(self, header: &PageHeader) -> Self {
         Self {
             page: self.page + 1,

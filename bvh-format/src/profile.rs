@@ -2,7 +2,7 @@
 
 use crate::kdop::DirectionSet;
 
-/// How the slab ends of a child are stored. The list is as complete as that of [`Profile`], and not non-exhaustive either.
+/// How the slab ends of a child are stored. Like [`Profile`], the list is complete and not marked as non-exhaustive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// A residual of 4 bits, in units of 1/15 of the parent's slab.
@@ -17,8 +17,8 @@ pub enum Encoding {
 
 /// The layout of treelets.
 ///
-/// The list is part of the major version of the format. It is not marked as non-exhaustive, so that a decoder that has
-/// code for each profile does not compile until a new one is dealt with.
+/// The list is part of the major version of the format. It is not marked as non-exhaustive: a decoder that has code for
+/// each profile does not compile until it has code for a new one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Profile {
@@ -101,7 +101,7 @@ impl Profile {
         WIDTHS[self as usize] as usize
     }
 
-    /// Whether treelets of nothing but leaf packets may be short: see [`treelet`](crate::treelet).
+    /// Whether treelets whose children are all leaf packets may be short: see [`treelet`](crate::treelet).
     #[inline]
     pub const fn has_short_treelets(self) -> bool {
         matches!(self, Self::Dop14U8 | Self::Dop6U8)
@@ -124,7 +124,7 @@ impl Profile {
         }
     }
 
-    /// The number of groups of four children in which a treelet is decoded: 2 at width 8, else 1.
+    /// The number of groups of four children to which a treelet decodes: 2 at width 8, else 1.
     #[inline]
     pub const fn groups(self) -> usize {
         if self.width() == 8 { 2 } else { 1 }

@@ -5,8 +5,8 @@
 //! Since the prediction starts from the decoded parent, the errors of successive levels do not add up. The method is that
 //! of Tan, Weller and Zachmann (arXiv 2012.05348, section 4), with explicit rounding.
 //!
-//! A quantisation step has 16 significant bits and a code at most 8, so their product is exact in `f32`: a decoder gets
-//! the same bits whether it fuses the product with the sum or not.
+//! A quantisation step has 16 significant bits and a code at most 8, so their product is exact in `f32`. A decoder
+//! therefore gets the same bits whether it fuses the product with the sum or not.
 
 use crate::profile::Encoding;
 use half::f16;

@@ -2,10 +2,11 @@
 //! with the directions of another.
 //!
 //! Let `d = sum c_j n_j` over directions `n_j` of the set. Then each point x of the k-DOP has `d . x <= sum c_j end_j`,
-//! where `end_j` is the upper end of slab j if `c_j` is positive, and the lower end if it is negative (duality of linear
-//! programs). Of all such sums over three directions, the three neighbours of `d` in the set give the least for a ball,
-//! and one close to the least for any round body. The neighbours follow from the order of the magnitudes of the
-//! coordinates of `d`. The method is that of Zachmann (VRAIS 1998), who uses the three faces at the extreme vertex.
+//! where `end_j` is the upper end of slab j if `c_j` is positive, and the lower end if it is negative (duality of
+//! linear programs). Of all such sums over three directions, that over the three neighbours of `d` in the set is the
+//! least for a ball, and close to the least for any round body. The neighbours follow from the order of the magnitudes
+//! of the coordinates of `d`. The method is that of Zachmann (VRAIS 1998), who uses the three faces at the extreme
+//! vertex.
 
 use crate::kdop::DirectionSet;
 use crate::slabs::row;

@@ -1,7 +1,7 @@
 //! The bytes of a file, in memory or read piece by piece, and the pages and blocks among them.
 //!
-//! Code that reads a file through a [`Source`] works the same on bytes in memory and on a file of any size, of which it
-//! holds a few pages at a time.
+//! Code that reads a file through a [`Source`] works the same for bytes in memory and for a file of any size, and holds
+//! only a few pages at a time.
 
 use crate::checksum::{Hasher, checksum};
 use crate::error::FormatError;
@@ -72,8 +72,8 @@ impl<'a> PageBytes<'a> {
     }
 }
 
-/// A leaf block or an id block that has not been checked. If it is longer than any block that keeps the rules, only its
-/// first bytes are here, and the checksum of all. A block that does not lie within its section is empty.
+/// A leaf block or an id block that has not been checked. If it is longer than any block that keeps the rules, this
+/// holds only its first bytes, and the checksum of all. A block that does not lie within its section is empty.
 pub struct Block<'a> {
     bytes: Cow<'a, [u8]>,
     /// The length and the checksum of a block that is too long.

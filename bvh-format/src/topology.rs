@@ -1,5 +1,5 @@
-//! The topology section: which objects are closed, a triangle of each of their components, and how often a triangle
-//! counts of which duplicates were left out.
+//! The topology section: which objects are closed, a triangle of each of their components, and how often triangles
+//! count whose duplicates were left out.
 //!
 //! A head, one record per object, the components of all objects and the nets of all objects follow each other. Section
 //! 3.2 of `spec/format.md` states each byte and defines the terms.
@@ -36,7 +36,7 @@ pub struct TopologyRecord {
     pub reserved: U32,
 }
 
-/// How often a triangle counts whose duplicates were left out, as stored.
+/// The stored count of a triangle whose duplicates were left out.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Net {
@@ -49,7 +49,7 @@ pub struct Net {
 
 const _: () = assert!(size_of::<TopologyRecord>() == 16 && size_of::<Net>() == 8);
 
-/// What the section says about an object: whether it is closed, and which bytes of the file are its lists.
+/// What the section states about an object: whether it is closed, and which bytes of the file are its lists.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectTopology {
     /// Whether the triangles have no boundary, each counted as often as its net says.
@@ -175,7 +175,7 @@ fn read_table(
     Ok(topology)
 }
 
-/// Checks the lists of all objects: the order of their places, and that nets are listed where they matter only.
+/// Checks the lists of all objects: the order of their places, and that only nets other than 1 are listed.
 ///
 /// # Errors
 /// The first of rules 46 and 47 that does not hold, or an error of the source.
@@ -233,7 +233,7 @@ fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable, E: Fro
 /// the triangle goes along the edge from its greater end to its lesser one. An edge between equal ends adds nothing.
 ///
 /// The sum over triangles without a boundary is 0, since each edge is added as often as it is subtracted. The sum over
-/// others is 0 by a chance of about 2^-64. All sums wrap around.
+/// others is 0 with a probability of about 2^-64. All sums wrap around.
 pub fn boundary(corners: &[[f32; 3]; 3]) -> u64 {
     let ends = corners.map(end_of_edge);
     let mut sum = 0u64;

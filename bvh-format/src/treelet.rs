@@ -3,14 +3,13 @@
 //! Rows stand for slabs and columns for children, so that a vector register loads four slabs of four children at once.
 //! A treelet has two halves: the first holds the lower ends, the second the upper ends. U4 packs both ends into one
 //! byte instead. Its first half holds slabs 0 to 6 and its second half slabs 7 to 12, or, at width 8, children 0 to 3
-//! and 4 to 7. Slab 7 and those above it begin a new register, so slab `s` stands in row `s` below 7 and in row
-//! `s + 1` from 7 on. The last four bytes of each half, which no row uses, hold the links: the kinds of the children,
-//! and where the first child of each kind is. Children of one kind are numbered consecutively from the first, in the
-//! order of the children.
+//! and 4 to 7. Slab 7 begins a new register: slab `s` is in row `s` if it is below 7, and in row `s + 1` otherwise. The
+//! last four bytes of each half, which no row uses, hold the links: the kinds of the children, and where the first
+//! child of each kind is. Children of one kind are numbered consecutively from the first, in the order of the children.
 //!
-//! A *short* treelet has no children but leaf packets, and takes half a line. One byte holds both codes of a slab, each
-//! of four bits that stand for one of [`SHORT_CODES`]. Packets are where a loose slab costs least, because no slab
-//! below is predicted from theirs, and two treelets of three have nothing else.
+//! All children of a *short* treelet are leaf packets, and it takes half a line. One byte holds both codes of a slab,
+//! each of four bits that stand for one of [`SHORT_CODES`]. Loose slabs cost least for packets, because no slab is
+//! predicted from theirs. Two thirds of all treelets have only packets as children.
 //!
 //! Section 7 of `spec/format.md` says where each byte stands and what the kinds are.
 

@@ -1,9 +1,10 @@
 //! The turning slab of a child: one more slab, along a direction of the child's own that follows its surface.
 //!
-//! Slabs along fixed directions are as wide as a curved patch is long, however small it is. A slab along the patch's own
-//! normal grows thin with the square of its length. It takes four bytes in the rows that fixed slabs of
-//! [`Profile::Dop26U8Wide`] leave empty: two for the direction, and one for each end, counted inward from what the
-//! child's own decoded box reaches along the direction. Four zero bytes mean that there is none.
+//! The width of a slab along a fixed direction shrinks only with the length of a curved patch. The width of a slab
+//! along the patch's own normal shrinks with the square of the length. Such a slab takes four bytes in the rows that
+//! fixed slabs of [`Profile::Dop26U8Wide`] leave empty: two for the direction, and one for each end. The ends are
+//! counted inward from the reach of the child's own decoded box along the direction. Four zero bytes mean that there is
+//! none.
 //!
 //! The direction is a hemi-octahedral code (Cigolle et al., "A Survey of Efficient Representations for Independent Unit
 //! Vectors", JCGT 2014): two integers that name a point of the unfolded half octahedron. It is an integer vector divided by
@@ -36,7 +37,8 @@ pub struct TurningDirection {
     pub b: u8,
 }
 
-/// What is added to an integer of a direction to make a code of it, and the largest magnitude that writers use.
+/// The difference between a code and its integer of a direction, and the largest magnitude of an integer that writers
+/// use.
 pub const BIAS: u8 = 127;
 
 impl TurningDirection {
@@ -46,8 +48,8 @@ impl TurningDirection {
         [a + b, a - b, 2 * i16::from(BIAS) - 2 * a.abs().max(b.abs())].map(|c| f32::from(c) / 256.0)
     }
 
-    /// The code whose direction is nearly that of a vector, or its opposite: within a degree. The vector may have any
-    /// length; a zero vector or NaN gives the z axis.
+    /// The code of a direction within a degree of that of a vector, or of its opposite. The vector may have any length;
+    /// a zero vector or NaN gives the z axis.
     pub fn near([x, y, z]: [f64; 3]) -> Self {
         let most = f64::from(BIAS);
         let scale = if z < 0.0 { -most } else { most } / (x.abs() + y.abs() + z.abs());
@@ -72,8 +74,8 @@ pub struct TurningSlab {
 }
 
 impl TurningSlab {
-    /// The slab of the triangles in packets along a direction. Each end is less than 2^-22 of the largest coordinate from
-    /// the tightest one, outward. Lanes beyond a packet's triangles count as well, so they must repeat some of them.
+    /// The slab of the triangles in packets along a direction. Each end is outside the tightest one, by less than 2^-22
+    /// of the largest coordinate. Lanes beyond a packet's triangles count as well, so they must repeat some of these.
     pub fn around<'a>(direction: TurningDirection, packets: impl IntoIterator<Item = &'a Packet>) -> Self {
         let n = direction.vector().map(f64::from);
         let (mut lo, mut hi) = ([f64::INFINITY; PACKET], [f64::NEG_INFINITY; PACKET]);

@@ -1,8 +1,8 @@
 //! Checks the structure and all checksums of a whole file, page by page.
 //!
-//! The check reads the bytes in order, wherever they are, and holds a few pages at a time. One pass is for the checksums
-//! of sections, one for the pages and their blocks, and one for the links between pages. All that stays of a page is
-//! added to sums, so memory does not grow with the file.
+//! The check reads the bytes in order, from memory or from storage, and holds a few pages at a time. One pass is for
+//! the checksums of sections, one for the pages and their blocks, and one for the links between pages. It keeps only
+//! sums over the pages, so memory does not grow with the file.
 
 mod counts;
 
@@ -28,7 +28,7 @@ const PAGES_PER_BATCH: u32 = 1 << 12;
 
 /// How the work of [`validate_with`] is shared: by one thread, or by several.
 pub trait Workers: Sync {
-    /// Does both, perhaps at the same time.
+    /// Runs both functions, perhaps at the same time.
     ///
     /// # Errors
     /// The error of `a`, or else that of `b`.
@@ -79,12 +79,13 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
 /// [`crate::bounds::check_bounds`].
 ///
 /// The check takes two passes over all bytes, and one over the pages for their links, with one more page read per link.
-/// It needs twice the memory of the object table and of the instances, 48 bytes per object for the topology, some 300 KiB for counts, and a page with its
-/// blocks for each worker: at most 1 MiB, and 64 KiB in files of `bvh-bake`.
+/// It needs twice the memory of the object table and of the instances, 48 bytes per object for the topology, and some
+/// 300 KiB for counts. Each worker also holds a page with its blocks. These take at most 1 MiB, and 64 KiB in files of
+/// `bvh-bake`.
 ///
 /// # Errors
-/// The first rule that does not hold, in the order of the specification, however the work is shared and wherever the
-/// bytes are; or an error of the source.
+/// The first rule that does not hold, in the order of the specification, or an error of the source. The rule depends
+/// neither on how the work is shared nor on where the bytes are.
 pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> Result<Layout, S::Error> {
     let layout = Layout::read_from(source)?;
     let pages = || {
@@ -167,7 +168,7 @@ fn check_object<S: Source + ?Sized>(
     topology.map_or(Ok(()), |topology| check_in_pages(layout, source, object, topology, boundary))
 }
 
-/// A page that has been validated, except where its remote links lead.
+/// A page that has been validated, except for the targets of its remote links.
 pub struct ValidatedPage<'a> {
     /// The bytes of the page.
     pub bytes: PageBytes<'a>,
@@ -179,8 +180,8 @@ pub struct ValidatedPage<'a> {
     pub boundary: u64,
 }
 
-/// Reads a page and its blocks, and checks them value by value, except where the remote links lead. `closed` says whether
-/// the file states that the object is closed.
+/// Reads a page and its blocks, and checks them value by value, except for the targets of remote links. `closed` tells
+/// whether the file states that the object is closed.
 ///
 /// # Errors
 /// The first of rules 15 to 33, 37 and 38 that does not hold, or an error of the source.

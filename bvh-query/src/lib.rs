@@ -14,14 +14,14 @@
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
 //! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
-//! | is the way free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
+//! | is a motion free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
-//! [`Scene`] asks them about many placed shapes, over all pairs that matter: see there for its questions.
-//! [`Tracker`] asks the same questions about poses that follow a path, in less time, and [`Batch`] asks about many poses on
-//! all cores, as [`ProbeBatch`] does about many points, rays and segments. Batches, and scenes on all cores, need the feature
-//! `parallel`, which is on by default and brings the dependency on rayon. The feature `mint` converts matrices and
-//! quaternions of other crates to a [`Pose`]. Points, rays and segments are given in the frame of a mesh, or in the world about
-//! a mesh that [`Shape::at`] places there.
+//! [`Scene`] answers these questions about many placed shapes, over all pairs that matter. [`Tracker`] answers them in
+//! less time for poses that follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points,
+//! rays and segments. Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds
+//! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`]. Points,
+//! rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the
+//! world.
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or
 //! portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have the same bits on
@@ -37,14 +37,15 @@
 //! ```
 //!
 //! # Examples
-//! Programs to start from are in the folder `examples` of this crate; each runs without arguments from the root of the
+//! The folder `examples` of this crate has programs to start from. Each runs without arguments from the root of the
 //! workspace:
 //!
-//! - `cargo run --release --example collide`: two meshes in one pose, touching or how far apart.
+//! - `cargo run --release --example collide`: whether two meshes touch in one pose, and how far apart they are.
 //! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
-//! - `cargo run --release --example planner`: a way through an environment, each edge of which is certified to be free.
-//! - `cargo run --release --example robot`: a robot of a URDF file among obstacles, in a [`Scene`], in
-//!   poses and on the ways between.
+//! - `cargo run --release --example planner`: a path through an environment, each edge of which is certified to be
+//!   free.
+//! - `cargo run --release --example robot`: a robot from a URDF file among obstacles, in a [`Scene`], in poses and on
+//!   the motions between them.
 //! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
 //!
 //! In short:
@@ -110,9 +111,9 @@ pub use scene::{
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
-/// The path is that of `include_bytes!`. For a file that a build script baked, it is
-/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. The file starts at a cache line, so that queries read plain triangles where
-/// they are.
+/// The path is written as for `include_bytes!`. For a file that a build script baked, it is
+/// `concat!(env!("OUT_DIR"), "/name.cbvh")`. The file starts at a cache line, so that queries read plain triangles in
+/// place.
 #[macro_export]
 macro_rules! include_cbvh {
     ($path:expr $(,)?) => {

@@ -1,4 +1,4 @@
-//! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh it was baked from.
+//! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh from which it was baked.
 
 use crate::console::{self, Failure, Record, hex, length, names, plural, record};
 use crate::options::size;

@@ -1,4 +1,4 @@
-//! What every command prints, and how it ends: standard output and error, records in JSON, and exit codes.
+//! Output and exit of all commands: standard output and error, records in JSON, and exit codes.
 
 use bvh_bake::input::ReadError;
 use bvh_bake::{BakeError, FileError, VerifyError};

@@ -1,9 +1,10 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
-//! Each folder is what a person does with the command: `bake` one output, or many `assets`; `dump`; `check`; `query`;
-//! `motion`; `probe`; `scene`; `report`. They stand on `asking` (what commands that ask questions have in common), `options` (what
-//! several commands accept), `process` (memory and signals), `map` (mapped files) and `console` (what is printed, and how a command ends). Imports
-//! lead from the former to the latter only. What scripts may rely on is in `cbvh --help` and in the help of each command.
+//! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
+//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `report`. They import these modules, which do not import them:
+//! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
+//! (memory and signals), `map` (mapped files) and `console` (output and exit codes). `cbvh --help` and the help of each
+//! command state what scripts may rely on.
 
 mod asking;
 mod assets;
@@ -67,7 +68,7 @@ enum Command {
     Validate(check::ValidateArguments),
     /// Check that a .cbvh file has the triangles of a mesh and that every bound contains its triangles
     Verify(check::VerifyArguments),
-    /// Ask whether two meshes touch, where, how far apart they are, and whether one is inside the other
+    /// Ask whether and where two meshes touch, how far apart they are, and whether one is inside the other
     Query(query::QueryArguments),
     /// Ask whether a motion between two poses is free at every moment, and when it first touches
     Motion(motion::MotionArguments),

@@ -1,4 +1,4 @@
-//! Maps `.cbvh` files: the one place where the command promises that nobody changes them.
+//! Maps `.cbvh` files. Only here, the command promises that nobody changes them.
 
 use bvh_query::{Bvh, OpenError, ReadAhead};
 use std::path::Path;

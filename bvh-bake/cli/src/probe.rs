@@ -137,7 +137,7 @@ fn expected(mode: Mode) -> &'static str {
     }
 }
 
-/// Guesses what a line with a wrong number of numbers means, and says what to write instead.
+/// Guesses the meaning of a line with a wrong count of numbers, and says what to write instead.
 fn wrong_count(mode: Mode, count: usize) -> String {
     let guess = match count {
         3 => "; a point? use --mode closest or --mode side",

@@ -74,7 +74,7 @@ pub(crate) struct QueryArguments {
 /// A question about two meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Mode {
-    /// Do they touch? This is about surfaces: a mesh inside another does not touch it, and relation tells
+    /// Do they touch? This is about surfaces: a mesh inside another does not touch it; relation finds it
     Collide,
     /// How many pairs of triangles touch?
     Contacts,

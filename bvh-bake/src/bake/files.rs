@@ -99,22 +99,23 @@ impl<'a> FileBake<'a> {
         Self { force, ..self }
     }
 
-    /// Sets the most memory that the whole process may have resident, in bytes; `None` for no limit. What does not fit
-    /// goes to scratch files. Inputs are read piece by piece; only the JSON of glTF files, and files that are not
-    /// regular such as pipes, are read into memory as a whole. What is too large for the budget is refused. Some allocators keep much of the freed memory, such as that of the GNU C
-    /// library. Such an allocator must be told not to: see its `mallopt`.
+    /// Sets the most memory that the whole process may have resident, in bytes; `None` for no limit. Data that do not
+    /// fit go to scratch files. Inputs are read piece by piece; only the JSON of glTF files, and files that are not
+    /// regular such as pipes, are read into memory as a whole. If one of these is too large for the budget, the bake
+    /// fails. Some allocators, such as that of the GNU C library, keep much of the freed memory and must be told not
+    /// to: see its `mallopt`.
     pub fn max_memory(self, bytes: impl Into<Option<u64>>) -> Self {
         Self { max_memory: bytes.into(), ..self }
     }
 
-    /// Sets whether a glTF file may name buffers outside its own folder, by `..` or by symbolic links. By default that is
-    /// refused, because whoever made the file would choose which files of this system end up in the output.
+    /// Sets whether a glTF file may name buffers outside its own folder, by `..` or by symbolic links. By default that
+    /// is refused, because the author of the file could choose which files of this system end up in the output.
     pub fn allow_outside(self, allow: bool) -> Self {
         Self { allow_outside: allow, ..self }
     }
 
-    /// Sets the directory for scratch files; `None` for the directory of the output. Scratch files have no names there,
-    /// so that nothing is left however the process ends.
+    /// Sets the directory for scratch files; `None` for the directory of the output. Scratch files have no names, so
+    /// nothing is left however the process ends.
     pub fn scratch(self, directory: impl Into<Option<PathBuf>>) -> Self {
         Self { scratch: directory.into(), ..self }
     }

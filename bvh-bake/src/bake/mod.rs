@@ -32,8 +32,8 @@ use zerocopy::FromZeros;
 
 /// Bakes a mesh into the bytes of a `.cbvh` file.
 ///
-/// The bytes depend on the mesh and the options alone. They do not depend on the number of threads, which are those of
-/// rayon's current pool. Every bake is proved: the bytes are validated and every bound is checked.
+/// The bytes depend only on the mesh and the options, and not on the number of threads, which are those of rayon's
+/// current pool. Every bake is proved: the bytes are validated and every bound is checked.
 ///
 /// Cost: about 0.6 microseconds per triangle on two cores, and up to 300 bytes of memory per triangle.
 ///

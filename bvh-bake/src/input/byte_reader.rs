@@ -1,7 +1,7 @@
 //! Reads a file from its beginning to its end, block by block, as bytes or as words with their lines.
 //!
-//! Memory and files are read in the same way. A cause that is no fault of the text, such as an error of the system, is
-//! kept in `stopped` and looks like the end of the file until the caller asks for it with `finish`.
+//! Memory and files are read in the same way. An error that is no fault of the text, such as one of the system, is kept
+//! in `stopped`. It looks like the end of the file until `finish` returns it.
 
 use super::text::{is_blank, number};
 use crate::error::{Fault, Halt, Place, excerpt};

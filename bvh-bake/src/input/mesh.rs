@@ -19,8 +19,8 @@ const MAX_INSTANCES: u64 = u32::MAX as u64;
 pub struct Mesh {
     /// The objects, in the order of the file.
     pub objects: Vec<Object>,
-    /// Where the objects stand in the world. With instances, each object has its own frame and gets its own tree, and the
-    /// file is a scene. Without them, a mesh says nothing about a world.
+    /// The poses of objects in the world. With instances, each object has its own frame and gets its own tree, and the
+    /// file is a scene. Without instances, there is no world.
     pub instances: Vec<Instance>,
 }
 
@@ -107,7 +107,8 @@ impl Mesh {
     }
 
     /// Joins all objects into one unnamed object, with the triangles in the order of their ids. A single object keeps
-    /// its name. Instances are left out: the objects are joined as they are, not as they stand in the world. The vertices of the objects are appended one after the other; equal vertices are not joined.
+    /// its name. Instances are left out: the objects are joined in their own coordinates, not at their places in the
+    /// world. The vertices of the objects are appended one after the other; equal vertices are not joined.
     pub fn merged(mut self) -> Mesh {
         self.instances.clear();
         if self.objects.len() <= 1 {

@@ -102,9 +102,9 @@ pub(crate) fn stem(path: &Path) -> String {
 }
 
 /// Reads a mesh file into memory. The format is that of the file's extension or, if the extension is unknown or
-/// missing, the one that the content suggests. The buffers that a glTF file names must be in regular files in its folder or
-/// below it, whatever `..` or symbolic links lead to; [`FileBake::allow_outside`](crate::FileBake::allow_outside) reads
-/// others.
+/// missing, the one that the content suggests. The buffers that a glTF file names must be regular files in its folder
+/// or below it, after `..` and symbolic links are resolved. [`FileBake::allow_outside`](crate::FileBake::allow_outside)
+/// allows others.
 ///
 /// # Errors
 /// [`ReadError`]: the error of the system, or the first defect of the file.
@@ -112,14 +112,15 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     collect(&find(path)?)
 }
 
-/// Reads a mesh file as a scene, which has instances. In a glTF file, each node with a mesh is an instance, nodes share
-/// their meshes, and a mesh is an object for each scale with which it occurs. In other files, each object is an instance
-/// where it stands. Names that occur again get a number.
+/// Reads a mesh file as a scene, which has instances. In a glTF file, each node with a mesh is an instance. Nodes share
+/// their meshes, and a mesh becomes one object for each scale with which it occurs. In other files, each object is an
+/// instance at its own place. Names that occur again get a number.
 ///
-/// A node whose transform is a matrix is taken as a rotation with scales, if it is one to within 2^-22, and a scale within
-/// 2^-22 of one that a node states, or of that of an earlier matrix, as the same: numbers of f32 tell them no better apart. So
-/// each matrix above a vertex may move it by 2^-21 of its distance from the node's origin, which no field of a file counts.
-/// Nodes with a translation, a rotation and a scale are exact but for roundings of f64.
+/// The transform of a node may be a matrix. If it is a rotation with scales to within 2^-22, it is treated as one. If a
+/// scale is within 2^-22 of one that a node states, or of the scale of an earlier matrix, both count as equal, because
+/// f32 numbers cannot distinguish them better. Each matrix above a vertex may therefore move it by 2^-21 of its
+/// distance from the node's origin, and no field of a file records this. Nodes with a translation, a rotation and a
+/// scale are exact except for roundings of f64.
 ///
 /// # Errors
 /// The errors of [`read`].

@@ -173,7 +173,7 @@ struct Sections<'a> {
 }
 
 impl Sections<'_> {
-    /// Fills the file with zeros up to a multiple of so many bytes.
+    /// Fills the file with zeros up to a multiple of `bytes`.
     fn align(&mut self, bytes: usize) -> Result<(), BakeError> {
         let end = self.output.length() as usize;
         self.output.append(Arc::new(vec![0; end.next_multiple_of(bytes) - end]))

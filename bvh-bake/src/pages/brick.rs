@@ -46,8 +46,8 @@ pub(crate) struct EncodedObject {
     pub(crate) children: u64,
 }
 
-/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. The topology of the object, if there is a survey for it, is
-/// added to `lists`.
+/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. If there is a survey of
+/// the topology of the object, it is added to `lists`.
 pub(crate) fn encode_object(
     bricks: Bricks,
     style: Style,

@@ -6,10 +6,11 @@
 //! The pages of the last level, which has the root, come first in the file, so that children are always in later pages
 //! than their parents.
 //!
-//! Treelets of nothing but packets are written as short ones if the style of the pages says so, except for roots.
+//! If the style of the pages says so, treelets whose children are all packets are written as short ones, except for
+//! roots.
 //!
 //! Each brick is planned by itself, except for a rest of at most half a page. The rests and the tree above the bricks
-//! are planned last and come first in the file; the bricks follow one after the other.
+//! are planned last and come first in the file. The bricks follow one after the other.
 
 use crate::pages::Style;
 use crate::tree::arena::{Arena, TreeletIndex};

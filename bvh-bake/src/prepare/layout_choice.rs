@@ -25,8 +25,8 @@ pub(crate) struct Choice {
 }
 
 /// The candidates, and the cost in nanoseconds of testing 16 pairs of their nodes, with everything that belongs to a
-/// test: the median time of a collide query divided by the mean number of its node tests, bunny poses 1e-6 of the size
-/// apart; AVX-512, AMD EPYC (Zen 5 class), 2026-11-22.
+/// test. The cost is the median time of a collide query divided by the mean number of its node tests, for bunny poses
+/// 1e-6 of the size apart (AVX-512, AMD EPYC, Zen 5 class, 2026-11-22).
 const FAST_PROFILES: [(Profile, f64); 3] =
     [(Profile::Dop6F16, 94.0), (Profile::Dop14U8, 108.0), (Profile::Dop26U8Wide, 150.0)];
 /// The same for profiles with treelets of one line, for files that must be small.
@@ -46,7 +46,7 @@ const TRIAL_COUNT: usize = 400;
 
 /// The least numbers of triangles below the nodes of trials, which take turns.
 const TRIAL_SIZES: [usize; 3] = [1, 8, 64];
-/// A node that has so many times more triangles than wanted is not taken, but its child.
+/// A node with more than this many times the wanted number of triangles is not taken; the node below it is.
 const MAX_EXCESS: usize = 4;
 
 /// The width of all profiles among which the choice is open.

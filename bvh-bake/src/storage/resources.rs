@@ -1,4 +1,4 @@
-//! Divides the memory budget of a bake or a check among its stages, and names the scratch files for the rest.
+//! Divides the memory budget of a bake or a check among its stages, and provides scratch files for the rest.
 
 use super::{Scratch, Stream};
 use crate::error::Halt;

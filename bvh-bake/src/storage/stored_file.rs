@@ -84,8 +84,8 @@ impl StoredFile {
         Ok(opened)
     }
 
-    /// Refuses a piece of `piece` bytes if there is too little memory to read it at once and keep it in another form,
-    /// or a growing list if there is too little memory for `piece` bytes of it.
+    /// Refuses a piece of `piece` bytes if there is too little memory to read it at once and keep it in another form.
+    /// For a growing list, it refuses if there is too little memory for `piece` bytes of the list.
     ///
     /// # Errors
     /// [`FileError::Memory`] if the limit is exceeded.

@@ -1,17 +1,17 @@
-//! Finds out whether objects are closed, and a triangle of each of their components, on the way through a bake.
+//! Finds out, during a bake, whether objects are closed, and a triangle of each of their components.
 //!
-//! An object is closed if every edge is traversed as often in one direction as in the other, by its triangles, each
-//! counted as often as its net says. Edges are counted in three steps, each of which passes on only those that do not
-//! cancel: in runs of a few hundred neighbouring triangles (`brick`), in a brick, and in the object (`joined`). The same
-//! steps join triangles that share an edge into parts, and parts into components.
+//! An object is closed if its triangles, each counted as often as its net says, traverse every edge as often in one
+//! direction as in the other. Edges are counted in three steps, each of which passes on only those that do not cancel:
+//! in runs of a few hundred neighbouring triangles (`brick`), in a brick, and in the object (`joined`). The same steps
+//! join triangles that share an edge into parts, and parts into components.
 //!
-//! An edge that cancels in one step is not looked at again, even if triangles elsewhere have it too. Surfaces that meet
-//! along such an edge may therefore stay two components. An edge that does not cancel in a brick is passed on only if
-//! another brick's box contains it: only edges between bricks reach the last step, where they are sorted, in files if
+//! An edge that cancels in one step is dropped, even if triangles elsewhere also have it. Surfaces that meet along such
+//! an edge may therefore stay two components. An edge that does not cancel in a brick is passed on only if another
+//! brick's box contains it. Only edges between bricks therefore reach the last step, where they are sorted, in files if
 //! need be.
 //!
-//! Triangles count once in their bricks. What duplicates add, and take away where their orientation is the opposite, is
-//! counted apart (`nets`), as edges of their own.
+//! Triangles count once in their bricks. Duplicates add to this, or take away if their orientation is the opposite.
+//! These differences are counted separately (`nets`), as additional edges.
 
 mod brick;
 mod edge;

@@ -1,4 +1,4 @@
-//! Collects how often the triangles of an object count that have duplicates.
+//! Collects the nets of the triangles of an object that have duplicates.
 
 use super::edge::{Edge, End};
 use crate::error::BakeError;

@@ -1,4 +1,4 @@
-//! Treelets in one array: those of a brick, or the tree above the bricks followed by what the bricks left over.
+//! Treelets in one array: those of a brick, or the tree above the bricks followed by the rests of the bricks.
 
 use crate::tree::PacketTriangles;
 use crate::tree::bricks::BrickIndex;

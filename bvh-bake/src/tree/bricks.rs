@@ -1,8 +1,8 @@
 //! Divides an object into bricks, which are parts of at most 2^18 triangles, and builds the tree above them.
 //!
-//! Trees are built within bricks and above bricks, and never mix the two. What a part of the file looks like
-//! therefore depends on the triangles of its brick and on a few numbers from the rest. A baker can take one brick at
-//! a time, whatever the size of the mesh, and get the same bytes.
+//! Trees are built within bricks and above bricks, and never mix the two. The bytes of a part of the file therefore
+//! depend only on the triangles of its brick and on a few numbers from the rest. A baker can take one brick at a time,
+//! whatever the size of the mesh, and get the same bytes.
 //!
 //! The box around the centres of all triangles' boxes is divided into a grid of 64 cells along each axis. Each cell
 //! counts its centres and joins the boxes of their triangles. Planes between cells then split the grid, by the same

@@ -15,10 +15,10 @@ use super::PacketTriangles;
 use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::Aabb;
 
-/// The most nodes that a search visits; hardly any search visits so many. It bounds the time for meshes in which every
-/// part overlaps every other.
+/// The most nodes that a search visits. Searches rarely reach it. It bounds the time for meshes in which every part
+/// overlaps every other.
 const MAX_VISITS: usize = 1024;
-/// The largest subtrees are moved, one of every so many.
+/// The largest subtrees are moved: one subtree in this number.
 const ONE_IN: usize = 10;
 /// The most levels of a tree. A deeper one cannot be used, because later stages recurse.
 const MAX_DEPTH: usize = 256;

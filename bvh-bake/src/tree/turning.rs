@@ -1,6 +1,6 @@
-//! Fits a turning slab to each child of not too many triangles: along the mean normal of its patch.
+//! Fits a turning slab, along the mean normal of its patch, to each child that does not have too many triangles.
 //!
-//! The mean weighs by area and does not ask which side of a triangle is outside, so that the two sides of a sheet do not
+//! The mean is weighted by area and ignores which side of a triangle is outside, so the two sides of a sheet do not
 //! cancel. Patches are fitted from the leaves up: normals add up, and the slab of each patch is measured from all its
 //! triangles.
 

@@ -185,7 +185,7 @@ struct Pool {
 }
 
 impl Pool {
-    /// A pool to which at most so many vertices are given.
+    /// Returns an empty pool with room for this number of vertices.
     fn new(vertices: usize) -> Self {
         Self { vertices: Vec::new(), table: vec![0; (2 * vertices).next_power_of_two()] }
     }

@@ -1,15 +1,16 @@
 //! The packed leaf block: the distinct vertices of a page in a pool of bit fields, and a record for each packet.
 //!
-//! A record holds the number of a [pattern](super::patterns), by how much the triangles are rotated, and the places in
-//! the pool of six vertices. A pattern of more slots than six has the others elsewhere: the last field of its record
-//! then leads to them. Records therefore have one size, and a packet is found by its number.
+//! A record holds the number of a [pattern](super::patterns), the rotation of each triangle, and the places of six
+//! vertices in the pool. If a pattern has more than six slots, the last field of the record leads to the others. All
+//! records of a block therefore have one size, and a packet is found by its number.
 //!
-//! Each coordinate in the pool is an offset from the block's base, of a few bits, and stands for a number in one of
-//! three ways, whichever takes the fewest bits on its axis. The bits of an *ordered* `f32`, made monotone
-//! (`b ^ ((b >> 31) >>> 1)`), are the sum. A *binary* or *decimal* coordinate is the sum times a power of 2 or 10: grids
-//! and CAD models are multiples of a power of two, and scans are often printed in decimals. All are exact.
+//! Each coordinate in the pool is an offset of a few bits from the block's base. The sum of both stands for a number in
+//! one of three ways, whichever takes the fewest bits on its axis. For an *ordered* coordinate, the sum is the bits of
+//! the `f32`, made monotone (`b ^ ((b >> 31) >>> 1)`). A *binary* or *decimal* coordinate is the sum times a power of 2
+//! or 10: grids and CAD models are multiples of a power of two, and scans are often printed in decimals. All three are
+//! exact.
 //!
-//! Section 11.2 of `spec/format.md` says where each byte stands.
+//! Section 11.2 of `spec/format.md` states the place of each byte.
 
 use super::patterns::{CORNERS, MAX_SLOTS, PATTERNS, RECORD_SLOTS, SLOTS};
 use super::{PACKET, Packet};
@@ -81,7 +82,7 @@ impl Unit {
     }
 }
 
-/// The coordinate that is so many units: a product of two `f64`, rounded to `f32`.
+/// Returns the coordinate that is `integer` units: a product of two `f64`, rounded to `f32`.
 #[inline(always)]
 pub(super) fn in_units(integer: i32, unit: f64) -> f32 {
     (f64::from(integer) * unit) as f32
@@ -291,7 +292,7 @@ impl PackedHead {
     }
 }
 
-/// What a block states of a packet: the vertices that it has, and which of them its corners are.
+/// The record of a packet: its vertices, and which of them its corners are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record {
     pattern: u8,

@@ -1,8 +1,8 @@
 //! Patterns: which corners of a packet's triangles are the same vertex.
 //!
-//! Neighbours share most of their corners, so that the twelve corners of a packet are six vertices as a rule. A packed
-//! packet stores these, in *slots*, and the number of a pattern: for each corner of each lane, a slot. Triangles may be
-//! rotated to fit a pattern, and a record states by how much, so that their corners keep their order.
+//! Neighbours share most of their corners, so the twelve corners of a packet usually are six vertices. A packed packet
+//! stores these in *slots*, together with the number of a pattern, which gives the slot of each corner of each lane.
+//! Triangles may be rotated to fit a pattern. The record states the rotations, so that corners keep their order.
 //!
 //! The table has the patterns that occur most in scans and CAD models, in the canonical form that [`Fit::new`] finds:
 //! slots are numbered in the order in which they first occur, and rotations make the sequence of slots the least. Where
@@ -316,8 +316,9 @@ pub(crate) fn labels_of(triangles: &[[[u32; 3]; 3]; PACKET]) -> Places {
     labels
 }
 
-/// Returns an order of one to four triangles in which a packet of them takes the fewest bytes: which triangle comes
-/// first, second and so on. It depends only on which corners are equal, and is the order as given where no other helps.
+/// Returns the order of one to four triangles in which their packet takes the fewest bytes: the number of the triangle
+/// that comes first, second and so on. It depends only on which corners are equal. If no order helps, it is the one
+/// given.
 pub fn order_of_lanes(triangles: &[[[f32; 3]; 3]]) -> [u8; PACKET] {
     let count = triangles.len().min(PACKET);
     let mut bits = [[[0; 3]; 3]; PACKET];

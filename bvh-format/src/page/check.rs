@@ -11,8 +11,8 @@ use crate::rule::Rule;
 use crate::slabs::{NodeSlabs, row};
 use crate::treelet::{read_codes, read_ends};
 
-/// Checks all that a page shows by itself: its checksum, shape, anchors, codes and links. `number` is the page's number
-/// in the node section, and `at` its byte offset in the file.
+/// Checks everything that can be checked in a page alone: its checksum, shape, anchors, codes and links. `number` is
+/// the page's number in the node section, and `at` its byte offset in the file.
 ///
 /// The page to which a remote link leads is checked when the link is followed: see [`check_crossing`].
 ///
@@ -187,8 +187,8 @@ pub fn check_nested(
 }
 
 /// Checks that a remote link and the root to which it leads name each other, and that the root's slabs lie within those
-/// decoded for the child with that link. `link` is the page and the number of the link, `slabs` what was decoded, and the root
-/// is in page `target` at byte `at` of the file.
+/// decoded for the child with that link. `link` is the page and the number of the link, and `slabs` are the decoded
+/// slabs. The root is in page `target`, which is at byte `at` of the file.
 ///
 /// # Errors
 /// Rules 20 and 49.

@@ -1,8 +1,8 @@
 //! Changes the numbers in a page after it has been written: its own place, its parents, and the targets of its links.
 //!
-//! A baker writes a page before it knows how many pages, lines, words and packets will stand before it. Such a page
-//! counts from the first page that was written along with it. When the order of the file is known, a patcher
-//! puts in the final numbers and then seals the page with its checksum.
+//! A baker writes a page before it knows how many pages, lines, words and packets will come before it. The numbers in
+//! such a page count from the first page that was written together with it. When the order of the file is known, a
+//! patcher writes the final numbers and then seals the page with its checksum.
 
 use super::writer::{write_header, write_parent, write_remote};
 use super::{PAGE, Page, PagePlace, RootRef, page_checksum};
@@ -40,7 +40,7 @@ impl<'a> PagePatcher<'a> {
         write_parent(self.bytes, self.profile, root.into(), (page, link));
     }
 
-    /// Lets a remote link lead to another root.
+    /// Changes the root to which a remote link leads.
     pub fn set_remote(&mut self, link: u8, to: RootRef) {
         let roots = self.page().header().roots;
         write_remote(self.bytes, self.profile, roots, link, to);

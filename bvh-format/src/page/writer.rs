@@ -19,8 +19,8 @@ use crate::treelet::{Child, ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
 use crate::turning::{TurningSlab, encode_turning};
 use zerocopy::{FromZeros, IntoBytes};
 
-/// A page and its blocks. Its numbers count from itself until a [`PagePatcher`](super::PagePatcher) changes them: it is
-/// page 0, its blocks start their sections, and its checksum is missing.
+/// A page and its blocks. Until a [`PagePatcher`](super::PagePatcher) changes its numbers, it is page 0, its blocks are
+/// the first of their sections, and its checksum is missing.
 pub struct WrittenPage {
     /// The bytes of the page.
     pub bytes: Box<[u8; PAGE]>,
@@ -32,11 +32,12 @@ pub struct WrittenPage {
 
 /// Writes one page.
 ///
-/// Call [`root`](Self::root) for each root; then, for each slot in turn, [`begin_treelet`](Self::begin_treelet) and one
-/// of [`treelet`](Self::treelet), [`short_treelet`](Self::short_treelet), [`remote`](Self::remote) and
-/// [`leaf`](Self::leaf) for each child; at last [`finish`](Self::finish). Children that are treelets of this page take
-/// the next free slots, short ones the next after all others, and remote links and leaf packets the next free numbers,
-/// in the order of the calls. A short treelet must have no children but packets.
+/// First call [`root`](Self::root) for each root. Then call, for each slot in turn,
+/// [`begin_treelet`](Self::begin_treelet) and one of [`treelet`](Self::treelet),
+/// [`short_treelet`](Self::short_treelet), [`remote`](Self::remote) and [`leaf`](Self::leaf) for each child. Finally
+/// call [`finish`](Self::finish). In the order of the calls, children that are treelets of this page take the next free
+/// slots, short ones the next slots after all others, and remote links and leaf packets the next free numbers. The
+/// children of a short treelet must all be packets.
 ///
 /// # Panics
 /// The methods panic if more is written than the shape has room for, or than the profile allows for a treelet.

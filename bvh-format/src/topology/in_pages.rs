@@ -1,7 +1,7 @@
 //! Checks the topology of an object against its pages, once these have been checked.
 //!
-//! Places ascend, and so do the packets of pages. A cursor goes through the pages once, and leaps over those between two
-//! places by steps that double, so a short list costs a few pages.
+//! Places ascend, and so do the packets of pages. A cursor goes through the pages once, and skips those between two
+//! places in steps that double, so a short list costs a few pages.
 
 use super::{LANES, Net, ObjectTopology, boundary, visit_list};
 use crate::error::ensure;

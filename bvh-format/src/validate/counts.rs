@@ -1,4 +1,4 @@
-//! Sums up how many treelets, packets and so on the pages of an object have, and compares the sums with its record.
+//! Adds up the treelets, packets and triangles of an object's pages, and compares the sums with its record.
 //!
 //! Counts of consecutive pages are joined in any order, so a check may walk through the pages forward or backward.
 
@@ -7,7 +7,7 @@ use crate::layout::Layout;
 use crate::object::Object;
 use crate::rule::Rule;
 
-/// How many parts a page has, or consecutive pages of an object together. The default is that of no page.
+/// The numbers of parts of one page, or of consecutive pages of an object together. The default stands for no page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     pub(super) first_page: u32,

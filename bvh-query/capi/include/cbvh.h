@@ -1,7 +1,6 @@
 /* cbvh: exact collision and distance queries between rigid triangle meshes. The C interface, C99.
  *
- * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file; questions are asked about meshes in
- * poses:
+ * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file. Questions are about meshes in poses:
  *
  *     cbvh_mesh room, robot;
  *     cbvh_querier querier;
@@ -13,40 +12,39 @@
  *
  * What holds for all functions:
  *
- * Errors. Every function but cbvh_last_message returns a cbvh_status. Any status but CBVH_OK leaves a message with the
- * thread, which names the argument, what was expected and what was found. Arguments are checked before any question is
- * asked. After a failure, handles that a function should have made are 0, and answers hold no particular values;
- * nothing is ever written beyond them. Nothing unwinds out of a function, and no argument makes one crash as long as
- * pointers that are neither null nor misaligned lead to as many elements as is said, and text ends with a zero byte.
- * Where memory for arrays of the caller or for a list of contacts runs out, the status is CBVH_LIMIT; where it runs out
- * elsewhere, the process ends. Functions need 128 KiB of stack.
+ * Errors. Every function except cbvh_last_message returns a cbvh_status. Any status except CBVH_OK leaves a message for
+ * the thread, which names the argument, what was expected and what was found. Arguments are checked before any question
+ * is asked. After a failure, handles that a function should have made are 0, and answers have no particular values;
+ * nothing is ever written beyond them. Nothing unwinds out of a function. No argument makes a function crash if two
+ * conditions hold: pointers that are neither null nor misaligned lead to as many elements as stated, and text ends with
+ * a zero byte. If memory for arrays of the caller or for a list of contacts runs out, the status is CBVH_LIMIT. If it
+ * runs out elsewhere, the process ends. Functions need 128 KiB of stack.
  *
  * Poses are "body to world". In questions about two meshes, the world is the frame of mesh A: a point x of mesh B is at
  * R x + t in A's frame. Points are columns; a pose is the rows of the 3 by 4 matrix [R | t]. R is a rotation to within
  * 2^-20. Lengths are in the unit of the meshes.
  *
- * Handles are numbers, not addresses: small structures that are passed by value. A handle of 0 is none, and freeing it
- * does nothing. A handle that was freed, is of another kind or was made up is refused with CBVH_INVALID_HANDLE; it is
- * never followed. A copy of the structure is the same handle, which is to be freed once. Handles that are not freed
- * live as long as the process. In a child after fork() without exec() use none.
+ * Handles are numbers in small structures that are passed by value; they are not addresses. 0 is not a handle, and
+ * freeing it does nothing. A handle that was freed, has another kind or was made up is refused with CBVH_INVALID_HANDLE
+ * and never followed. A copy of the structure is the same handle, and must be freed only once. Handles that are not
+ * freed live as long as the process. Use no handles in a child after fork() without exec().
  *
- * Threads. Functions may be called on any thread. Meshes and paths may be used by many threads at the same time; a
- * querier, a tracker and a scene by one at a time, and a second one gets CBVH_BUSY. Make one querier for each thread.
- * Many threads may look at a scene together, which is to say clone it or call cbvh_scene_find, _instances,
- * _instance_name, _instance_pose, _instance_mesh or _stats, while none uses or changes it.
- * Freeing a mesh or a path that other threads use is allowed: it lives on until their questions end.
- * cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all cores; the number of threads is that
- * of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
+ * Threads. Functions may be called on any thread. Many threads may use a mesh or a path at the same time. Only one
+ * thread at a time may use a querier, a tracker or a scene; a second one gets CBVH_BUSY. Make one querier for each
+ * thread. While no thread uses or changes a scene, many threads may clone it or call cbvh_scene_find, _instances,
+ * _instance_name, _instance_pose, _instance_mesh or _stats. A mesh or a path may be freed while other threads use it:
+ * it lives until their questions end. cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all
+ * cores. The number of threads is that of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
- * command cbvh and of the Rust library. How the calling thread rounds (fesetround), whether it flushes subnormal
- * numbers (-ffast-math) and which exceptions trap (feenableexcept) does not matter: functions change it where they have
- * to, and change it back. Functions of the caller run as the caller of the question computes; on threads of the
- * library, long double on x86-64 is an exception.
+ * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
+ * flushes subnormal numbers (-ffast-math) and which exceptions trap (feenableexcept): functions change this state if
+ * they have to, and restore it. Functions of the caller run in the floating-point state of the thread that asked the
+ * question, except for long double on x86-64 on threads of the library.
  *
- * Lists. A function with a list of answers takes a buffer, the number of elements that it has room for, and a count.
- * The count always gets the number of all answers. If there are more than there is room for, those that fit are
- * written, and the status is CBVH_BUFFER_TOO_SMALL. The buffer may be NULL where there is room for none.
+ * Lists. A function with a list of answers takes a buffer, the number of elements for which it has room, and a count.
+ * The count always gets the number of all answers. If there are more answers than room, those that fit are written, and
+ * the status is CBVH_BUFFER_TOO_SMALL. If there is room for none, the buffer may be NULL.
  *
  * Options start with their size in bytes, for example `cbvh_motion_options options = {.size = sizeof options};`, so
  * that later versions can add fields. Fields that are 0 have their defaults. NULL stands for all defaults.
@@ -68,9 +66,9 @@ extern "C" {
 #define CBVH_VERSION_MINOR 9
 #define CBVH_VERSION_PATCH 0
 
-/* The version of the binary interface: the number in the name of the shared library. A library with the same number
- * runs programs that were built with an older header of that number. Functions and numbers may be added within it; what
- * is there keeps its meaning. */
+/* The version of the binary interface, which is the number in the name of the shared library. A library runs programs
+ * that were built with an older header of the same number. Within a number, functions and constants may be added, and
+ * existing ones keep their meaning. */
 #define CBVH_ABI 0
 
 /* ---------------------------------------------------------------------------------------------------------- status */
@@ -79,9 +77,9 @@ extern "C" {
 typedef int32_t cbvh_status;
 enum {
     CBVH_OK = 0,
-    /* An argument is not what it has to be: null, misaligned, not finite, not rigid, too large, an unknown number. */
+    /* An argument is not valid: null, misaligned, not finite, not rigid, too large, an unknown number. */
     CBVH_INVALID_ARGUMENT = 1,
-    /* A handle is 0, was freed, is of another kind, or is none of this library. */
+    /* A handle is 0, was freed, has another kind, or is not from this library. */
     CBVH_INVALID_HANDLE = 2,
     /* Another thread, or a function that called this one, uses the querier, tracker or scene. */
     CBVH_BUSY = 3,
@@ -93,8 +91,8 @@ enum {
     CBVH_SYSTEM = 6,
     /* A file is not a .cbvh file, or is damaged. The message names the rule it breaks and where. */
     CBVH_DAMAGED = 7,
-    /* A budget of visits or of memory or the memory there is does not suffice, a limit of the format is exceeded, or
-     * 2^24 - 1 handles of a kind are open. */
+    /* A budget of visits or of memory, or the memory of the machine, does not suffice; a limit of the format is
+     * exceeded; or 2^24 - 1 handles of a kind are open. */
     CBVH_LIMIT = 8,
     /* A mesh cannot be baked. */
     CBVH_BAKE_FAILED = 9,
@@ -116,11 +114,11 @@ cbvh_status cbvh_abi(uint32_t *abi);
 
 /* A baked mesh: all objects of a file, or one of them. */
 typedef struct cbvh_mesh { uint64_t id; } cbvh_mesh;
-/* What answers questions, and the memory for it, which is used again from question to question. */
+/* A querier answers questions. It keeps its working memory from question to question. */
 typedef struct cbvh_querier { uint64_t id; } cbvh_querier;
-/* What is remembered from pose to pose of a mesh that moves little by little. */
+/* A tracker keeps results from pose to pose of a mesh that moves in small steps. */
 typedef struct cbvh_tracker { uint64_t id; } cbvh_tracker;
-/* A way of mesh B in the frame of mesh A, or of an instance in the world, over times from 0 to 1. */
+/* A path of mesh B in the frame of mesh A, or of an instance in the world, over times from 0 to 1. */
 typedef struct cbvh_path { uint64_t id; } cbvh_path;
 /* Many placed meshes. */
 typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
@@ -130,7 +128,7 @@ typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
 /* A rigid placement: the rows of the 3 by 4 matrix [R | t], one after the other, body to world. */
 typedef struct cbvh_pose { double rows[12]; } cbvh_pose;
 
-/* The pose of what is not moved. */
+/* The identity pose. */
 #define CBVH_IDENTITY {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}
 
 /* Checks a pose: finite, a translation of at most 2^120 along each axis, a rotation to within 2^-20. */
@@ -140,10 +138,10 @@ cbvh_status cbvh_pose_check(const cbvh_pose *pose);
 cbvh_status cbvh_pose_from_quaternion(const double *quaternion, const double *translation, cbvh_pose *result);
 /* Makes the rigid pose nearest to one that is off by at most 2^-6: for rounded matrices. */
 cbvh_status cbvh_pose_nearest(const cbvh_pose *pose, cbvh_pose *result);
-/* Makes the pose that takes back what a pose does. */
+/* Makes the inverse of a pose. */
 cbvh_status cbvh_pose_inverse(const cbvh_pose *pose, cbvh_pose *result);
-/* Makes the pose that does what `first` does and then what `next` does: a part's pose in a body, then the body's pose
- * in the world, is the part's pose in the world. */
+/* Makes the pose that applies `first` and then `next`. For example, a part's pose in a body and then the body's pose in
+ * the world make the part's pose in the world. */
 cbvh_status cbvh_pose_then(const cbvh_pose *first, const cbvh_pose *next, cbvh_pose *result);
 /* Makes the pose of B in A's frame, which questions about two meshes take, from the poses of both in the world. */
 cbvh_status cbvh_pose_relative(const cbvh_pose *world_a, const cbvh_pose *world_b, cbvh_pose *result);
@@ -161,31 +159,31 @@ enum {
     CBVH_MAP_SPARSE = 1,
     /* Maps the file, and reads all of it in the background. */
     CBVH_MAP_WHOLE = 2,
-    /* Copies the file into memory. What becomes of the file afterwards does not matter. */
+    /* Copies the file into memory. Later changes of the file have no effect. */
     CBVH_READ = 3
 };
 
-/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it or it is no regular file, CBVH_DAMAGED if it is no .cbvh
- * file. Only the header and the table of objects are checked; damage elsewhere is found by the question that needs
- * it. */
+/* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it or it is not a regular file, CBVH_DAMAGED if it is not a
+ * .cbvh file. Only the header and the table of objects are checked. If other parts are damaged, the question that needs
+ * them fails. */
 cbvh_status cbvh_mesh_open(const char *path, cbvh_open_mode mode, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file, which are copied. */
 cbvh_status cbvh_mesh_from_bytes(const void *bytes, size_t size, cbvh_mesh *mesh);
-/* Opens the bytes of a .cbvh file where they are, at any address. They must stay there unchanged until `release` is
- * called with `user`: once, on any thread, when the handle, its clones and objects are freed, scenes with them are
- * freed, and queriers asked about them are freed or have been asked about something else. That may be during this call,
- * as large files are copied to large memory pages. Without `release`, the bytes must stay as long as the process. After
- * a failure `release` is not called.
- * `release` must not let an exception out and must not call this library. */
+/* Opens the bytes of a .cbvh file in place, at any address. They must stay there unchanged until `release` is called
+ * with `user`. This happens once, on any thread, when nothing uses the bytes any more: the handle, its clones and
+ * objects and scenes with them are freed, and queriers that used them are freed or were asked about something else. It
+ * may happen during this call, because large files are copied to large memory pages. Without `release`, the bytes must
+ * stay as long as the process. After a failure, `release` is not called. `release` must not throw an exception and must
+ * not call this library. */
 cbvh_status cbvh_mesh_borrow_bytes(const void *bytes, size_t size, void (*release)(void *user), void *user,
                                    cbvh_mesh *mesh);
-/* Makes another handle of the same mesh, to be freed by itself. Nothing is copied. */
+/* Makes another handle of the same mesh, which must also be freed. Nothing is copied. */
 cbvh_status cbvh_mesh_clone(cbvh_mesh mesh, cbvh_mesh *other);
-/* Frees a handle. Scenes and clones keep what they use; a querier keeps a mesh that it was asked about, of the last
- * eight, until it is next asked about any mesh that is open, or freed. */
+/* Frees a handle. Scenes and clones keep the meshes that they use. A querier keeps the last eight meshes of its
+ * questions until it is freed, or until the next question about any open mesh. */
 cbvh_status cbvh_mesh_free(cbvh_mesh mesh);
 
-/* Makes a mesh of one object of the file that a mesh is in. CBVH_NOT_FOUND if it has no object of this number. */
+/* Makes a mesh of one object in the file of a mesh. CBVH_NOT_FOUND if the file has no object of this number. */
 cbvh_status cbvh_mesh_object(cbvh_mesh mesh, size_t number, cbvh_mesh *object);
 /* Writes how many objects the file of a mesh has: at least one. */
 cbvh_status cbvh_mesh_object_count(cbvh_mesh mesh, size_t *count);
@@ -202,10 +200,10 @@ cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *tr
                                  size_t *count);
 /* Writes the bytes of the file that a mesh is in, and how many there are. */
 cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_t *size);
-/* Writes a mesh to a file, completely or not at all: to another one, which then takes its place. What is there is
- * replaced, also if it is a symbolic link. */
+/* Writes a mesh to a file, completely or not at all: it writes another file, which then replaces the first. Anything
+ * under this name is replaced, also a symbolic link. */
 cbvh_status cbvh_mesh_save(cbvh_mesh mesh, const char *path);
-/* Checks the whole file that a mesh is in: CBVH_DAMAGED with the first rule that it breaks. It is read once. */
+/* Checks the whole file of a mesh, which is read once. CBVH_DAMAGED, with the first rule that the file breaks. */
 cbvh_status cbvh_mesh_validate(cbvh_mesh mesh);
 
 /* How a mesh is baked. The names are those of the command `cbvh bake`, which explains them. */
@@ -223,7 +221,7 @@ typedef struct cbvh_bake_options {
     double max_error;
     /* The most memory that the process may use, in bytes; 0 for no limit. Files only. */
     uint64_t max_memory;
-    /* These are 0 or 1. */
+    /* The following fields are 0 or 1. */
     /* Gives each object of the input a tree of its own. */
     int32_t split_objects;
     /* Reads files as scenes: nodes of glTF files become instances. Files only. */
@@ -232,19 +230,19 @@ typedef struct cbvh_bake_options {
     int32_t no_ids;
     /* Leaves out the slabs that turn with the surface. */
     int32_t no_turning_slabs;
-    /* Leaves out which objects are closed, which questions about what is inside need. */
+    /* Leaves out the topology, which questions about what is inside a mesh need. */
     int32_t no_topology;
     /* Bakes even if the output is up to date. Files only. */
     int32_t force;
 } cbvh_bake_options;
 
 /* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes
- * about 0.6 microseconds per triangle on two cores. CBVH_BAKE_FAILED for what is no mesh: a face that names no vertex,
- * a coordinate that is not finite or beyond 2^120, no faces at all. */
+ * about 0.6 microseconds per triangle on two cores. CBVH_BAKE_FAILED if the arrays are not a mesh: a face names a
+ * vertex that does not exist, a coordinate is not finite or beyond 2^120, or there are no faces. */
 cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_t *faces, size_t face_count,
                       const cbvh_bake_options *options, cbvh_mesh *mesh);
 /* Bakes mesh files (OBJ, STL, PLY, glTF) of any size into a .cbvh file, which is written completely or not at all. An
- * output that is up to date is left alone; `was_up_to_date` gets 1 then, else 0, and may be NULL. */
+ * output that is up to date is not written again. `was_up_to_date` then gets 1, else 0; it may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);
 
@@ -253,28 +251,28 @@ cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const
 /* Which instructions questions use. Answers do not depend on it. */
 typedef int32_t cbvh_backend;
 enum {
-    /* The fastest of this CPU, or that which the environment variable CBVH_ISA names. */
+    /* The fastest one of this CPU, or the one that the environment variable CBVH_ISA names. */
     CBVH_BACKEND_BEST = 0,
     CBVH_BACKEND_SCALAR = 1,
     CBVH_BACKEND_AVX2 = 2,
     CBVH_BACKEND_AVX512 = 3
 };
 
-/* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. It keeps the memory of the largest question
- * it was asked, of 100 bytes for each pose and each probe, until it is freed. */
+/* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. Until it is freed, it keeps the memory of
+ * its largest question: 100 bytes for each pose and each probe. */
 cbvh_status cbvh_querier_new(cbvh_backend backend, cbvh_querier *querier);
 /* Frees a querier. CBVH_BUSY while it is in use. */
 cbvh_status cbvh_querier_free(cbvh_querier querier);
-/* Lets questions about many poses, paths or probes use all cores (1), or the calling thread alone (0, the default).
- * Answers are the same. Give poses that follow a path in the order of the path: neighbours share what was found. */
+/* Lets questions about many poses, paths or probes use all cores (1), or only the calling thread (0, the default).
+ * Answers are the same. Give the poses of a path in the order of the path, because neighbours share results. */
 cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
-/* Lets the question about each pose, path or probe make at most so many visits, of some 100 ns each; more ends with
- * CBVH_LIMIT. A visit is a pair of objects or of nodes, or a node for a probe, a contact with each of its duplicates, a
- * component and an object of a relation, or an interval of a motion. Without it, only the sizes of the files bound a
- * question. */
+/* Limits the question about each pose, path or probe to this many visits, of some 100 ns each. A question that needs
+ * more ends with CBVH_LIMIT. A visit is a pair of objects or of nodes; a node, for a probe; a contact, and each of its
+ * duplicates; a component and an object, for a relation; or an interval of a motion. Without a budget, only the sizes
+ * of the files limit a question. */
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 
-/* How much work the last question was. */
+/* The work of the last question. */
 typedef struct cbvh_stats {
     /* Tests of up to 16 pairs of nodes each. */
     uint64_t node_tests;
@@ -286,15 +284,15 @@ typedef struct cbvh_stats {
     uint64_t pairs;
 } cbvh_stats;
 
-/* Writes how much work the last pose, path or probe of the last question was. Work on other cores is not counted. */
+/* Writes how much work the last pose, path or probe of the last question took. Work on other cores is not counted. */
 cbvh_status cbvh_querier_stats(cbvh_querier querier, cbvh_stats *stats);
 
 /* --------------------------------------------------------------------------------------- questions about two meshes
  *
- * Each takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces; touching is contact,
- * exactly. They fail with CBVH_DAMAGED if a page that a question touches is damaged, and with CBVH_LIMIT if the budget
- * of the querier does not suffice. A question about small or separated meshes takes about a microsecond, a call adds
- * some 0.1. */
+ * Each function takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces. Touching is
+ * contact, exactly. The functions fail with CBVH_DAMAGED if a page that a question touches is damaged, and with
+ * CBVH_LIMIT if the budget of the querier does not suffice. A question about small or separated meshes takes about a
+ * microsecond; a call adds some 0.1. */
 
 /* Answers whether the meshes touch. */
 cbvh_status cbvh_collide(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
@@ -303,7 +301,7 @@ cbvh_status cbvh_collide(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const c
 cbvh_status cbvh_within(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count, double d,
                         bool *answers);
 
-/* How two meshes lie. */
+/* The relation of two meshes. */
 typedef int32_t cbvh_relation;
 enum {
     /* Their surfaces have a point in common. */
@@ -316,11 +314,11 @@ enum {
     CBVH_B_IN_A = 3,
     /* Some connected components are inside the other mesh and some are not, or some of each mesh are. */
     CBVH_MIXED = 4,
-    /* A mesh that is not closed would have to contain something. */
+    /* The answer depends on the inside of a mesh that is not closed. */
     CBVH_RELATION_UNDEFINED = 5
 };
 
-/* Answers how the meshes lie. CBVH_INVALID_ARGUMENT for a file that was baked without topology. */
+/* Answers with the relation of the meshes. CBVH_INVALID_ARGUMENT for a file that was baked without topology. */
 cbvh_status cbvh_relations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                         cbvh_relation *answers);
 
@@ -328,10 +326,10 @@ cbvh_status cbvh_relations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const
 typedef struct cbvh_distance_answer {
     /* The distance; 0 if and only if the meshes touch. */
     double distance;
-    /* The two triangles named here are certainly at least this far apart and, if an error was allowed, no two are
-     * nearer. */
+    /* A certified lower bound: the two triangles named here are at least this far apart. If an error was allowed, no two
+     * triangles are nearer. */
     double lower;
-    /* The meshes are certainly at most this far apart. */
+    /* A certified upper bound: the meshes are at most this far apart. */
     double upper;
     /* The closest points on A and on B, in A's frame. */
     double point_a[3];
@@ -364,23 +362,24 @@ typedef struct cbvh_contact {
     uint32_t triangle_b;
 } cbvh_contact;
 
-/* Lists all pairs of triangles in contact in ascending order, those of one pose after those of the one before. `counts`
- * gets the number of pairs of each pose, and may be NULL. On one core it takes at most four times the memory of the
- * buffer, however many pairs there are; about many poses on all cores, that of all pairs. */
+/* Lists all pairs of triangles in contact in ascending order, pose after pose. `counts` gets the number of pairs of
+ * each pose, and may be NULL. On one core, this takes at most four times the memory of the buffer, however many pairs
+ * there are. For many poses on all cores, it takes the memory of all pairs. */
 cbvh_status cbvh_contacts(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t pose_count,
                           size_t *counts, cbvh_contact *contacts, size_t capacity, size_t *count);
 /* Writes the number of the first pose in which the meshes touch, or `count` if they touch in none. */
 cbvh_status cbvh_first_collision(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                                  size_t *number);
-/* Writes a bound of how far any point of B moves from one pose to another. */
+/* Writes an upper bound of how far any point of B moves from one pose to another. */
 cbvh_status cbvh_displacement(cbvh_mesh b, const cbvh_pose *from, const cbvh_pose *to, double *bound);
 
 /* Makes a tracker. */
 cbvh_status cbvh_tracker_new(cbvh_tracker *tracker);
 /* Frees a tracker. */
 cbvh_status cbvh_tracker_free(cbvh_tracker tracker);
-/* Answer as the functions of querier do, by means of it, on one core and in less time where each pose is near the one
- * before, in this call or the last one. A tracker is about one pair of meshes; another pair makes it forget. */
+/* These functions give the answers of the querier that they use. They use one core, and take less time if each pose is
+ * near the previous one, in this call or the last one. A tracker is for one pair of meshes; another pair makes it
+ * forget. */
 cbvh_status cbvh_tracker_collide(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
                                  const cbvh_pose *poses, size_t count, bool *answers);
 cbvh_status cbvh_tracker_within(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
@@ -390,51 +389,52 @@ cbvh_status cbvh_tracker_distance(cbvh_tracker tracker, cbvh_querier querier, cb
 
 /* --------------------------------------------------------------------------------------------------------- motions
  *
- * Is the way free, at every moment from 0 to 1, and where does it end? Answers are certain between samples, too. */
+ * Is a path free, at every moment from 0 to 1, and where does it end? Answers are certain, also between samples. */
 
-/* Makes the path between two poses: the origin of B moves on a line, B turns about one axis the shorter way, both at a
- * constant rate. CBVH_INVALID_ARGUMENT if the poses are half a turn apart. */
+/* Makes the path between two poses: the origin of B moves on a line, and B turns about one axis by the shorter angle,
+ * both at a constant rate. CBVH_INVALID_ARGUMENT if the poses are half a turn apart. */
 cbvh_status cbvh_path_between(const cbvh_pose *start, const cbvh_pose *end, cbvh_path *path);
-/* Makes a screw motion from `start`: a turn by `angle` radians, any number of turns, about the axis through `point`
+/* Makes a screw motion from `start`: a rotation by `angle` radians, any number of turns, about the axis through `point`
  * with `direction`, and a shift along it. Points and directions are 3 numbers. */
 cbvh_status cbvh_path_screw(const cbvh_pose *start, const double *point, const double *direction, double angle,
                             double shift, cbvh_path *path);
-/* Makes the path through at least two poses, each part of which takes the same time. */
+/* Makes the path through at least two poses. The motion from each pose to the next takes the same share of the time. */
 cbvh_status cbvh_path_polyline(const cbvh_pose *poses, size_t count, cbvh_path *path);
 
-/* Writes where B is at a time from 0 to 1, and returns 0; any other number is a failure, which the question passes on.
- * The same time gives the same pose, to the bit. */
+/* Writes where B is at a time from 0 to 1, and returns 0. Any other number is a failure, which the question reports.
+ * The same time must always give the same pose, to the bit. */
 typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
-/* Returns a bound of the sagitta: how far any point that moves with B, and is at most `radius` from B's origin, is
- * during [t0, t1] from where it would be if it went straight, at a constant rate, from where it is at t0 to where it is
- * at t1. At most an eighth of the greatest acceleration times the square of the time. It must hold with all rounding;
- * answers are only as certain as it is. It may be infinite; NaN and negative numbers end the question with
- * CBVH_CALLBACK_FAILED. */
+/* Returns an upper bound of the sagitta. Take any point that moves with B and is at most `radius` from B's origin.
+ * Compare it with a point that moves on a straight line, at a constant speed, from its place at t0 to its place at t1.
+ * The sagitta is the greatest distance between the two during [t0, t1], which is at most an eighth of the greatest
+ * acceleration times the square of the time. The bound must hold with all rounding; answers are only as certain as it
+ * is. It may be infinite; NaN and negative numbers end the question with CBVH_CALLBACK_FAILED. */
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
 /* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
- * several threads at the same time if the querier or scene is parallel. They must not let an exception or longjmp out.
- * They may call this library, but with the querier or scene in use they get CBVH_BUSY; what they ask on a thread of the
- * library takes that thread alone. `release` is called with `user` when the path is no longer used: once, on any
- * thread, when the handle is freed and questions about it have ended. It may be NULL, must not let an exception out and
- * must not call this library. After a failure it is not called. */
+ * several threads at the same time if the querier or scene is parallel. They must not leave by an exception or longjmp.
+ * They may call this library, but with the querier or scene in use they get CBVH_BUSY. A question that they ask on a
+ * thread of the library uses that thread only. `release` is called with `user` when the path is no longer used: once,
+ * on any thread, when the handle is freed and questions about it have ended. It may be NULL. It must not throw an
+ * exception and must not call this library. After a failure it is not called. */
 cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta,
                                      void (*release)(void *user), void *user, cbvh_path *path);
-/* Says in a function of a path, before it fails, why it does: the message of the question then ends with this text. */
+/* States why a function of a path is about to fail. Call it in that function; the message of the question then ends
+ * with this text. */
 cbvh_status cbvh_callback_message(const char *message);
 /* Frees a path. */
 cbvh_status cbvh_path_free(cbvh_path path);
 /* Writes where B is at a time from 0 to 1. */
 cbvh_status cbvh_path_pose(cbvh_path path, double t, cbvh_pose *result);
-/* Writes a bound of how far any point of B is, from t0 to t1, from where it is in the middle of that time. */
+/* Writes an upper bound of how far any point of B is, from t0 to t1, from its place in the middle of that time. */
 cbvh_status cbvh_path_reach(cbvh_mesh b, cbvh_path path, double t0, double t1, double *bound);
 
 /* What counts as a hit, and how exactly time is searched. */
 typedef struct cbvh_motion_options {
     size_t size;
-    /* Meshes that come as near as this hit; 0 for contact. Finite, at least 0. */
+    /* Meshes that are at most this far apart count as a hit; 0 for contact. Finite, at least 0. */
     double clearance;
-    /* How near B may come to a hit, beyond the clearance, without an answer that says free or hit; 0 for a millionth of
-     * the diagonal of the larger object's box. A smaller one costs more. */
+    /* The width of the undecided range beyond the clearance: if B comes that near and is no hit, the answer may be near. 0
+     * for a millionth of the diagonal of the larger object's box. A smaller tolerance costs more. */
     double tolerance;
 } cbvh_motion_options;
 
@@ -442,37 +442,39 @@ typedef int32_t cbvh_outcome;
 enum {
     /* At no time from 0 to 1 are the meshes within the clearance. */
     CBVH_FREE = 0,
-    /* At the time `at` they are. */
+    /* At the time `at` they are within the clearance. */
     CBVH_HIT = 1,
-    /* They come within clearance and tolerance at the time `at`, and neither free nor hit can be told. */
+    /* At the time `at` their distance is at most the clearance plus the tolerance, and neither free nor hit is certain.
+     * */
     CBVH_NEAR = 2
 };
 
 /* An instance of a scene. 0 is none. */
 typedef struct cbvh_instance { uint64_t id; } cbvh_instance;
 
-/* Whether a way is free, and where it ends. */
+/* Whether a path is free, and where it ends. */
 typedef struct cbvh_motion_answer {
     cbvh_outcome outcome;
     int32_t reserved;
-    /* Before this time the meshes certainly are not within the clearance; 1 where the way is free. */
+    /* Before this time the meshes certainly are not within the clearance; 1 if the path is free. */
     double free_until;
-    /* The earliest time found at which they are, or may be; NaN where the way is free. */
+    /* The earliest time found at which they are, or may be, within the clearance; NaN if the path is free. */
     double at;
-    /* In a scene, the pair: A stands still or, if both move, is the lower one. Else 0. */
+    /* In a scene, the pair: A is the instance that stands still or, if both move, the lower one. Else 0. */
     cbvh_instance instance_a;
     cbvh_instance instance_b;
-    /* The distance at that time. NaN where the way is free. */
+    /* The distance at that time. NaN if the path is free. */
     cbvh_distance_answer nearest;
 } cbvh_motion_answer;
 
-/* Answers where the way along each path ends. */
+/* Answers whether each path is free, and where it ends. */
 cbvh_status cbvh_motions(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_path *paths, size_t count,
                          const cbvh_motion_options *options, cbvh_motion_answer *answers);
-/* Answers whether each path is certainly free. Planners ask this: it needs less time than cbvh_motions to say no. */
+/* Answers whether each path is certainly free. Use it in planners: it needs less time than cbvh_motions to say no. */
 cbvh_status cbvh_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_path *paths, size_t count,
                           const cbvh_motion_options *options, bool *answers);
-/* Answer the same about the paths of cbvh_path_between from each start to its end: the edges of a planner. */
+/* These functions give the same answers about the paths of cbvh_path_between from each start to its end, which are the
+ * edges of a planner. */
 cbvh_status cbvh_edge_motions(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *starts,
                               const cbvh_pose *ends, size_t count, const cbvh_motion_options *options,
                               cbvh_motion_answer *answers);
@@ -482,7 +484,7 @@ cbvh_status cbvh_edges_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, 
 
 /* ---------------------------------------------------------------------------------------------------------- probes
  *
- * Questions about one mesh and many points, rays or segments. `pose` is where the mesh stands in the frame of the
+ * Questions about one mesh and many points, rays or segments. `pose` is the pose of the mesh in the frame of the
  * probes; NULL for the mesh's own frame. Points are 3 numbers each. */
 
 /* On which side of a mesh a point is. The command prints the same numbers. */
@@ -500,7 +502,8 @@ enum {
 
 /* The closest point of a mesh. */
 typedef struct cbvh_closest_point {
-    /* The distance; 0 if and only if the given point is on the mesh. It is not negative inside: see `side`. */
+    /* The distance; 0 if and only if the given point is on the mesh. It is not negative inside; `side` tells the side.
+     * */
     double distance;
     /* The distance certainly lies between these. */
     double lower;
@@ -512,7 +515,7 @@ typedef struct cbvh_closest_point {
     /* The number of the object in its file, and of the triangle in the input. */
     uint32_t object;
     uint32_t triangle;
-    /* 1, or 0 if the mesh is farther than `within`; then numbers are NaN or 0. */
+    /* 1, or 0 if the mesh is farther away than `within`; the numbers are then NaN or 0. */
     int32_t found;
     /* The side of the given point, in answers of signed distances. */
     cbvh_side side;
@@ -524,7 +527,7 @@ cbvh_status cbvh_closest_points(cbvh_querier querier, cbvh_mesh mesh, const cbvh
 /* Answers on which side each point is, exactly. */
 cbvh_status cbvh_sides(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points, size_t count,
                        cbvh_side *answers);
-/* Answers both. */
+/* Answers both questions. */
 cbvh_status cbvh_signed_distances(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
                                   size_t count, double within, cbvh_closest_point *answers);
 
@@ -550,20 +553,20 @@ typedef struct cbvh_ray_hit {
     /* The number of the object in its file, and of the triangle in the input. */
     uint32_t object;
     uint32_t triangle;
-    /* 1, or 0 if the ray hits nothing; then numbers are NaN or 0. */
+    /* 1, or 0 if the ray hits nothing; the numbers are then NaN or 0. */
     int32_t found;
     int32_t reserved;
 } cbvh_ray_hit;
 
-/* Answers where each ray first hits. Which triangle is hit is decided exactly; edges and corners belong to
+/* Answers where each ray first hits. It is decided exactly which triangle is hit. Edges and corners belong to
  * triangles. */
 cbvh_status cbvh_first_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                             size_t count, cbvh_ray_hit *answers);
 /* Answers whether each ray hits at all. */
 cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t count, bool *answers);
-/* Lists all hits in their order along each ray, those of one ray after those of the one before. Hits at exactly the
- * same parameter are one. `counts` gets the number of hits of each ray, and may be NULL. */
+/* Lists all hits, ray after ray, in the order along each ray. Hits at exactly the same parameter count as one. `counts`
+ * gets the number of hits of each ray, and may be NULL. */
 cbvh_status cbvh_all_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t ray_count, size_t *counts, cbvh_ray_hit *hits, size_t capacity, size_t *count);
 
@@ -579,15 +582,15 @@ cbvh_status cbvh_segment_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_p
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
- * Many placed meshes, and questions over all pairs that matter. Of a pair, A is the instance that was added in the
- * lower place, and answers are in A's frame. A scene is used by one thread at a time; clone it for others. */
+ * Many placed meshes, and questions over all pairs that may meet. In a pair, A is the instance in the lower place, and
+ * answers are in A's frame. One thread at a time may use a scene; clone it for others. */
 
 /* Makes an empty scene. */
 cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
-/* Opens a scene file, which `cbvh bake --scene` makes: maps it as CBVH_MAP does, with one instance for each of
- * its own. CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
+/* Makes a scene with the instances of a file of `cbvh bake --scene`, which is mapped as by CBVH_MAP.
+ * CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
 cbvh_status cbvh_scene_open(const char *path, cbvh_scene *scene);
-/* Makes a scene of the instances in the file of a mesh. */
+/* Makes a scene with the instances in the file of a mesh. */
 cbvh_status cbvh_scene_of_mesh(cbvh_mesh mesh, cbvh_scene *scene);
 /* Makes a copy of a scene with the same instances, which shares their meshes. */
 cbvh_status cbvh_scene_clone(cbvh_scene scene, cbvh_scene *other);
@@ -595,26 +598,27 @@ cbvh_status cbvh_scene_clone(cbvh_scene scene, cbvh_scene *other);
 cbvh_status cbvh_scene_free(cbvh_scene scene);
 /* Lets questions use all cores (1) or one (0, the default). */
 cbvh_status cbvh_scene_set_parallel(cbvh_scene scene, int32_t parallel);
-/* Lets the scene remember (1) what it found about each pair: faster where instances move little between questions. */
+/* Lets the scene reuse earlier results about each pair (1) or not (0, the default). This is faster if instances move
+ * little between questions. */
 cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
-/* Lets each question make at most so many visits over all its pairs, and each probe over all instances: those of
- * cbvh_querier_set_budget, and each pair of boxes that the search for near pairs looks at. On several threads, each may
- * make so many before they find out. */
+/* Limits each question to this many visits over all its pairs, and each probe over all instances. Visits are those of
+ * cbvh_querier_set_budget, and each pair of boxes that the search for near pairs tests. If there are several threads,
+ * each may make this many before they stop. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
 
-/* Adds a mesh at a pose in the world. Its rotation is rigid to within 2^-23 and its translation at most 2^118 along
- * each axis. `name` may be NULL; else no other instance has it. `instance` may be NULL. The handle of the mesh may be
- * freed afterwards. */
+/* Adds a mesh at a pose in the world. The rotation must be rigid to within 2^-23, and the translation at most 2^118
+ * along each axis. `name` may be NULL; else no other instance may have it. `instance` may be NULL. The handle of the
+ * mesh may be freed afterwards. */
 cbvh_status cbvh_scene_add(cbvh_scene scene, cbvh_mesh mesh, const cbvh_pose *world, const char *name,
                            cbvh_instance *instance);
-/* Removes an instance. Its number is never given again by this scene. CBVH_NOT_FOUND if the scene has no such instance;
- * an instance of another scene is not recognised as such. */
+/* Removes an instance. This scene never gives its number again. CBVH_NOT_FOUND if the scene has no such instance. An
+ * instance of another scene is not recognised as such. */
 cbvh_status cbvh_scene_remove(cbvh_scene scene, cbvh_instance instance);
-/* Moves many instances, or none after a failure. Of an instance that is given twice, the last pose counts. */
+/* Moves many instances, or none if it fails. If an instance is given twice, the last pose counts. */
 cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds,
                                  size_t count);
-/* Sets the groups that an instance is in and those it meets, a bit each. Two instances are asked about if each is in a
- * group that the other meets. By default all bits are set. */
+/* Sets the groups that an instance is in and those that it meets, one bit per group. Questions are about two instances
+ * if each is in a group that the other meets. By default all bits are set. */
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
 /* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
 cbvh_status cbvh_scene_set_allowed(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t allowed);
@@ -629,7 +633,7 @@ cbvh_status cbvh_scene_instance_name(cbvh_scene scene, cbvh_instance instance, c
 cbvh_status cbvh_scene_instance_pose(cbvh_scene scene, cbvh_instance instance, cbvh_pose *world);
 /* Makes a handle of the mesh of an instance, to be freed. */
 cbvh_status cbvh_scene_instance_mesh(cbvh_scene scene, cbvh_instance instance, cbvh_mesh *mesh);
-/* Writes how much work the last question was, over all its pairs. */
+/* Writes how much work the last question took, over all its pairs. */
 cbvh_status cbvh_scene_stats(cbvh_scene scene, cbvh_stats *stats);
 
 /* A pair of instances. */
@@ -647,14 +651,14 @@ typedef struct cbvh_scene_distance_answer {
     int32_t reserved;
 } cbvh_scene_distance_answer;
 
-/* How a pair lies. */
+/* The relation of a pair. */
 typedef struct cbvh_scene_relation {
     cbvh_scene_pair pair;
     cbvh_relation relation;
     int32_t reserved;
 } cbvh_scene_relation;
 
-/* Two triangles in contact, and the instances that they are of. */
+/* Two triangles in contact, and their instances. */
 typedef struct cbvh_scene_contact {
     cbvh_scene_pair pair;
     cbvh_contact contact;
@@ -670,21 +674,21 @@ cbvh_status cbvh_scene_distance(cbvh_scene scene, cbvh_scene_distance_answer *an
 cbvh_status cbvh_scene_pairs_in_contact(cbvh_scene scene, cbvh_scene_pair *pairs, size_t capacity, size_t *count);
 /* Lists all pairs at most `d` apart, in ascending order. */
 cbvh_status cbvh_scene_pairs_within(cbvh_scene scene, double d, cbvh_scene_pair *pairs, size_t capacity, size_t *count);
-/* Lists all pairs that touch, or of which one is inside the other, wholly or in part, and how they lie. */
+/* Lists all pairs that touch, or of which one is inside the other, wholly or in part, with their relations. */
 cbvh_status cbvh_scene_relations(cbvh_scene scene, cbvh_scene_relation *relations, size_t capacity, size_t *count);
 /* Lists all pairs of triangles in contact. */
 cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, size_t capacity, size_t *count);
 
-/* Answers where the ways of some instances end that move at the same time along paths in the world, while the rest
- * stands still: the earliest hit of all pairs of which one moves. Where those instances stand now does not matter, and
- * they stay there. CBVH_INVALID_ARGUMENT if an instance is given twice. */
+/* Answers whether some instances can move freely at the same time along paths in the world, while the others stand
+ * still. The answer is the earliest hit of all pairs with at least one moving instance. The present poses of moving
+ * instances do not matter, and do not change. CBVH_INVALID_ARGUMENT if an instance is given twice. */
 cbvh_status cbvh_scene_motion(cbvh_scene scene, const cbvh_instance *instances, const cbvh_path *paths, size_t count,
                               const cbvh_motion_options *options, cbvh_motion_answer *answer);
-/* Answers whether all of them are certainly free, which takes less time. */
+/* Answers whether all these paths are certainly free, which takes less time. */
 cbvh_status cbvh_scene_is_free(cbvh_scene scene, const cbvh_instance *instances, const cbvh_path *paths, size_t count,
                                const cbvh_motion_options *options, bool *answer);
 
-/* Answer as the functions of queriers do, over all instances, for probes in the world. */
+/* These functions answer as those of queriers do, over all instances, for probes in the world. */
 cbvh_status cbvh_scene_closest_points(cbvh_scene scene, const double *points, size_t count, double within,
                                       cbvh_closest_point *answers);
 cbvh_status cbvh_scene_sides(cbvh_scene scene, const double *points, size_t count, cbvh_side *answers);

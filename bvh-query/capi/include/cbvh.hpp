@@ -83,7 +83,7 @@ using Stats = cbvh_stats;
 
 /// A rigid placement, body to world: see cbvh_pose. Questions check that it is rigid.
 struct Pose : cbvh_pose {
-    /// No motion.
+    /// The identity.
     Pose() : cbvh_pose CBVH_IDENTITY {}
     /// From the rows of the 3 by 4 matrix [R | t], also in braces: Pose({1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}).
     Pose(const cbvh_pose &pose) : cbvh_pose(pose) {}
@@ -96,8 +96,8 @@ struct Pose : cbvh_pose {
     }
     /// A translation.
     static Pose translation(double x, double y, double z) { return Pose({1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}); }
-    /// From a matrix whose entries are m(row, column): Eigen::Isometry3d, Eigen::Matrix4d, a 3 by 4 matrix. Of the
-    /// fourth row nothing is read.
+    /// From a matrix whose entries are m(row, column): Eigen::Isometry3d, Eigen::Matrix4d, a 3 by 4 matrix. A fourth
+    /// row is not read.
     template <class Matrix> static Pose from_matrix(const Matrix &m) {
         Pose pose;
         for (int row = 0; row < 3; row++) {
@@ -125,9 +125,9 @@ struct Pose : cbvh_pose {
     void check_rigid() const { check(cbvh_pose_check(this)); }
     /// The rigid pose nearest to this one, which is off by at most 2^-6.
     Pose nearest() const { return made([&](cbvh_pose *pose) { return cbvh_pose_nearest(this, pose); }); }
-    /// The pose that takes back what this one does.
+    /// The inverse of this pose.
     Pose inverse() const { return made([&](cbvh_pose *pose) { return cbvh_pose_inverse(this, pose); }); }
-    /// The pose that does what this one does and then what `next` does.
+    /// The pose that applies this one and then `next`.
     Pose then(const Pose &next) const {
         return made([&](cbvh_pose *pose) { return cbvh_pose_then(this, &next, pose); });
     }
@@ -265,8 +265,8 @@ template <class Ask> std::vector<bool> choices(std::size_t count, Ask ask) {
 /// The number of entries to make room for before the length of a list is known.
 inline constexpr std::size_t few = 64;
 
-/// Asks for a list, and once more where it is longer than there is room for. That takes twice the time, so that there
-/// is room for as many elements as the last list had.
+/// Asks for a list, and once more if the list is longer than there is room for. That takes twice the time, so there is
+/// room for as many elements as the last list had.
 template <class Element, class Ask> std::vector<Element> list(std::size_t &room, Ask ask) {
     std::vector<Element> found(room);
     std::size_t count = 0;
@@ -466,10 +466,10 @@ private:
     detail::Handle<cbvh_mesh, cbvh_mesh_free> handle_;
 };
 
-/// A way over times from 0 to 1.
+/// A path over times from 0 to 1.
 class Path {
 public:
-    /// On a line, and the shorter way round.
+    /// The origin moves on a line, and the rotation is the shorter one.
     static Path between(const Pose &start, const Pose &end) {
         return made([&](cbvh_path *path) { return cbvh_path_between(&start, &end, path); });
     }
@@ -481,10 +481,10 @@ public:
     static Path polyline(const std::vector<Pose> &poses) {
         return made([&](cbvh_path *path) { return cbvh_path_polyline(poses.data(), poses.size(), path); });
     }
-    /// A path of one's own: an object with `Pose pose(double t) const` and `double sagitta(double radius, double t0,
-    /// double t1) const`, which cbvh_sagitta_function explains. It is copied, and lives until the last question about
-    /// the path has ended. If either throws, the question throws an Error of CBVH_CALLBACK_FAILED with the text of the
-    /// exception.
+    /// A path of your own: an object with `Pose pose(double t) const` and
+    /// `double sagitta(double radius, double t0, double t1) const`, which cbvh_sagitta_function explains. The object is
+    /// copied, and the copy lives until the last question about the path has ended. If either function throws, the
+    /// question throws an Error of CBVH_CALLBACK_FAILED with the text of the exception.
     template <class Own> static Path of(Own own) {
         auto kept = std::make_unique<Own>(std::move(own));
         Path path = made([&](cbvh_path *raw) {
@@ -500,7 +500,7 @@ public:
         check(cbvh_path_pose(raw(), t, &pose));
         return pose;
     }
-    /// A bound of how far any point of a mesh is, from t0 to t1, from where it is in the middle of that time.
+    /// An upper bound of how far any point of a mesh is, from t0 to t1, from its place in the middle of that time.
     double reach(const Mesh &b, double t0, double t1) const {
         double bound = 0;
         check(cbvh_path_reach(b.raw(), raw(), t0, t1, &bound));
@@ -545,8 +545,8 @@ private:
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 
-/// Answers questions about meshes: one for each thread. Lists of contacts and hits that are longer than 64 and than the
-/// last list are asked for twice, as the first time only counts them.
+/// Answers questions about meshes. Make one for each thread. If a list of contacts or hits is longer than 64 and than
+/// the last list, the library asks for it twice, because the first time only counts its elements.
 class Querier {
 public:
     explicit Querier(cbvh_backend backend = CBVH_BACKEND_BEST) {
@@ -631,7 +631,7 @@ public:
         return number < poses.size() ? std::optional<std::size_t>(number) : std::nullopt;
     }
 
-    /// Where does the way end?
+    /// Is the path free, and where does it end?
     MotionAnswer motion(const Mesh &a, const Mesh &b, const Path &path, const MotionOptions &options = {}) {
         const cbvh_motion_options raw_options = options.raw();
         const cbvh_path raw_path = path.raw();
@@ -639,7 +639,7 @@ public:
         check(cbvh_motions(raw(), a.raw(), b.raw(), &raw_path, 1, &raw_options, &answer));
         return answer;
     }
-    /// Is the way certainly free?
+    /// Is the path certainly free?
     bool is_free(const Mesh &a, const Mesh &b, const Path &path, const MotionOptions &options = {}) {
         const cbvh_motion_options raw_options = options.raw();
         const cbvh_path raw_path = path.raw();
@@ -647,7 +647,7 @@ public:
         check(cbvh_are_free(raw(), a.raw(), b.raw(), &raw_path, 1, &raw_options, &answer));
         return answer;
     }
-    /// The same about many ways.
+    /// The same about many paths.
     std::vector<MotionAnswer> motions(const Mesh &a, const Mesh &b, const std::vector<Path> &paths,
                                       const MotionOptions &options = {}) {
         const cbvh_motion_options raw_options = options.raw();
@@ -664,7 +664,7 @@ public:
             return cbvh_are_free(raw(), a.raw(), b.raw(), raw_paths.data(), raw_paths.size(), &raw_options, answers);
         });
     }
-    /// The same about the ways between poses.
+    /// The same about the paths between poses.
     MotionAnswer motion(const Mesh &a, const Mesh &b, const Pose &start, const Pose &end,
                         const MotionOptions &options = {}) {
         const cbvh_motion_options raw_options = options.raw();
@@ -723,7 +723,7 @@ public:
         check(cbvh_sides(raw(), mesh.raw(), &pose, point.data(), 1, &answer));
         return answer;
     }
-    /// Both: cbvh::signed_distance makes one number of an answer.
+    /// Both: cbvh::signed_distance turns an answer into one number.
     std::vector<std::optional<ClosestPoint>>
     signed_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {},
                      double within = std::numeric_limits<double>::infinity()) {
@@ -787,7 +787,7 @@ private:
     Owned handle_;
 };
 
-/// Remembers what it found from pose to pose of one pair: faster where a mesh moves little by little. One for each
+/// Reuses results from pose to pose of one pair, which is faster if a mesh moves in small steps. Make one for each
 /// thread.
 class Tracker {
 public:
@@ -834,8 +834,9 @@ private:
     Owned handle_;
 };
 
-/// Many placed meshes. One for each thread; copies share the meshes. Lists of pairs, contacts and hits that are longer
-/// than 64 and than the last list are asked for twice, as the first time only counts them.
+/// Many placed meshes. Make one for each thread; copies share the meshes. If a list of pairs, contacts or hits is
+/// longer than 64 and than the last list, the library asks for it twice, because the first time only counts its
+/// elements.
 class Scene {
 public:
     explicit Scene(cbvh_backend backend = CBVH_BACKEND_BEST)
@@ -876,7 +877,7 @@ public:
     }
     void remove(Instance instance) { check(cbvh_scene_remove(raw(), instance)); }
     void set_pose(Instance instance, const Pose &world) { check(cbvh_scene_set_poses(raw(), &instance, &world, 1)); }
-    /// Moves many, or none where it throws.
+    /// Moves many instances, or none if it throws.
     void set_poses(const std::vector<std::pair<Instance, Pose>> &poses) {
         std::vector<Instance> instances;
         std::vector<Pose> worlds;
@@ -986,7 +987,7 @@ public:
         return answer;
     }
 
-    /// These answer as those of Querier do, over all instances, for probes in the world.
+    /// These functions answer as those of Querier do, over all instances, for probes in the world.
     std::vector<std::optional<ClosestPoint>>
     closest_points(const std::vector<Point> &points, double within = std::numeric_limits<double>::infinity()) {
         return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {

@@ -4,7 +4,7 @@ use crate::search::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
-/// Measures cbvh itself. What users ask is in `cbvh report`.
+/// Experiments for developers of cbvh. To measure your own meshes, use `cbvh report`.
 #[derive(Debug, Parser)]
 #[command(name = "cbvh-lab", version, after_help = "bvh-query/lab/README.md says how long each takes.")]
 pub(crate) struct Arguments {
@@ -20,12 +20,13 @@ pub(crate) enum Experiment {
     Search(SearchArguments),
 }
 
-/// Writes hard.md and hard.json. Each case is a pair of small meshes in a pose with an exactly known answer; it is
-/// asked in every profile, in both lossless triangle encodings, on every backend of this CPU, and in a fifth of these with
-/// corners, triangles and sides in other orders. A wrong answer of cbvh ends with exit code 1, after the files are written.
+/// Writes hard.md and hard.json. Each case is a pair of small meshes in a pose whose answer is known exactly. It is
+/// asked in every profile, in both lossless triangle encodings and on every backend of this CPU. In a fifth of these,
+/// it is also asked with corners, triangles and sides in other orders. If an answer of cbvh is wrong, the exit code is
+/// 1; the files are still written.
 #[derive(Debug, Args)]
 pub(crate) struct HardArguments {
-    /// The folder to write to; made if it does not exist
+    /// The folder to write to; it is created if it does not exist
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// A build of programs that ask other libraries: DIR/bin/peer_*. They take two OBJ files, a pose file, --mode, --bv
@@ -37,12 +38,12 @@ pub(crate) struct HardArguments {
     pub(crate) every: u16,
 }
 
-/// Goes on where the record ends, and saves it at least once a minute, so that it may be killed at any time. Everything in a
-/// round follows from its kind and number. A wrong answer, a panic and a round of minutes are findings: they are shrunk,
-/// kept in the record, and end with exit code 1 at the end.
+/// The search continues from its record. It saves the record at least once a minute, so it may be killed at any time.
+/// The kind and number of a round determine everything in it. A wrong answer, a panic, or a round that takes minutes is
+/// a finding. Findings are shrunk and kept in the record. If there are any, the exit code is 1.
 #[derive(Debug, Args)]
 pub(crate) struct SearchArguments {
-    /// The record, a JSON file; made if it does not exist
+    /// The record, a JSON file; it is created if it does not exist
     #[arg(long, value_name = "FILE", default_value = "target/lab/search.json")]
     pub(crate) record: PathBuf,
     /// The time to search

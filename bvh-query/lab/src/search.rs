@@ -39,7 +39,7 @@ pub(crate) enum Kind {
 const SAVE_SECONDS: u64 = 20;
 /// A round that takes longer than this is a finding; it takes a second or so otherwise.
 const MAX_ROUND_SECONDS: u64 = 300;
-/// After so many findings the search ends.
+/// The search ends after this number of findings.
 const MAX_FINDINGS: usize = 50;
 
 impl Kind {

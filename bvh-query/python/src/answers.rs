@@ -1,7 +1,7 @@
-//! Answers as Python has them: plain values after one question alone, arrays of one element or row each after N.
+//! Answers in the form of Python: plain values for a single question, and arrays of N elements or rows for N questions.
 //!
-//! An answer of several parts is a tuple. Answers that may be missing have a bool in front; the other parts are NaN and 0
-//! where there is none.
+//! An answer of several parts is a tuple. An answer that may be missing begins with a bool; if it is missing, the other
+//! parts are NaN and 0.
 
 use bvh_query::{ClosestPoint, Contact, Distance, MotionAnswer, Pose, RayHit};
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
@@ -126,7 +126,7 @@ pub(crate) const FREE: u8 = 0;
 pub(crate) const HIT: u8 = 1;
 pub(crate) const NEAR: u8 = 2;
 
-/// Kind, time until which the way is free, time of the contact or of the first undecided pose, and the distance there.
+/// Kind, time until which the path is free, time of the contact or of the first undecided pose, and the distance there.
 pub(crate) fn motions<'py>(to: Answers<'py>, of: &[MotionAnswer]) -> PyResult<Bound<'py, PyTuple>> {
     let rows: Vec<_> = of
         .iter()

@@ -1,4 +1,4 @@
-//! Questions about the way of one mesh past another.
+//! Questions about motions of one mesh past another.
 
 use crate::answers::{self, Answers};
 use crate::arguments::{flag, number};

@@ -1,4 +1,4 @@
-//! Paths: the library's own motions and polylines, and paths that Python code answers for.
+//! Paths: the motions and polylines of the library, and paths that Python code defines.
 
 use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
@@ -265,7 +265,8 @@ impl RigidPath for Called {
     }
 }
 
-/// The shortest interval that a question asks about, as a part of the time. Where nothing is known of it, there is no answer.
+/// The shortest interval that a question looks at, as a part of the time. Without a finite bound for it, there is no
+/// answer.
 const SHORTEST: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// The roundings of [`least_departure`], as a fraction of the magnitudes: sums of at most twelve terms, of a few roundings of

@@ -20,12 +20,12 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock, Weak};
 
-/// An open file, with all of its objects: what every program starts with. Cloning it copies a pointer, and threads may
+/// An open file, with all of its objects. Every program starts with one. Cloning it copies a pointer, and threads may
 /// share it.
 ///
-/// Opening a file reads its head and its object table, whatever the size of the file. A page is checked when a
-/// query first touches it. The memory needed is one byte per page, twice the bytes of the object table, and some KiB,
-/// whatever numbers the file holds.
+/// Opening a file reads only its head and its object table, whatever the size of the file. A page is checked when a
+/// query first touches it. An open file needs one byte of memory per page, twice the bytes of the object table, and
+/// some KiB, whatever numbers the file holds.
 #[derive(Clone, Debug)]
 pub struct Bvh(Arc<OpenFile>);
 
@@ -84,8 +84,8 @@ impl Bvh {
         opened.map_err(|source| OpenError::format(path, source))
     }
 
-    /// Reads a whole file into memory and opens the copy. What becomes of the file afterwards does not matter:
-    /// use this where others may write to it, and [`Bvh::map`] where nobody does.
+    /// Reads a whole file into memory and opens the copy. Later changes of the file have no effect: use this where
+    /// others may write to the file, and [`Bvh::map`] where nobody does.
     ///
     /// Cost: that of reading the file, and its size in memory.
     ///
@@ -100,10 +100,10 @@ impl Bvh {
 
     /// Opens the bytes of a file in memory, such as those that `bvh_bake::to_bytes` returns.
     ///
-    /// The bytes may have any owner: a `Vec<u8>`, an `Arc<[u8]>` that others share, a `&'static [u8]`. They are used
-    /// where they are, at any alignment; packets of plain `f32` triangles that are not aligned to 4 bytes are copied
-    /// when they are tested. Only from 8 MiB on the bytes are moved to large memory pages, where the system
-    /// has them: queries then take a tenth less time, at the cost of one copy. [`Bvh::from_static`] never copies.
+    /// The bytes may have any owner: a `Vec<u8>`, an `Arc<[u8]>` that others share, a `&'static [u8]`. They are used in
+    /// place, at any alignment; packets of plain `f32` triangles that are not aligned to 4 bytes are copied when they
+    /// are tested. From 8 MiB on, the bytes are moved to large memory pages if the system has them. Queries then take a
+    /// tenth less time, at the cost of one copy. [`Bvh::from_static`] never copies.
     ///
     /// # Errors
     /// The rule that the header or the object table breaks.
@@ -191,7 +191,7 @@ impl Bvh {
         Ok(of_id.map(|[_, dropped]| dropped.get()))
     }
 
-    /// Checks every page, leaf block and id block now, so that no query has to: otherwise the first touch of a page
+    /// Checks every page, leaf block and id block now, so that no query has to. Otherwise the first touch of a page
     /// costs some microseconds. This reads the whole file once.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Files that are opened when a scene first needs them, of which at most so many stay open.
+//! Files that are opened when a scene first needs them. The number that stay open is limited.
 
 use crate::error::{OpenError, QueryError};
 use crate::file::bvh::{Bvh, WeakBvh};
@@ -9,13 +9,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Files for scenes of more files than shall be open: each is opened when an instance of it is first near another one, and
-/// at most so many stay open. Cloning it copies a pointer.
+/// Files for scenes that have more files than should be open at once. Each file is opened when one of its instances is
+/// first near another instance, and the number of files that stay open is limited. Cloning it copies a pointer.
 ///
-/// [`Files::shape`] reads the header and the object table of a file and closes it. A question that needs the file opens it
-/// again, and fails if it is no longer the same. Of the files that stay open, the one whose last use is the longest ago is
-/// closed for another one; files in use are not closed, so that up to two more per thread may be open while a question
-/// runs.
+/// [`Files::shape`] reads the header and the object table of a file and closes it. A question that needs the file opens
+/// it again, and fails if it is no longer the same. When too many files are open, the least recently used one is
+/// closed. Files in use are not closed, so while a question runs, up to two more files per thread may be open.
 ///
 /// ```no_run
 /// use bvh_query::{Files, Pose, Scene};
@@ -55,8 +54,8 @@ struct Known {
     last_use: AtomicU64,
 }
 
-/// A shape as a scene holds it: its file is open as long as the shape lives, or [`Files`] opens it only while a question
-/// needs it. Whatever has its file open converts into one.
+/// A shape in a scene. Either its file is open as long as the shape lives, or [`Files`] opens it only while a question
+/// needs it. Every shape whose file is open converts into one.
 #[derive(Clone, Debug)]
 pub struct SceneShape(Held);
 
@@ -68,8 +67,8 @@ enum Held {
 }
 
 impl Files {
-    /// Makes a shelf of which at most so many files stay open, and at least one. Each opening copies the file into memory;
-    /// [`Files::mapped`] maps it.
+    /// Creates a set of files of which at most `most` stay open, and at least one. Each opening copies the file into
+    /// memory; [`Files::mapped`] maps it.
     pub fn new(most: usize) -> Self {
         Self::opened_by(most, |path| Bvh::read(path))
     }
@@ -97,7 +96,7 @@ impl Files {
         Ok(SceneShape(Held::Stored(self.clone(), Arc::new(known), None)))
     }
 
-    /// Returns how many files stay open at present.
+    /// Returns how many files are open at present.
     pub fn open_count(&self) -> usize {
         locked(&self.0.open).len()
     }

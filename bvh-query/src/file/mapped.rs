@@ -16,15 +16,15 @@ use std::path::Path;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum ReadAhead {
-    /// Reads as the system usually does: around each page that is touched, other pages as well; on Linux 128 KiB, or
-    /// what is set for the disk. Best where queries touch most of the file in the end.
+    /// Reads as the system usually does, which includes other pages around each page that is touched: on Linux 128 KiB,
+    /// or the setting of the disk. Best if queries touch most of the file in the end.
     #[default]
     Usual,
-    /// Reads no more than queries touch: pages of nodes one by one, blocks of leaves and of ids each at once. Best where
-    /// the file is larger than memory, or where few of its pages will ever be asked for.
+    /// Reads only what queries touch: pages of nodes one by one, and each leaf or id block as a whole. Best if the file
+    /// is larger than memory, or if queries will touch few of its pages.
     Sparse,
-    /// Reads the whole file in the background, from the time it is opened. Best where there is memory for all of it
-    /// and time before the first query.
+    /// Reads the whole file in the background as soon as it is opened. Best if there is memory for all of it and time
+    /// before the first query.
     Whole,
 }
 
@@ -34,17 +34,18 @@ impl Bvh {
     /// Cost: microseconds, whatever the size of the file; for memory see [`Bvh`].
     ///
     /// # Safety
-    /// Nobody may change the bytes of the file while it is open, neither this process nor another one. In detail:
+    /// Neither this process nor another one may change the bytes of the file while it is open. In detail:
     ///
     /// - *Replaced* by renaming another file over it, or *removed*: allowed. The old content stays, and so do the answers.
     ///   `cbvh bake` replaces its output in this way.
     /// - *Truncated*, by whatever process: on Unix the first access beyond the new end sends SIGBUS, which ends this process.
     ///   There is no error to catch.
-    /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not change.
-    ///   Queries are written so that they do not depend on that assumption: they take file bytes as numbers of which each
-    ///   value is valid, they check each index they compute from them, and a walk is bounded by counts that were read once.
+    /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not
+    ///   change. Queries are written so that they do not depend on that assumption. They read file bytes only as
+    ///   numbers for which every value is valid. They check each index that they compute from them. Counts that were
+    ///   read once bound each walk.
     ///
-    /// Damaged or forged bytes are no reason not to map a file. [`Bvh::read`] copies a file and needs no promise.
+    /// A file with damaged or forged bytes may be mapped. [`Bvh::read`] copies a file and needs no promise.
     ///
     /// # Errors
     /// [`OpenError::Io`] if the system refuses the file, [`OpenError::Format`] if the header or the object table
@@ -54,7 +55,7 @@ impl Bvh {
         unsafe { Self::map_with(path, ReadAhead::Usual) }
     }
 
-    /// Maps a file as [`Bvh::map`] does, and tells the system how to read it. Answers do not depend on that.
+    /// Maps a file as [`Bvh::map`] does, and tells the system how to read it. Answers do not depend on `read_ahead`.
     ///
     /// # Safety
     /// That of [`Bvh::map`].
@@ -70,11 +71,11 @@ impl Bvh {
 }
 
 impl Files {
-    /// Makes a shelf of which at most so many files stay open, and at least one. Files are mapped.
+    /// Creates a set of files of which at most `most` stay open, and at least one. Files are mapped.
     ///
     /// # Safety
-    /// That of [`Bvh::map`], for each file that is given to [`Files::shape`], as long as a shape of it lives. A file may
-    /// change while it is closed: the next question that needs it fails.
+    /// The same as for [`Bvh::map`], for each file given to [`Files::shape`], as long as a shape of it lives. A file
+    /// may change while it is closed: the next question that needs it then fails.
     pub unsafe fn mapped(most: usize) -> Self {
         // SAFETY: the caller vouches for each file that is opened in this way.
         Self::opened_by(most, |path| unsafe { Bvh::map(path) })
@@ -103,7 +104,7 @@ unsafe fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
     Ok(map)
 }
 
-/// Refuses what has no bytes of its own.
+/// Refuses anything but a regular file, such as a directory or a device.
 fn require_mappable(metadata: &Metadata) -> io::Result<()> {
     if metadata.is_dir() {
         return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory"));

@@ -1,4 +1,4 @@
-//! Opened files: their bytes, what of them has been checked, and what queries read from them.
+//! Opened files: their bytes, which parts have been checked, and what queries read from them.
 
 pub(crate) mod bvh;
 pub(crate) mod files;

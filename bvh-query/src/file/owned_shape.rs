@@ -1,11 +1,11 @@
-//! A shape that owns its file: for what outlives the code that opened it, such as scenes and other threads.
+//! A shape that owns its file, for scenes, threads and others that outlive the code that opened it.
 
 use crate::file::bvh::Bvh;
 use crate::file::shape::Shape;
 
-/// A [`Shape`] that keeps its file open: for one object that outlives the code that opened its file. For all objects of a
-/// file, a [`Bvh`] does as well. Cloning it copies a pointer, and a reference to it converts into a shape, so that every
-/// question takes it.
+/// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all
+/// objects of a file, a [`Bvh`] is enough. Cloning it copies a pointer. A reference to it converts into a shape, so
+/// every question takes it.
 ///
 /// ```
 /// use bvh_query::{Bvh, OwnedShape, Pose, Querier};
@@ -36,7 +36,7 @@ impl OwnedShape {
         Some(Self { bvh, object: Some(number) })
     }
 
-    /// Returns the shape as questions take it.
+    /// Returns the shape in the form that questions take.
     pub fn shape(&self) -> Shape<'_> {
         // The number was checked when the shape was made.
         self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all())

@@ -20,8 +20,8 @@ impl Bvh {
     }
 }
 
-/// One side of a question, borrowed from its file: one object, or all objects as one. Questions take it, and a `&Bvh`
-/// converts into the shape of all its objects.
+/// One side of a question, borrowed from its file: one object, or all objects as one. A `&Bvh` converts into the shape
+/// of all its objects.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape<'a> {
     bvh: &'a Bvh,

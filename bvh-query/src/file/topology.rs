@@ -1,5 +1,5 @@
-//! What a file states about its surfaces: whether an object is closed, where its components are, and how often triangles
-//! count of which duplicates were left out.
+//! What a file states about its surfaces: whether an object is closed, where its components are, and how often
+//! triangles count whose duplicates were left out.
 //!
 //! The section is checked when it is first needed. A triangle is named there by its place, which counts the lanes of all
 //! packets of the object; pages are searched for it by the number of their first packet.
@@ -43,15 +43,15 @@ impl<'a> Topology<'a> {
 }
 
 impl Bvh {
-    /// Returns whether an object is closed: whether each edge of its triangles is traversed as often in one direction as
-    /// in the other, as on the surface of a solid. Points that do not lie on a closed surface are inside or outside of
-    /// it. Exact duplicates count, with their orientation.
+    /// Returns whether an object is closed: whether its triangles traverse each edge as often in one direction as in
+    /// the other, as on the surface of a solid. Points that do not lie on a closed surface are inside or outside of it.
+    /// Exact duplicates count, with their orientation.
     ///
-    /// Cost: at the first call for a file, a pass over what it states about all objects; then none.
+    /// Cost: at the first call for a file, one pass over its topology section; then none.
     ///
     /// # Errors
-    /// [`QueryError::NoTopology`] if the file was baked without it, [`QueryError::Damaged`] if what it states breaks a
-    /// rule, and [`QueryError::Number`] if there is no such object.
+    /// [`QueryError::NoTopology`] if the file was baked without topology, [`QueryError::Damaged`] if its topology
+    /// breaks a rule, and [`QueryError::Number`] if there is no such object.
     pub fn is_closed(&self, object: usize) -> Result<bool, QueryError> {
         Ok(self.topology(object)?.closed)
     }

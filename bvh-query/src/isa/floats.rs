@@ -1,12 +1,12 @@
-//! The state in which a thread computes with floating-point numbers, and a way to have the default one.
+//! The state of a thread's floating-point arithmetic, and a way to run code in the default state.
 //!
-//! Everything here rests on the default state: to nearest, ties to even; with subnormal numbers; without traps. Rust
-//! promises that its threads have it. Programs in C and C++ may change it, thread by thread: by `fesetround` and
+//! All code of this crate needs the default state: rounding to nearest, ties to even; subnormal numbers; no traps. Rust
+//! promises that its threads have it. Programs in C and C++ may change it for a thread: by `fesetround` and
 //! `feenableexcept`, or by linking with `-ffast-math`, which flushes subnormal numbers to zero.
 //!
-//! The state is a register: MXCSR on x86-64, whose bits 6 to 15 control and whose bits 0 to 5 remember exceptions, and
-//! FPCR on AArch64, which has control bits only. Elsewhere the state is taken to be the default. The x87, which Rust does
-//! not compute with on x86-64, has a state of its own, which is left alone.
+//! The state is a register. On x86-64 it is MXCSR, whose bits 6 to 15 control arithmetic and whose bits 0 to 5 record
+//! exceptions. On AArch64 it is FPCR, which has control bits only. Elsewhere the state is taken to be the default. The
+//! x87 has a state of its own, which is left alone, because Rust does not compute with it on x86-64.
 
 use std::hint::black_box;
 
@@ -25,18 +25,18 @@ impl FloatState {
         Self(register::read())
     }
 
-    /// Returns whether computations have the results that they have in the default state, and none traps. Exceptions
-    /// that happened before do not matter.
+    /// Returns whether computations give the same results as in the default state, and none traps. Exceptions that
+    /// happened before do not matter.
     #[inline]
     pub fn is_default(self) -> bool {
         self.0 & register::CONTROL == register::DEFAULT & register::CONTROL
     }
 
-    /// Runs a function in this state, and takes back the state of this thread afterwards, also where it panics.
+    /// Runs a function in this state, and restores the state of this thread afterwards, also if the function panics.
     ///
     /// # Safety
-    /// Rust may compute nothing in another state than the default one: unless this is the default state, `body` does no
-    /// more than call a function that is not of Rust.
+    /// Rust code may compute only in the default state. Unless this is the default state, `body` must do nothing but
+    /// call a function of another language.
     #[inline]
     pub unsafe fn run<R>(self, body: impl FnOnce() -> R) -> R {
         let before = Self::of_thread();
@@ -45,15 +45,15 @@ impl FloatState {
     }
 }
 
-/// Runs a function in the default state of floating-point arithmetic, and takes back the state of this thread afterwards,
-/// also where it panics. The function gets that state, for what it calls back.
+/// Runs a function in the default state of floating-point arithmetic, and restores the state of this thread afterwards,
+/// also if the function panics. The function gets the previous state, which it needs for callbacks.
 ///
-/// Answers of this crate are exact in the default state, and mean nothing in others: with another rounding bounds do not
-/// hold, without subnormal numbers small meshes touch what they do not, and traps end the process. Threads of Rust are in
-/// the default state. Call this where Rust code is called from C or C++, whose threads may be in another one. Threads that
-/// are started meanwhile start in the default state, as those of rayon's pool are at the first question that uses it.
+/// Answers of this crate are exact in the default state only. With another rounding mode, bounds do not hold. Without
+/// subnormal numbers, small meshes seem to touch. Traps end the process. Threads of Rust are in the default state, but
+/// threads of C or C++ may not be: use this where they call Rust code. Threads that are started in the function start
+/// in the default state. That includes those of rayon's pool, which start at the first question that uses them.
 ///
-/// Cost: a few nanoseconds where the state is the default, some ten more where it is not.
+/// Cost: a few nanoseconds in the default state, some ten more in any other.
 #[inline]
 pub fn with_default_floats<R>(body: impl FnOnce(FloatState) -> R) -> R {
     let before = FloatState::of_thread();

@@ -1,10 +1,10 @@
 //! Defines the vector operations that kernels are written in, and chooses a backend at run time.
 //!
-//! The token of a backend has size zero and can be created only on a CPU with the features it stands for.
-//! Kernels are generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a function
-//! of its own with the features of the backend enabled. A walk is made of a handful of tasks: a single function would
-//! take 64 KB, in which compilers allocate registers badly. A register has 16 lanes (`V`: four children of A against
-//! four of B) or 4 lanes (`H`: four children or triangles of one side).
+//! The token of a backend has size zero and can be created only on a CPU with the backend's features. Kernels are
+//! generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a separate function
+//! with the features of the backend enabled. A walk consists of a few tasks: in a single function of 64 KB, compilers
+//! allocate registers badly. A register has 16 lanes (`V`: four children of A against four of B) or 4 lanes (`H`: four
+//! children or triangles of one side).
 //!
 //! Decoding gives the same bits on every backend, because it uses exact products only. Other operations may
 //! round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters

@@ -1,23 +1,22 @@
-//! Which of 16 triangle pairs are apart, and which intersect: separating axes in two stages.
+//! Finds which of 16 triangle pairs are apart and which intersect, by separating axes in two stages.
 //!
-//! Stage one looks at the two face planes of each pair of a packet pair and settles most of them.
-//! The remaining pairs are queued, so that stage two, the nine cross products of edges, has full lanes.
-//! Axes are not normalised. What the two stages leave undecided goes to exact arithmetic.
+//! Stage one tests the two face planes of each pair of triangles and decides most pairs. The remaining pairs are
+//! queued, so that stage two, the nine cross products of edges, has full lanes. Axes are not normalised. Pairs that
+//! neither stage decides go to exact arithmetic.
 //!
 //! A pair is apart if its projections on one axis certainly are. It intersects if its projections on all eleven axes
-//! certainly overlap in more than a point: corners of either triangle are then strictly on both sides of the other's
-//! plane, so both have area and their planes cross, and the differences of their points form a body whose facets are
-//! perpendicular to these axes (Gottschalk, Lin, Manocha, OBBTree, SIGGRAPH 1996, for boxes; a facet comes from a face
-//! and a corner or from two edges). The origin is strictly inside all of its facets.
+//! certainly overlap in more than a point. Corners of either triangle are then strictly on both sides of the other's
+//! plane, so both triangles have area and their planes cross. The differences of their points form a body whose facets
+//! are perpendicular to these axes, since a facet comes from a face and a corner or from two edges (Gottschalk, Lin,
+//! Manocha, OBBTree, SIGGRAPH 1996, show this for boxes). The origin is strictly inside all of its facets.
 //!
-//! Error. Let e bound the error of every coordinate, r the sum of the magnitudes of a coordinate of
-//! A and one of B (`Local`), and E the largest edge component. A product of two edge components is
-//! off by 4 E e + 4u E^2, a component of the axis by twice that and u of itself; a projection sums
-//! three products of an axis component (at most 2 E^2) and a coordinate or difference (at most r).
-//! The height of a corner over a face of B is such a projection, too: its three parts, along the corner, the offset and
-//! the corner of the face, are at most r together, and their two sums lose 12u E^2 r more.
-//! Together that stays below `E r (48 e + 112 u E)`. Squares of numbers below 2^-75 vanish; the frame's
-//! unit makes 2^-120 far less than any projection that matters, and it is added.
+//! Error. Let e bound the error of every coordinate, r the sum of the magnitudes of a coordinate of A and one of B
+//! (`Local`), and E the largest edge component. A product of two edge components is off by 4 E e + 4u E^2. A component
+//! of the axis is off by twice that, and by u of itself. A projection sums three products of an axis component (at most
+//! 2 E^2) and a coordinate or difference (at most r). The height of a corner over a face of B is such a projection,
+//! too. Its three parts, along the corner, the offset and the corner of the face, are at most r together, and their two
+//! sums lose 12u E^2 r more. Together that stays below `E r (48 e + 112 u E)`. Squares of numbers below 2^-75 vanish.
+//! 2^-120 is added for them; the frame's unit makes it far less than any projection that matters.
 
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};

@@ -1,18 +1,16 @@
 //! Bounds on the distances of 16 triangle pairs.
 //!
-//! The closest features are guessed in plain f32, with no care for rounding; then the guess is
-//! certified. Upper bound: both points of the guess are convex combinations of corners, so that they
-//! lie on the triangles but for the error of the coordinates. Lower bound: all six corners are
-//! projected on the line between the two points; the gap of the projections is a lower bound
-//! whatever the line is, and the distance itself if the guess was right. Intersecting triangles give
-//! no gap, degenerate ones are no exception.
+//! The closest features are guessed in plain f32, without regard to rounding. Then the guess is certified. Upper bound:
+//! both points of the guess are convex combinations of corners, so they lie on the triangles, except for the error of
+//! the coordinates. Lower bound: all six corners are projected onto the line between the two points. The gap of the
+//! projections is a lower bound for any line, and the distance itself if the guess was right. Intersecting triangles
+//! give no gap. Degenerate triangles are not special.
 //!
-//! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the
-//! distance of two within 4 e. Combinations and projections of coordinates of magnitude r or less
-//! round by at most 16u r. Products of coordinates that are dust in the local frame underflow. Those with a
-//! direction of length 1 lose less than 2^-140, which is charged; a guess whose square is below 2^-100 is not
-//! certified but taken as 0 to 2^-50, and above that all that underflows is less than 2^-95 of a length that
-//! `r` is not far below.
+//! Error: with every coordinate within e (`Local`) a point of a triangle is within sqrt(3) e, and the distance of two
+//! within 4 e. Combinations and projections of coordinates of magnitude r or less round by at most 16u r. Products of
+//! coordinates that are dust in the local frame underflow. Those with a direction of length 1 lose less than 2^-140,
+//! which is charged. A guess whose square is below 2^-100 is not certified but taken as 0 to 2^-50. Above that, all
+//! that underflows is less than 2^-95 of a length that `r` is not far below.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, repeat, tile};
@@ -81,9 +79,9 @@ pub(crate) fn near<I: Isa>(isa: I, local: &Local<'_>, limit: f32) -> u16 {
     !far
 }
 
-/// Lanes whose triangles may be closer than `limit` while B moves from where it is in the first frame to where it is in the
-/// second one, looking along directions that are the same at both ends: A's axes, the normals of A's faces and, midway
-/// between both ends, those of B's faces and from centroid to centroid.
+/// Lanes whose triangles may be closer than `limit` while B moves from its place in the first frame to that in the
+/// second one. Tests directions that are the same at both ends: A's axes, the normals of A's faces and, midway between
+/// both ends, the normals of B's faces and the line from centroid to centroid.
 #[inline(always)]
 pub(crate) fn swept_near<I: Isa>(isa: I, [start, end]: [&Local<'_>; 2], limit: f32) -> u16 {
     let ((a, from), (_, to)) = (start.lanes(isa), end.lanes(isa));
@@ -186,9 +184,9 @@ pub(crate) fn bounds<I: Isa>(isa: I, queue: &TriangleQueue) -> Bounds {
     certify(isa, slack_of(isa, queue), gap, guess)
 }
 
-/// Lanes of two queues, of the same pairs in the same order, whose triangles may be closer than `limit` while B moves from
-/// where the first queue has it to where the second one has it. Looks along the line between the closest points, with B
-/// midway between.
+/// Lanes of two queues, of the same pairs in the same order, whose triangles may be closer than `limit` while B moves
+/// from its place in the first queue to that in the second one. Tests the line between the closest points, with B
+/// midway between both.
 #[inline(always)]
 pub(crate) fn swept_bounds<I: Isa>(isa: I, [start, end]: [&TriangleQueue; 2], limit: f32) -> u16 {
     let ((a, from), (_, to)) = (start.corners(isa), end.corners(isa));

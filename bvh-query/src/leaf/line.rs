@@ -1,12 +1,14 @@
 //! Which triangles of up to four packets a line may cross.
 //!
-//! A line with direction w passes an edge from a to b on the side that the sign of w · (a × b) tells, as seen from a point of
-//! the line: see [`crate::narrow::Ray`]. Two opposite signs that are certain show that it misses the triangle.
+//! The sign of w · (a × b) tells on which side a line with direction w passes an edge from a to b, where a and b are
+//! seen from a point of the line: see [`crate::narrow::Ray`]. Two opposite signs that are certain show that the line
+//! misses the triangle.
 //!
-//! Error: a point of the line near the packets is the origin, in the frame of [`crate::leaf::point`]. Let m bound the coordinates
-//! of a triangle there, and u = 2^-24. A coordinate is off by at most d = 2u m + e, with e what [`LocalPoint`] charges; a
-//! component of the cross product then by 4 m d + 2 d^2 + 4u m^2, and one of w by u, as none is beyond 1. The three products and
-//! their sums add 24u m^2. Together that is at most 12 m d + 6 d^2 + 36u m^2, and less than (m + d) (18 d + 48u m).
+//! Error: a point of the line near the packets is the origin, in the frame of [`crate::leaf::point`]. Let m bound the
+//! coordinates of a triangle there, and u = 2^-24. A coordinate is off by at most d = 2u m + e, with e what
+//! [`LocalPoint`] charges. A component of the cross product is then off by 4 m d + 2 d^2 + 4u m^2. A component of w is
+//! off by u, as none is beyond 1. The three products and their sums add 24u m^2. Together that is at most 12 m d + 6
+//! d^2 + 36u m^2, and less than (m + d) (18 d + 48u m).
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::math::{U, cross, dot, largest_of};

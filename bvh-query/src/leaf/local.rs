@@ -1,16 +1,16 @@
 //! Brings a packet of A and a packet of B into one local frame, with a bound on the error.
 //!
-//! It has the directions and the unit of [`LocalFrame`], and the first corner of A's packet as its origin. The packets'
-//! offset from each other is computed in f64: what remains for f32 is as small as the packets and their distance, and so
-//! is its rounding.
+//! The frame has the directions and the unit of [`LocalFrame`], and the first corner of A's packet as its origin. The
+//! offset between the packets is computed in f64. The numbers in f32 are therefore only as large as the packets and
+//! their distance, and so their rounding errors are small.
 //!
-//! With u = 2^-24, w the corners of B relative to its packet's first corner, |w| <= m_b, c the offset,
-//! |c| <= m_c, |a| <= m_a: a corner of A is off by u m_a (one rounded difference); a corner R w + c of B
-//! by at most 9u sum |R||w| + 4u m_c (rounded w, R and c, three products, two sums, and that with c), and the
-//! sum is at most sqrt(3) m_b because rows of R have length 1 (within 2^-20). The pose's f64 error comes on
-//! top. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`. Packets that are dust
-//! beside their object have coordinates that underflow: what is left of a coordinate after six roundings
-//! of 2^-150 and less is within 2^-140 more, which `e_pose` includes.
+//! Let u = 2^-24, a the corners of A with |a| <= m_a, w the corners of B relative to its packet's first corner with
+//! |w| <= m_b, and c the offset with |c| <= m_c. A corner of A is off by u m_a (one rounded difference). A corner R w + c
+//! of B is off by at most 9u sum |R||w| + 4u m_c (rounded w, R and c, three products, two sums, and the sum with c).
+//! There, sum |R||w| is at most sqrt(3) m_b, because rows of R have length 1 (within 2^-20). The pose's f64 error is
+//! added. So every coordinate is within `error = u (2 m_a + 16 m_b + 5 m_c) + e_pose`. If a packet is dust beside its
+//! object, its coordinates underflow. Six roundings of 2^-150 or less move a coordinate by less than 2^-140 more, which
+//! `e_pose` includes.
 
 use crate::isa::Isa;
 use crate::leaf::frame::LocalFrame;

@@ -1,7 +1,7 @@
-//! Leaf packets as filters see them, kept for a query: a packet meets several others.
+//! Leaf packets in the form that filters need, kept for a query, because a packet meets several others.
 //!
-//! A placed packet has A's directions and the unit of the local frame, and its first corner as its origin, so that it does
-//! not depend on the packet that it meets. See `Local` for both together, and for the error.
+//! A placed packet has A's directions and the unit of the local frame, and its first corner as its origin. It therefore
+//! does not depend on the packet that it meets. See `Local` for pairs of packets, and for the error.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::frame::LocalFrame;

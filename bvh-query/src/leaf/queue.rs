@@ -1,7 +1,7 @@
 //! Triangle pairs of several packet pairs, gathered until they fill all lanes of a register.
 //!
-//! Cheap tests leave one or two of the 16 pairs of two packets. The costly tests are done for 16 of the remaining pairs at
-//! once.
+//! Cheap tests leave one or two of the 16 pairs of two packets. The costly tests are made for 16 of the remaining pairs
+//! at once.
 
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::Isa;

@@ -1,4 +1,4 @@
-//! Motions of B in A's frame: the paths that questions about the way between two poses take.
+//! Motions of B in A's frame: the paths for questions about motions.
 
 mod linear;
 mod path;

@@ -1,4 +1,4 @@
-//! Paths: where B is at each moment, and how far it is from a straight line meanwhile.
+//! Paths: where B is at each time, and how far its points are from straight lines in between.
 
 use crate::motion::linear::{Matrix, difference, length, norm, transposed};
 use crate::pose::frames::{product, turn};
@@ -9,19 +9,23 @@ use bvh_format::object::MAX_COORDINATE;
 ///
 /// [`Motion`] and [`Polyline`] are paths. Implement it for others, such as a link of a robot whose joints move.
 pub trait RigidPath {
-    /// Returns where B is at a time from 0 to 1. The same time gives the same pose, to the bit.
+    /// Returns where B is at a time from 0 to 1. The same time must always give the same pose, to the bit.
     fn pose(&self, t: f64) -> Pose;
 
-    /// Returns a bound, in mesh units, of the *sagitta*: how far any point that moves with B, and is at most `radius` from the
-    /// origin of B's frame, is during `[t0, t1]` from where it would be if it went straight, at a constant rate, from where it
-    /// is at `t0` to where it is at `t1`. That is at most an eighth of the greatest acceleration times the square of the time.
-    /// It must hold at every time for which [`RigidPath::pose`] is asked, with all rounding. NaN or a negative number
-    /// counts as infinite. Answers are only as certain as this bound; the smaller it is for short intervals, the less work
-    /// a question takes.
+    /// Returns an upper bound of the *sagitta*, in mesh units.
     ///
-    /// Questions ask with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library answer for any numbers,
-    /// so that others can stand on them: times in any order, as of a way back; times before 0 and after 1, when they stand
-    /// still; and NaN, for which nothing is known.
+    /// Take any point that moves with B and is at most `radius` from the origin of B's frame. Compare it with a point
+    /// that moves on a straight line, at a constant speed, from its place at `t0` to its place at `t1`. The sagitta is
+    /// the greatest distance between the two at any time in `[t0, t1]`. It is at most an eighth of the greatest
+    /// acceleration times the square of `t1 - t0`.
+    ///
+    /// The bound must hold for all poses that [`RigidPath::pose`] returns, rounding included. Answers are only as
+    /// certain as this bound. The smaller it is for short intervals, the less work a question takes. NaN or a negative
+    /// number counts as infinite.
+    ///
+    /// Questions call this with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library accept any
+    /// numbers, so that other paths can be built on them. The times may be in any order, as on a path that is reversed.
+    /// Before 0 and after 1, these paths stand still. For NaN, the bound is infinite.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 }
 
@@ -35,12 +39,13 @@ impl<P: RigidPath + ?Sized> RigidPath for &P {
     }
 }
 
-/// How far a computed pose may take a point from the ideal one, as a fraction of the magnitudes involved: 32 roundings, which
-/// is twice what a sine and cosine (one rounding each), Rodrigues' formula and a product of matrices amount to.
+/// How far a point of a computed pose may be from its ideal place, as a fraction of the magnitudes involved: 32
+/// roundings. That is twice the error of a sine and a cosine (one rounding each), Rodrigues' formula and a product of
+/// matrices.
 const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
-/// The same of a point on a line between two others: 2^-51, four roundings of which three occur.
+/// The same bound for a point on a line between two others: 2^-51, which is four roundings. Three occur.
 const LINE_ERROR: f64 = 1.0 / (1u64 << 51) as f64;
-/// The least cosine of half the angle between two poses, for which the shorter way between them is certain.
+/// The least cosine of half the angle between two poses for which it is certain which rotation is the shorter one.
 const MIN_HALF_COSINE: f64 = 1e-9;
 
 /// Why there is no motion between two poses.
@@ -76,7 +81,7 @@ pub struct Motion {
     end: Pose,
     /// The rotation at the start; between poses, the nearest orthonormal one.
     rotation: Matrix,
-    /// What the rotations of `start` and `end` differ from orthonormal ones by.
+    /// The differences of the rotations of `start` and `end` from orthonormal ones.
     defects: [Matrix; 2],
     /// Of length 1.
     axis: [f64; 3],
@@ -85,7 +90,7 @@ pub struct Motion {
     course: Course,
 }
 
-/// What the origin of B's frame does.
+/// The movement of the origin of B's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Course {
     /// It moves on a line from the start to the end.
@@ -95,11 +100,12 @@ enum Course {
 }
 
 impl Motion {
-    /// Returns the motion that planners call interpolation in SE(3): the origin of B's frame moves on a line, and B turns about
-    /// one axis the shorter way (slerp), both at a constant rate. `pose(0)` and `pose(1)` are `start` and `end`, bit for bit.
+    /// Returns the motion that planners call interpolation in SE(3): the origin of B's frame moves on a line, and B
+    /// turns about one axis by the shorter angle (slerp), both at a constant rate. `pose(0)` and `pose(1)` are `start`
+    /// and `end`, bit for bit.
     ///
-    /// A rotation that is not orthonormal (a pose may be 2^-20 off) is interpolated in its nearest orthonormal one, and what it
-    /// is off by is interpolated linearly.
+    /// If a rotation is not orthonormal (a pose may be 2^-20 off), the nearest orthonormal rotation is interpolated,
+    /// and the difference from it is interpolated linearly.
     ///
     /// # Errors
     /// [`MotionError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
@@ -125,12 +131,13 @@ impl Motion {
         })
     }
 
-    /// Returns a screw motion from `start`: a rotation by `angle` radians, any number of turns, about the axis through `point`
-    /// with `direction` (of any length), in A's frame, and a shift by `shift` mesh units along it.
+    /// Returns a screw motion from `start`: a rotation about an axis, and a shift along it. The axis goes through
+    /// `point` in `direction` (of any length), both in A's frame. The rotation is by `angle` radians, which may be many
+    /// turns. The shift is by `shift` mesh units.
     ///
     /// # Errors
-    /// [`MotionError::Number`] if a number is not finite or the direction has no length, [`MotionError::Pose`] if the end is no
-    /// pose.
+    /// [`MotionError::Number`] if a number is not finite or the direction has length 0, [`MotionError::Pose`] if the
+    /// end is not a valid pose.
     pub fn screw(
         start: &Pose,
         point: [f64; 3],
@@ -197,7 +204,7 @@ impl Motion {
         (rotation, translation)
     }
 
-    /// Returns how far rounding may take a point within `radius` of B's origin from where it ideally is.
+    /// Returns how far rounding may move a point within `radius` of B's origin from its ideal place.
     fn rounding(&self, radius: f64) -> f64 {
         let sum = |v: [f64; 3]| v.iter().map(|x| x.abs()).sum::<f64>();
         let ends = sum(self.start.translation()) + sum(self.end.translation());
@@ -283,7 +290,7 @@ fn sagitta_of(
     inside + moved * (outside / (t1 - t0)).min(1.0) * (1.0 + 1.0 / (1u64 << 40) as f64)
 }
 
-/// Motions between one pose after another, each of which takes the same time.
+/// A path through several poses. The motion from each pose to the next takes the same share of the time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
     motions: Vec<Motion>,
@@ -309,8 +316,8 @@ impl Polyline {
         (number, scaled - number as f64)
     }
 
-    /// How far any point within `radius` of B's origin is from the straight way between two poses, in the pose that the motion
-    /// of a number starts with.
+    /// Returns how far any point within `radius` of B's origin is from the straight line between two poses, in the
+    /// first pose of the motion with this number.
     fn bend(&self, number: usize, radius: f64, [t0, t1]: [f64; 2], [from, to]: &[Pose; 2]) -> f64 {
         let share = (number as f64 / self.motions.len() as f64 - t0) / (t1 - t0);
         let between = |from: f64, to: f64, at: f64| at - (from + share * (to - from));
@@ -327,8 +334,8 @@ impl Polyline {
         moved.sqrt() + turned.sqrt() * radius
     }
 
-    /// The way is within the largest sagitta of its motions of the polygon through the knots, and that is farthest from the
-    /// straight way at a knot.
+    /// The path is within the largest sagitta of its motions of the polygon through the knots, and this polygon is
+    /// farthest from the straight line at a knot.
     fn sagitta_within(&self, radius: f64, [t0, t1]: [f64; 2]) -> f64 {
         let ((first, from), (mut last, mut to)) = (self.at(t0), self.at(t1));
         if to == 0.0 && last > first {

@@ -4,11 +4,12 @@ use crate::motion::RigidPath;
 use crate::motion::linear::{difference, length, norm};
 use crate::pose::Pose;
 
-/// The path of B in A's frame, given the paths of both in the world: at each time, `Pose::relative` of their poses. This is
-/// what [`Scene::motion`](crate::Scene::motion) asks a querier about.
+/// The path of B in A's frame, given the paths of both in the world. At each time, its pose is the `Pose::relative` of
+/// their poses. [`Scene::motion`](crate::Scene::motion) asks a querier about such paths.
 ///
-/// All poses of both paths must be rigid to within 2^-23, and no translation may exceed 2^118: then they have a relative pose.
-/// Where they have none, B counts as unmoved, and the sagitta of what begins or ends there as infinite.
+/// All poses of both paths must be rigid to within 2^-23, and no translation may exceed 2^118. Within these limits
+/// there is always a relative pose. At a time without one, B counts as unmoved, and the sagitta of an interval that
+/// begins or ends there as infinite.
 #[derive(Clone, Copy)]
 pub struct RelativePath<'a> {
     a: &'a dyn RigidPath,
@@ -22,7 +23,7 @@ impl<'a> RelativePath<'a> {
     }
 }
 
-/// What stands still, in the world.
+/// A pose is the path of a body that stands still in the world.
 impl RigidPath for Pose {
     fn pose(&self, _t: f64) -> Pose {
         *self

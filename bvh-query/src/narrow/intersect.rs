@@ -42,8 +42,8 @@ pub(crate) fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     intervals_overlap(a, sides_a, b, sides_b)
 }
 
-/// Returns whether a closed triangle contains a point: what `triangles_intersect` says of the triangle and one whose corners
-/// are all that point, at the cost of one orientation unless the point is in the triangle's plane.
+/// Returns whether a closed triangle contains a point. The answer is that of `triangles_intersect` for the triangle and
+/// one whose corners are all that point. It costs one orientation, unless the point is in the triangle's plane.
 #[must_use]
 pub(super) fn triangle_contains(triangle: &Triangle, point: Point) -> bool {
     // A triangle without area has no height over it.

@@ -1,9 +1,9 @@
 //! Measures the distance of a point from a closed triangle, to the bits of [`triangle_distance`] for a triangle whose corners
 //! are all that point.
 //!
-//! Of the 42 candidates there, those of edges and faces without length drop out, and of three equal ones the first stays: 3
-//! corners, 3 edges and the face. Each is computed by the same operations in the same order, and so are the bounds. Nothing
-//! but the search for a better lower bound, which is rare, is left to the general routine.
+//! Of the 42 candidates there, those of edges and faces without length drop out. Of three equal ones the first stays.
+//! This leaves 3 corners, 3 edges and the face. Each is computed by the same operations in the same order, and so are
+//! the bounds. The general routine is only needed for the search for a better lower bound, which is rare.
 
 use super::distance::{
     Closest, Foot, MAX_ERROR_ASYMMETRY, certified_gap, longest, negated, perpendicular_normal,

@@ -1,16 +1,18 @@
 //! Decides exactly whether a ray meets a closed triangle, and bounds where.
 //!
 //! # Method
-//! With the corners A, B and C seen from the ray's origin, its line passes the directed edge from A to B on the side that the
-//! sign of d · (A × B) tells (A. Segura, F. Feito, "Algorithms to Test Ray-Triangle Intersection", 2001). It crosses the
-//! triangle if no two of the three signs are opposite. If all are 0, ray and triangle lie in one plane, or the triangle has
-//! no area. Otherwise, with n = (B - A) × (C - A), the three products add up to d · n, whose sign therefore is that of those
-//! that are not 0, and the line meets the plane at t = (n · A) / (n · d).
+//! Let A, B and C be the corners as seen from the ray's origin, and d its direction. The sign of d · (A × B) tells on
+//! which side the ray's line passes the directed edge from A to B (A. Segura, F. Feito, "Algorithms to Test
+//! Ray-Triangle Intersection", 2001). The line crosses the triangle if no two of the three signs are opposite. If all
+//! are 0, ray and triangle lie in one plane, or the triangle has no area. Otherwise, with n = (B - A) × (C - A), the
+//! three products add up to d · n, which therefore has the sign of those that are not 0. The line meets the plane at t
+//! = (n · A) / (n · d).
 //!
-//! Signs are those of f64 where a bound of its error allows, and those of integers elsewhere. The filter computes the
-//! differences, products and sums of stage A of Shewchuk's `orient3d` in the same order, with the exact direction in the place
-//! of a rounded difference, and so has at most his error. The parameter t is a quotient of two such determinants, each within
-//! its error, unless that leaves more than 2^-44 of it in doubt: then it is the quotient of integers, rounded.
+//! Signs are computed in f64 where a bound of the error allows it, and in integers elsewhere. The filter computes the
+//! differences, products and sums of stage A of Shewchuk's `orient3d` in the same order, with the exact direction in
+//! the place of a rounded difference, and so has at most the same error. The parameter t is a quotient of two such
+//! determinants, each within its error. If that leaves more than 2^-44 of t in doubt, t is the rounded quotient of
+//! integers.
 //!
 //! # Precondition
 //! Origin and corners keep the precondition of [`narrow`](super). The largest component of the direction is in [1, 2), and
@@ -46,7 +48,7 @@ impl Crossing {
     }
 }
 
-/// What of a triangle the line meets. Lines meet equal corners and equal edges at equal parameters.
+/// The feature of a triangle that a line meets. Lines meet equal corners and equal edges at equal parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Feature {
     Corner(Point),

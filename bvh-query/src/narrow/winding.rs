@@ -1,13 +1,14 @@
 //! Counts exactly how often closed surfaces wind around a point, triangle by triangle.
 //!
-//! A ray from the point along an axis leaves a surface as often as it enters it, less the winding number. If it meets an edge
-//! or a corner, the count must still take each passage once: the ray is thought to be moved by ε along the next axis and by
-//! ε² along the one after, for an ε smaller than any other number in question (H. Edelsbrunner, E. P. Mücke, "Simulation of
-//! Simplicity", ACM Transactions on Graphics 9(1), 1990). The moved ray meets no edge, and nothing else changes, because only
-//! a triangle that contains the point itself could make it change: and then the point is on the surface.
+//! Along a ray from the point in the direction of an axis, the number of times that the ray leaves the surface, less
+//! the number of times that it enters it, is the winding number. If the ray meets an edge or a corner, each passage
+//! must still count once. Therefore the ray is treated as if it were moved by ε along the next axis and by ε² along the
+//! one after, for an ε smaller than any other number in question (H. Edelsbrunner, E. P. Mücke, "Simulation of
+//! Simplicity", ACM Transactions on Graphics 9(1), 1990). The moved ray meets no edge. Nothing else changes, because
+//! only a triangle that contains the point itself could cause a change, and then the point is on the surface.
 //!
-//! Seen along the axis, all is plane: signs are those of `orient2d` and, for the triangles that the ray's line meets, of one
-//! `orient3d`. Both are exact under the precondition of [`narrow`](super).
+//! Seen along the axis, the problem is two-dimensional: signs are those of `orient2d` and, for the triangles that the
+//! ray's line meets, of one `orient3d`. Both are exact under the precondition of [`narrow`](super).
 
 use super::intersect::{area, triangles_intersect, volume};
 use super::{Point, Triangle};
@@ -77,8 +78,8 @@ impl AxisRay {
 
     /// Returns a number with the sign of the side on which the moved ray passes an edge whose line the ray meets.
     ///
-    /// The area that p and q span with a point x is (q - p) × (x - p): along the first of the axes in the plane it grows with
-    /// the edge's second component, negated, and along the second with the first.
+    /// The area that p and q span with a point x is (q - p) × (x - p). Its derivative along the first axis of the plane
+    /// is the negated second component of the edge; along the second axis, it is the first component.
     fn side_of_moved(&self, (p, q): (Point, Point)) -> f64 {
         let (first, second) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         if p[second] == q[second] { q[first] - p[first] } else { p[second] - q[second] }

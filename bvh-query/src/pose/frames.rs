@@ -1,7 +1,7 @@
 //! Inverses, compositions and relative poses: from one frame to another.
 //!
-//! A pose may be 2^-20 from rigid, so that an inverse is that of the matrix, not its transpose. All formulas are plain `f64`,
-//! never fused, so that results have the same bits everywhere.
+//! A pose may be 2^-20 from rigid, so its inverse is that of the matrix and not the transpose. All formulas are plain
+//! `f64`, never fused, so that results have the same bits everywhere.
 //!
 //! Error, with u = 2^-53: entries of an inverse are within 16u of exact ones (3u from a difference of products, 12u from
 //! the determinant's inverse, u from their product), entries of a product of two rotations within 4u. A translation is
@@ -12,17 +12,17 @@ use super::{Pose, PoseError};
 type Rotation = [[f64; 3]; 3];
 
 impl Pose {
-    /// Returns the pose that takes back: `R^-1` and `-(R^-1 t)`, where `R^-1` is the adjugate over the determinant.
+    /// Returns the inverse pose: `R^-1` and `-(R^-1 t)`, where `R^-1` is the adjugate over the determinant.
     ///
     /// # Errors
-    /// [`PoseError`] if the inverse is beyond a limit of [`Pose::new`], as that of a pose near such a limit may be.
+    /// [`PoseError`] if the inverse is beyond a limit of [`Pose::new`]. This may happen for a pose near such a limit.
     pub fn inverse(&self) -> Result<Self, PoseError> {
         let inverse = inverse(&self.rotation);
         Self::new(inverse, turn(&inverse, self.translation).map(|t| -t))
     }
 
-    /// Returns the pose that does what this one does and then what `next` does: `R' R` and `R' t + t'`, where `R'` and `t'`
-    /// are those of `next`. So a part's pose in a body, then the body's pose in the world, is the part's pose in the world.
+    /// Returns the pose that applies this one and then `next`: `R' R` and `R' t + t'`, where `R'` and `t'` are those of
+    /// `next`. For example, `part_in_body.then(&body_in_world)` is the pose of the part in the world.
     ///
     /// # Errors
     /// [`PoseError`] if the result is beyond a limit of [`Pose::new`]: two poses near the limit of 2^-20 may compose to one
@@ -31,9 +31,9 @@ impl Pose {
         Self::new(product(&next.rotation, &self.rotation), next.place(self.translation))
     }
 
-    /// Returns the pose of B in A's frame, given the poses of both in the world: `Ra^-1 Rb` and `Ra^-1 (tb - ta)`. This is
-    /// what queries take. The translations are subtracted first, so that a place far from the world's origin costs no more
-    /// accuracy than it has.
+    /// Returns the pose of B in A's frame, given the poses of both in the world: `Ra^-1 Rb` and `Ra^-1 (tb - ta)`.
+    /// Queries take this pose. The translations are subtracted first, so that a place far from the world's origin loses
+    /// no accuracy.
     ///
     /// # Errors
     /// [`PoseError`] if the result is beyond a limit of [`Pose::new`]. It is not if both rotations are within 2^-23 of rigid

@@ -50,8 +50,9 @@ impl Pose {
     /// the iteration of Newton and Schulz, `X (3 I - X^T X) / 2`.
     ///
     /// # Errors
-    /// [`PoseError::NotNearlyRigid`] if an entry of `R R^T - I` exceeds 2^-6, [`PoseError::Scaled`] if the matrix is a
-    /// multiple of a rotation beyond that, and the errors of [`Pose::new`] for what is not finite, too far or a reflection.
+    /// [`PoseError::NotNearlyRigid`] if an entry of `R R^T - I` exceeds 2^-6; [`PoseError::Scaled`] if it does and the
+    /// matrix is a multiple of a rotation; and the errors of [`Pose::new`] for numbers that are not finite, for a
+    /// translation beyond the limit and for a reflection.
     pub fn nearest(rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Result<Self, PoseError> {
         let worst = departure(&rotation, 1.0);
         if worst.is_nan() || worst > MAX_NEARLY_RIGID_ERROR {

@@ -15,10 +15,9 @@ use bvh_format::instances::{departure, handedness};
 /// Conventions: points are columns, matrices are given row by row, rotations are right-handed, quaternions are
 /// `[x, y, z, w]` with the real part last, lengths are mesh units.
 ///
-/// A placed vertex is, coordinate by coordinate, the f64 value `((R0 * x + R1 * y) + R2 * z) + t` with
-/// each product and sum rounded to nearest, never fused; queries are about these points exactly.
-/// For that arithmetic to be exact where it must be, entries are canonical: a rotation entry below
-/// 2^-64 in magnitude counts as 0, and so does a translation below 2^-213.
+/// Each coordinate of a placed vertex is the f64 value `((R0 * x + R1 * y) + R2 * z) + t`, where each product and sum
+/// is rounded to nearest and none is fused. Queries are about exactly these points. To keep exact arithmetic within the
+/// range of f64, a rotation entry below 2^-64 in magnitude counts as 0, and so does a translation below 2^-213.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     rotation: [[f64; 3]; 3],
@@ -39,7 +38,7 @@ const MIN_ROTATION_ENTRY: f64 = 1.0 / (1u128 << 64) as f64;
 const MIN_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
 
 impl Pose {
-    /// No motion: B's frame is A's.
+    /// The identity: B's frame is A's.
     pub const IDENTITY: Self =
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 

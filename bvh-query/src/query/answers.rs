@@ -1,4 +1,4 @@
-//! What queries answer with.
+//! The types of answers.
 
 /// A pair of triangles in contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,10 +19,11 @@ pub struct Contact {
 pub struct Distance {
     /// The distance in mesh units; 0 if and only if the meshes touch.
     pub distance: f64,
-    /// The two triangles named here are certainly at least this far apart and, if the query allowed an error, no two
-    /// triangles of the meshes are nearer. Exact arithmetic, not this bound, decides whether the meshes touch.
+    /// A certified lower bound: the two triangles named here are at least this far apart. If the query allowed an
+    /// error, no two triangles of the meshes are nearer. Exact arithmetic, not this bound, decides whether the meshes
+    /// touch.
     pub lower: f64,
-    /// The two triangles, and so the meshes, are certainly at most this far apart.
+    /// A certified upper bound: the two triangles, and so the meshes, are at most this far apart.
     pub upper: f64,
     /// The closest point on A, in A's frame.
     pub point_a: [f64; 3],
@@ -60,8 +61,8 @@ pub struct ClosestPoint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct RayHit {
-    /// The parameter, in units of the ray's direction; 0 if and only if the ray's origin is on the mesh. It is within 2^-43 of
-    /// itself of the exact one.
+    /// The parameter, in units of the ray's direction; 0 if and only if the ray's origin is on the mesh. Its relative
+    /// error is at most 2^-43.
     pub t: f64,
     /// The exact parameter is at least this.
     pub lower: f64,
@@ -89,12 +90,11 @@ pub enum Relation {
     BInA = 3,
     /// Some connected components are inside the other mesh and some are not, or some of each mesh are.
     Mixed = 4,
-    /// A mesh that is not closed would have to contain something.
+    /// The answer depends on the inside of a mesh that is not closed.
     Undefined = 5,
 }
 
-/// Where a point is with regard to a mesh. The command and the bindings of other languages use its numbers:
-/// `side as i8`.
+/// On which side of a mesh a point is. The command and the bindings of other languages use its numbers: `side as i8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(i8)]
 pub enum Side {
@@ -104,7 +104,7 @@ pub enum Side {
     On = 0,
     /// The surface winds around the point.
     Inside = 1,
-    /// The point is not on the surface, and the mesh is not closed and consistently oriented: it has no inside.
+    /// The point is not on the surface, and the mesh has no inside, because it is not closed and consistently oriented.
     Undefined = 2,
 }
 
@@ -119,7 +119,7 @@ pub struct SignedDistance {
 }
 
 impl SignedDistance {
-    /// Returns the distance in mesh units, negative inside, or nothing if the mesh has no inside.
+    /// Returns the distance in mesh units, negative inside, or `None` if the mesh has no inside.
     pub fn value(&self) -> Option<f64> {
         match self.side {
             Side::Inside => Some(-self.closest.distance),
@@ -129,7 +129,7 @@ impl SignedDistance {
     }
 }
 
-/// How much work the last query was.
+/// The work of the last query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct QueryStats {

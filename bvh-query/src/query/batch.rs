@@ -1,12 +1,12 @@
 //! Asks about many poses of one pair of meshes, on all cores.
 //!
 //! Poses are cut into runs. Each thread takes the next run; it has one querier for all of its runs, and a fresh tracker
-//! for each run. How poses are cut depends on their number alone, so that what a query reads, and hence which errors
-//! there are, is the same on any number of threads. The answers are the same whatever is read.
+//! for each run. The cut depends only on the number of poses. A query therefore reads the same pages, and meets the
+//! same errors, on any number of threads. Answers do not depend on the cut.
 //!
-//! A batch ends at the first pose, in their order, that ends it: by an error, or by the contact that was looked for. Runs
-//! are taken in order, and a run is left out only if it lies behind a known end. So every pose before the first end is
-//! asked about, and only the last few runs can be work in vain.
+//! A batch ends at the first pose, in their order, that ends it: by an error, or by the contact that was looked for.
+//! Runs are taken in order, and a run is left out only if it lies behind a known end. Every pose before the first end
+//! is therefore tested, and only the last few runs can be wasted work.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -23,13 +23,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
-/// The answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads. Give poses
-/// that follow a path in the order of the path, because neighbours share a [`Tracker`]; other poses cost what they cost
-/// one by one. A batch needs the memory of one querier per thread, and of the answers.
+/// The answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads.
+/// Neighbouring poses share a [`Tracker`], so give the poses of a path in the order of the path. Other poses cost as
+/// much as one by one. A batch needs the memory of one querier per thread, and of the answers.
 ///
 /// # Errors
 /// Each method returns the error of the first pose, in their order, that has no answer: because a page that its query
-/// touches is damaged, or because the budget per pose does not suffice. Later poses may not be looked at.
+/// touches is damaged, or because the budget per pose does not suffice. It may skip later poses.
 ///
 /// ```
 /// use bvh_query::{Batch, Bvh, Pose};
@@ -125,10 +125,10 @@ impl<'a> Batch<'a> {
             .map_err(|(_, error)| error)
     }
 
-    /// Returns the number of the first pose, in their order, in which the meshes touch. So it tells whether a motion that is
-    /// sampled by poses is free.
+    /// Returns the number of the first pose, in their order, in which the meshes touch. This tells whether a sampled
+    /// motion is free.
     ///
-    /// Poses behind that one cost next to nothing: each thread looks at no more than those of the run it is in.
+    /// Poses after that one cost next to nothing: each thread tests at most those of its current run.
     ///
     /// # Errors
     /// Returns the error of the first pose that fails, if the meshes touch in no earlier pose.

@@ -1,4 +1,4 @@
-//! Decides by the bounding spheres and boxes of two objects: most meshes apart get no further.
+//! Compares the bounding spheres and boxes of two objects, which decides most queries of separated meshes.
 
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::object::Object;

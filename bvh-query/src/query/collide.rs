@@ -25,9 +25,9 @@ const FIRST_DRAIN: usize = 6;
 impl Querier {
     /// Returns whether the meshes touch or intersect, with B placed by `pose` in A's frame.
     ///
-    /// The answer is exact: that of exact predicates on the placed vertices, for all pairs of triangles. Touching
-    /// counts as collision. Meshes are surfaces, so that a mesh wholly inside another one without touching it
-    /// does not collide with it: [`Querier::relation`] tells.
+    /// The answer is exact: it is that of exact predicates on the placed vertices, for all pairs of triangles. Touching
+    /// counts as collision. Meshes are surfaces: a mesh wholly inside another one, without touching it, does not
+    /// collide with it. [`Querier::relation`] finds such a mesh.
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
@@ -124,7 +124,7 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Ca
         Ok(ControlFlow::Continue(()))
     }
 
-    /// Decides a candidate, exactly if it is not certain to be in contact.
+    /// Decides a candidate: exactly, unless it is already certain that it is in contact.
     #[inline(never)]
     fn decide(&mut self, candidate: TrianglePair, certain: bool) -> Result<ControlFlow<()>, QueryError> {
         if (certain || self.intersect(candidate)?)

@@ -21,9 +21,9 @@ use std::ops::ControlFlow;
 impl Querier {
     /// Returns all pairs of triangles in contact, in ascending order.
     ///
-    /// The answer is that of exact predicates on all pairs of the input's triangles. An exact duplicate that the baker
-    /// left out is in contact wherever the triangle that replaces it is, if the file has ids. Each contact counts as a visit
-    /// ([`Querier::set_budget`]).
+    /// The answer is that of exact predicates on all pairs of the input's triangles. If the file has ids, an exact
+    /// duplicate that the baker left out is in contact wherever the triangle that replaces it is. Each contact counts
+    /// as a visit ([`Querier::set_budget`]).
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not

@@ -17,10 +17,10 @@ fn half_sides(object: &Object) -> [f64; 3] {
     [0, 1, 2].map(|axis| (f64::from(hi[axis].get()) - f64::from(lo[axis].get())) / 2.0)
 }
 
-/// Returns an upper bound of how far any vertex of B moves from one pose to another, in mesh units. So one answer about a
-/// distance shows how far B may move or turn and surely stays apart: as long as this is below
-/// [`Distance::lower`](crate::Distance::lower), the meshes do not touch. It says nothing of the way: see
-/// [`path_reach`](crate::path_reach).
+/// Returns an upper bound of how far any vertex of B moves from one pose to another, in mesh units. As long as it is
+/// below [`Distance::lower`](crate::Distance::lower) of the first pose, the meshes do not touch in the second. One
+/// answer about a distance therefore shows how far B may move or turn. The bound is about the two poses and not about
+/// the path between them: see [`path_reach`](crate::path_reach).
 pub fn displacement<'a>(b: impl Into<Shape<'a>>, from: &Pose, to: &Pose) -> f64 {
     // A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
     // moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.

@@ -1,7 +1,6 @@
 //! How far apart the meshes are, and whether they are within a distance.
 //!
-//! Touching meshes are at distance 0; the pair of triangles named is then the first contact that a walk for contact
-//! meets.
+//! Touching meshes are at distance 0. The answer then names the first contact that a walk for contact meets.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -35,8 +34,8 @@ impl Querier {
         self.distance_with(a, b, pose, &DistanceOptions::default())
     }
 
-    /// Returns a distance that may exceed the least one by an allowed error, which saves time. `lower` is what has been
-    /// proved. Which of the allowed answers is returned may depend on the backend.
+    /// Returns a distance that may exceed the least one by an allowed error, which saves time. `lower` is the bound
+    /// that was proved. Different backends may return different allowed answers.
     ///
     /// # Errors
     /// [`QueryError::Number`] if an allowed error is negative, NaN or infinite; else the errors of
@@ -101,8 +100,8 @@ impl Querier {
     /// Returns whether the placed meshes are at most `d` apart, in mesh units. `within` at 0 is
     /// [`Querier::collide`].
     ///
-    /// The answer is exact, also where `d` is between the bounds of [`Querier::distance`]. Integers of any length decide
-    /// there; they are the only thing that a warm query allocates.
+    /// The answer is exact, also if `d` is between the bounds of [`Querier::distance`]. Integers of any length decide
+    /// such a case; a warm query allocates nothing else.
     ///
     /// # Errors
     /// [`QueryError::Number`] if `d` is negative, NaN or infinite; else the errors of [`Querier::distance`].

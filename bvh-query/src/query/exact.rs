@@ -22,8 +22,8 @@ impl PlacedPair<'_> {
     }
 }
 
-/// The triangles of a side that were placed last, one for each lane. Candidates of two packets name a triangle up to four
-/// times, and to unpack and place it takes a good part of an exact test.
+/// The triangles of a side that were placed last, one for each lane. Candidates of two packets name a triangle up to
+/// four times, and unpacking and placing it takes a large part of an exact test.
 pub(super) struct RecentTriangles([(Option<(u32, u16)>, Triangle); PACKET]);
 
 impl Default for RecentTriangles {

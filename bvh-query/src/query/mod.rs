@@ -1,4 +1,4 @@
-//! The questions: collide, contacts, distance, within, motion. Each is a visitor of the one pair walk.
+//! The questions: collide, contacts, distance, within, motion. Each is a visitor of the same pair walk.
 
 pub(crate) mod answers;
 #[cfg(feature = "parallel")]

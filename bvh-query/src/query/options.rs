@@ -25,21 +25,21 @@ impl DistanceOptions {
         Self::default()
     }
 
-    /// Lets the answer exceed the least distance by this fraction of it. A query refuses a negative fraction and one that
-    /// is not finite.
+    /// Lets the answer exceed the least distance by this fraction of it. A query refuses a fraction that is negative or
+    /// not finite.
     #[must_use]
     pub fn rel_err(self, rel_err: f64) -> Self {
         Self { rel_err, ..self }
     }
 
-    /// Lets the answer exceed the least distance by this length, in mesh units. A query refuses a negative length and one
-    /// that is not finite.
+    /// Lets the answer exceed the least distance by this length, in mesh units. A query refuses a length that is
+    /// negative or not finite.
     #[must_use]
     pub fn abs_err(self, abs_err: f64) -> Self {
         Self { abs_err, ..self }
     }
 
-    /// Refuses errors that mean nothing.
+    /// Refuses invalid errors.
     pub(super) fn check(&self) -> Result<(), QueryError> {
         check("rel_err", "a finite fraction of at least 0", self.rel_err)?;
         check("abs_err", "a finite length of at least 0", self.abs_err)

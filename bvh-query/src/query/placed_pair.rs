@@ -1,4 +1,4 @@
-//! Two objects in place: what every query of a pair of shapes walks.
+//! Two placed objects, which every query about a pair of shapes walks.
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;

@@ -1,4 +1,4 @@
-//! The querier: the backend and the memory that every query works with.
+//! The querier: the backend and the working memory of all queries.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -13,24 +13,25 @@ use crate::traverse::walk_memory::WalkMemory;
 
 /// Asks questions about two meshes.
 ///
-/// A querier holds the backend and the memory that queries work in, so that a query allocates nothing once the memory has
-/// grown to what the meshes need. It keeps some decoded treelets from one query to the next, which changes no answer.
-/// Use one querier per thread.
+/// A querier holds the backend and the working memory of queries. Once the memory has grown to the size that the meshes
+/// need, a query allocates nothing. A querier keeps some decoded treelets from one query to the next, which does not
+/// affect answers. Use one querier per thread.
 ///
 /// # Worst case
 /// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0
-/// takes a second walk. Let the pages of both objects have t and u treelets, p and q leaf packets in all.
+/// takes a second walk. Let the pages of the two objects have t and u treelets, and p and q leaf packets.
 ///
-/// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or
-///   one packet test each. Ordinary meshes need a few hundred visits. Where files come from strangers, bound the
-///   time further by [`Querier::set_budget`].
-/// - Memory: at most 8 KiB for each treelet that the query opens, of either file, and 4 MiB; no recursion.
-///   A page has at most 110 treelets. The answer of [`Querier::contacts`] takes 16 bytes per contact on top.
-/// - Contacts: at most as many as the pages of both files have room for pairs of triangles, listed duplicates
+/// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or one packet
+///   test each. Ordinary meshes need a few hundred visits. For files from strangers, limit the time further with
+///   [`Querier::set_budget`].
+/// - Memory: 4 MiB, and at most 8 KiB for each treelet of either file that the query opens; no recursion. A page has at
+///   most 110 treelets. The answer of [`Querier::contacts`] takes 16 bytes more per contact.
+/// - Contacts: at most one for each pair of triangles for which the pages of both files have room, listed duplicates
 ///   included. More are an error.
 ///
-/// A byte that was changed in a page, leaf block or id block that a query touches is an error. A file forged
-/// with right checksums may hold wrong bounds: its answers may then be wrong or an error, but nothing worse happens.
+/// If a query touches a page, leaf block or id block in which a byte was changed, it returns an error. A file that was
+/// forged with correct checksums may hold wrong bounds. Its answers may then be wrong or an error, but nothing worse
+/// happens.
 pub struct Querier {
     pub(super) backend: Backend,
     pub(super) memory: WalkMemory,
@@ -80,12 +81,11 @@ impl Querier {
         }
     }
 
-    /// Lets each query from now on make at most this many visits. A query that needs more ends with
-    /// [`QueryError::Budget`]. Without a budget, only the sizes of the files bound a query, and those of a motion and its
-    /// tolerance.
+    /// Limits each query from now on to this many visits. A query that needs more ends with [`QueryError::Budget`].
+    /// Without a budget, only the sizes of the files limit a query and, for a motion, its path and tolerance.
     ///
-    /// These count as one visit each, so that the budget bounds the time of a query, and the memory that it adds, whatever
-    /// the files hold:
+    /// The budget limits the time of a query, and the memory that it adds, whatever the files hold. Each of these
+    /// counts as one visit:
     ///
     /// - a pair of objects, and a pair of nodes or of leaf packets of both trees;
     /// - for a point or a line: an object, a node that is opened, and a leaf packet;
@@ -93,10 +93,10 @@ impl Querier {
     /// - for [`Querier::relation`]: each pair of a component of one mesh and an object of the other;
     /// - for a motion: each interval of time, and each object of B in it beyond the first.
     ///
-    /// A visit takes some 100 ns; the first one of a page takes some microseconds more, because the page is checked. Queries of
-    /// scans and of CAD models with 10^5 to 10^6 triangles take from some hundred visits, for separated meshes, to some 10^6,
-    /// for all contacts of a deep overlap. What is stated once for a whole file is not charged: the lists of duplicates and
-    /// of the topology are checked when a query first needs them, in one pass.
+    /// A visit takes some 100 ns; the first one of a page takes some microseconds more, because the page is checked.
+    /// Queries of scans and of CAD models with 10^5 to 10^6 triangles take from some hundred visits, for separated
+    /// meshes, to some 10^6, for all contacts of a deep overlap. The lists of duplicates and of the topology are not
+    /// charged: a query checks each in one pass when it first needs it.
     pub fn set_budget(&mut self, visits: u64) {
         self.budget = Budget::new(visits);
     }
@@ -111,7 +111,7 @@ impl Querier {
         self.memory.budget.made()
     }
 
-    /// Charges a visit that is made outside of queries, by what puts them together.
+    /// Charges a visit that is made outside of queries, by the code that combines them.
     pub(crate) fn charge_visit(&mut self) -> Result<(), QueryError> {
         self.memory.budget.visit()
     }
@@ -126,7 +126,7 @@ impl Querier {
         self.backend
     }
 
-    /// Returns how much work the last query was.
+    /// Returns how much work the last query took.
     pub fn stats(&self) -> QueryStats {
         self.stats
     }

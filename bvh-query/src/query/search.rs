@@ -1,9 +1,9 @@
 //! The search for the closest pair of triangles.
 //!
-//! Pairs of triangles are bounded in f32, 16 at a time. Those that may be the closest are kept, and settled in f64 at the
-//! end, nearest first. Pruning is strict: a pair is left out only if its distance certainly exceeds that of another
-//! pair. So the answer does not depend on the order of visits: it is the least f64 distance and, of equal ones, that
-//! with the smallest triangle numbers.
+//! Pairs of triangles are bounded in f32, 16 at a time. Those that may be the closest are kept, and settled in f64 at
+//! the end, nearest first. Pruning is strict: a pair is left out only if its distance certainly exceeds that of another
+//! pair. The answer therefore does not depend on the order of visits. It is the pair with the least f64 distance and,
+//! of equal ones, that with the smallest triangle numbers.
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;

@@ -1,24 +1,23 @@
 //! Temporal coherence: reuses the last answers about two meshes for the next pose.
 //!
-//! A tracker keeps two things, and neither shows in an answer:
+//! A tracker keeps two things, and neither affects an answer:
 //!
-//! - *A pair of triangles*, the last that was closest, near or in contact. Whatever the pose, it is one of the pairs
-//!   that the question is about. If it meets in the new pose, so do the meshes. Otherwise its distance in the new pose,
-//!   measured in f64 with a certified upper bound, limits the walk before it begins, and the direction between its
-//!   closest points is the first witness direction. The pair is no answer itself: the walk prunes strictly beyond the
-//!   limit, meets this pair or a nearer one, and decides as it always does.
+//! - *A pair of triangles*, the last that was closest, near or in contact. In any pose, it is one of the pairs that the
+//!   question is about. If it meets in the new pose, so do the meshes. Otherwise its distance in the new pose is
+//!   measured in f64, and the certified upper bound limits the walk before it begins. The direction between its closest
+//!   points is the first witness direction. The pair itself is not an answer: the walk prunes strictly beyond the
+//!   limit, meets this pair or a nearer one, and decides as always.
 //! - *Bounds* of the distance in an earlier pose, which are certified. No vertex of B moves farther than
-//!   [`displacement`] from that pose to a new one, so that the distance changes by no more. Where the bounds decide the
+//!   [`displacement`] from that pose to a new one, so the distance changes by no more. If the bounds decide the
 //!   question, there is no walk.
 //!
-//! Both belong to two open files and the objects asked about. They are forgotten when a question is about others.
+//! Both belong to two open files and the objects in question. They are forgotten when a question is about others.
 //!
-//! A walk that only looks for contact learns nothing of the distance. So after the answer no, the tracker at times asks
-//! whether the meshes come as near as [`LOOK_AHEAD_MOTIONS`] times the last motion, with no more work than the question
-//! took. If they do not, the next few answers are known. If they do, or if that takes too much work, the tracker waits
-//! longer before it asks again.
-//! Conservative advancement bounds motion in the same way: B. Mirtich, "Impulse-based Dynamic Simulation of Rigid
-//! Body Systems", 1996, section 2.3.2.
+//! A walk that only looks for contact learns nothing about the distance. After the answer no, the tracker therefore
+//! sometimes asks whether the meshes are within [`LOOK_AHEAD_MOTIONS`] times the last motion, with no more work than
+//! the question took. If they are not, the next few answers are known. If they are, or if that takes too much work, the
+//! tracker waits longer before it asks again. Conservative advancement bounds motion in the same way: B. Mirtich,
+//! "Impulse-based Dynamic Simulation of Rigid Body Systems", 1996, section 2.3.2.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -33,15 +32,16 @@ use crate::query::placed_pair::Found;
 use crate::query::querier::Querier;
 use crate::query::search::Search;
 
-/// Remembers the last answers about two meshes, so that the next one, about a pose near by, costs less.
+/// Reuses the last answers about two meshes, so that an answer about a nearby pose costs less.
 ///
-/// A tracker asks the questions of [`Querier`] and gives the same answers, bit for bit. Keep one tracker for each pair of
-/// meshes that moves along a path. It may be asked about any meshes and poses in any order: a pose far from the last one
-/// costs a look at two triangles, and other meshes make it forget. A tracker holds some 300 bytes, borrows nothing, and
-/// allocates nothing that the querier would not.
+/// A tracker asks the questions of [`Querier`] and gives the same answers, bit for bit. Keep one tracker for each pair
+/// of meshes that moves along a path. Meshes and poses may come in any order: a pose far from the last one costs one
+/// more test of two triangles, and other meshes make the tracker forget. A tracker holds some 300 bytes, borrows
+/// nothing, and allocates nothing that the querier would not.
 ///
-/// A query through a tracker visits less, so that it may have an answer where the querier alone meets a damaged page or
-/// exceeds its budget. Each object of B beyond the first counts as a visit, because the tracker bounds how far it has moved.
+/// A query through a tracker makes fewer visits. It may therefore have an answer where the querier alone meets a
+/// damaged page or exceeds its budget. Each object of B beyond the first counts as a visit, because the tracker bounds
+/// how far it has moved.
 ///
 /// ```
 /// use bvh_query::{Bvh, Pose, Querier, Tracker};
@@ -251,8 +251,8 @@ impl Tracker {
         Some((triangle_a, placed(&triangle_b, pose)))
     }
 
-    /// Asks of meshes more than `beyond` apart, the last motion of which was `moved`, whether there is room for several
-    /// motions more. This takes at most as many visits as the query did, and its errors do not matter.
+    /// Asks whether meshes that are more than `beyond` apart have room for several more motions as long as the last
+    /// one, `moved`. This takes at most as many visits as the query did, and its errors do not matter.
     fn look_ahead(
         &mut self,
         querier: &mut Querier,

@@ -1,15 +1,16 @@
 //! The broad phase: binary trees of boxes over the instances, one for those that stand still and one for those that move.
 //!
-//! An instance counts as standing still until it moves. Then its leaf in the first tree becomes empty, and the second tree
-//! has it from the next question on. Of an instance that moves again, the boxes above it are computed again; when moves have
-//! made the boxes of the second tree half as large again as after its build, the next question builds that tree anew. So the
-//! first tree stays as tight as it was built, however far a few instances travel. Adding and removing builds both anew.
+//! An instance counts as standing still until it moves. Then its leaf in the first tree becomes empty, and it is in the
+//! second tree from the next question on. When it moves again, the boxes above it are computed again. When moves have
+//! made the boxes of the second tree 1.5 times as large as after its build, the next question builds that tree anew.
+//! The first tree therefore stays as tight as it was built, however far a few instances travel. Both trees are built
+//! anew when an instance is added or removed.
 //!
-//! A tree is split at the median along the longest side. Each node also has the union of the groups below it, so that parts
-//! of the scene that are not asked about each other are left out at once.
+//! A tree is split at the median along the longest side. Each node also has the union of the groups below it, so that
+//! parts of the scene whose groups do not meet are left out at once.
 //!
-//! Where a file puts all instances in one place, or gives them groups of which only the unions meet, each pair has to be looked
-//! at. So each step of a search is charged to the budget of the question, and no search holds all pairs.
+//! A file may put all instances in one place, or give them groups of which only the unions meet. Then every pair must
+//! be tested. Each step of a search is therefore charged to the budget of the question, and no search holds all pairs.
 
 use crate::error::QueryError;
 use crate::scene::groups::Groups;
@@ -109,8 +110,8 @@ impl BroadPhase {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// Calls `visit` with each place whose groups meet those given and whose box is near another box, and with the square of
-    /// their gap. How far apart they may be, `limit` says of a box or of one that holds it.
+    /// Calls `visit` with each place whose groups meet those given and whose box is near another box, and with the
+    /// square of their gap. `limit` returns how far apart they may be, for a box or for one that contains it.
     pub(super) fn near(
         &self,
         bounds: &WorldBox,

@@ -1,12 +1,12 @@
-//! Groups: which instances are asked about with which.
+//! Groups, which select the pairs of instances that questions are about.
 
-/// Which groups an instance is in, and which groups it is asked about with, one bit per group. Two instances are asked
-/// about if each is in a group that the other meets. By default an instance is in all groups and meets all.
+/// The groups that an instance is in, and the groups that it meets, one bit per group. Questions are about two
+/// instances if each is in a group that the other meets. By default an instance is in all groups and meets all.
 ///
 /// ```
 /// use bvh_query::Groups;
 ///
-/// // What stands still is asked about with what moves, and not with what stands still.
+/// // Bodies that stand still are tested against moving ones, and not against each other.
 /// const STILL: u32 = 1;
 /// const MOVING: u32 = 2;
 /// let wall = Groups { member: STILL, meets: MOVING };
@@ -22,12 +22,12 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// In all groups, meets all.
+    /// An instance that is in all groups and meets all.
     pub const ALL: Self = Self { member: u32::MAX, meets: u32::MAX };
     /// In no group.
     pub(super) const NONE: Self = Self { member: 0, meets: 0 };
 
-    /// Returns whether instances of these groups are asked about.
+    /// Returns whether questions are about two instances of these groups.
     pub fn meet(self, other: Self) -> bool {
         self.member & other.meets != 0 && other.member & self.meets != 0
     }

@@ -1,4 +1,4 @@
-//! Instances: shapes placed in the world, and which of them are asked about.
+//! Instances: shapes placed in the world.
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
@@ -7,9 +7,9 @@ use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
 use std::fmt;
 
-/// Names an instance of a scene. An identifier is never given twice by one scene, so that a removed instance is not
-/// mistaken for a later one. Identifiers are ordered by the places of their instances, and of a pair of instances the
-/// lower one is A.
+/// Identifies an instance of a scene. A scene never gives an identifier twice, so a removed instance cannot be mistaken
+/// for a later one. Identifiers are ordered by the places of their instances. In a pair of instances, the lower one is
+/// A.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct InstanceId {
     pub(super) place: u32,
@@ -18,12 +18,13 @@ pub struct InstanceId {
 }
 
 impl InstanceId {
-    /// Returns the identifier as a number, for what cannot hold the type: bindings of other languages, or a message.
+    /// Returns the identifier as a number, for bindings of other languages or for messages.
     pub fn to_bits(self) -> u64 {
         u64::from(self.generation) << 32 | u64::from(self.place)
     }
 
-    /// Returns the identifier that a number stands for. Any number does; a scene refuses one of no instance.
+    /// Returns the identifier with this number. Every number is an identifier, and a scene refuses those of no
+    /// instance.
     pub fn from_bits(bits: u64) -> Self {
         Self { place: bits as u32, generation: (bits >> 32) as u32 }
     }

@@ -1,4 +1,4 @@
-//! Scenes: many placed shapes, and questions over all pairs of them that matter.
+//! Scenes: many placed shapes, and questions over all pairs of them that may meet.
 //!
 //! ```text
 //! set_pose ──> box in the world ──> tree of boxes (broad phase)
@@ -40,22 +40,24 @@ use trackers::Trackers;
 use workers::Workers;
 use world_box::WorldBox;
 
-/// Many placed shapes, and questions over all pairs that are asked about.
+/// Many placed shapes, and questions over all pairs that may meet.
 ///
-/// An instance is a shape with its pose in the world. A question is over each pair of instances whose [`Groups`] meet and
-/// whose contact is not allowed ([`Scene::set_allowed`]). Of a pair, the lower [`InstanceId`] is A, and the answer about it is
-/// that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers come in ascending order
-/// of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of threads, nor on what was
-/// asked before. Which error a question ends with, if a page is damaged, may depend on the latter two where the answer can do
-/// without some pairs: [`Scene::collide`], [`Scene::within`] and [`Scene::distance`]. Where a budget runs out, it may in each
-/// question: see [`Scene::set_budget`].
+/// An instance is a shape with a pose in the world. A question is about all pairs of instances whose [`Groups`] meet
+/// and whose contact is not allowed ([`Scene::set_allowed`]). The lower [`InstanceId`] of a pair is A. The answer about
+/// a pair is that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers are in
+/// ascending order of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of
+/// threads, nor on earlier questions.
 ///
-/// Pairs that are near each other are found before they are asked about, but no more than 65,536 and those of one more instance
-/// at a time. So memory grows with the number of instances, and not with that of pairs.
+/// Errors may depend on the number of threads and on earlier questions in two cases. If a page is damaged, this holds
+/// for [`Scene::collide`], [`Scene::within`] and [`Scene::distance`], whose answers may not need all pairs. If a budget
+/// runs out, it holds for every question: see [`Scene::set_budget`].
 ///
-/// Cost: a moved instance takes some 0.2 us and a question with nothing near some 2 us for 8 of 100 instances that move (AMD
-/// EPYC, family 26). A question reads of each file the object table, and pages only of instances that are near something.
-/// Clone a scene to ask it on several threads: shapes are shared.
+/// A question first finds near pairs and then tests them, at most 65,536 at a time plus those of one more instance.
+/// Memory therefore grows with the number of instances and not with the number of pairs.
+///
+/// Cost: moving an instance takes some 0.2 us. A question with nothing near takes some 2 us if 8 of 100 instances move
+/// (AMD EPYC, family 26). A question reads the object table of each file, and pages only of instances that are near
+/// another one. Clone a scene to use it on several threads: the clones share the shapes.
 ///
 /// ```
 /// use bvh_query::{Bvh, Pose, Scene};
@@ -118,23 +120,23 @@ impl Scene {
         }
     }
 
-    /// Makes a scene of the instances of a file, in their order. `cbvh bake --scene` makes such files.
+    /// Creates a scene from the instances of a file, in their order. `cbvh bake --scene` makes such files.
     ///
-    /// Cost: that of reading the instances, and some 0.5 to 1.5 us per instance. Nothing else of the file is read until a
-    /// question needs it.
+    /// Cost: reading the instances, and some 0.5 to 1.5 us per instance. The rest of the file is read when a question
+    /// needs it.
     ///
     /// # Errors
-    /// [`SceneError::NoInstances`] if the file says nothing of a world; [`SceneError::Query`] if its instances break a rule
-    /// of the format, or as for [`Scene::new`].
+    /// [`SceneError::NoInstances`] if the file has no instances; [`SceneError::Query`] if its instances break a rule of
+    /// the format, or as for [`Scene::new`].
     pub fn of_file(bvh: Bvh) -> Result<Self, SceneError> {
         Self::of_file_with_backend(bvh, Backend::detect().map_err(|error| SceneError::Query(error.into()))?)
     }
 
-    /// Makes a scene of the instances of a file, as [`Scene::of_file`] does, with a backend. The portable backend replaces one
-    /// that the CPU lacks.
+    /// Creates a scene from the instances of a file, as [`Scene::of_file`] does, with a backend. The portable backend
+    /// replaces one that the CPU lacks.
     ///
     /// # Errors
-    /// The errors of [`Scene::of_file`], but for those of the backend.
+    /// The errors of [`Scene::of_file`], except those of the backend.
     pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneError> {
         let damaged = |error: FormatError| SceneError::Query(error.into());
         let instances = bvh.layout().read_instances(bvh.bytes()).map_err(damaged)?;
@@ -154,41 +156,43 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Lets questions use all threads of the rayon pool that they are called in. Without it they use one.
+    /// Lets questions use all threads of the rayon pool in which they are called. By default they use one thread.
     #[cfg(feature = "parallel")]
     pub fn set_parallel(&mut self, parallel: bool) {
         self.workers.parallel = parallel;
     }
 
-    /// Lets the scene remember of each pair what it last found ([`Tracker`](crate::Tracker)), which changes no answer about
-    /// contact or a distance to compare with, and helps where instances move little from question to question.
+    /// Lets the scene keep a [`Tracker`](crate::Tracker) for each pair, for questions about contact and about a
+    /// distance to compare with. It affects no answer, and saves time if instances move little from question to
+    /// question.
     ///
-    /// On the project's test scenes, where instances move by some 3 degrees a frame, a frame takes 0.95 to 1.17 times as long;
-    /// with a twentieth of the steps 0.84 to 1.12 times, and with a two-hundredth 0.61 to 0.83 times. A tracker holds some 300
-    /// bytes. A scene has one for each of the first 16,384 pairs of the last question, at most as many more for those of the
-    /// question before it, and 1,024 to spare.
+    /// On the project's test scenes, where instances move by some 3 degrees per frame, a frame takes 0.95 to 1.17 times
+    /// as long. With a twentieth of these steps it takes 0.84 to 1.12 times as long, and with a two-hundredth 0.61 to
+    /// 0.83 times. A tracker holds some 300 bytes. A scene has one for each of the first 16,384 pairs of the last
+    /// question, at most as many more for those of the question before, and up to 1,024 others.
     ///
-    /// What a tracker knows need not be looked up: a question may have an answer where it would otherwise meet a damaged page or
-    /// exceed the budget.
+    /// With a tracker, a question makes fewer visits. It may therefore have an answer where it would otherwise meet a
+    /// damaged page or exceed the budget.
     pub fn set_tracking(&mut self, tracking: bool) {
         self.trackers.on = tracking;
     }
 
-    /// Lets each question make at most this many visits over all its pairs, and each point, ray or segment so many over all
-    /// instances. Without a budget, only the number of instances and the sizes of the files bound a question.
+    /// Limits each question to this many visits over all its pairs, and each point, ray or segment to this many over
+    /// all instances. Without a budget, only the number of instances and the sizes of the files limit a question.
     ///
-    /// Visits are those of [`Querier::set_budget`](crate::Querier::set_budget) for each pair that is asked about, and those of
-    /// the broad phase: a pair of boxes, or for a probe a box, that the search for near ones looks at. So both time and memory
-    /// are bounded, however many instances a file puts in one place. Where the visits run out, the error is
-    /// [`SceneError::Pair`] or [`SceneError::Instance`] with [`QueryError::Budget`](crate::QueryError::Budget), or
-    /// [`SceneError::Query`] with it if that was in the broad phase. Whether they suffice does not depend on the number of
-    /// threads where the answer needs all pairs; which pair the error names does, and t threads may make t times as many visits
-    /// before they find out.
+    /// Two kinds of visits count: those of [`Querier::set_budget`](crate::Querier::set_budget) for each pair tested,
+    /// and those of the broad phase. The latter are the pairs of boxes, or for a probe the boxes, that the search for
+    /// near ones tests. So both time and memory are limited, however many instances a file puts in one place.
+    ///
+    /// If the visits run out, the error is [`SceneError::Pair`] or [`SceneError::Instance`] with
+    /// [`QueryError::Budget`](crate::QueryError::Budget), or [`SceneError::Query`] with it in the broad phase. If the
+    /// answer needs all pairs, the number of threads does not affect whether the visits suffice. It does affect which
+    /// pair the error names, and t threads may make t times as many visits before they stop.
     pub fn set_budget(&mut self, visits: u64) {
         self.workers.budget = visits;
     }
 
-    /// Adds an instance. It is in all groups, and nothing is allowed to touch it.
+    /// Adds an instance. It is in all groups, and no other instance is allowed to touch it.
     ///
     /// # Errors
     /// [`SceneError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an axis:
@@ -245,7 +249,7 @@ impl Scene {
     /// Removes an instance, and its permissions to touch others.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`] if the scene has no such instance, or no longer.
+    /// [`SceneError::NoInstance`] if the scene never had such an instance, or no longer has it.
     pub fn remove(&mut self, id: InstanceId) -> Result<(), SceneError> {
         let place = self.place(id)?;
         if let Some(instance) = self.instances[place].take() {
@@ -275,7 +279,7 @@ impl Scene {
         self.set_poses([(id, world)])
     }
 
-    /// Moves many instances. Of an instance that is named twice, the last pose counts.
+    /// Moves many instances. If an instance is named twice, the last pose counts.
     ///
     /// # Errors
     /// The errors of [`Scene::set_pose`]. Then none has moved.
@@ -403,7 +407,7 @@ impl Scene {
         self.instances.iter().all(Option::is_none)
     }
 
-    /// Returns how much work the last question was, over all its pairs.
+    /// Returns how much work the last question took, over all its pairs.
     pub fn stats(&self) -> QueryStats {
         self.stats
     }
@@ -430,7 +434,7 @@ impl Scene {
         }
     }
 
-    /// Starts a question: builds the broad phase, if it does not show all instances as they are.
+    /// Starts a question: updates the broad phase if instances have changed.
     fn start(&mut self) {
         (self.stats, self.pairs_asked) = (QueryStats::default(), 0);
         self.workers.start();

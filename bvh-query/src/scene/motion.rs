@@ -1,8 +1,8 @@
-//! Motions in a scene: some instances on paths, the rest still, and all pairs of which one moves.
+//! Motions in a scene: some instances move on paths, and questions are about all pairs with at least one of these.
 //!
-//! A pair is about one path: that of B in the frame of A, the one that stands still, or the lower one. Pairs are left out
-//! whose boxes never come near each other. The whole time is divided into slices for that: during a slice, an instance stays
-//! in the box around both ends, but for the sagitta.
+//! A pair has one path: that of B in the frame of A. A is the instance that stands still or, if both move, the lower
+//! one. Pairs whose boxes never come near each other are left out. To find these, the whole time is divided into
+//! slices: during a slice, an instance stays in the box around its places at both ends, except for the sagitta.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -17,25 +17,25 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Into how many slices the time is divided at most, so that boxes follow the paths.
+/// The most slices into which the time is divided, so that boxes follow the paths.
 const MOST_SLICES: usize = 16;
 
-/// Whether the ways of all moving instances are free. In the pairs named here, A is the one that stands still or, if both
-/// move, the lower one.
+/// Whether the motions of all moving instances are free. In the pairs named here, A is the instance that stands still
+/// or, if both move, the lower one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SceneMotionAnswer {
     /// At no time from 0 to 1 is any pair within the clearance.
     Free,
     /// A pair is within the clearance in the poses at `touching_at`.
     Hit {
-        /// Before this time certainly no pair is. It equals `touching_at` only where both are 0.
+        /// Before this time certainly no pair is within the clearance. It equals `touching_at` only if both are 0.
         free_until: f64,
-        /// A time at which the pair is: the earliest one found.
+        /// A time at which the pair is within the clearance: the earliest one found.
         touching_at: f64,
-        /// The pair, and its distance at that time. Of several, the first pair.
+        /// The pair, and its distance at that time. If there are several such pairs, it is the first.
         nearest: SceneDistance,
     },
-    /// A pair comes so near that neither can be told, as for [`MotionAnswer::Near`].
+    /// A pair comes near, but it is undecided whether it comes within the clearance, as for [`MotionAnswer::Near`].
     Near {
         /// Before this time certainly no pair is within the clearance.
         free_until: f64,
@@ -67,36 +67,37 @@ struct Moving<'a> {
 }
 
 impl Moving<'_> {
-    /// Returns into how many slices to divide a time of one slice: as many as the box is larger than the instance.
+    /// Returns the number of slices for the whole time: the ratio of the sizes of the box and the instance.
     fn slices_worthwhile(&self) -> usize {
         let times = self.slices[0].girth() / self.girth;
         if times.is_finite() { (times as usize).clamp(1, MOST_SLICES) } else { MOST_SLICES }
     }
 }
 
-/// What is asked: the paths by the places of their instances.
+/// The paths in question, by the places of their instances.
 struct Ways<'a> {
     paths: BTreeMap<u32, WorldPath<'a>>,
     options: &'a MotionOptions,
 }
 
 impl Scene {
-    /// Returns whether the ways of some instances are free while they move in the world along `paths`, at the same time, and
-    /// the rest stands still. Asked about are all pairs of which one moves, as in other questions: their groups meet, and
-    /// they may not touch. Where an instance on a path stands now does not matter, and it stays there.
+    /// Returns whether the motions of some instances are free while they move in the world along `paths`, at the same
+    /// time, and the other instances stand still. The question is about all pairs with at least one moving instance
+    /// whose groups meet and whose contact is not allowed. The present pose of a moving instance does not matter, and
+    /// does not change.
     ///
-    /// The answer is certain at every moment, and that of [`Querier::motion`] about each pair along its
-    /// [`RelativePath`], put together: the earliest hit, before which no pair may be within the clearance. The default tolerance
-    /// is that of each pair. Of an instance that is named twice, the last path counts. All poses of a path have to be such as
-    /// [`Scene::add`] takes.
+    /// The answer is certain at every moment. It combines the answers of [`Querier::motion`] about each pair along its
+    /// [`RelativePath`] to the earliest hit, before which no pair is within the clearance. Each pair has its own
+    /// default tolerance. If an instance is named twice, the last path counts. [`Scene::add`] must accept all poses of
+    /// a path.
     ///
-    /// Cost: that of [`Querier::motion`] for each pair whose boxes come near each other, until the earliest hit. Where both
-    /// instances turn, more intervals are looked at than where one stands still.
+    /// Cost: that of [`Querier::motion`] for each pair whose boxes come near each other, until the earliest hit. If
+    /// both instances of a pair turn, more intervals are needed than if one stands still.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`]; [`SceneError::Pose`] as for [`Scene::add`], of a path's start and end;
-    /// [`SceneError::Query`] for a clearance or a tolerance that means nothing; and [`SceneError::Pair`] with the first pair
-    /// whose question has no answer before the earliest hit.
+    /// [`SceneError::NoInstance`]; [`SceneError::Pose`] as for [`Scene::add`], for a path's start and end;
+    /// [`SceneError::Query`] for an invalid clearance or tolerance; and [`SceneError::Pair`] with the first pair whose
+    /// question has no answer before the earliest hit.
     pub fn motion(
         &mut self,
         paths: &[(InstanceId, WorldPath<'_>)],
@@ -122,8 +123,9 @@ impl Scene {
         }
     }
 
-    /// Returns whether the ways are certainly free: whether [`Scene::motion`] would answer [`SceneMotionAnswer::Free`]. It
-    /// takes less time than the full answer. This is what planners ask. To check many edges on all cores, clone the scene for each thread.
+    /// Returns whether the motions are certainly free: whether [`Scene::motion`] would answer
+    /// [`SceneMotionAnswer::Free`]. It takes less time than the full answer. Use it in planners. To check many edges on
+    /// all cores, clone the scene for each thread.
     ///
     /// # Errors
     /// The errors of [`Scene::motion`], unless another pair is found not to be free.
@@ -187,8 +189,8 @@ impl Scene {
         Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })
     }
 
-    /// Calls `visit` with the pairs that may come within the clearance, so many at a time as are known, until it breaks. Those
-    /// of a piece are in the order in which their boxes come near each other.
+    /// Calls `visit` with the pairs that may come within the clearance, until `visit` breaks: in several calls if there
+    /// are many. The pairs of a call are in the order in which their boxes come near each other.
     fn each_piece_of_encounters(
         &self,
         ways: &Ways<'_>,

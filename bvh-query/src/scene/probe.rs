@@ -1,8 +1,8 @@
 //! Questions about points, rays and segments in the world, over all instances of a scene.
 //!
-//! Instances are asked in the order in which their boxes are met, nearest first, until none can change the answer. What is
-//! asked about are the vertices as [`Pose::place`](crate::Pose::place) defines them for the pose of an instance in the world.
-//! Probes meet all instances, whatever their groups.
+//! Instances are tested in the order in which a probe meets their boxes, nearest first, until none can change the
+//! answer. The questions are about the vertices as [`Pose::place`](crate::Pose::place) defines them for the pose of an
+//! instance in the world. Probes meet all instances, whatever their groups.
 
 use crate::error::QueryError;
 use crate::narrow::Point;
@@ -24,7 +24,7 @@ use std::ops::ControlFlow;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneClosestPoint {
-    /// The instance. Of instances that are equally near, the first.
+    /// The instance: of equally near ones, the first.
     pub instance: InstanceId,
     /// The answer of [`Querier::closest_point`] for it, in the world.
     pub closest: ClosestPoint,
@@ -34,7 +34,7 @@ pub struct SceneClosestPoint {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneRayHit {
-    /// The instance. Of instances that are hit at exactly the same parameter, the first.
+    /// The instance: of those hit at exactly the same parameter, the first.
     pub instance: InstanceId,
     /// The hit, in the world.
     pub hit: RayHit,
@@ -44,14 +44,14 @@ pub struct SceneRayHit {
 const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
 
 impl Scene {
-    /// Returns the closest point of all instances to each of many points in the world; nothing for a point from which all are
-    /// farther than `within`.
+    /// Returns the closest point of all instances to each of many points in the world, or `None` for a point from which
+    /// all are farther away than `within`.
     ///
-    /// Of each instance the answer is that of [`Querier::closest_point`], where its pose puts it.
+    /// The answer about each instance is that of [`Querier::closest_point`] for the placed instance.
     ///
     /// # Errors
-    /// [`SceneError::Query`] for a point or limit that [`Querier::closest_point`] refuses, and [`SceneError::Instance`] with an
-    /// instance whose question has no answer; of several points, the first one's error.
+    /// [`SceneError::Query`] for a point or limit that [`Querier::closest_point`] refuses, and [`SceneError::Instance`]
+    /// with an instance whose question has no answer. If several points fail, the error is that of the first.
     pub fn closest_points(
         &mut self,
         points: &[[f64; 3]],
@@ -61,19 +61,20 @@ impl Scene {
         self.each_probe(points, |asked, point| asked.closest_point(&check_point(point)?, within))
     }
 
-    /// Returns on which side of the instances each of many points in the world is: inside if it is inside any instance, else
-    /// on a surface, else undefined if it is in the box of an instance that has no inside, else outside.
+    /// Returns on which side of the instances each of many points in the world is. It is inside if it is inside any
+    /// instance; else on a surface if it is on one; else undefined if it is in the box of an instance that has no
+    /// inside; else outside.
     ///
     /// # Errors
-    /// Those of [`Scene::closest_points`], and of [`Querier::side`].
+    /// The errors of [`Scene::closest_points`] and of [`Querier::side`].
     pub fn sides(&mut self, points: &[[f64; 3]]) -> Result<Vec<Side>, SceneError> {
         self.each_probe(points, |asked, point| asked.side(&check_point(point)?))
     }
 
-    /// Returns the closest points and the sides that points are on: see [`Scene::closest_points`] and [`Scene::sides`].
+    /// Returns the closest points and the sides of many points: see [`Scene::closest_points`] and [`Scene::sides`].
     ///
     /// # Errors
-    /// Those of both.
+    /// The errors of both.
     pub fn signed_distances(
         &mut self,
         points: &[[f64; 3]],
@@ -93,8 +94,8 @@ impl Scene {
     /// Returns where each of many rays in the world first hits an instance.
     ///
     /// # Errors
-    /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an instance whose
-    /// question has no answer; of several rays, the first one's error.
+    /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an
+    /// instance whose question has no answer. If several rays fail, the error is that of the first.
     pub fn first_hits(&mut self, rays: &[Ray]) -> Result<Vec<Option<SceneRayHit>>, SceneError> {
         self.each_probe(rays, |asked, ray| {
             let mut first = First::new(ray)?;
@@ -115,8 +116,8 @@ impl Scene {
         })
     }
 
-    /// Returns all hits of each of many rays in the world, in the order along it: see [`Querier::all_hits`]. Each parameter
-    /// occurs once, however many instances are hit at exactly that.
+    /// Returns all hits of each of many rays in the world, in the order along the ray: see [`Querier::all_hits`]. Each
+    /// parameter occurs once, however many instances are hit at exactly that parameter.
     ///
     /// # Errors
     /// Those of [`Scene::first_hits`].
@@ -131,8 +132,8 @@ impl Scene {
     /// Returns whether each of many closed segments in the world meets any instance: see [`Querier::segment_hit`].
     ///
     /// # Errors
-    /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an instance
-    /// whose question has no answer; of several segments, the first one's error.
+    /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an
+    /// instance whose question has no answer. If several segments fail, the error is that of the first.
     pub fn segment_hits(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
         self.each_probe(segments, |asked, [from, to]| {
             let mut question = MeetsSegment::new(*from, *to)?;
@@ -159,7 +160,7 @@ impl Scene {
     }
 }
 
-/// A scene that is asked about a probe.
+/// A question about a probe to a whole scene.
 struct Asked<'a> {
     scene: &'a Scene,
     querier: &'a mut Querier,

@@ -15,17 +15,17 @@ use std::ops::ControlFlow;
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A pair of instances. A is the lower one, but where one of the two stands still in the answer to a motion
-/// ([`SceneMotionAnswer`](crate::SceneMotionAnswer)), that one is A.
+/// A pair of instances. A is the lower one. In answers about motions ([`SceneMotionAnswer`](crate::SceneMotionAnswer)),
+/// A is the instance that stands still, if one does.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct ScenePair {
-    /// The instance whose frame answers are in.
+    /// The instance in whose frame answers are given.
     pub a: InstanceId,
     /// The other instance.
     pub b: InstanceId,
 }
 
-/// Two triangles in contact, and the instances that they are of.
+/// Two triangles in contact, and their instances.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[non_exhaustive]
 pub struct SceneContact {
@@ -35,19 +35,19 @@ pub struct SceneContact {
     pub contact: Contact,
 }
 
-/// The nearest pair of instances, and how far apart they are. Points are in A's frame: `scene.pose(pair.a)?.place(point)`
-/// is where a point is in the world.
+/// The nearest pair of instances, and how far apart they are. Points are in A's frame;
+/// `scene.pose(pair.a)?.place(point)` returns a point in the world.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneDistance {
-    /// The instances. Of pairs that are equally near, the first.
+    /// The instances: of equally near pairs, the first.
     pub pair: ScenePair,
     /// The answer of [`Querier::distance`].
     pub nearest: Distance,
 }
 
-/// How many pairs of a question are known at a time: 1.5 MiB of them. If more are near each other, the pairs of one instance
-/// after the other are found, until so many are known, and asked about before the next.
+/// The most pairs of a question that are held at a time, which take 1.5 MiB. If more are near each other, pairs are
+/// found instance by instance until this many are held, and are tested before the next ones are found.
 pub(super) const MAX_KNOWN_PAIRS: usize = 1 << 16;
 
 /// Which pairs of a question are found next.
@@ -142,9 +142,9 @@ impl Scene {
         self.all(d, |querier, pair| pair.within(querier, d))
     }
 
-    /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, and how they lie. Pairs that have
-    /// nothing in common are left out: all pairs whose boxes in the world are apart, and those for which
-    /// [`Querier::relation`] says so.
+    /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, with their relations.
+    /// Pairs that have nothing in common are left out: those whose boxes in the world are apart, and those for which
+    /// [`Querier::relation`] answers [`Relation::Apart`].
     ///
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
@@ -170,8 +170,8 @@ impl Scene {
         Ok(of_pairs.into_iter().flat_map(with_pair).collect())
     }
 
-    /// Calls `visit` with each pair that is at most `d` apart, in ascending order, until it breaks. Pairs after that are not
-    /// looked at. It uses one thread.
+    /// Calls `visit` with each pair that is at most `d` apart, in ascending order, until it breaks. Later pairs are not
+    /// tested. It uses one thread.
     ///
     /// # Errors
     /// The errors of [`Scene::pairs_within`], for pairs up to that one.
@@ -220,8 +220,8 @@ impl Scene {
     /// Returns the nearest pair and its distance; `None` if there are no pairs.
     ///
     /// # Errors
-    /// [`SceneError::Pair`] with a pair whose question has no answer. Pairs that are certainly farther apart than another
-    /// one are not looked at.
+    /// [`SceneError::Pair`] with a pair whose question has no answer. Pairs that are certainly farther apart than
+    /// another one are not tested.
     pub fn distance(&mut self) -> Result<Option<SceneDistance>, SceneError> {
         self.start();
         let mut nearest = None;
@@ -388,8 +388,8 @@ impl Scene {
         Ok(all)
     }
 
-    /// Starts a question, and calls `visit` with the pairs asked about whose boxes are at most `limit` apart, in ascending
-    /// order, so many at a time as are known, until it breaks.
+    /// Starts a question, and calls `visit` with the tested pairs whose boxes are at most `limit` apart, until `visit`
+    /// breaks. The pairs come in ascending order, in several calls if there are many.
     fn each_piece(
         &mut self,
         limit: f64,
@@ -406,8 +406,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Returns the next pairs asked about whose boxes are at most `limit` apart, in any order: all of them, unless they are too
-    /// many. Each piece comes before the next one in the order of the pairs.
+    /// Returns the next tested pairs whose boxes are at most `limit` apart, in any order. These are all pairs, unless
+    /// there are too many for one piece. All pairs of a piece precede those of the next piece.
     fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
         let mut near_pairs = Vec::new();
         let places = self.instances.len() as u32;

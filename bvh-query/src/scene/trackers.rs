@@ -1,14 +1,14 @@
-//! What is remembered of each pair between questions, where instances move little.
+//! Trackers for the pairs of a scene, which save time if instances move little between questions.
 
 use crate::query::tracker::Tracker;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// How many trackers are kept for pairs that are no longer asked about, before they are let go.
+/// The most trackers that are kept for pairs about which no question is asked any more.
 const MOST_IDLE: usize = 1024;
 
-/// How many pairs of a question have trackers at most: some 20 MiB of them.
+/// The most pairs of a question that have trackers, which take some 20 MiB.
 const MOST_TRACKED: usize = 1 << 14;
 
 /// A tracker for each pair of places, in scenes that want them.
@@ -38,7 +38,7 @@ impl fmt::Debug for Trackers {
 }
 
 impl Trackers {
-    /// Begins a question. Lets go of pairs that the last one was not about, if they are many.
+    /// Begins a question. Removes the trackers of pairs that the last question was not about, if there are many.
     pub(super) fn start(&mut self) {
         if !self.on {
             self.of.clear();

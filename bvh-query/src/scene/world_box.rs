@@ -1,18 +1,18 @@
 //! Boxes in the world that contain every vertex as a question places it.
 //!
-//! A question about two instances places B in A's frame by `Pose::relative`. Its vertices, seen from the world through A's
-//! exact pose, are where B's exact pose puts them but for roundings. With u = 2^-53 and m the sum of the magnitudes of a
-//! translation and of what it places, over both instances, entries of the relative rotation are off by at most 32u (three
-//! products with entries of an inverse, 16u each, and 4u: see `pose/frames.rs`), its translation by 64u m, and a placed vertex
-//! by 8u m more. Over three axes that is below 2^-45 m. Each box is larger by 2^-43 of its own share of m, because computing
-//! the box itself loses less than the rest. A's frame may be stretched against the world by 2^-22, so that squared gaps between
-//! boxes are reduced by 2^-19 of themselves: see `squared_gap`. A relative translation below 2^-213 counts as 0, for which each
-//! box is larger by 2^-211.
+//! A question about two instances places B in A's frame by `Pose::relative`. Seen from the world through A's exact
+//! pose, its vertices are where B's exact pose puts them, except for roundings. Let u = 2^-53, and let m be the sum,
+//! over both instances, of the magnitudes of the translation and of the box that it places. Entries of the relative
+//! rotation are off by at most 32u (three products with entries of an inverse, 16u each, and 4u: see `pose/frames.rs`),
+//! its translation by 64u m, and a placed vertex by 8u m more. Over three axes that is below 2^-45 m. Each box is
+//! larger by 2^-43 of its own share of m, because computing the box itself loses less than the rest. A's frame may be
+//! stretched against the world by 2^-22, so that squared gaps between boxes are reduced by 2^-19 of themselves: see
+//! `squared_gap`. A relative translation below 2^-213 counts as 0, for which each box is larger by 2^-211.
 
 use crate::pose::Pose;
 use bvh_format::object::Object;
 
-/// The share of the magnitudes that a box is larger by.
+/// The share of the magnitudes by which a box is enlarged.
 const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
 
 /// More than a relative translation that counts as 0, 2^-211 mesh units.

@@ -25,8 +25,8 @@ const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 /// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end
 /// has the same coefficients over the other ends of the slabs.
 ///
-/// Everything is laid out as the groups that it turns out: four rows of four nodes to a register. Rows of no
-/// slab hold nothing of meaning.
+/// Everything is laid out as the groups that it produces: four rows of four nodes to a register. Rows without a slab
+/// have no meaning.
 #[repr(C, align(64))]
 pub(crate) struct Alignment {
     /// Where each term's end is taken from, `[term]`, as lanes and as rows: see `FourRows`.

@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 
-/// The number of visits that a look ahead may make beyond those of the query: they cost less than finding out whether
+/// The number of visits that a look ahead may make beyond those of the query. They cost less than finding out whether
 /// they pay.
 const EXTRA_LOOK_AHEAD_VISITS: u64 = 8;
 

@@ -5,7 +5,7 @@
 //! direction from its closest point to the centre of the node. Whatever the direction is, the gap of the projections on
 //! it is at most its length times the distance.
 //!
-//! Rounding: all is computed in f64 from decoded slab ends, which are exact, so that only three things are charged.
+//! Rounding: everything is computed in f64 from decoded slab ends, which are exact, so only three errors are charged.
 //! Coefficients of the form are rounded to f32 (`form_error`). A placed vertex is off by `Placement::error` along each
 //! axis, and so is the offset. Three products and two sums for each of two projections round by less than 2^-49 of the
 //! coordinates, whose magnitudes `Placement::error` is 2^-48 of.
@@ -26,8 +26,8 @@ type Point = [f64; 3];
 /// The triangles of a leaf packet are bounded one by one if the packet is this many times larger than the node it meets.
 const EXTENT_RATIO_TO_TEST_TRIANGLES: f32 = 8.0;
 
-/// How many visits follow unbounded when the triangles turned out not to be beyond the limit, so that a walk in which
-/// they never are takes at most twice as long.
+/// The number of visits without these bounds after triangles were not beyond the limit. A walk in which they never are
+/// therefore takes at most twice as long.
 const VISITS_AFTER_FAILED_BOUNDS: u32 = 4;
 
 /// The leaf packets of A and of B that a walk bounded last, and when it bounds the next.
@@ -46,8 +46,8 @@ impl LargeLeaves {
         self.unbounded_visits = 0;
     }
 
-    /// Returns whether an entry is a leaf packet against a much smaller node and its triangles are certainly beyond `limit`
-    /// of that node. After it has found out in vain, it does not for some visits.
+    /// Returns whether an entry is a leaf packet against a much smaller node and its triangles are certainly beyond
+    /// `limit` of that node. After a test without success, it returns false for some visits without a test.
     #[inline(always)]
     pub(crate) fn are_beyond(
         &mut self,

@@ -1,6 +1,6 @@
 //! The pairs of leaf packets that a walk has met, appended 16 lanes at a time and visited several at a time.
 //!
-//! Bounds, nodes of A and nodes of B are separate arrays. So the survivors of a node test are moved here in a few
+//! Bounds, nodes of A and nodes of B are separate arrays, so the survivors of a node test are appended in a few
 //! instructions without a branch.
 
 use crate::isa::Isa;

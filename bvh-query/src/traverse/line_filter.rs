@@ -1,18 +1,19 @@
 //! The node filter for a line: where a segment enters each of four nodes.
 //!
-//! A segment leads from p to p + q, and its points are p + s q for s from 0 to 1. Along a direction n of a slab that is from
-//! (lo - n p) / (n q) to (hi - n p) / (n q), and within a node where it is so along all directions (T. L. Kay, J. T. Kajiya,
-//! "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_filter`]), a register holds
-//! four slabs of four nodes.
+//! A segment leads from p to p + q, and its points are p + s q for s from 0 to 1. It is within a slab of direction n
+//! for s from (lo - n p) / (n q) to (hi - n p) / (n q), and within a node where this holds for all directions (T. L.
+//! Kay, J. T. Kajiya, "Ray Tracing Complex Scenes", SIGGRAPH 1986). As for a point ([`crate::traverse::point_filter`]),
+//! a register holds four slabs of four nodes.
 //!
-//! Error, with u = 2^-24: what is subtracted and n q are rounded to f32, which moves a point along n by at most
-//! 1.01 u (|n p| + |n q|), and the segment's own error by 3 E along a direction of three entries. Slabs are moved outward by
-//! w = 3 u (|n p| + |n q|) + 8 E, more than twice as much. What is left is relative: a rounded difference, a rounded inverse and
-//! a product make an end of the interval wrong by 3u of itself, for which entries are made less by 8u and exits greater. Their
-//! signs are right, so that this is right for those before the segment's start as well, which count as 0.
+//! Error, with u = 2^-24. The subtracted numbers and n q are rounded to f32, which moves a point along n by at most
+//! 1.01 u (|n p| + |n q|). The segment's own error moves it by 3 E along a direction of three entries. Slabs are moved
+//! outward by w = 3 u (|n p| + |n q|) + 8 E, more than twice as much. The remaining errors are relative: a rounded
+//! difference, a rounded inverse and a product make an end of the interval wrong by 3u of itself. To cover this,
+//! entries are made less, and exits greater, by 8u. The signs are right, so this also holds for ends before the
+//! segment's start, which count as 0.
 //!
-//! Where |n q| is less than w / 2, slabs are moved by |n q| more, and n q counts as w / 2. Wherever the segment meets the slab,
-//! both ends are then at least w - w / 2 away, and the quotients beyond 0 and 1.
+//! If |n q| is less than w / 2, slabs are moved by |n q| more, and n q counts as w / 2. Wherever the segment meets the
+//! slab, both ends are then at least w - w / 2 away, and the quotients are beyond 0 and 1.
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{FACTORS_BY_AXIS, U};

@@ -1,4 +1,4 @@
-//! Walks two trees together, or one for a probe: decoding, re-alignment, node tests, order of visits.
+//! Walks two trees together, or one tree for a probe: decoding, re-alignment, node tests, and the order of visits.
 
 pub(crate) mod align;
 pub(crate) mod budget;

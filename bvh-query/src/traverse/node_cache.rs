@@ -134,9 +134,9 @@ pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
 
 /// The opened nodes of one side. Node 0 holds the object's root as its only child.
 ///
-/// They are a tree whatever the file says, because a node is opened once, from one child of an earlier node. The
-/// rules of the format make that tree no larger than the object. `max_nodes` enforces this even if the bytes change
-/// after they were checked, so that every walk ends.
+/// These nodes form a tree, whatever the file says, because a node is opened once, from one child of an earlier node.
+/// By the rules of the format, the tree is no larger than the object. `max_nodes` enforces this even if the bytes
+/// change after they were checked, so that every walk ends.
 #[derive(Default)]
 pub(crate) struct NodeCache {
     nodes: Vec<CachedNode>,
@@ -346,8 +346,8 @@ fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page
     Ok((page, to.root()))
 }
 
-/// Returns whether the slabs of an anchor, in all columns, lie within those of a column: rule 49. What is rounded along the
-/// way down is charged by the magnitudes of the object's root, which bound those of all nodes only because of this.
+/// Returns whether the slabs of an anchor, in all columns, lie within those of a column: rule 49. Roundings in all
+/// nodes are charged by the magnitudes of the object's root, which bound those of all nodes only because of this rule.
 #[inline(always)]
 fn is_nested<I: Isa>(isa: I, set: DirectionSet, (decoded, column): (&Group, usize), anchor: &Group) -> bool {
     // A bit for each lane of a row with a slab, by register.

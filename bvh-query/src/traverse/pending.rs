@@ -1,8 +1,8 @@
-//! The pairs that a walk has still to visit, kept by the node test that left them.
+//! The pairs that a walk has still to visit, grouped by the node test that left them.
 //!
-//! A test writes its 16 bounds straight into the list, and a mask marks the pairs that are left. So pairs are neither
-//! moved nor sorted, and no branch depends on how many there are. Depth-first, the last test is next; best-first, the test
-//! with the least bound.
+//! A test writes its 16 bounds directly into the list, and a mask marks the pairs that are left. Pairs are therefore
+//! neither moved nor sorted, and no branch depends on their number. In a depth-first walk, the last test is next. In a
+//! best-first walk, the test with the least bound is next.
 
 use crate::isa::Isa;
 use crate::traverse::node_cache::ChildRef;
@@ -109,7 +109,7 @@ impl PendingTests {
         self.push(1, 0);
     }
 
-    /// Takes the next pair of the last test, and finds the nearest of those that are left: nothing waits for that before
+    /// Takes the next pair of the last test, and finds the nearest of those that are left. Nothing waits for this until
     /// the next pair is taken.
     #[inline(always)]
     pub(crate) fn pop<I: Isa>(&mut self, isa: I) -> Option<Entry> {

@@ -1,10 +1,10 @@
 //! The node filter for a point: lower bounds of its distance from four nodes.
 //!
-//! A group has four children in columns and slabs in rows, four to a register. Against a single point, each register is
-//! one comparison of sixteen slabs, where a pair of nodes takes one for each slab.
+//! A group has four children in columns and slabs in rows, four rows to a register. For a single point, one comparison
+//! of a register tests sixteen slabs, whereas a pair of nodes takes one comparison per slab.
 //!
-//! Distances are in units of 2^k mesh units, which are no less than a fraction of the farthest corner of the object's
-//! box from the point. So no square overflows.
+//! Distances are in units of 2^k mesh units, which are no less than a fraction of the distance from the point to the
+//! farthest corner of the object's box. So no square overflows.
 //!
 //! Error: the point's slabs hold its projections. A gap is one difference (u = 2^-24), times the inverse length of its
 //! direction (2u, rounded down before); the root of the sum of squares adds three products, two sums and a root. Together

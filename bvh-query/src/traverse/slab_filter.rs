@@ -1,8 +1,8 @@
 //! The slab filter: bounds 16 pairs of nodes along the directions of their turning slabs, and along the line between them.
 //!
-//! Along a direction `x` a node reaches no further than `alpha` times its slab along `u`, and its box along what remains
-//! of `x`, which is `x - alpha u`. That holds for every `alpha`; the projection `x . u` leaves the least rest. With a box
-//! of centre `c` and half sides `h`, and a slab of half width `w` whose middle is `m` from the centre,
+//! Along a direction `x`, a node reaches no further than `alpha` times its slab along `u` plus the reach of its box
+//! along `x - alpha u`. That holds for every `alpha`; the projection `x . u` leaves the least rest. With a box of
+//! centre `c` and half sides `h`, and a slab of half width `w` whose middle is `m` from the centre,
 //!
 //! ```text
 //! |x . (v - c) - alpha m| <= |alpha| w + sum |x - alpha u|_i h_i          for every point v of the node
@@ -10,10 +10,10 @@
 //!
 //! so that two nodes are apart along `x` by the distance of the middles of two such intervals, less both radii.
 //!
-//! Rounding: let u = 2^-24, M_A and M_B bound the coordinates of all nodes, and t be the translation. Radii are sums of
-//! positive terms with at most 12 roundings, for which a factor of 1 + 2^-20 pays. `spec/numerics.md` counts what else is
-//! rounded, in whatever order and fused or not: less than u (64 M_A + 112 M_B + 16 |t|) along a direction of length 1,
-//! where |t| is the sum of its coordinates' magnitudes. `prepare` adds it up once a query.
+//! Rounding: let u = 2^-24, let M_A and M_B bound the coordinates of all nodes, and let t be the translation. Radii are
+//! sums of positive terms with at most 12 roundings, which a factor of 1 + 2^-20 covers. `spec/numerics.md` counts the
+//! other roundings, in any order and fused or not: less than u (64 M_A + 112 M_B + 16 |t|) along a direction of length
+//! 1, where |t| is the sum of its coordinates' magnitudes. `prepare` computes this once per query.
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{U, round_up};
@@ -231,9 +231,9 @@ impl SlabFilter {
 const UNDERFLOW: f64 = f64::from_bits((1023 - 110) << 52);
 /// The least square of a distance between centres that is used, 2^-60.
 const LEAST_SQUARE: f32 = f32::from_bits((127 - 60) << 23);
-/// What the coordinates of A and of B and the translation may be together for the line between centres to be looked along:
-/// 2^60 mesh units. Products along it are then below 2^127. One that overflows may have the sign of a gap where there is
-/// none.
+/// The largest sum of the magnitudes of coordinates of A, of B and of the translation for which the line between
+/// centres is tested: 2^60 mesh units. Products along it are then below 2^127. A product that overflows could have the
+/// sign of a gap where there is none.
 const MAX_MAGNITUDES: f64 = (1u64 << 60) as f64;
 
 /// Three rows of nodes of A, in the lanes of their pairs.

@@ -1,7 +1,7 @@
-//! When the slab test is made, and what it remembers of nodes.
+//! Decides when the slab test is made, and keeps what it computes of nodes.
 //!
-//! A slab test costs about a third of a node test, so it has to pay. Short walks do without, and a walk in which slabs have
-//! kept too few pairs apart leaves some tests out. Answers do not depend on it.
+//! A slab test costs about a third of a node test, so it must pay. Short walks make none, and a walk in which slabs
+//! have separated too few pairs skips some tests. Answers do not depend on this.
 
 use crate::isa::{Isa, Task};
 use crate::traverse::node_cache::NodeCache;
@@ -15,7 +15,7 @@ use crate::traverse::slab_filter::{Seen, SlabFilter, TurningGroup};
 const ALWAYS: bool = cfg!(debug_assertions);
 /// Node tests of a walk before slab tests begin.
 const NODE_TESTS_BEFORE_SLABS: u32 = if ALWAYS { 0 } else { 24 };
-/// What keeping a pair apart saves, in slab tests.
+/// The saving for each separated pair, in slab tests.
 const TESTS_SAVED_PER_PAIR: i32 = 2;
 /// The most that past savings count, in slab tests.
 const MAX_BALANCE: i32 = 6;

@@ -15,13 +15,13 @@
 //! visitor has seen enough leaves to go on depth-first, or until the list has its full length. Then the list becomes the
 //! stack.
 //!
-//! The walk ends: each file is a tree (its rules say so, and `NodeCache` does not rely on it), an entry
-//! stands for the leaf pairs below it, and its children divide these among them. So no pair of nodes is
-//! visited twice, except those of the first dive, and there are at most (nodes of A) * (nodes of B).
+//! The walk ends, for this reason. Each file is a tree (its rules say so, and `NodeCache` does not rely on it). An
+//! entry stands for the leaf pairs below it, and its children divide these among themselves. So no pair of nodes is
+//! visited twice, except those of the first dive, and there are at most (nodes of A) * (nodes of B) visits.
 //!
-//! Memory: each entry that is popped depth-first leaves at most four node tests on the stack, and those
-//! above it are one level deeper in A or in B. So there are at most 4 * (depth of A + depth of B) tests. A tree is no
-//! deeper than its number of treelets. Nothing recurses.
+//! Memory: each entry that is popped depth-first leaves at most four node tests on the stack, and those above it are
+//! one level deeper in A or in B. So there are at most 4 * (depth of A + depth of B) tests. A tree is no deeper than
+//! its number of treelets. Nothing recurses.
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
@@ -45,16 +45,16 @@ pub(crate) enum Order {
     Nearest,
     /// Depth-first, in whatever order is cheapest.
     Any,
-    /// First straight down to one leaf pair, for a limit; then the pair of least bound of all, until
-    /// the visitor has seen so many more leaf pairs; then nearest.
+    /// First straight down to one leaf pair, to get a limit; then the pair of least bound of all, until the visitor has
+    /// seen `leaves` more leaf pairs; then as `Nearest`.
     Best { leaves: u32 },
 }
 
 /// What a query does with the pairs of leaf packets that a walk meets.
 pub(crate) trait Visitor {
     const MEASURE: Measure;
-    /// Whether bounds are to hold for two placements of B at a time, `ObjectPair::placement` and `ObjectPair::end`: then a
-    /// bound is one along a direction on which B is on the same side of A in both.
+    /// Whether bounds must hold for two placements of B at a time, `ObjectPair::placement` and `ObjectPair::end`. A
+    /// bound is then one along a direction on which B is on the same side of A in both.
     const SWEEPS: bool = false;
 
     fn order(&self) -> Order;
@@ -101,9 +101,9 @@ const LEAF_PAIRS_PER_BATCH: usize = 4;
 /// A node this many times larger than its partner is opened alone, so that its children meet the partner at its size.
 const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
 
-/// The number of node tests along A's directions alone before B's are prepared: most queries of separated meshes end
-/// before. In CAD models, whose faces follow the axes of their own frame, B's directions separate up to half of the
-/// pairs that A's leave, in scans an eighth.
+/// The number of node tests along A's directions alone before B's are prepared. Most queries of separated meshes end
+/// before that. B's directions separate up to half of the pairs that A's leave in CAD models, whose faces follow the
+/// axes of their own frame, and an eighth in scans.
 const NODE_TESTS_BEFORE_B_DIRECTIONS: u64 = 16;
 
 /// Node tests before the triangles of large leaf packets are bounded one by one. Most queries of meshes of similar size

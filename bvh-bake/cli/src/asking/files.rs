@@ -6,8 +6,8 @@ use bvh_query::{Motion, Pose};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Reads all files of a list, so that a mistake in the last one is told before the first one is asked about. Returns their
-/// stems and the questions to ask. `what` names the files in messages.
+/// Reads all files of a list before any question is asked, so that a mistake in the last file is reported first.
+/// Returns their stems and the questions to ask. `what` names the files in messages.
 pub(crate) fn read_all<T>(
     list: Option<&str>,
     what: &str,
@@ -39,8 +39,8 @@ pub(crate) fn unnumbered<T>(questions: Vec<(usize, T)>) -> Vec<T> {
     questions.into_iter().map(|(_, question)| question).collect()
 }
 
-/// Refuses what is no regular file, without opening it: opening a named pipe would wait for its other end. Files that the
-/// command line names may be pipes; those that a text or a folder names may not.
+/// Refuses anything but a regular file, without opening it: opening a named pipe would wait for its other end. Files
+/// that the command line names may be pipes; those that a text or a folder names may not.
 pub(crate) fn regular_file(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path)? {
         metadata if metadata.is_file() => Ok(()),

@@ -1,4 +1,5 @@
-//! What commands that ask have in common: meshes, files of questions, the run, and how answers are told.
+//! The common part of the commands that ask questions: meshes, files of questions, the run, and how answers are
+//! printed.
 
 pub(crate) mod files;
 pub(crate) mod mesh;
@@ -14,7 +15,7 @@ use mesh::{How, LoadedMesh};
 use runner::Run;
 use std::path::Path;
 
-/// What every answer has, whatever the question.
+/// The common part of all answers.
 pub(crate) trait Answer {
     /// Returns whether the answer counts among the positives.
     fn is_positive(&self) -> bool;
@@ -27,7 +28,7 @@ pub(crate) trait Answer {
         significant(self.value())
     }
 
-    /// Returns all that the answer has.
+    /// Returns everything that the answer has.
     fn json(&self) -> Record;
 
     /// Hashes what the line tells.
@@ -52,7 +53,7 @@ pub(crate) fn mode_name(mode: &impl ValueEnum) -> String {
     mode.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-/// One mesh or two that are asked about, and how.
+/// One mesh or two, and how to ask about them.
 pub(crate) struct Session<'a> {
     arguments: &'a AskingArguments,
     backend: Backend,
@@ -194,7 +195,7 @@ pub(crate) struct RunArguments {
     /// Ask only the first N questions of each file; 0 asks all
     #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub(crate) limit: usize,
-    /// Print one JSON object per question, with all that the answer has
+    /// Print one JSON object per question, with everything that the answer has
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -252,8 +253,8 @@ fn read_ahead() -> impl TypedValueParser<Value = ReadAhead> {
     })
 }
 
-/// Returns the sorted value at a fraction of the way from the least to the largest, by the rule of the peers' protocol; 0 if
-/// there are none.
+/// Returns the quantile of sorted values at a fraction from 0 to 1, by the rule of the peers' protocol; 0 if there are
+/// none.
 pub(crate) fn quantile(sorted: &[u64], fraction: f64) -> u64 {
     let index = (fraction * sorted.len() as f64) as usize;
     sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0)

@@ -1,7 +1,8 @@
-//! Asks all questions of a run, on one thread or several, times each by itself, and tells the answers.
+//! Asks all questions of a run, on one thread or several, times each of them, and prints the answers.
 //!
-//! First come `warm` untimed questions from the end of the list, then all items in order until the budget is spent. Each
-//! thread takes the next one. The answers are put back in order, so that a budget that ends early leaves the first ones.
+//! First come `warm` untimed questions from the end of the list, then all items in order until the budget is spent.
+//! Each thread takes the next item. The answers are put back in order: if the budget ends early, the first ones are
+//! there.
 
 use super::files::write_file;
 use super::{Answer, RunArguments, quantile};

@@ -1,7 +1,9 @@
-//! The output manifest: lines are appended to a file beside it as assets end, and at the end it is written whole, in order.
+//! The output manifest. As assets end, their lines are appended to a file beside it. At the end, the manifest is
+//! written as a whole, in order.
 //!
-//! The file beside it has the same name and `.part`. A process that is killed leaves it behind; the next one appends to it,
-//! and removes it when the output manifest is written. It is locked, so that two processes never share it.
+//! The file beside it has the same name and `.part`. A process that is killed leaves it behind. The next process
+//! appends to it, and removes it when the output manifest is written. It is locked, so that two processes never share
+//! it.
 
 use super::shown;
 use crate::bake::{Report, Shard};

@@ -1,7 +1,7 @@
 //! `cbvh bake` of many assets: baked in parallel within one budget, with one line of results per asset.
 //!
-//! Each thread takes the next asset in turn, waits for its share of the memory, and bakes it on the thread pool that all
-//! share. If an asset fails, the failure is told and noted, and the next asset follows.
+//! Each thread takes the next asset in turn, waits for its share of the memory, and bakes it on the thread pool that
+//! all share. If an asset fails, the failure is printed and noted, and the next asset follows.
 
 mod journal;
 mod list;

@@ -1,8 +1,8 @@
-//! Divides a budget of memory among bakes that run side by side.
+//! Divides a budget of memory among bakes that run in parallel.
 //!
-//! Each bake keeps within its own share, and the shares of all running bakes never exceed the budget. A share is what the
-//! largest mesh needs that the file can hold, or an equal part of the budget if that is more. So small assets run side by
-//! side, and an asset that needs the whole budget runs alone.
+//! Each bake keeps within its own share, and the shares of all running bakes never exceed the budget. A share is the
+//! memory for the largest mesh that the file can hold, or an equal part of the budget if that is more. Small assets
+//! therefore run in parallel, and an asset that needs the whole budget runs alone.
 
 use bvh_bake::input::MeshFormat;
 use bvh_bake::least_memory;

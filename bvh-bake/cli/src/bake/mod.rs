@@ -107,7 +107,7 @@ pub(crate) enum Event<'a> {
     Ended(&'a StageLine),
 }
 
-/// Bakes meshes into one file within a budget of memory, and reports on it. How to go about files is in the arguments.
+/// Bakes meshes into one file within a budget of memory, and reports on it. The arguments say how files are handled.
 pub(crate) fn bake(
     inputs: &[PathBuf],
     output: &Path,
@@ -195,7 +195,7 @@ that have the same output, exits with code 3 before anything is baked.";
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct BakeArguments {
-    /// Meshes: OBJ, STL, PLY or glTF files; or one folder, each of whose meshes is baked to a file of its own
+    /// Meshes: OBJ, STL, PLY or glTF files; or one folder, whose meshes are baked to separate files
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "IN")]
     pub(crate) inputs: Vec<PathBuf>,
     /// The file to write; for a folder of meshes, the folder to write to
@@ -245,7 +245,7 @@ pub(crate) struct BakeArguments {
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,
-    /// Do not store which objects are closed; questions about what is inside a mesh need that
+    /// Do not store which objects are closed, which questions about what is inside a mesh need
     #[arg(long)]
     pub(crate) no_topology: bool,
     /// Bake even if the output is up to date

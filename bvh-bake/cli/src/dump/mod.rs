@@ -1,4 +1,4 @@
-//! `cbvh dump`: shows what a file contains: all of it, one page, or one treelet.
+//! `cbvh dump`: shows the contents of a whole file, of one page, or of one treelet.
 
 mod page;
 mod statistics;

@@ -1,7 +1,7 @@
 //! Statistics of an object's tree by level: counts of treelets, children, packets and triangles.
 //!
-//! Links lead to later pages only, so that one pass is enough. Memory holds one page with its leaf block, and the levels of
-//! roots whose page has not been reached.
+//! Links lead only to later pages, so one pass is enough. Memory holds one page with its leaf block, and the levels of
+//! roots in pages that have not been reached.
 
 use super::Contents;
 use bvh_bake::FileError;

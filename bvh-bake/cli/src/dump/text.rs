@@ -1,4 +1,4 @@
-//! Shows a record for a person: a field per line, and objects in a list one per line where they are flat.
+//! Shows a record for a person: one field per line. Objects in a list take one line each if they are flat.
 
 use crate::console::Record;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};

@@ -1,4 +1,4 @@
-//! What `cbvh report` and the laboratory of this project share: where a report comes from, and how it is written.
+//! The common part of `cbvh report` and the laboratory of this project: the origin of a report, and how it is written.
 //!
 //! This library is not meant for applications, and nothing in it is stable.
 

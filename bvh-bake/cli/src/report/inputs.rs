@@ -1,4 +1,4 @@
-//! What a report is about: a list of pairs, one per line, their meshes, and their files of poses or motions.
+//! The inputs of a report: a list of pairs, one per line, their meshes, and their files of poses or motions.
 
 use super::{Kind, ReportArguments};
 use crate::asking::files::require_regular;

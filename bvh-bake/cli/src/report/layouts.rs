@@ -1,10 +1,10 @@
-//! Which layout suits these meshes: how fast each one answers, how many bytes it takes, and with what error.
+//! Which layout suits these meshes: how fast each one answers, how many bytes it takes, and how large its errors are.
 //!
-//! Each pair is baked in every profile with every encoding of triangles. Then it is asked in all its poses, and the answers
-//! are compared with those of the reference: the profile of plain floats, with the same triangles. Contact and exact
-//! distances have one right answer for given triangles, bit for bit. With an allowed error the answer lies between the least
-//! distance and that much more. Quantised triangles have moved and have answers of their own: their difference from the
-//! answers for the mesh itself is an error that is reported.
+//! Each pair is baked in every profile with every encoding of triangles. Then it is queried in all its poses, and the
+//! answers are compared with those of the reference: the profile of plain floats, with the same triangles. For given
+//! triangles, contact and exact distances have one right answer, bit for bit. With an allowed error, the answer lies
+//! between the least distance and that much more. Quantised triangles have moved, and so have different answers. Their
+//! difference from the answers for the mesh itself is an error that is reported.
 
 use super::inputs::bake_both;
 use super::page::{Column, Table, Words, excess, figure, micro, percent};

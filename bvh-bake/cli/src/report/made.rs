@@ -16,11 +16,11 @@ pub(super) const MOTIONS: &str =
 
 /// The gaps of poses in turn, as fractions of A's diagonal; 0 stands for overlap.
 const POSE_GAPS: [f64; 5] = [0.0, 1e-6, 0.005, 0.01, 0.05];
-/// The gap at the start of a motion, as a fraction of A's diagonal: of long ways, short ways, slides and turns.
+/// The gap at the start of a motion, as a fraction of A's diagonal: of long motions, short motions, slides and turns.
 const MOTION_GAPS: [f64; 4] = [0.05, 0.01, 0.005, 0.01];
-/// How far B is shifted on a short way and slides, as a fraction of A's diagonal.
+/// How far B moves in short motions and slides, as a fraction of A's diagonal.
 const SHIFT: f64 = 0.02;
-/// The angles by which B turns on a short way and on the spot, in radians.
+/// The angles by which B turns in short motions and on the spot, in radians.
 const SHORT_TURN: f64 = 0.1;
 const LONG_TURN: f64 = 2.0;
 /// By which fraction of the gap the distance of a pose may exceed it.

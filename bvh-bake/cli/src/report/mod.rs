@@ -1,7 +1,7 @@
 //! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
 //!
-//! `layouts` and `motions` are the two kinds of report. Both make rows of named figures, from which all else is written: a
-//! table, JSON, a drawing and a page for people. They stand on `inputs`, `made` poses and motions, and `timing`.
+//! `layouts` and `motions` are the two kinds of report. Both make rows of named figures, from which everything else is
+//! written: a table, JSON, a drawing and a page for people. They use `inputs`, `made` poses and motions, and `timing`.
 
 mod inputs;
 mod layouts;
@@ -62,7 +62,7 @@ Queries run on one thread. On a machine that does other work the times include t
 pub(crate) struct ReportArguments {
     /// The list of the pairs of meshes to report on
     pairs: PathBuf,
-    /// The folder to write to; made if it does not exist
+    /// The folder to write to; it is created if it does not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The folder of the meshes [default: that of PAIRS]
@@ -94,7 +94,7 @@ const QUICK: (usize, usize) = (2, 10);
 /// The number of items that are made for a pair without any.
 const MADE: usize = 60;
 
-/// Makes so many items for two meshes.
+/// Makes a number of items for two meshes.
 type Make<T> = fn(&mut Querier, &Bvh, &Bvh, usize) -> Result<Vec<T>, QueryError>;
 
 /// What one kind of report has that the other does not. Its items are poses or motions.
@@ -129,7 +129,7 @@ struct Measured {
     about: String,
     /// Its record in `report.json`.
     record: Value,
-    /// All that is told of the pair is taken from its rows in `report.csv`, of which this is the number of the first one.
+    /// The number of the pair's first row in `report.csv`. Everything that is said about the pair comes from its rows.
     rows: Vec<Record>,
     first_row: usize,
     /// Wrong answers, one line each.
@@ -211,7 +211,7 @@ fn layout_of(report: &BakeReport) -> String {
 }
 
 impl Report {
-    /// Adds the results of a pair, which was asked about so many items of this name and origin.
+    /// Adds the results of a pair for `count` items of this name and origin.
     fn add(&mut self, subject: &Subject<'_>, mut of: Measured, (items, count, from): (&str, usize, &str)) {
         let Subject { pair, baked, .. } = subject;
         let side = |path: &Path, (bvh, report): &Baked| {

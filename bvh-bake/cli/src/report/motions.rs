@@ -1,8 +1,8 @@
-//! Speed against error of the ways to ask about a motion: how many contacts samples miss, how late they are with the
-//! others, and how long that takes beside a certified answer.
+//! Speed against error of the methods for motions: how many contacts samples miss, how late they find the others, and
+//! how long they take compared with a certified answer.
 //!
-//! The ways take turns in rounds. Ten thousand samples take thousands of times as long as a certified answer, so each way
-//! asks in the first round, and then in as many more as fit into its share of time.
+//! The methods take turns in rounds. Ten thousand samples take thousands of times as long as a certified answer, so
+//! each method takes part in the first round, and then in as many more as fit into its share of time.
 
 use super::page::{Column, Table, Words, figure, micro, percent};
 use super::plot::{Panel, Series};
@@ -47,10 +47,10 @@ in rounds, as many as fit into 10 seconds per pair, but at least one; <code>repo
 taken over the motions of a round and then over the rounds.</li>
 <li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";
 
-/// For how long each way asks about the motions of a pair, in seconds, unless one round takes longer.
+/// For how long each method asks about the motions of a pair, in seconds, unless one round takes longer.
 const MAX_SECONDS: f64 = 10.0;
 
-/// What is said in one way about each motion, and nanoseconds by round and motion.
+/// What one method says about each motion, and nanoseconds by round and motion.
 type Asked = (Vec<Said>, Vec<Vec<u64>>);
 
 /// Returns whether one more round like those before fits into the time.
@@ -60,7 +60,7 @@ fn has_time(rounds: &[Vec<u64>]) -> bool {
     count == 0.0 || spent as f64 * (1.0 + 1.0 / count) <= MAX_SECONDS * 1e9
 }
 
-/// Asks in all ways, in up to so many rounds.
+/// Asks by all methods, in up to this many rounds.
 fn ask(
     methods: &[Method],
     meshes: [&Bvh; 2],
@@ -89,7 +89,7 @@ fn ask(
     Ok(all)
 }
 
-/// Measures all ways to ask about the motions of a pair.
+/// Measures all methods on the motions of a pair.
 fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failure> {
     let Subject { pair, baked: [(a, _), (b, _)], backend, rounds, .. } = *subject;
     let methods: Vec<Method> = Method::all().collect();

@@ -1,7 +1,7 @@
 //! Times single queries in rounds: subjects take turns on one thread, and medians are taken over the rounds.
 //!
-//! A turn is a few untimed questions and then all items in their order. Caches hold what the previous questions left there,
-//! which is called warm. Within a round all subjects take their turn, and the next round starts with another subject, so
+//! A turn is a few untimed questions and then all items in their order. Caches are warm: they hold what the previous
+//! questions left there. Within a round all subjects take their turn. The next round starts with another subject, so
 //! that drift (clock, temperature, neighbours) affects all of them alike.
 
 use crate::asking::quantile;

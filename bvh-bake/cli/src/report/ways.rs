@@ -1,8 +1,8 @@
-//! The ways to ask about a motion: samples, as programs without certified answers take them, and the certified answers; and
-//! how what is said compares with what is certified.
+//! The methods to ask about a motion: samples, which programs without certified answers take, and the certified
+//! answers. Also compares the answers of samples with the certified ones.
 //!
-//! Samples may miss a contact and be late with one. They may not find one where the way is certified free: this would be an
-//! error of the certified answer, or of the query about a pose.
+//! Samples may miss a contact or find one late. They must not find one in a motion that is certified free: this would
+//! be an error of the certified answer, or of the query about a pose.
 
 use super::timing::median;
 use bvh_query::{Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
@@ -114,9 +114,10 @@ impl Method {
 /// The errors of one way to ask.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Errors {
-    /// Certified hits of which it says that the way is free.
+    /// The number of certified hits for which the method says that the motion is free.
     pub(super) missed: u64,
-    /// How late its first contacts are after the time until which the way is certified free, as a fraction of the way.
+    /// How late its first contacts are after the time until which the motion is certified free, as a fraction of the
+    /// motion.
     pub(super) late_median: Option<f64>,
     pub(super) late_max: Option<f64>,
     /// Motions that a certified answer leaves undecided.

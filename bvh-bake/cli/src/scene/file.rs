@@ -1,4 +1,4 @@
-//! Reads scene files: meshes, instances, what moves and what may touch; and opens baked scenes.
+//! Reads scene files (meshes, instances, moving instances and allowed pairs), and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The groups of what frames move, and of what stands still.
+/// The groups of instances that frames move, and of those that stand still.
 const MOVING: u32 = 1;
 const STILL: u32 = 2;
 
@@ -247,7 +247,7 @@ pub(super) struct Frame {
     pub(super) poses: Vec<Pose>,
 }
 
-/// The only frame of a scene as it stands.
+/// The only frame of a scene in which nothing moves.
 pub(super) fn as_it_stands() -> Vec<Frame> {
     vec![Frame { number: 1, line: 0, poses: Vec::new() }]
 }

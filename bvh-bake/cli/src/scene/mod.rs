@@ -54,7 +54,7 @@ nanoseconds. They include moving the instances and, with --list, the distances o
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct SceneArguments {
-    /// The meshes, where they are, and what moves
+    /// A scene file, or a .cbvh file made by cbvh bake --scene
     scene: PathBuf,
     /// The poses of the moving instances, one frame per line
     frames: Option<PathBuf>,

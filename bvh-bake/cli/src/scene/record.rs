@@ -1,4 +1,4 @@
-//! What is told of an answer about a frame: the line of `--bench` with the hash of the answers, records and lists of pairs.
+//! The output about a frame: the line of `--bench` with the hash of the answers, records, and lists of pairs.
 
 use super::file::LoadedScene;
 use super::{Answer, Mode, SceneArguments};

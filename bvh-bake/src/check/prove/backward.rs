@@ -1,8 +1,9 @@
 //! Checks the pages of a file from the last to the first, a run of pages at a time.
 //!
-//! Links lead to later pages. Of each page that has been checked, only the subtree roots are kept, each with its tight
-//! k-DOP, the link that it names and, if there are few, its triangles, until the walk reaches that link. Only few roots
-//! wait at any time, since bricks follow one after the other: the memory for them hardly grows with the file.
+//! Links lead to later pages. After a page has been checked, only its subtree roots are kept, until the walk reaches
+//! the links that they name. A root is kept with its tight k-DOP, its link and, if there are few, its triangles. Since
+//! bricks follow one after the other, only few roots wait at any time, and the memory for them hardly grows with the
+//! file.
 
 use super::InParallel;
 use crate::progress::{Progress, Stage, Step, WHOLE};

@@ -1,10 +1,10 @@
 //! Proves a file: its structure follows the rules, and every decoded bound contains its triangles.
 //!
-//! The proof is part of every bake, in release builds too. It works on the finished bytes with the reference decoder, and
-//! trusts nothing of the baker. The bytes are those in memory that the writing thread is given, or, within a budget of
-//! memory, those that the system reads back (`storage/output.rs`). What the proof covers is thus everything up to the
-//! call that hands the bytes to the system. What the medium makes of them is not covered; `cbvh verify` reads a file
-//! again at any time, and queries check the checksum of each page when they first touch it.
+//! The proof is part of every bake, also in release builds. It works on the finished bytes with the reference decoder,
+//! and does not rely on the baker. The bytes are those in memory that the writing thread gets or, within a memory
+//! budget, those that the system reads back (`storage/output.rs`). The proof therefore covers everything up to the call
+//! that passes the bytes to the system. It does not cover errors of the disk; `cbvh verify` can read a file again at
+//! any time, and queries check the checksum of each page when they first touch it.
 
 mod backward;
 

@@ -1,8 +1,8 @@
 //! Verifies a file against the mesh it was baked from: the same triangles, and bounds that contain them.
 //!
-//! The comparison shares no code with the way from mesh to bytes, so that neither can hide a mistake of the other. It
-//! shares what surrounds that way: the mesh readers, which return corners as the file states them; scratch files and
-//! the sorter; and the checks of finished bytes, which use the reference decoder of bvh-format.
+//! The comparison shares no code with the steps from mesh to bytes, so neither can hide a mistake of the other. It
+//! shares the code around these steps: the mesh readers, which return corners as the file states them; scratch files
+//! and the sorter; and the checks of finished bytes, which use the reference decoder of bvh-format.
 //!
 //! With ids, every triangle is matched by its number, and its corners are compared in order. Without ids, the stored
 //! triangles and the rounded triangles of the mesh are compared as multisets. In both cases the two sides are sorted
@@ -96,10 +96,13 @@ impl VerifyError {
     }
 }
 
-/// Verifies that a file is a faithful bake of a mesh: the file is valid; every bound contains what is below it; the
-/// triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones; no corner has moved
-/// farther than the file states; the surfaces that the file states to be closed are those of the mesh that are; and the
-/// instances are those of the mesh.
+/// Verifies that a file is a faithful bake of a mesh:
+///
+/// - the file is valid, and every bound contains what is below it;
+/// - the triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones;
+/// - no corner has moved farther than the file states;
+/// - the file states correctly which surfaces of the mesh are closed;
+/// - the instances are those of the mesh.
 ///
 /// Cost: about that of reading the mesh. Memory: 104 bytes per triangle of the mesh; in addition, 64 bytes per stored
 /// triangle with ids, or 48 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
@@ -116,10 +119,10 @@ pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct VerifyOptions {
-    /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. What does not fit goes
-    /// to scratch files. Of the meshes, only the JSON of glTF files and files that are not regular are read into memory as a
-    /// whole. If the allocator keeps much of
-    /// the freed memory, tell it not to; see [`FileBake::max_memory`](crate::FileBake::max_memory).
+    /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. Data that do not fit go
+    /// to scratch files. Of the meshes, only the JSON of glTF files and files that are not regular are read into memory
+    /// as a whole. If the allocator keeps much of the freed memory, tell it not to; see
+    /// [`FileBake::max_memory`](crate::FileBake::max_memory).
     pub max_memory: Option<u64>,
     /// The directory for scratch files; `None` for the system's directory for temporary files. Scratch files have no
     /// names there, so that nothing is left however the process ends.
@@ -155,9 +158,9 @@ const USUAL_MEMORY: u64 = 3 << 29;
 /// Verifies a file of any size like [`verify`]. The file and the meshes are read piece by piece. If the file is a scene, the
 /// meshes are read as scenes.
 ///
-/// OBJ files of up to a 32nd of the memory are read a second time, with the parser of the crate `tobj`, and both readings
-/// have to agree: the first is that of the bake, whose mistakes it would share. Files that `tobj` is known to read
-/// differently are read once.
+/// OBJ files of up to a 32nd of the memory are read a second time, with the parser of the crate `tobj`, and both
+/// readings must agree. The first reading uses the readers of the bake, and so would share their mistakes. Files that
+/// `tobj` is known to read differently are read once.
 ///
 /// Cost: reading the meshes once and the file five times, and up to 350 bytes of scratch per triangle, which are
 /// written and read once or twice.

@@ -2,8 +2,8 @@
 //!
 //! The first reading uses the readers of the baker, and a mistake in them would affect both sides of the comparison.
 //! `tobj` reads text and numbers by itself; only the triangulation of polygons is shared. It reads some OBJ files
-//! differently: it takes the fourth number of a vertex as a divisor and polylines as faces, supports neither continued
-//! lines nor lines that end in CR alone, and refuses some faces that come before their vertices. Such files, and those
+//! differently. It divides a vertex by its fourth number, and takes polylines as faces. It supports neither continued
+//! lines nor lines that end in CR alone. It refuses some faces that come before their vertices. Such files, and those
 //! that do not fit in memory, are read once.
 
 use super::VerifyError;

@@ -1,8 +1,9 @@
-//! Opens a file that a mesh file names, and refuses what such a name must not lead to.
+//! Opens a file that a mesh file names, and refuses names that lead to forbidden places.
 //!
-//! Whoever writes a mesh file chooses the names in it, and the person who bakes it does not read them. So a name leads
-//! only to regular files in the folder of the mesh file or below it. `..` and symbolic links are followed, and where
-//! they end decides. A named pipe or a device is opened without waiting for it, and refused.
+//! The author of a mesh file chooses the names in it, and the person who bakes it does not read them. A name may
+//! therefore lead only to a regular file in the folder of the mesh file or below it. `..` and symbolic links are
+//! followed first, and the place where they end decides. A named pipe or a device is opened without waiting for it, and
+//! refused.
 
 use crate::error::{Fault, Place, excerpt};
 use std::fs::{self, File};

@@ -1,4 +1,5 @@
-//! Where the nodes of a scene stand: transforms, and their division into a rigid pose and what is left for the mesh.
+//! The transforms of the nodes of a scene, and their division into a rigid pose and the rest, which is baked into the
+//! mesh.
 
 use gltf::scene::Transform;
 use std::collections::BTreeSet;
@@ -15,9 +16,9 @@ const UNIT: Linear = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// its entries to f32 does.
 const MATRIX_ERROR: f64 = 1.0 / (1u32 << 22) as f64;
 
-/// A node's place in the world: a point x of its mesh stands at R (S x) + t. The rotation R and the translation t are
-/// the pose of an instance; S, the scales and whatever else is left, is baked into the mesh. Nodes that differ in R and t
-/// alone share a mesh, so S has the same bits for them.
+/// A node's place in the world: a point x of its mesh is at R (S x) + t. The rotation R and the translation t are the
+/// pose of an instance. S holds the scales and whatever else is left, and is baked into the mesh. Nodes that differ
+/// only in R and t share a mesh, so S has the same bits for them.
 #[derive(Clone, Copy)]
 pub(super) struct Frame {
     pub(super) rotation: Linear,

@@ -1,14 +1,15 @@
 //! Reads glTF 2.0 scenes, in one of two ways. As a mesh, each node with a mesh becomes an object, and the nodes above it
 //! place it. As a scene, each mesh becomes an object, or one per scale (module `frame`), and each node an instance of it.
 //!
-//! The `gltf` crate reads and validates the document (module `document`), which is all that is in memory as a whole.
-//! Accessors are read block by block in module `accessor`, because the crate's own iterators panic on counts and strides
-//! that a file may contain; buffers are found in module `buffer`, and files that the document names are opened in module
-//! `beside`. The reader takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without a parent.
-//! Transforms are read as f32 and multiplied in f64. Triangles, strips and fans are read; points and lines are not.
-//! Skins, morph targets and animations move nothing. As a mesh, what several nodes share is copied for each. The degenerate
-//! triangles that join the parts of a strip are left out, because they are no part of the surface; other degenerate
-//! triangles are kept.
+//! The `gltf` crate reads and validates the document (module `document`); nothing else is in memory as a whole. Module
+//! `accessor` reads accessors block by block, because the crate's own iterators panic on counts and strides that a file
+//! may contain. Module `buffer` finds buffers, and module `beside` opens files that the document names.
+//!
+//! The reader takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without
+//! a parent. Transforms are read as f32 and multiplied in f64. Triangles, strips and fans are read; points and lines
+//! are not. Skins, morph targets and animations are ignored. As a mesh, a mesh that several nodes share is copied for
+//! each of them. The degenerate triangles that join the parts of a strip are left out, because they are not part of the
+//! surface; other degenerate triangles are kept.
 //!
 //! Required extensions that do not change triangles are ignored, `KHR_mesh_quantization` is supported, and any other
 //! extension (Draco, meshopt) is refused.
@@ -86,7 +87,7 @@ struct Scene<'a, S> {
     items: u64,
 }
 
-/// What a node stands in: a matrix, or a frame if nodes become instances.
+/// The transform of a node's parent: a matrix, or a frame if nodes become instances.
 #[derive(Clone, Copy)]
 enum Parent {
     Matrix(Affine),
@@ -148,7 +149,7 @@ impl<S: Sink> Scene<'_, S> {
         Ok(())
     }
 
-    /// Returns what the topmost nodes stand in.
+    /// Returns the parent transform of the topmost nodes.
     fn world(&self) -> Parent {
         if self.as_scene { Parent::Frame(Frame::WORLD) } else { Parent::Matrix(IDENTITY) }
     }

@@ -1,19 +1,20 @@
 //! Cuts 3D polygons into triangles that cover them and nothing else.
 //!
 //! A polygon is projected along the dominant axis of its Newell normal (Sutherland, Sproull and Schumacker 1974;
-//! Tampieri, Graphics Gems III). The projection drops a coordinate, so that nothing is rounded. Triangles need no cut.
-//! A quad is cut along the diagonal that lies inside it. Larger polygons are cut by ear clipping, by the crate `earcut` or,
-//! if they are long, in module `ears`, because a fan would cover area outside a concave polygon. Ear clipping leaves out vertices that lie on an edge in projection.
-//! If such a vertex lies off that edge in space, the triangle between the two is added.
+//! Tampieri, Graphics Gems III). The projection drops a coordinate, so nothing is rounded. Triangles need no cut. A
+//! quad is cut along the diagonal that lies inside it. Larger polygons are cut by ear clipping, because a fan would
+//! cover area outside a concave polygon. The crate `earcut` does this, or module `ears` for long polygons. Ear clipping
+//! leaves out vertices that lie on an edge in projection. If such a vertex lies off that edge in space, the triangle
+//! between the two is added.
 //!
 //! A polygon without area (its Newell normal is zero or not finite, or nothing is left to clip) becomes a fan, which
 //! keeps the points and segments of the polygon. A long polygon that crosses itself also becomes a fan: definitions of
 //! its inside differ, a fan covers every point that the polygon winds around, and clipping such polygons takes cubic
 //! time. The same input always gives the same triangles.
 //!
-//! A file decides how many corners its polygons have and where, and the worst of them would take time that grows with the
-//! square of their number. So the steps for a long polygon are limited per corner, which limits the time per byte of a
-//! file. Usual outlines, and combs of 32,000 teeth, take less than a quarter of the limit.
+//! A file may hold polygons whose time would grow with the square of the number of their corners. The steps for a long
+//! polygon are therefore limited per corner, which limits the time per byte of a file. Usual outlines, and combs of
+//! 32,000 teeth, take less than a quarter of the limit.
 
 mod ears;
 

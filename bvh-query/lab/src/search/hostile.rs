@@ -38,7 +38,7 @@ const MAX_SECONDS: Duration = Duration::from_secs(20);
 /// Findings of a round; shrinking each takes seconds.
 const MAX_FINDINGS: usize = 2;
 
-/// What a file is asked with: the other file, the pose, and which of both is A.
+/// What the questions about a file need: the other file, the pose, and which of the two is A.
 struct Scene<'a> {
     good: &'a Bvh,
     triangles: &'a [Triangle],
@@ -75,7 +75,8 @@ fn contradiction(answers: &Answers, other: &Answers) -> Option<&'static str> {
         ("collide", answers.collide != other.collide),
         ("contacts", answers.contacts != other.contacts),
         ("distance", differ(interval(answers), interval(other))),
-        // Nothing is known about an open object whose box or sphere, which may be loose, meets that of another.
+        // The relation of an open object is undefined where its box or sphere meets that of another, and both may be
+        // loose.
         ("relation", answers.relation != other.relation && !is_undefined(answers) && !is_undefined(other)),
         ("closest point", differ(closest(answers), closest(other))),
         ("side", answers.side != other.side),
@@ -98,14 +99,15 @@ enum Way {
     MadeUp,
 }
 
-/// Two meshes, with a pose in which they meet. Files of both are forged, and asked about with a part of the other.
+/// Two meshes, with a pose in which they meet. Files of both are forged, and each is tested against a part of the
+/// other.
 struct Meshes {
     sides: [Vec<Triangle>; 2],
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
 }
 
-/// Triangles of the mesh that a forged file is asked about with.
+/// The number of triangles of the mesh against which a forged file is tested.
 const GOOD_TRIANGLES: usize = 20;
 
 impl Meshes {

@@ -1,5 +1,5 @@
-//! The record of a search: what it covered, where and when, and what it found. It is written at least once a minute, and
-//! a search goes on where its record ends.
+//! The record of a search: what it covered, where and when, and what it found. It is written at least once a minute. A
+//! search that is started again continues from its record.
 
 use super::shrink::Case;
 use crate::Failure;

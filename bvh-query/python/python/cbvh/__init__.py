@@ -1,6 +1,6 @@
 """Exact collision and distance queries between triangle meshes.
 
-A mesh is baked once, from arrays or from a file, into a ``.cbvh`` file that is mapped into memory as it is:
+A mesh is baked once, from arrays or from a file, into a ``.cbvh`` file, which is then used in place:
 
 >>> import cbvh, numpy as np
 >>> tetrahedron = cbvh.bake([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -13,26 +13,27 @@ False
 
 **Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a
 point ``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the
-frame of the first one. Rotations must be rigid to within 2^-20, those of scenes and of `relative` to within 2^-23, as
-matrices with eight digits after the point are; `nearest_pose` makes a pose of one that is
-less.
+frame of the first one. Rotations must be rigid to within 2^-20, and those of scenes and of `relative` to within 2^-23.
+Matrices with eight digits after the point are. `nearest_pose` makes a pose from a matrix that is less exact.
 
-**Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are ways of a body.
-`Mesh.motion` and `Mesh.is_free` tell whether a way is free, certainly at every moment. **Scenes** are many placed
-meshes (`Scene`), and `CollisionManager` asks about them as trimesh does.
+**Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are paths of a body.
+`Mesh.motion` and `Mesh.is_free` tell whether a path is free; the answer is certain at every moment.
 
-**Answers** to one question are plain values; answers to N questions are arrays of N elements or rows, or lists of N
-arrays where each question finds as many as there are. Lengths are in mesh units. Contact and insides are decided exactly: touching is contact, and the surface of a mesh is what collides.
+**Scenes** are many placed meshes (`Scene`). `CollisionManager` has trimesh's interface for them.
+
+**Answers** to one question are plain values. Answers to N questions are arrays of N elements or rows, or lists of N
+arrays if each question may have any number of results. Lengths are in mesh units. Contact and insides are decided
+exactly. Touching is contact, and meshes are surfaces.
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
 ``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about
-one `Scene` wait for each other, and a path of your own is called on the thread of its question. Arrays are copied before
-a question runs, so that changing one meanwhile changes no answer. An interpreter without a global lock turns it on when
-it imports this module.
+one `Scene` wait for each other, and a path of your own is called on the thread of its question. Arrays are copied
+before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
+enables the lock when it imports this module.
 
-Errors are exceptions: ``ValueError`` for arguments that mean nothing, ``TypeError`` for those of another kind,
-``KeyError`` for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError``
-for files that are damaged or no .cbvh files, ``BakeError`` for meshes that cannot be baked.
+Errors are exceptions: ``ValueError`` for invalid arguments, ``TypeError`` for arguments of a wrong type, ``KeyError``
+for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError`` for files that
+are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked.
 """
 
 from ._answers import (

@@ -1,4 +1,4 @@
-"""What questions answer with: enumerations and named tuples of numbers and arrays."""
+"""The types of answers: enumerations and named tuples of numbers and arrays."""
 
 import enum
 from typing import Any, ClassVar, NamedTuple
@@ -10,21 +10,21 @@ Floats = NDArray[np.float64]
 
 
 class _Named(enum.IntEnum):
-    """A number with a name, which it is printed as. It equals the number."""
+    """A number that is printed as its name. It equals the number."""
 
     def __str__(self) -> str:
         return self.name
 
 
 class Relation(_Named):
-    """How two meshes lie.
+    """The relation of two meshes.
 
     - ``TOUCHING``: their surfaces have a point in common.
     - ``APART``: they have nothing in common, insides included.
     - ``A_IN_B``: all of the first mesh is inside the second.
     - ``B_IN_A``: all of the second mesh is inside the first.
     - ``MIXED``: some parts of a mesh are inside the other and some are not, or some of each mesh are.
-    - ``UNDEFINED``: a mesh that is not closed would have to contain something.
+    - ``UNDEFINED``: the answer depends on the inside of a mesh that is not closed.
     """
 
     TOUCHING = 0
@@ -36,10 +36,10 @@ class Relation(_Named):
 
 
 class Side(_Named):
-    """Where a point is with regard to a mesh.
+    """On which side of a mesh a point is.
 
     - ``OUTSIDE``, ``ON``, ``INSIDE``: the point is outside, on the surface, or inside.
-    - ``UNDEFINED``: the point is not on the surface, and the mesh has no inside: it is not closed.
+    - ``UNDEFINED``: the point is not on the surface, and the mesh has no inside, because it is not closed.
     """
 
     OUTSIDE = -1
@@ -49,12 +49,12 @@ class Side(_Named):
 
 
 class MotionKind(_Named):
-    """Whether a way is free.
+    """Whether a path is free.
 
     - ``FREE``: at no time are the meshes within the clearance.
-    - ``HIT``: at the time `at`, they are.
-    - ``NEAR``: they come nearer than the clearance and the tolerance, and in no pose looked at within the
-      clearance.
+    - ``HIT``: at the time `at`, they are within the clearance.
+    - ``NEAR``: their distance is at some time at most the clearance plus the tolerance, but in no pose tested are they
+      within the clearance.
     """
 
     FREE = 0
@@ -65,13 +65,13 @@ class MotionKind(_Named):
 class Distance(NamedTuple):
     """The least distance of two meshes. After N questions, each field has N elements or rows.
 
-    - ``distance``: the distance in mesh units: 0 where they touch. Shape () or (N,).
-    - ``lower``: a certain lower bound of the least distance of the meshes.
-    - ``upper``: a certain upper bound of it.
+    - ``distance``: the distance in mesh units; 0 if they touch. Shape () or (N,).
+    - ``lower``: a certified lower bound of the least distance of the meshes.
+    - ``upper``: a certified upper bound of it.
     - ``point_a``: the closest point of the first mesh, in its frame. Shape (3,) or (N, 3).
     - ``point_b``: the closest point of the second mesh, in the frame of the first.
     - ``object_a``: the number of the first mesh's object in its file. An int, or an array of uint32.
-    - ``triangle_a``: the number of its triangle in the input, or of its place in a file without ids, likewise.
+    - ``triangle_a``: the number of its triangle in the input or, in a file without ids, of its place. The same type.
     - ``object_b``, ``triangle_b``: those of the second mesh.
     """
 
@@ -87,15 +87,15 @@ class Distance(NamedTuple):
 
 
 class MotionAnswer(NamedTuple):
-    """Whether a way is free, and where it ends if it is not. After N questions, each field has N elements or rows.
+    """Whether a path is free, and where it ends if it is not. After N questions, each field has N elements or rows.
 
-    - ``kind``: a `MotionKind` or, of N, their numbers as uint8, shape (N,), printed as names.
-    - ``free_until``: before this time, from 0 to 1, the meshes certainly are not within the clearance. 1 where the
-      way is free.
-    - ``at``: of a hit, a time at which they are, the earliest one found; of NEAR, that of the first undecided pose;
-      else NaN.
-    - ``nearest``: their distance at the time `at`, where the way is not free: 0 where they touch. Else its numbers
-      are NaN and 0.
+    - ``kind``: a `MotionKind` or, for N paths, their numbers as uint8, shape (N,), printed as names.
+    - ``free_until``: before this time, from 0 to 1, the meshes certainly are not within the clearance. 1 if the path is
+      free.
+    - ``at``: for HIT, the earliest time found at which they are within the clearance; for NEAR, the time of the first
+      undecided pose; else NaN.
+    - ``nearest``: their distance at the time `at`, which is 0 if they touch. If the path is free, its numbers are NaN
+      and 0.
     """
 
     kind: Any
@@ -107,14 +107,14 @@ class MotionAnswer(NamedTuple):
 class ClosestPoint(NamedTuple):
     """The point of a mesh that is closest to a point. After N questions, each field has N elements or rows.
 
-    - ``found``: whether there is one within the distance asked for. Else the numbers are NaN and 0. Shape () or
+    - ``found``: whether there is such a point within the given distance. If not, the numbers are NaN and 0. Shape () or
       (N,).
     - ``distance``: the distance in mesh units.
-    - ``lower``: a certain lower bound of the least distance.
-    - ``upper``: a certain upper bound of it.
+    - ``lower``: a certified lower bound of the least distance.
+    - ``upper``: a certified upper bound of it.
     - ``point``: the closest point, in the frame of the question. Shape (3,) or (N, 3).
     - ``object``: the number of the object in the file. An int, or an array of uint32.
-    - ``triangle``: the number of the triangle in the input, or of its place in a file without ids, likewise.
+    - ``triangle``: the number of the triangle in the input or, in a file without ids, of its place. The same type.
     """
 
     found: Any
@@ -129,13 +129,13 @@ class ClosestPoint(NamedTuple):
 class RayHit(NamedTuple):
     """Where a ray hits a mesh. After N questions, each field has N elements or rows.
 
-    - ``found``: whether it hits. Else the numbers are NaN and 0. Shape () or (N,).
+    - ``found``: whether it hits. If not, the numbers are NaN and 0. Shape () or (N,).
     - ``t``: the parameter: the hit is at origin + t * direction.
-    - ``lower``: a certain lower bound of the parameter.
-    - ``upper``: a certain upper bound of it.
+    - ``lower``: a certified lower bound of the parameter.
+    - ``upper``: a certified upper bound of it.
     - ``point``: the hit, in the frame of the question. Shape (3,) or (N, 3).
     - ``object``: the number of the object in the file. An int, or an array of uint32.
-    - ``triangle``: the number of the triangle in the input, or of its place in a file without ids, likewise.
+    - ``triangle``: the number of the triangle in the input or, in a file without ids, of its place. The same type.
     """
 
     found: Any
@@ -148,7 +148,7 @@ class RayHit(NamedTuple):
 
 
 class SceneRelations(NamedTuple):
-    """Pairs of instances, and how they lie.
+    """Pairs of instances, and their relations.
 
     - ``pairs``: numbers of instances, A and B, shape (K, 2).
     - ``relations``: numbers of `Relation` as uint8, shape (K,), printed as names.
@@ -172,7 +172,7 @@ class SceneContacts(NamedTuple):
 class SceneDistance(NamedTuple):
     """A pair of instances, and how far apart they are.
 
-    - ``a``: the number of the instance whose frame the points are in.
+    - ``a``: the number of the instance in whose frame the points are given.
     - ``b``: the number of the other instance.
     - ``nearest``: the answer of `Mesh.distance`.
     """
@@ -194,15 +194,14 @@ class SceneDistances(NamedTuple):
 
 
 class SceneMotionAnswer(NamedTuple):
-    """Whether the ways of instances are free.
+    """Whether the paths of instances are free.
 
     - ``kind``: a `MotionKind`.
-    - ``free_until``: before this time, from 0 to 1, certainly no pair is within the clearance. 1 where
-      the ways are free.
-    - ``at``: of a hit, a time at which a pair is, the earliest one found; of NEAR, that of the first undecided
-      pose; else NaN.
-    - ``nearest``: the pair, and its distance at that time; A is the one that stands still or, if both move, the
-      first one. None where the ways are free.
+    - ``free_until``: before this time, from 0 to 1, certainly no pair is within the clearance. 1 if the paths are free.
+    - ``at``: for HIT, the earliest time found at which a pair is within the clearance; for NEAR, the time of the first
+      undecided pose; else NaN.
+    - ``nearest``: the pair, and its distance at that time. A is the instance that stands still or, if both move, the
+      first one. None if the paths are free.
     """
 
     kind: MotionKind
@@ -214,7 +213,7 @@ class SceneMotionAnswer(NamedTuple):
 class SceneClosestPoint(NamedTuple):
     """The point of all instances that is closest to a point. After N questions, each field has N elements or rows.
 
-    - ``instance``: the number of the instance; -1 where nothing is found. Shape () or (N,).
+    - ``instance``: the number of the instance; -1 if nothing is found. Shape () or (N,).
     - ``closest``: the answer of `Mesh.closest_points`, in the world.
     """
 
@@ -225,7 +224,7 @@ class SceneClosestPoint(NamedTuple):
 class SceneRayHit(NamedTuple):
     """Where a ray hits an instance. After N questions, each field has N elements or rows.
 
-    - ``instance``: the number of the instance; -1 where nothing is hit. Shape () or (N,).
+    - ``instance``: the number of the instance; -1 if nothing is hit. Shape () or (N,).
     - ``hit``: the answer of `Mesh.first_hits`, in the world.
     """
 
@@ -234,8 +233,8 @@ class SceneRayHit(NamedTuple):
 
 
 class _Names(np.ndarray[Any, np.dtype[Any]]):
-    """An array of numbers that have names: it prints them, and its elements are members of the enumeration. All that is
-    computed from it is an array as any other."""
+    """An array of numbers that have names. It prints the names, and its elements are members of the enumeration.
+    Results of computations with it are plain arrays."""
 
     kind: ClassVar[type[_Named]]
 

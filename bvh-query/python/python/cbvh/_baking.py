@@ -65,12 +65,12 @@ def bake(
 
     ``vertices`` have shape (V, 3), in any unit of length; ``faces`` have shape (F, 3), three numbers of vertices each.
     ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
-    Without ``ids`` triangles are numbered in an order of the baker's; without ``topology`` there are no answers about
-    insides. Baking takes about a microsecond a triangle. `Mesh.save` writes the result.
+    Without ``ids``, the baker numbers triangles in its own order. Without ``topology``, there are no answers about what
+    is inside. Baking takes about a microsecond per triangle. `Mesh.save` writes the result.
 
-    Vertices are stored as float32 offsets from an origin of each object. That moves no vertex whose coordinates are float32
-    numbers, and others by at most 2^-23 of the diagonal of the object's box; ``triangles="quantized"`` moves them by up to
-    ``max_error``. Answers are exact about the mesh that is stored.
+    Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
+    does not move. Others move by at most 2^-23 of the diagonal of the object's box, or by up to ``max_error`` with
+    ``triangles="quantized"``. Answers are exact for the stored mesh.
     """
     points = _cbvh.copied_numbers(vertices, "vertices")
     try:
@@ -104,11 +104,11 @@ def bake_files(
 ) -> Mesh:
     """Bakes mesh files (OBJ, STL, PLY, glTF) into a ``.cbvh`` file, and opens it.
 
-    Nothing is done if the file is up to date, unless ``force``. ``max_memory``: stay within so many bytes; the rest
-    goes to scratch files, so that a mesh may be larger than memory. The other options are those of `bake`. The
-    environment variable ``RAYON_NUM_THREADS`` tells how many threads the module uses, to bake as for ``parallel=True``;
-    without it, as many as there are cores.
-    Raises OSError if the system refuses a file, and BakeError if a mesh cannot be baked.
+    If the file is up to date, nothing is done, unless ``force``. ``max_memory``: the most bytes of memory; the rest
+    goes to scratch files, so a mesh may be larger than memory. The other options are those of `bake`. The environment
+    variable ``RAYON_NUM_THREADS`` sets the number of threads of the module, for bakes and for ``parallel=True``; the
+    default is the number of cores. Raises OSError if the system refuses a file, and BakeError if a mesh cannot be
+    baked.
     """
     if isinstance(inputs, (str, bytes, os.PathLike)):
         inputs = [inputs]

@@ -33,8 +33,8 @@ def _other(mesh: Mesh) -> _cbvh.Mesh:
 class Mesh:
     """A mesh in a ``.cbvh`` file: all objects of the file, or one. Made by `open` and `bake`.
 
-    It is never changed, so threads may share it. Pickling one that was opened from a file stores the path alone, so
-    that other processes map the same file; pickling one in memory stores its bytes.
+    A mesh never changes, so threads may share it. Pickling a mesh that was opened from a file stores only the path, so
+    that other processes map the same file. Pickling a mesh in memory stores its bytes.
     """
 
     __slots__ = ("_mesh", "_path", "_object")
@@ -74,30 +74,31 @@ class Mesh:
     def triangles(self) -> Floats:
         """The corners of all triangles as they are stored, in mesh units: shape (T, 3, 3), float64.
 
-        ``mesh.triangles[id]`` are the three corners of the triangle that answers call ``id``, in the order of the input or
-        a cyclic one of it. A duplicate that was left out has the corners of the triangle that is stored for it. Rows of ids
-        that this mesh does not have are NaN: those of other objects of the file, and places in a file without ids that are
-        empty. Each access reads and checks the whole file and makes a new array. ValueError for several objects of a file
-        without ids, whose numbers are not unique.
+        ``mesh.triangles[id]`` has the three corners of the triangle that answers call ``id``, in the order of the input
+        or a cyclic permutation of it. A duplicate that was left out has the corners of the triangle that is stored for
+        it. If this mesh does not have an id, its row is NaN: the id belongs to another object of the file, or is an
+        empty place in a file without ids. Each access reads and checks the whole file and makes a new array. Raises
+        ValueError for several objects of a file without ids, because their numbers are not unique.
         """
         return self._mesh.corners()
 
     @property
     def vertices(self) -> Floats:
-        """The positions of all corners, each once, ascending by x, then y, then z, in mesh units: shape (V, 3), float64.
+        """The positions of all corners, each once, ascending by x, then y, then z, in mesh units: shape (V, 3),
+        float64.
 
-        Each access costs a sort. To have `faces` as well, `arrays` reads the file once.
+        Each access costs a sort. `arrays` returns `faces` as well and reads the file only once.
         """
         return self.arrays()[0]
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """Three numbers of `vertices` per triangle, shape (T, 3): ``mesh.vertices[mesh.faces[id]]`` is
-        ``mesh.triangles[id]``. Rows of ids that this mesh does not have are -1."""
+        """Three indices into `vertices` per triangle, shape (T, 3): ``mesh.vertices[mesh.faces[id]]`` is
+        ``mesh.triangles[id]``. If this mesh does not have an id, its row is -1."""
         return self.arrays()[1]
 
     def arrays(self) -> tuple[Floats, NDArray[np.int64]]:
-        """`vertices` and `faces`, which together are what `bake` takes if the mesh has all ids."""
+        """`vertices` and `faces`. If the mesh has all ids, `bake` takes both."""
         corners = self.triangles
         is_there = ~np.isnan(corners[:, 0, 0])
         vertices, numbers = np.unique(corners[is_there].reshape(-1, 3), axis=0, return_inverse=True)
@@ -117,7 +118,7 @@ class Mesh:
 
     @property
     def nbytes(self) -> int:
-        """The bytes of the file, which are all the memory that the mesh takes."""
+        """The size of the file in bytes, which is all the memory that the mesh takes."""
         return self._mesh.size()
 
     def object(self, object: int | str) -> Mesh:
@@ -136,7 +137,7 @@ class Mesh:
         return Mesh(found, self._path, number)
 
     def validate(self) -> None:
-        """Checks all checksums and rules of the whole file, which questions check only where they go.
+        """Checks all checksums and rules of the whole file. Questions check only the parts that they touch.
 
         Raises FormatError for the first rule that is broken.
         """
@@ -177,7 +178,7 @@ class Mesh:
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4). ``rel_err`` and
         ``abs_err`` let the answer exceed the least distance by a fraction of it or by a length, which saves time;
-        ``lower`` is what is certain. They cannot be combined with ``parallel``.
+        ``lower`` is then the certified bound. They cannot be combined with ``parallel``.
         """
         return Distance(*_cbvh.distance((self._mesh, _other(other), poses, parallel), rel_err, abs_err))
 
@@ -208,13 +209,14 @@ class Mesh:
         tolerance: float | None = None,
         parallel: bool = False,
     ) -> MotionAnswer:
-        """Is the way of ``other`` free, with it moving in the frame of this mesh, and where does it end if it is not?
+        """Is the motion of ``other`` in the frame of this mesh free, and where does it end if it is not?
 
-        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`); of N motions at once, or of N paths in a
-        list or another iterable, the answer has arrays of N elements. The answer is certain at every moment, not at samples.
-        ``clearance``: meshes that come as near as this, in mesh units, hit. ``tolerance``: how near they may come to a
-        hit, beyond the clearance, without an answer that says free or hit, in mesh units; None: a millionth of the
-        diagonal of the larger object's box. ``parallel`` does nothing where a path is your own.
+        ``motion`` is a `Motion`, a `Polyline` or a path of your own (`Path`). For N motions at once, or N paths in a
+        list or another iterable, the answer has arrays of N elements. The answer is certain at every moment, not only
+        at samples. ``clearance``: meshes that are at most this far apart, in mesh units, count as a hit. ``tolerance``:
+        the width of the undecided range beyond the clearance, in mesh units; if the meshes come that near and do not
+        hit, the answer may be NEAR. None: a millionth of the diagonal of the larger object's box. ``parallel`` has no
+        effect if a path is your own.
         """
         paths = read_paths(motion)
         found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)
@@ -230,9 +232,9 @@ class Mesh:
         tolerance: float | None = None,
         parallel: bool = False,
     ) -> Any:
-        """Whether `motion` answers FREE, which takes less time to find out: bool, or an array of bool of shape (N,).
+        """Whether `motion` answers FREE: bool, or an array of bool of shape (N,). It takes less time than `motion`.
 
-        This is what planners ask. Arguments are those of `motion`.
+        Use it in planners. Arguments are those of `motion`.
         """
         return _cbvh.is_free(self._mesh, _other(other), read_paths(motion), clearance, tolerance, parallel)
 
@@ -246,8 +248,8 @@ class Mesh:
     ) -> ClosestPoint:
         """The points of the surface that are closest to ``points``, of shape (3,) or (N, 3).
 
-        ``within``: look no farther, in mesh units. ``pose``: of this mesh in the frame of the points (body to world),
-        shape (4, 4); None: they are in the frame of the mesh.
+        ``within``: the greatest distance to search, in mesh units. ``pose``: of this mesh in the frame of the points
+        (body to world), shape (4, 4); None: the points are in the frame of the mesh.
         """
         return ClosestPoint(*_cbvh.closest_points((self._mesh, pose, parallel), points, within)[1])
 
@@ -268,7 +270,7 @@ class Mesh:
     ) -> Any:
         """Distances of points from the surface, negative inside: a float, or an array of shape (N,).
 
-        NaN where the mesh has no inside, because it is not closed, and where the surface is farther than ``within``.
+        NaN if the mesh has no inside, because it is not closed, or if the surface is farther away than ``within``.
         ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
         return _cbvh.signed_distances((self._mesh, pose, parallel), points, within)
@@ -284,9 +286,9 @@ class Mesh:
     ) -> RayHit:
         """Where rays first hit the surface: which triangle, and at which parameter.
 
-        ``origins`` and ``directions`` have shape (3,) or (N, 3), and one of either serves N of the other; directions of
-        any length are the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,). ``pose``: of this mesh in the frame of the rays (body to
-        world).
+        ``origins`` and ``directions`` have shape (3,) or (N, 3), and one of either serves N of the other. Directions
+        may have any length, which is the unit of ``t``. ``until``: the greatest parameter, of shape () or (N,).
+        ``pose``: of this mesh in the frame of the rays (body to world).
         """
         return RayHit(*_cbvh.first_hits((self._mesh, pose, parallel), origins, directions, until)[1])
 
@@ -325,7 +327,8 @@ class Mesh:
     ) -> Any:
         """Whether closed segments meet the surface, exactly: bool, or an array of shape (N,).
 
-        ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this mesh in their frame (body to world).
+        ``starts`` and ``ends`` have shape (3,) or (N, 3), and one of either serves N of the other. ``pose``: of this
+        mesh in their frame (body to world).
         """
         return _cbvh.segment_hits((self._mesh, pose, parallel), starts, ends)
 
@@ -333,10 +336,10 @@ class Mesh:
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size.
 
-    The bytes of the file must not change while it is open: answers are undefined then, and formally all that the process
-    does. If the file is cut short, the system ends the process as soon as a question needs what is missing. Replace a
-    file by renaming another one over it, as `save` does. `Mesh.from_bytes` copies instead. A file that was damaged before
-    is a FormatError.
+    The bytes of the file must not change while it is open. If they do, answers are undefined, and formally so is
+    everything that the process does. If the file is truncated, the system ends the process as soon as a question needs
+    the missing part. Replace a file by renaming another one over it, as `save` does. `Mesh.from_bytes` copies instead.
+    A file that is already damaged raises FormatError.
     """
     name = os.fsdecode(path)
     mesh = Mesh(_cbvh.Mesh.open(name), os.path.abspath(name))

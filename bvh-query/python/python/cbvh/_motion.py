@@ -1,4 +1,4 @@
-"""Paths: motions between poses, screws and polylines, and what paths of the caller's own have to be."""
+"""Paths: motions between poses, screws and polylines, and the protocol for your own paths."""
 
 from __future__ import annotations
 
@@ -13,51 +13,54 @@ from ._answers import Floats
 
 
 class Path(Protocol):
-    """What a path of your own has to be: any object with these two methods. `Motion` and `Polyline` are paths.
+    """A path: any object with these two methods. `Motion` and `Polyline` are paths, and you can define your own.
 
-    Both are called with Python's lock, on the thread of the question. An exception ends the question, and is raised by
-    it.
+    Both methods are called with Python's lock, on the thread of the question. An exception ends the question, which
+    raises it.
     """
 
     def pose(self, t: float, /) -> ArrayLike:
-        """Where the body is at a time from 0 to 1 (body to world), shape (4, 4). The same time gives the same pose, to
-        the bit."""
+        """The pose of the body at a time from 0 to 1 (body to world), shape (4, 4). The same time must always give the
+        same pose, to the bit."""
 
     def sagitta(self, radius: float, t0: float, t1: float, /) -> float:
-        """A bound, in mesh units, of how far the path departs from a straight one between two times.
+        """A bound, in mesh units, of how far the path departs from a straight line between two times.
 
-        That is how far any point at most ``radius`` mesh units from the origin of the body's frame is, at any time from
-        ``t0`` to ``t1``, from where it would be if it went straight, at a constant rate, from its place at ``t0`` to
-        that at ``t1``: at most an eighth of the greatest acceleration times the square of the time. It must hold for
-        poses as computed, with all rounding. Answers are only as certain as this bound, and the smaller it is, the less
-        work they take. Infinity says that nothing is known; on every interval, the question ends with a ValueError. So does a
-        bound that is smaller than what `pose` shows in the middle of the interval.
+        Take any point that moves with the body and is at most ``radius`` mesh units from the origin of its frame.
+        Compare it with a point that moves on a straight line, at a constant speed, from its place at ``t0`` to its
+        place at ``t1``. The bound must be no less than the distance between the two at any time from ``t0`` to ``t1``.
+        An eighth of the greatest acceleration times the square of the time is enough.
+
+        The bound must hold for poses as computed, with all rounding. Answers are only as certain as this bound, and the
+        smaller it is, the less work they take. Infinity means that nothing is known; if it is returned for every
+        interval, the question ends with a ValueError. The question also ends with a ValueError if `pose` departs
+        further in the middle of an interval.
         """
 
 
 class _Own:
-    """Paths of the library: what `Motion` and `Polyline` have in common."""
+    """The common part of the library's paths, `Motion` and `Polyline`."""
 
     __slots__ = ("_paths",)
 
     _paths: _cbvh.Paths
 
     def pose(self, t: ArrayLike) -> Floats:
-        """Where the body is at ``t``, from 0 to 1, of shape () or (T,): poses (body to world) of shape (4, 4) or (T, 4,
-        4).
+        """The poses of the body (body to world) at times ``t`` from 0 to 1. ``t`` has shape () or (T,), and the poses
+        have shape (4, 4) or (T, 4, 4).
 
-        Times before 0 and NaN count as 0, times after 1 as 1. Of N motions, the poses have N in front of their shape.
+        Times before 0 and NaN count as 0, times after 1 as 1. For N motions, N comes first in the shape.
         """
         rows = self._paths.poses(t)
         return rows.reshape((() if self._paths.is_one() else (self._paths.count(),)) + np.shape(t) + (4, 4))
 
     def sagitta(self, radius: float, t0: float, t1: float) -> Any:
-        """The bound that `Path.sagitta` states, in mesh units: a float or, of N motions, an array of shape (N,)."""
+        """The bound of `Path.sagitta`, in mesh units: a float or, for N motions, an array of shape (N,)."""
         return self._paths.sagittas(radius, t0, t1)
 
 
 class Motion(_Own):
-    """Motions at a constant rate, over times from 0 to 1: one, or N at once. Made by `between` and `screw`.
+    """One motion or N motions at a constant rate, over times from 0 to 1. Made by `between` and `screw`.
 
     N motions have a length, and ``motions[i]`` is one of them.
     """
@@ -73,8 +76,8 @@ class Motion(_Own):
 
     @staticmethod
     def between(start: ArrayLike, end: ArrayLike) -> Motion:
-        """What planners call interpolation in SE(3): the origin of the body's frame moves on a line, and the body turns
-        about one axis the shorter way (slerp), both at a constant rate.
+        """Interpolates in SE(3), as planners do: the origin of the body's frame moves on a line, and the body turns
+        about one axis by the shorter angle (slerp), both at a constant rate.
 
         ``start`` and ``end`` are poses (body to world) of shape (4, 4) or (N, 4, 4); one start or end serves N of the
         other. Raises ValueError for poses that are half a turn apart, to within 2e-9 radians.
@@ -122,7 +125,7 @@ class Motion(_Own):
 
 
 class Polyline(_Own):
-    """A path through poses, with `Motion.between` from each to the next, all of which take the same time."""
+    """A path through poses, with `Motion.between` from each to the next. These motions all take the same time."""
 
     __slots__ = ("_knots",)
 

@@ -1,4 +1,4 @@
-"""Scenes: many placed meshes, and questions over all pairs of them that matter."""
+"""Scenes: many placed meshes, and questions over all pairs of them that may meet."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def _groups(value: Any, name: str) -> int:
 
 
 class Scene:
-    """Many placed meshes, and questions over all pairs that are asked about.
+    """Many placed meshes, and questions over all pairs that may meet.
 
     An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given
-    again: of an instance that was removed, it is a KeyError. Wherever an instance is asked for, its name will do, if it has
-    one; answers have numbers. Iterating over a scene gives the numbers of its instances,
-    in their order, and of a pair the one that comes first is A. A question is over each pair of instances whose groups
-    meet and whose contact is not allowed. Answers come in the order of the pairs, and each is that of `Mesh` for the
-    pose of B in A's frame, to the bit.
+    again. The number of an instance that was removed raises KeyError. Arguments may name an instance by its name
+    instead, if it has one; answers have numbers. Iterating over a scene gives the numbers of its instances in their
+    order. The first instance of a pair is A. A question is about all pairs of instances whose groups meet and whose
+    contact is not allowed. Answers are in the order of the pairs, and each is that of `Mesh` for the pose of B in A's
+    frame, to the bit.
 
-    **Threads** may share a scene: a question waits until the one before is answered, and other threads of Python run
+    **Threads** may share a scene: a question waits until the previous one is answered, and other threads of Python run
     meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers.
-    Pickling keeps instances, numbers, names, poses, groups and what may touch; meshes are pickled as they are alone,
-    each once. What is added later may have another place in the order than in the scene that was pickled.
+    Pickling keeps instances, numbers, names, poses, groups and allowed pairs. Each mesh is pickled once, as by itself.
+    An instance that is added later may have another place in the order than in the scene that was pickled.
 
     >>> import cbvh, numpy as np
     >>> vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -81,7 +81,7 @@ class Scene:
 
     @staticmethod
     def open(path: str | os.PathLike[str]) -> Scene:
-        """Opens a file that ``cbvh bake --scene`` made: its instances, in their order. Reads tables alone, whatever the
+        """Opens a file of ``cbvh bake --scene``: its instances, in their order. Reads only its tables, whatever its
         size. The file is mapped, and its bytes must not change while it is open: see `cbvh.open`."""
         name = os.fsdecode(path)
         whole = os.path.abspath(name)
@@ -90,7 +90,7 @@ class Scene:
         return scene
 
     def copy(self) -> Scene:
-        """A scene of the same instances, under the same numbers. Meshes are shared."""
+        """A scene with the same instances and numbers. Meshes are shared."""
         other = Scene.__new__(Scene)
         other._scene = self._scene.copy()
         return other
@@ -126,9 +126,9 @@ class Scene:
     ) -> int:
         """Adds an instance, and returns its number.
 
-        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: one
-        that no other instance has. ``member`` are the groups that the instance is in, ``meets`` those it is asked about
-        with, a bit for each of 32: two instances are asked about if each is in a group that the other meets.
+        ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: a
+        name that no other instance has. ``member`` are the groups that the instance is in, and ``meets`` those that it
+        meets, one bit for each of 32. Questions are about two instances if each is in a group that the other meets.
         """
         if not isinstance(mesh, Mesh):
             raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
@@ -146,8 +146,8 @@ class Scene:
         self._scene.set_pose(self._number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
-        """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4). Of an instance that is
-        given twice, the last pose counts. If an argument is wrong, none has moved."""
+        """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4).
+        If an instance is given twice, the last pose counts. If an argument is wrong, no instance moves."""
         self._scene.set_poses(self._ids(ids), poses)
 
     def set_groups(self, id: int | str, *, member: int | None = None, meets: int | None = None) -> None:
@@ -163,8 +163,8 @@ class Scene:
         return self._scene.groups(self._number(id, "id"))
 
     def set_allowed(self, a: int | str, b: int | str, allowed: bool = True) -> None:
-        """Allows two instances to touch, or forbids it again. No question is about an allowed pair: neighbours on a
-        robot."""
+        """Allows two instances to touch, such as neighbours on a robot, or forbids it again. No question is about an
+        allowed pair."""
         self._scene.set_allowed(self._number(a, "a"), self._number(b, "b"), bool(allowed))
 
     def allowed(self) -> NDArray[np.int64]:
@@ -240,7 +240,7 @@ class Scene:
     @property
     def parallel(self) -> bool:
         """Whether a question uses all cores, or as many as the environment variable ``RAYON_NUM_THREADS`` says. Answers
-        are the same bits. False at first."""
+        have the same bits. False by default."""
         return self._scene.switches()[0]
 
     @parallel.setter
@@ -249,8 +249,8 @@ class Scene:
 
     @property
     def tracking(self) -> bool:
-        """Whether the scene remembers of each pair what it last found, which changes no answer, and saves time where
-        instances move little from question to question. False at first."""
+        """Whether the scene reuses earlier results about each pair. This affects no answer, and saves time if instances
+        move little from question to question. False by default."""
         return self._scene.switches()[1]
 
     @tracking.setter
@@ -274,7 +274,7 @@ class Scene:
         return _cbvh.scene_pairs_within(self._scene, d)
 
     def relations(self) -> SceneRelations:
-        """All pairs that touch, or of which one is inside the other, wholly or in part, and how they lie."""
+        """All pairs that touch, or of which one is inside the other, wholly or in part, with their relations."""
         pairs, relations = _cbvh.scene_relations(self._scene)
         return SceneRelations(pairs, named(Relation, relations))
 
@@ -289,12 +289,12 @@ class Scene:
     def distances(
         self, pairs: ArrayLike | None = None, *, within: float | None = None, parallel: bool = False
     ) -> SceneDistances:
-        """How far apart pairs of instances are, each pair on its own: with certified bounds and closest points.
+        """How far apart pairs of instances are, pair by pair, with certified bounds and closest points.
 
-        ``pairs``: numbers or names of instances, shape (K, 2), whether they are asked about or not; None: all pairs that are
-        asked about, in their order or, with ``within``, those at most so many mesh units apart. Each answer is that of
-        `Mesh.distance` for the pose of B in A's frame, to the bit. Without either argument the cost grows with the square of
-        the number of instances.
+        ``pairs``: numbers or names of instances, shape (K, 2). These may be any pairs. None: all pairs whose groups
+        meet and whose contact is not allowed, in their order or, with ``within``, those of them that are at most so
+        many mesh units apart. Each answer is that of `Mesh.distance` for the pose of B in A's frame, to the bit.
+        Without either argument, the cost grows with the square of the number of instances.
         """
         if pairs is not None and within is not None:
             raise ValueError("within: expected None beside pairs, found a distance")
@@ -340,19 +340,19 @@ class Scene:
     ) -> SceneClosestPoint:
         """The points of instances that are closest to ``points`` in the world, of shape (3,) or (N, 3).
 
-        ``within``: look no farther, in mesh units. ``instances``: look at these alone, numbers or names of shape (K,); None:
-        at all.
+        ``within``: the greatest distance to search, in mesh units. ``instances``: numbers or names of the instances to
+        search, shape (K,); None: all.
         """
         scene = self._scene if instances is None else self._scene.only(self._ids(instances, "instances"))
         found_of, found = _cbvh.closest_points(scene, points, within)
         return SceneClosestPoint(found_of, ClosestPoint(*found))
 
     def sides(self, points: ArrayLike) -> Any:
-        """Which side of the instances points in the world are on, exactly: a `Side`, or an array of their numbers,
+        """On which side of the instances points in the world are, exactly: a `Side`, or an array of their numbers,
         shape (N,).
 
-        INSIDE if inside any instance, else ON if on a surface, else UNDEFINED if in the box of an instance that has no
-        inside.
+        A point is INSIDE if it is inside any instance; else ON if it is on a surface; else UNDEFINED if it is in the
+        box of an instance that has no inside; else OUTSIDE.
         """
         return named(Side, _cbvh.sides(self._scene, points))
 
@@ -360,7 +360,7 @@ class Scene:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
         (N,).
 
-        NaN where the side is UNDEFINED, and where no instance is within ``within``.
+        NaN if the side is UNDEFINED, or if no instance is within ``within``.
         """
         return _cbvh.signed_distances(self._scene, points, within)
 
@@ -375,7 +375,7 @@ class Scene:
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
 
-        Each parameter occurs once, however many instances are hit at exactly that.
+        Each parameter occurs once, however many instances are hit at exactly that parameter.
         """
         found = _cbvh.all_hits(self._scene, origins, directions, until)
         return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)
@@ -387,11 +387,13 @@ class Scene:
     def motion(
         self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
     ) -> SceneMotionAnswer:
-        """Are the ways of some instances free, while they move in the world at the same time and the rest stands still?
+        """Are the paths of some instances free, while they move in the world at the same time and the others stand
+        still?
 
-        ``paths`` has a `Motion`, a `Polyline` or a path of your own (body to world) for the number of each that moves.
-        Asked about are all pairs of which one moves. ``clearance`` and ``tolerance`` are those of `Mesh.motion`. Where
-        a moving instance stands now does not matter, and it stays there.
+        ``paths`` maps the number or name of each moving instance to a `Motion`, a `Polyline` or a path of your own
+        (body to world). The question is about all pairs with at least one moving instance. ``clearance`` and
+        ``tolerance`` are those of `Mesh.motion`. The present pose of a moving instance does not matter, and does not
+        change.
         """
         numbers, ways = self._ways(paths)
         kind, until, at, nearest = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
@@ -400,7 +402,7 @@ class Scene:
     def is_free(
         self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
     ) -> bool:
-        """Whether `motion` answers FREE, which takes less time to find out. Arguments are those of `motion`."""
+        """Whether `motion` answers FREE. It takes less time than `motion`, and has the same arguments."""
         numbers, ways = self._ways(paths)
         return _cbvh.scene_is_free(self._scene, numbers, ways, clearance, tolerance)
 

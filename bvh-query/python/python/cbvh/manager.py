@@ -1,15 +1,16 @@
 """A collision manager for users of trimesh: the methods, arguments and return values of
 `trimesh.collision.CollisionManager`.
 
-It stands on `Scene` and needs neither trimesh nor FCL. What differs:
+It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 
-- Meshes are surfaces, whether convex or not. One that is inside another without touching it does not collide with it.
-- Contact is exact, and distances are 0 where meshes touch. There is no penetration depth and no normal: answers do not
+- Meshes are surfaces, whether convex or not. A mesh that is inside another without touching it does not collide with
+  it.
+- Contact is exact, and distances are 0 if meshes touch. There is no penetration depth and no normal: answers do not
   have the attributes ``depth`` and ``normal``, and no distance is negative.
 - Contacts are all pairs of triangles that touch, each once.
 - `add_object` returns None, not an object of FCL.
-- Without any pair of objects, a distance is infinite, and the names and the data are None.
-- A manager is neither pickled nor copied; a `Scene` is.
+- If there is no pair of objects, a distance is infinite, and the names and the data are None.
+- A manager cannot be pickled or copied; a `Scene` can.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from ._poses import relative
 from ._scene import Scene
 
 EXTERNAL = "__external"
-"""What an object that is not in the manager is called in answers, as by trimesh."""
+"""The name in answers of an object that is not in the manager, as in trimesh."""
 
 # The groups of a manager's own objects, and of those that they are asked about with.
 _OWN, _OTHERS = 1, 2
@@ -123,7 +124,7 @@ class ContactData:
     def point(self) -> Floats:
         """A point in the world that both triangles have, to within rounding, shape (3,).
 
-        It is found when it is asked for. There is none of objects that were added as a `cbvh.Mesh`.
+        It is computed at the first access. There is none for objects that were added as a `cbvh.Mesh`.
         """
         if self._point is None:
             meshes, poses = [], []
@@ -206,11 +207,10 @@ class CollisionManager:
     def in_collision_single(
         self, mesh: Any, transform: ArrayLike | None = None, return_names: bool = False, return_data: bool = False
     ) -> Any:
-        """Whether an object collides with any of the manager's.
+        """Whether an object collides with any object of the manager.
 
-        The answer is a bool; with ``return_names``, the set of names of those that it collides with; and with
-        ``return_data``, a list of `ContactData`, in which the object is called ``"__external"``: a tuple of what is
-        asked for.
+        The answer is a bool. With ``return_names`` or ``return_data`` it is a tuple, which also has the set of names of
+        the objects that it collides with, or a list of `ContactData`, in which the object is called ``"__external"``.
         """
         others = [(EXTERNAL, _geometry(mesh), _transform(transform))]
         found, pairs, data = self._collisions_with(others, return_names, return_data)

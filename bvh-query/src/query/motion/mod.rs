@@ -1,18 +1,19 @@
-//! Is the way free, and where does it end? A search over time, certain at every moment.
+//! Is a motion free, and where does it end? A search over time, certain at every moment.
 //!
-//! An answer has a definition that knows nothing of how it is found. Time is halved again and again into *cells*, until B
-//! moves by at most an eighth of the tolerance within a cell: [`path_reach`]. A cell is *clear* if, in the pose of its
-//! middle, the meshes are farther apart than the clearance and that reach, added and rounded up. The cells are met in the
-//! order of time:
+//! The definition of an answer does not depend on how it is found. Time is halved again and again into *cells*, until B
+//! moves by at most an eighth of the tolerance within a cell: [`path_reach`]. A cell is *clear* if, in the pose at its
+//! middle, the meshes are farther apart than the sum of the clearance and that reach, rounded up. The cells are decided
+//! in the order of time:
 //!
 //! - In a clear cell nothing comes within the clearance.
-//! - In one that is not clear, the pose of the middle decides exactly: within the clearance is a hit.
-//! - Else the cell is undecided, and so is the answer, unless a later cell is a hit.
+//! - In any other cell, the pose at the middle is tested exactly. It is a hit if the meshes are within the clearance
+//!   there.
+//! - Otherwise the cell is undecided, and so is the answer, unless a later cell is a hit.
 //!
-//! The search leaves out cells that are certainly clear, many at a time: during an interval, everything that stays farther
-//! apart than the clearance and an eighth of the tolerance ([`sweep`]). Where few pairs of triangles are left, they are kept
-//! from interval to interval; all others are apart during the whole interval, so that these pairs alone decide.
-//! So what a filter sees does not show in an answer, which has the same bits on every backend.
+//! The search skips cells that are certainly clear, many at a time: those of an interval during which everything stays
+//! farther apart than the clearance and an eighth of the tolerance ([`sweep`]). If a sweep leaves few pairs of
+//! triangles, they are kept for the parts of the interval. All other pairs are apart during the whole interval, so
+//! these pairs alone decide. Filters therefore do not affect answers, which have the same bits on every backend.
 
 mod pairs;
 mod question;
@@ -37,10 +38,11 @@ use search::{Outcome, TimeSearch};
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct MotionOptions {
-    /// Meshes that come as near as this hit, in mesh units; 0 for contact.
+    /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact.
     pub clearance: f64,
-    /// How near B may come to a hit, beyond the clearance, without an answer that says free or hit, in mesh units; `None` for a
-    /// millionth of the diagonal of the larger object's box. A smaller one costs more.
+    /// The width of the undecided range beyond the clearance, in mesh units. If B comes that near and is no hit, the
+    /// answer may be [`MotionAnswer::Near`]. `None` stands for a millionth of the diagonal of the larger object's box.
+    /// A smaller tolerance costs more.
     pub tolerance: Option<f64>,
 }
 
@@ -64,7 +66,7 @@ impl MotionOptions {
 }
 
 impl MotionOptions {
-    /// Refuses numbers that mean nothing.
+    /// Refuses invalid numbers.
     pub(crate) fn check(&self) -> Result<(), QueryError> {
         check("clearance", "a finite length of at least 0", self.clearance)?;
         match self.tolerance {
@@ -76,22 +78,22 @@ impl MotionOptions {
     }
 }
 
-/// Whether a way is free.
+/// Whether a motion is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MotionAnswer {
     /// At no time from 0 to 1 are the meshes within the clearance.
     Free,
     /// They are within the clearance in the pose at `touching_at`.
     Hit {
-        /// Before this time they certainly are not. It equals `touching_at` only where both are 0.
+        /// Before this time they certainly are not within the clearance. It equals `touching_at` only if both are 0.
         free_until: f64,
-        /// A time at which they are: the earliest one found.
+        /// A time at which they are within the clearance: the earliest one found.
         touching_at: f64,
         /// The answer of [`Querier::distance`] for that pose.
         nearest: Distance,
     },
-    /// They come so near that neither can be told: the distance is at most the clearance and the tolerance, and in no pose
-    /// that was looked at are they within the clearance.
+    /// The meshes come near, but it is undecided whether they come within the clearance. In some pose the distance is
+    /// at most the sum of the clearance and the tolerance. In none of the poses tested are they within the clearance.
     Near {
         /// Before this time they certainly are not within the clearance.
         free_until: f64,
@@ -110,21 +112,23 @@ pub(crate) struct EndedByError {
 }
 
 impl Querier {
-    /// Returns whether B's way is free, with B moving in A's frame along `path`, and where it ends if it is not.
+    /// Returns whether the motion of B along `path`, in A's frame, is free, and where it ends if it is not.
     ///
-    /// The answer is certain: [`MotionAnswer::Free`] holds at every moment, not at samples, and a [`MotionAnswer::Hit`] names a
-    /// pose in which the meshes are within the clearance. Contact at time 0 counts. Answers have the same bits on every
-    /// backend and in any order of questions. As for [`Querier::collide`], meshes are surfaces.
+    /// The answer is certain: [`MotionAnswer::Free`] holds at every moment, not only at samples, and a
+    /// [`MotionAnswer::Hit`] names a pose in which the meshes are within the clearance. Contact at time 0 counts.
+    /// Answers have the same bits on every backend and in any order of questions. As for [`Querier::collide`], meshes
+    /// are surfaces.
     ///
-    /// Cost: about one query of contact for each interval that has to be looked at: few where B stays apart by more than it
-    /// turns aside, some thirty for a hit. Where B goes on and on at a gap below the tolerance, it takes a query for each eighth
-    /// of the tolerance that it moves by, because a hit may follow: a budget ends that, or [`Querier::is_free`], which says no
-    /// at once.
+    /// Cost: about one contact query for each interval that must be tested. There are few intervals if B keeps a
+    /// distance that is larger than the bend of its path, and some thirty for a hit. If B moves on at a gap below the
+    /// tolerance, there is one query for each eighth of the tolerance that it moves by, because a hit may still follow.
+    /// A budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
     ///
     /// # Errors
-    /// [`QueryError::Number`] for a clearance or a tolerance that means nothing, or a tolerance that poses do not resolve:
-    /// because B moves by more in 2^-45 of the time, or is rounded by more; and the errors of [`Querier::within`]. A budget is
-    /// for all intervals together. Which error there is, and whether one is met before an answer, may depend on the backend.
+    /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number, or if the tolerance is too small
+    /// for the path: B moves by more in 2^-45 of the time, or its poses are rounded by more. Also the errors of
+    /// [`Querier::within`]. A budget is for all intervals together. The backend may affect which error is returned, and
+    /// whether an error or an answer is found first.
     pub fn motion<'a>(
         &mut self,
         a: impl Into<Shape<'a>>,
@@ -135,7 +139,7 @@ impl Querier {
         self.motion_before(a.into(), b.into(), path, options, &Earliest::new()).map_err(|ended| ended.error)
     }
 
-    /// Answers as `motion` does, but for what is later than the earliest hit of all searches side by side.
+    /// Answers as `motion` does, but ignores everything later than the earliest hit of all parallel searches.
     pub(crate) fn motion_before(
         &mut self,
         a: Shape<'_>,
@@ -170,8 +174,9 @@ impl Querier {
         }
     }
 
-    /// Returns whether B's way is certainly free: whether [`Querier::motion`] answers [`MotionAnswer::Free`]. It does not look
-    /// for the first hit but for any, in poses spread over the way, and so says no in less time. This is what planners ask.
+    /// Returns whether the motion of B is certainly free: whether [`Querier::motion`] answers [`MotionAnswer::Free`].
+    /// It looks for any hit instead of the first, in poses spread over the path, so it needs less time to say no. Use
+    /// it in planners.
     ///
     /// # Errors
     /// The errors of [`Querier::motion`].
@@ -205,9 +210,9 @@ impl Querier {
     }
 }
 
-/// Returns how far any vertex of B is at most, during `[t0, t1]`, from where it is in the middle of that time, in mesh units:
-/// how far vertices are there from where they are at either end, and the sagitta of either half. [`Querier::motion`] halves
-/// time until this is at most an eighth of the tolerance.
+/// Returns an upper bound, in mesh units, of how far any vertex of B is, during `[t0, t1]`, from its place in the
+/// middle of that time. It is the sum of two terms: how far vertices at either end are from their places in the middle,
+/// and the sagitta of either half. [`Querier::motion`] halves time until this is at most an eighth of the tolerance.
 pub fn path_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn RigidPath, t0: f64, t1: f64) -> f64 {
     let b = b.into();
     let question = Question::unchecked(b, b, path);

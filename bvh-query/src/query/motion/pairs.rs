@@ -1,5 +1,5 @@
-//! A few pairs of triangles during a stretch of time: which of them it sets apart, whether any is within a distance, and when
-//! that may first be.
+//! A few pairs of triangles during an interval of time: which of them are apart all the time, whether any is within a
+//! distance, and when that may first be.
 
 use crate::isa::{Isa, Task};
 use crate::motion::RigidPath;
@@ -23,7 +23,7 @@ pub(super) struct SweptPair {
     pub(super) b: Triangle,
 }
 
-/// Pairs of triangles, shared by stretches. Those before the first one are known to be apart.
+/// Pairs of triangles, shared by intervals. Those before `first` are known to be apart.
 #[derive(Clone)]
 pub(super) struct Kept {
     pairs: Rc<[SweptPair]>,
@@ -40,19 +40,19 @@ impl Kept {
     }
 }
 
-/// A stretch of time: where B is at its start, in the middle and at its end.
+/// An interval of time: the poses of B at its start, in the middle and at its end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     pub(super) start: Pose,
     pub(super) middle: Pose,
     pub(super) end: Pose,
-    /// How far apart parts have to be, in mesh units, to be left out.
+    /// How far apart parts must be to be left out, in mesh units.
     pub(super) limit: f64,
 }
 
 impl Sweep {
-    /// Returns whether two triangles are farther apart than the limit all the time, as far as can be seen: by their boxes, the
-    /// normals of both, or the line between their closest points in the middle.
+    /// Returns whether a simple test shows that two triangles are farther apart than the limit all the time: by their
+    /// boxes, the normals of both, or the line between their closest points in the middle.
     #[inline(always)]
     fn sets_apart(&self, pair: &SweptPair) -> bool {
         let ends = [placed(&pair.b, &self.start), placed(&pair.b, &self.end)];
@@ -67,7 +67,7 @@ impl Sweep {
         }
     }
 
-    /// Returns whether a direction sets the triangles apart, in either sense.
+    /// Returns whether a direction separates the triangles, in either sense.
     #[inline(always)]
     fn is_apart_along(&self, x: Point, a: &Triangle, ends: &[Triangle; 2]) -> bool {
         let along = |corner: &Point| dot(x, *corner);
@@ -109,7 +109,7 @@ fn most(values: &[f64]) -> f64 {
 }
 
 impl Querier {
-    /// Leaves out those before the first pair that the stretch does not set apart.
+    /// Leaves out the pairs before the first one that is not certainly apart during the interval.
     pub(super) fn leave_out(&mut self, sweep: &Sweep, pairs: Kept) -> Kept {
         let apart = self.backend.run(CountApart(sweep, pairs.left()));
         self.stats.exact_tests += apart as u64;
@@ -122,7 +122,7 @@ impl Querier {
         self.backend.run(AnyWithin(pairs, pose, d))
     }
 
-    /// Returns about when the first of some pairs comes within the clearance, if any seems to.
+    /// Returns an estimate of the time when the first of some pairs comes within the clearance, if any seems to.
     pub(super) fn contact_time(
         &mut self,
         question: &Question<'_>,
@@ -134,7 +134,7 @@ impl Querier {
     }
 }
 
-/// Counts the pairs that a stretch sets apart before the first one that it does not.
+/// Counts the pairs before the first one that is not certainly apart during the interval.
 pub(super) struct CountApart<'a>(pub(super) &'a Sweep, pub(super) &'a [SweptPair]);
 
 impl Task for CountApart<'_> {
@@ -168,8 +168,8 @@ impl Task for AnyWithin<'_> {
     }
 }
 
-/// Guesses when pairs come within the clearance: from where B is, it goes on until the closest points would meet if they kept
-/// to the chords of their ways.
+/// Guesses when pairs come within the clearance. From each pose of B, it goes on to the time at which the closest
+/// points would meet if they moved on the chords of their paths.
 struct ContactTime<'a> {
     path: &'a dyn RigidPath,
     clearance: f64,

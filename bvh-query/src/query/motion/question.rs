@@ -1,5 +1,5 @@
-//! What stays the same while time is searched, and what is asked of a stretch of time: how far B is from its middle, and how
-//! far apart parts have to be at both ends.
+//! The part of a question that stays the same while time is searched, and its limits for an interval of time: how far B
+//! moves from the middle, and how far apart parts must be at both ends.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -29,19 +29,19 @@ pub(super) struct Question<'a> {
     radius_a: f64,
 }
 
-/// A stretch of time, and where B is at its ends.
+/// An interval of time, and the poses of B at its ends.
 #[derive(Clone, Copy)]
 pub(super) struct Stretch {
     pub(super) times: [f64; 2],
     pub(super) poses: [Pose; 2],
 }
 
-/// The middle of a stretch of time.
+/// The middle of an interval of time.
 #[derive(Clone, Copy)]
 pub(super) struct Middle {
     pub(super) at: f64,
     pub(super) pose: Pose,
-    /// How far any vertex of B is at most from where it is now, during the stretch.
+    /// How far any vertex of B is at most from its place in the middle, during the interval.
     pub(super) reach: f64,
 }
 
@@ -73,12 +73,12 @@ impl<'a> Question<'a> {
         }
     }
 
-    /// Returns the stretch between two times.
+    /// Returns the interval between two times.
     pub(super) fn stretch(&self, t0: f64, t1: f64) -> Stretch {
         Stretch { times: [t0, t1], poses: [self.path.pose(t0), self.path.pose(t1)] }
     }
 
-    /// Returns the middle of a stretch.
+    /// Returns the middle of an interval.
     pub(super) fn middle(&self, stretch: &Stretch) -> Middle {
         let [t0, t1] = stretch.times;
         let at = t0 + (t1 - t0) / 2.0;
@@ -88,8 +88,8 @@ impl<'a> Question<'a> {
         Middle { at, pose, reach }
     }
 
-    /// Returns how far apart parts have to be at both ends of a stretch to be left out: farther than the clearance and an
-    /// eighth of the tolerance all the time, which is as far as any cell reaches.
+    /// Returns how far apart parts must be at both ends of an interval to be left out. They are then farther apart than
+    /// the clearance and an eighth of the tolerance all the time, which is as far as any cell reaches.
     pub(super) fn limit(&self, stretch: &Stretch) -> f64 {
         let [t0, t1] = stretch.times;
         let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
@@ -98,7 +98,7 @@ impl<'a> Question<'a> {
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
     }
 
-    /// Returns the sagitta of the path. A number of a user's path that is none leaves nothing certain.
+    /// Returns the sagitta of the path. If a user's path returns an invalid number, it counts as infinite.
     fn sagitta(&self, t0: f64, t1: f64) -> f64 {
         let sagitta = self.path.sagitta(self.radius, t0, t1);
         if sagitta >= 0.0 { sagitta } else { f64::INFINITY }

@@ -1,17 +1,17 @@
-//! The search over time: which stretches are left out, and which cells are decided.
+//! The search over time: it skips intervals that are certainly free, and decides the remaining cells.
 //!
 //! ```text
-//! stretches := {[0, 1]}
-//! while stretch := earliest(stretches):
+//! intervals := {[0, 1]}
+//! while interval := earliest(intervals):
 //!     if it is a cell: decide it
-//!     if a sweep sets the meshes apart all the time: skip
-//!     if its end is within the clearance, or few pairs of triangles are left: descend to the cell of the first contact,
-//!         as far as can be told cheaply, and set apart what was passed on the way, several stretches at once
-//!     else halve it
+//!     else if a sweep shows that the meshes are apart all the time: skip it
+//!     else if its end is within the clearance, or few pairs of triangles are left:
+//!         descend to the cell that is likely to have the first contact, and sweep the intervals before it in groups
+//!     else: halve it
 //! ```
 //!
-//! Descending is a guess, and a wrong guess costs little. The search does not assume that the time before the cell is free: it
-//! sweeps that time or looks into it. The time after the cell waits.
+//! Descending is a guess, and a wrong guess costs little. The search does not assume that the time before the cell is
+//! free: it sweeps that time or searches it. The time after the cell waits.
 
 use crate::error::QueryError;
 use crate::pose::Pose;
@@ -26,24 +26,25 @@ use crate::query::search::Search;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The most pairs of triangles that are kept from stretch to stretch.
+/// The most pairs of triangles that an interval passes on to its parts.
 const MOST_PAIRS: usize = 24;
-/// The most pairs of packets that the first walk looks at; each halving allows eight times as many. A long stretch in which
-/// much is near is given up early, and a short one has to be looked through in the end.
+/// The most pairs of packets that the first walk tests; each halving allows eight times as many. A walk of a long
+/// interval in which many packets are near is given up early. In a short interval, all of them must be tested in the
+/// end.
 const FIRST_PACKET_TESTS: u64 = 12;
-/// A stretch that ends within the clearance is swept when B moves by less than this fraction of the larger object's
-/// diagonal: few pairs of triangles are likely to be left.
+/// An interval that ends within the clearance is swept if B moves by less than this fraction of the larger object's
+/// diagonal. Few pairs of triangles are likely to be left then.
 const FINE: f64 = 1.0 / 4096.0;
-/// The search guesses no time of contact in a stretch in which B moves by less than this many times the tolerance. Guessing
-/// would take as many steps as the stretch has cells.
+/// The search guesses no time of contact in an interval in which B moves by less than this many times the tolerance.
+/// Guessing would take as many steps as the interval has cells.
 const LEAST_GUESSED: f64 = 16.0;
-/// The most stretches that may wait while a search for any hit takes long stretches first.
+/// The most intervals that may wait while a search for any hit takes long intervals first.
 const MOST_SPREAD: usize = 64;
 /// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
 const MAX_DEPTH: u32 = 45;
-/// Bounds how close to a guessed contact several stretches are swept together. From the end of such a group to the contact, B
-/// must still move by at least this many times the gap that a sweep of the group needs. The value only divides the work; it
-/// affects no answer.
+/// Bounds how close to a guessed contact several intervals are swept together. From the end of such a group to the
+/// contact, B must still move by at least this many times the gap that a sweep of the group needs. The value only
+/// divides the work; it affects no answer.
 const SAFE_REST: f64 = 4.0;
 
 /// What a search has found.
@@ -53,25 +54,26 @@ pub(super) enum Outcome {
     Undecided { free_until: f64, at: f64 },
 }
 
-/// A stretch that has to be looked at: one that comes of halving the whole time `depth` times.
+/// An interval of time to search, which comes from halving the whole time `depth` times.
 #[derive(Clone)]
 struct Interval {
     stretch: Stretch,
     depth: u32,
-    /// Whether the end is within the clearance, if that is known: then nothing sets the meshes apart all the time.
+    /// Whether the end is within the clearance, if that is known. If it is, no sweep can separate the meshes all the
+    /// time.
     ends_within: Option<bool>,
-    /// Among which all pairs of triangles are that are not apart all the time, if they are few.
+    /// If there are few, pairs of triangles that include all pairs that are not apart all the time.
     pairs: Option<Kept>,
 }
 
-/// What a cell is found to be.
+/// The outcome for a cell.
 enum Cell {
     Clear,
     Hit,
     Undecided,
 }
 
-/// The earliest hit that several searches side by side have found so far.
+/// The earliest hit that several parallel searches have found so far.
 pub(crate) struct Earliest(AtomicU64);
 
 impl Earliest {
@@ -103,8 +105,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Self { querier, question, decided_until: 0.0 }
     }
 
-    /// Returns the first hit, or the first cell that is undecided. What is later than the earliest hit of all searches side by
-    /// side is not looked at.
+    /// Returns the first hit, or the first cell that is undecided. It ignores the time after the earliest hit of all
+    /// parallel searches.
     pub(super) fn first(&mut self, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let found = self.first_before(earliest)?;
         if let Outcome::Hit { touching_at, .. } = found {
@@ -156,8 +158,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(undecided.map_or(Outcome::Free, |(free_until, at)| Outcome::Undecided { free_until, at }))
     }
 
-    /// Returns whether there is neither a hit nor an undecided cell. Long stretches come first while there are few of them,
-    /// because poses that are spread over the path meet a hit earlier.
+    /// Returns whether there is neither a hit nor an undecided cell. Long intervals come first while there are few of
+    /// them, because poses that are spread over the path find a hit earlier.
     pub(super) fn is_free(&mut self) -> Result<bool, QueryError> {
         let (whole, clearance) = (self.whole(), self.question.clearance);
         if self.is_within(&whole.stretch.poses[0], clearance)? {
@@ -195,7 +197,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Interval { stretch: self.question.stretch(0.0, 1.0), depth: 0, ends_within: None, pairs: None }
     }
 
-    /// Returns the middle of a stretch of time, which is charged: it takes a look at each object of B.
+    /// Returns the middle of an interval, and charges it to the budget, because it takes a step for each object of B.
     fn middle(&mut self, stretch: &Stretch) -> Result<Middle, QueryError> {
         self.querier.memory.budget.charge(self.question.b.objects().len() as u64)?;
         Ok(self.question.middle(stretch))
@@ -256,8 +258,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Goes down to the cell of a contact, at a time if one is given, else from where there is none to where there is, until
-    /// B moves little. Adds that cell and the intervals beside the way.
+    /// Descends to the cell of a contact and adds it, with the intervals left on the way down. If a time is given, the
+    /// cell is the one at that time. Otherwise it halves between a time without contact and one with it, until B moves
+    /// little.
     fn descend(
         &mut self,
         mut interval: Interval,
@@ -291,7 +294,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         self.pass(passed, &contact, todo)
     }
 
-    /// Adds those of some adjoining intervals before a contact that are not set apart, in the order of time.
+    /// Adds those of some adjoining intervals before a contact that a sweep does not clear, in the order of time.
     fn pass(
         &mut self,
         passed: Vec<Interval>,
@@ -318,7 +321,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Returns how many of some adjoining intervals one sweep is likely to clear together, and their joint stretch.
+    /// Returns how many of some adjoining intervals one sweep is likely to clear together, and their union.
     fn safe_stretch(&self, rest: &[Interval], contact: &Stretch) -> (usize, Stretch) {
         let start = &rest[0].stretch;
         let (time, pose) = (contact.times[0], contact.poses[0]);
@@ -357,8 +360,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         ])
     }
 
-    /// Returns pairs of triangles, among which are all that may come within the clearance during an interval, unless there are
-    /// many. If there are any, the first one may.
+    /// Returns pairs of triangles that include all that may come within the clearance during an interval, or `None` if
+    /// there are many. If the list is not empty, its first pair may do so.
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
         let [start, end] = interval.stretch.poses;

@@ -1,12 +1,13 @@
-//! What may meet during an interval of time: a walk that leaves out what is apart all the time.
+//! What may meet during an interval of time: a walk that leaves out everything that is apart all the time.
 //!
-//! Take a direction x that is fixed in A's frame for the interval. If at both ends of the interval all of a part of B is on one
-//! side of a part of A along x, by more than `limit * |x|`, then it is all the time, but for the sagitta: each point of B is
-//! within the sagitta of the segment between where it is at the ends, and both ends of the segment are beyond. The limit is
-//! the clearance and the sagitta, and more. It would not do for a direction that turns with B to set both apart at both ends.
+//! Take a direction x that is fixed in A's frame for the interval. Let all of a part of B be on one side of a part of A
+//! along x, by more than `limit * |x|`, at both ends of the interval. Each point of B is within the sagitta of the
+//! segment between its places at both ends, and both ends of the segment are beyond the limit. The part of B is
+//! therefore on that side all the time, except for the sagitta, which the limit includes together with the clearance. A
+//! direction that turns with B would not do, even if it separates both parts at both ends.
 //!
-//! Nodes are set apart along A's directions, by the slabs that hold B's at both ends. Pairs of triangles are set apart 16 at a
-//! time, by their boxes, normals, centroids and closest points ([`crate::leaf::distance`]).
+//! Nodes are separated along A's directions, by slabs that contain B's slabs at both ends. Pairs of triangles are
+//! separated 16 at a time, by their boxes, normals, centroids and closest points ([`crate::leaf::distance`]).
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
@@ -26,8 +27,8 @@ use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
 impl Querier {
-    /// Adds the pairs of triangles of two objects that the interval does not set apart. Returns false if there are more of
-    /// them, or more work, than there is room for; then some are missing.
+    /// Adds the pairs of triangles of two objects that are not certainly apart during the interval. Returns false if
+    /// there are more pairs, or more work, than allowed; some pairs are then missing.
     pub(super) fn sweep(
         &mut self,
         (placed, sweep): (&PlacedPair<'_>, &Sweep),
@@ -72,7 +73,7 @@ struct Swept<'a> {
     candidates: SweptCandidates<'a>,
 }
 
-/// Looks at pairs of triangles, 16 at a time, and keeps those that the interval does not set apart.
+/// Tests pairs of triangles, 16 at a time, and keeps those that are not certainly apart during the interval.
 struct SweptCandidates<'a> {
     /// With B at the start of the interval and at its end.
     placed: [PlacedPair<'a>; 2],

@@ -1,7 +1,7 @@
 //! Asks about many points, rays or segments and one mesh, on all cores.
 //!
-//! Probes are sorted along a space-filling curve, so that what one has brought into the caches is there for the next. Each thread
-//! takes runs of them. Answers are placed in the order of the probes, and do not depend on the number of threads.
+//! Probes are sorted along a space-filling curve, so that the next probe finds in the caches what the last one needed.
+//! Each thread takes runs of them. Answers are in the order of the probes, and do not depend on the number of threads.
 
 use crate::error::QueryError;
 use crate::isa::Backend;
@@ -120,7 +120,7 @@ impl<'a> ProbeBatch<'a> {
         self.each(segments, middle, |querier, [from, to]| querier.segment_hit(self.shape, *from, *to))
     }
 
-    /// Asks about each probe, in the order of where they are.
+    /// Asks about each probe, in the order of their places along the curve.
     fn each<P: Sync, R: Send>(
         &self,
         probes: &[P],

@@ -1,8 +1,8 @@
 //! Where the closest surface to a point is.
 //!
-//! Triangles are bounded in f32, up to sixteen at a time. Those that may be the closest are kept, and measured in f64 at the
-//! end, nearest first. Pruning is strict, as in [`crate::query::search`]: so the answer does not depend on the order of
-//! visits.
+//! Triangles are bounded in f32, up to sixteen at a time. Those that may be the closest are kept, and measured in f64
+//! at the end, nearest first. Pruning is strict, as in [`crate::query::search`], so the answer does not depend on the
+//! order of visits.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -47,13 +47,13 @@ struct Best {
 }
 
 impl Querier {
-    /// Returns the closest point of a mesh to `point`, given in the mesh's frame, and its triangle. Nothing if the mesh is
-    /// farther than `within`, in mesh units, which may be infinite.
+    /// Returns the closest point of a mesh to `point`, given in the mesh's frame, and its triangle. Returns `None` if
+    /// the mesh is farther away than `within`, in mesh units, which may be infinite.
     ///
-    /// The distance is that of the stored triangles, to within a few roundings of f64 at the scale of the closest triangle and
-    /// of its gap. Of equally near triangles, the answer names that with the lowest numbers of object and triangle. Whether the
-    /// mesh is farther than `within` is decided exactly. It has the same bits on all backends. A coordinate below 2^-213
-    /// counts as 0.
+    /// The distance is that of the stored triangles, to within a few roundings of f64 at the scale of the closest
+    /// triangle and its gap. Of equally near triangles, the answer names the one with the lowest numbers of object and
+    /// triangle. It is decided exactly whether the mesh is farther away than `within`. The answer has the same bits on
+    /// all backends. A coordinate below 2^-213 counts as 0.
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120, or `within` is negative or NaN;
@@ -96,7 +96,7 @@ impl Querier {
     }
 }
 
-/// Refuses a limit that means nothing. Infinity is none.
+/// Refuses an invalid limit. Infinity means that there is no limit.
 pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
     if within >= 0.0 {
         return Ok(());

@@ -1,7 +1,7 @@
 //! The walk of a line: finds the triangles that a ray or a segment may meet, nearest first.
 //!
-//! The line is first clipped to the box of an object, in f64. What is left is a segment as long as the object, and nodes and
-//! packets are tested against it in f32. What may be met goes to a question, which decides exactly.
+//! The line is first clipped to the box of an object, in f64. This leaves a segment as long as the object, against
+//! which nodes and packets are tested in f32. The remaining triangles go to a question, which decides exactly.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -45,7 +45,7 @@ impl Line {
     }
 }
 
-/// What is asked about a line.
+/// A question about a line.
 pub(crate) trait LineQuestion {
     fn line(&self) -> Line;
 

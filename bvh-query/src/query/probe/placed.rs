@@ -1,4 +1,4 @@
-//! A shape where a pose puts it: what probes are asked about.
+//! A placed shape, for questions about probes.
 
 use crate::file::bvh::Bvh;
 use crate::file::owned_shape::OwnedShape;
@@ -7,11 +7,11 @@ use crate::pose::Pose;
 use crate::pose::frames::{inverse, turn};
 use bvh_format::object::Object;
 
-/// A shape and where it is: for questions about points, rays and segments that are given in the world.
+/// A shape and its pose, for questions about points, rays and segments that are given in the world.
 ///
-/// A `&Bvh` or a [`Shape`] converts into the shape in its own frame, and [`Shape::at`] places it by a pose, so that probes are
-/// given in the world. What is asked about are then the stored vertices as [`Pose::place`] places them, as in questions about
-/// pairs of meshes.
+/// A `&Bvh` or a [`Shape`] converts into the shape in its own frame. [`Shape::at`] places it by a pose, and probes are
+/// then given in the world. The question is then about the stored vertices as [`Pose::place`] places them, as in
+/// questions about pairs of meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct PlacedShape<'a> {
     pub(crate) shape: Shape<'a>,
@@ -22,7 +22,7 @@ pub struct PlacedShape<'a> {
 }
 
 impl<'a> Shape<'a> {
-    /// Returns the shape where a pose puts it: see [`PlacedShape`].
+    /// Returns the shape placed by a pose: see [`PlacedShape`].
     pub fn at(self, pose: &Pose) -> PlacedShape<'a> {
         PlacedShape { shape: self, pose: Some(*pose), instance: 0 }
     }
@@ -51,7 +51,7 @@ impl<'a> From<&'a OwnedShape> for PlacedShape<'a> {
 /// `Placement::inverse`), and placed vertices by 8v.
 const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
 
-/// The way from the frame of the probes to that of an object, around its origin.
+/// The transform from the frame of the probes to that of an object, around its origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct IntoObject {
     rotation: Option<[[f64; 3]; 3]>,

@@ -8,7 +8,7 @@ use bvh_format::object::MAX_COORDINATE;
 /// needs them (`narrow`).
 const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
 
-/// Refuses a point that no file can be near. Coordinates too small for exact arithmetic become 0.
+/// Refuses a point beyond the range of files. Coordinates too small for exact arithmetic become 0.
 pub(crate) fn check_point(point: &Point) -> Result<Point, QueryError> {
     if let Some(&found) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
         let expected = "finite coordinates of at most 2^120";

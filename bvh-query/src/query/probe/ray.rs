@@ -1,4 +1,4 @@
-//! What a ray hits: first, at all, or all of it.
+//! What a ray hits: the first hit, any hit, or all hits.
 
 use crate::error::QueryError;
 use crate::narrow::{self, Crossing, Triangle};
@@ -14,8 +14,8 @@ use std::cmp::Ordering;
 pub struct Ray {
     /// Where the ray starts, in mesh units.
     pub origin: [f64; 3],
-    /// The direction, of any length from 2^-500 to 2^500: the unit of `t`. A component of less than 2^-200 of the largest
-    /// counts as 0.
+    /// The direction, which is the unit of `t`. Its length may be from 2^-500 to 2^500. A component of less than 2^-200
+    /// of the largest counts as 0.
     pub direction: [f64; 3],
     /// The greatest `t`, in units of the direction; it may be infinite.
     pub until: f64,
@@ -35,20 +35,21 @@ impl Ray {
 }
 
 impl Querier {
-    /// Returns where a ray first hits a mesh, or nothing.
+    /// Returns where a ray first hits a mesh, or `None`.
     ///
-    /// Triangles are closed sets: a ray that touches a corner or an edge, or lies in the plane of a triangle, hits it; its first
-    /// point in the triangle counts. Whether and what it hits is decided exactly. Of triangles that it hits at exactly the same
-    /// parameter, the answer names that with the lowest numbers of object and triangle. It has the same bits on all backends.
+    /// Triangles are closed sets: a ray that touches a corner or an edge, or meets a triangle in its plane, hits it at
+    /// its first point in the triangle. Exact predicates decide whether the ray hits, and what. Of triangles that it
+    /// hits at exactly the same parameter, the answer names the one with the lowest numbers of object and triangle. The
+    /// answer has the same bits on all backends.
     ///
     /// The method is that of A. Segura and F. Feito (2001), decided by exact predicates, on a walk along the slabs of k-DOPs.
     /// Cost: some microseconds.
     ///
     /// # Errors
-    /// [`QueryError::Number`] if a coordinate of the origin is not finite or beyond 2^120, the largest component of the
-    /// direction is not from 2^-500 to 2^500 in magnitude or one is NaN, or `until` is negative or NaN;
-    /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
-    /// suffice.
+    /// [`QueryError::Number`] if a coordinate of the origin is not finite or beyond 2^120, if the largest component of
+    /// the direction is not from 2^-500 to 2^500 in magnitude, if a component is NaN, or if `until` is negative or NaN;
+    /// [`QueryError::Damaged`] if a page that the query touches is damaged; [`QueryError::Budget`] if the budget does
+    /// not suffice.
     pub fn first_hit<'a>(
         &mut self,
         shape: impl Into<PlacedShape<'a>>,
@@ -60,7 +61,7 @@ impl Querier {
         Ok(first.hit().map(|(_, hit)| hit))
     }
 
-    /// Returns whether a ray hits a mesh at all, decided as by [`Querier::first_hit`].
+    /// Returns whether a ray hits a mesh at all. The decision is that of [`Querier::first_hit`].
     ///
     /// # Errors
     /// The errors of [`Querier::first_hit`].
@@ -71,9 +72,9 @@ impl Querier {
         Ok(any.found)
     }
 
-    /// Returns all hits of a ray in the order along it. Each parameter occurs once, however many triangles are hit at exactly
-    /// that: a ray through an edge hits once, and the hit names the triangle with the lowest numbers. A triangle that the ray
-    /// lies in counts where the ray first meets it.
+    /// Returns all hits of a ray in the order along it. Each parameter occurs once, however many triangles are hit at
+    /// exactly that parameter: a ray through an edge hits once, and the hit names the triangle with the lowest numbers.
+    /// If the ray lies in a triangle's plane and meets it, the first point counts.
     ///
     /// # Errors
     /// The errors of [`Querier::first_hit`].

@@ -1,4 +1,4 @@
-//! How two meshes lie: whether they touch, and if they do not, which is inside the other.
+//! The relation of two meshes: whether they touch and, if not, whether one is inside the other.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -16,21 +16,23 @@ use bvh_format::object::Object;
 use bvh_format::validate::packets;
 
 impl Querier {
-    /// Returns how two meshes lie, B placed by a pose in A's frame: whether they touch and, if not, which is inside the other.
+    /// Returns the relation of two meshes, with B placed by a pose in A's frame: whether they touch and, if not,
+    /// whether one is inside the other.
     ///
-    /// [`Querier::collide`] is about surfaces: a mesh inside another does not collide with it. This question tells. Where no
-    /// triangles touch, each connected component of a mesh is on one side of the other mesh, and one point of each component
-    /// tells which. Decided exactly; the answer has the same bits on all backends.
+    /// [`Querier::collide`] is about surfaces, so a mesh inside another does not collide with it. This question finds
+    /// such a mesh. If no triangles touch, each connected component of a mesh is wholly on one side of the other mesh,
+    /// and one point of the component tells which. The answer is exact and has the same bits on all backends.
     ///
-    /// An object that is not closed contains nothing that is certainly apart from its box. If an object of the other mesh may
-    /// meet that box, it is unknown whether the open object contains it. The answer is then [`Relation::Undefined`], unless the
-    /// rest decides it: an open mesh inside a closed one is inside it.
+    /// An object that is not closed contains nothing that is certainly apart from its box. If an object of the other
+    /// mesh may meet that box, it is unknown whether the open object contains it. The answer is then
+    /// [`Relation::Undefined`], unless other objects decide it: an open mesh inside a closed one is inside it.
     ///
     /// Cost: that of `collide`, and about a microsecond per connected component.
     ///
     /// # Errors
-    /// [`QueryError::NoTopology`] if a file was baked without what this question needs; [`QueryError::Damaged`] if a page that
-    /// the query touches is damaged, [`QueryError::Budget`] if the budget does not suffice.
+    /// [`QueryError::NoTopology`] if a file that this question needs was baked without topology;
+    /// [`QueryError::Damaged`] if a page that the query touches is damaged; [`QueryError::Budget`] if the budget does
+    /// not suffice.
     pub fn relation<'a, 'b>(
         &mut self,
         a: impl Into<Shape<'a>>,

@@ -8,10 +8,11 @@ use crate::query::probe::point::check_point;
 use crate::query::querier::Querier;
 
 impl Querier {
-    /// Returns whether the closed segment between two points meets a mesh: whether it is free to see or to go along.
+    /// Returns whether the closed segment between two points meets a mesh. If it does not, there is a free line of
+    /// sight between the points.
     ///
-    /// Decided exactly, by the predicates of [`Querier::collide`]: a segment that only touches a corner, an edge or a face meets
-    /// it. The points may be equal. Cost: a microsecond or so.
+    /// The predicates of [`Querier::collide`] decide this exactly: a segment that only touches a corner, an edge or a
+    /// face meets the mesh. The points may be equal. Cost: about a microsecond.
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::Damaged`] if a page that the query

@@ -24,16 +24,16 @@ pub(crate) enum OpenObject {
 impl Querier {
     /// Returns whether a point is inside a mesh, on its surface or outside.
     ///
-    /// Inside is where the surface winds around the point: its winding number is not 0. So overlapping closed parts count as
-    /// one solid, and a closed surface turned inside out has the same inside. An exact duplicate in the input counts like
-    /// any other triangle, with its own orientation. Decided exactly; the answer has the same bits on all backends. Of a
-    /// mesh that is not closed and consistently oriented, only what is on it is known.
+    /// A point is inside if the surface winds around it, that is, if its winding number is not 0. So overlapping closed
+    /// parts count as one solid, and a closed surface turned inside out has the same inside. An exact duplicate in the
+    /// input counts like any other triangle, with its own orientation. The answer is exact and has the same bits on all
+    /// backends. If a mesh is not closed and consistently oriented, the side is known only for points on it.
     ///
     /// Cost: about a microsecond.
     ///
     /// # Errors
-    /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::NoTopology`] if the file was baked
-    /// without what this question needs; [`QueryError::Damaged`] if a page that the query touches is damaged,
+    /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::NoTopology`] if the file was
+    /// baked without topology; [`QueryError::Damaged`] if a page that the query touches is damaged;
     /// [`QueryError::Budget`] if the budget does not suffice.
     pub fn side<'a>(
         &mut self,
@@ -45,9 +45,9 @@ impl Querier {
         self.side_of(&shape.into(), &point, OpenObject::Undefined)
     }
 
-    /// Returns the closest point of a mesh to `point` and the side that `point` is on. Nothing if the mesh is farther than
-    /// `within`. So the signed distance is that of the surface, negative inside. These are two questions, and the budget
-    /// holds for each of them.
+    /// Returns the closest point of a mesh to `point`, and the side that `point` is on. Returns `None` if the mesh is
+    /// farther away than `within`. The signed distance is that of the surface, negative inside. These are two
+    /// questions, and each has the whole budget.
     ///
     /// # Errors
     /// The errors of [`Querier::closest_point`] and [`Querier::side`].
