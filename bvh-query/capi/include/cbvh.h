@@ -91,8 +91,8 @@ enum {
     CBVH_SYSTEM = 6,
     /* A file is not a .cbvh file, or is damaged. The message names the rule it breaks and where. */
     CBVH_DAMAGED = 7,
-    /* A budget of visits or of memory, or the memory of the machine, does not suffice; a limit of the format is
-     * exceeded; or 2^24 - 1 handles of a kind are open. */
+    /* A budget of visits or of memory, or the memory of the machine, does not suffice; or a limit of the format is
+     * exceeded. */
     CBVH_LIMIT = 8,
     /* A mesh cannot be baked. */
     CBVH_BAKE_FAILED = 9,

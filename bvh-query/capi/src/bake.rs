@@ -1,13 +1,13 @@
 //! Bakes meshes: arrays into memory, and files into files of any size.
 
+use crate::at_hand::MESHES;
 use crate::cores;
-use crate::entry::entry;
-use crate::input::{array, flag, optional_text, options, path, rows_of_three};
-use crate::mesh::{hand_out, new_mesh};
+use crate::entry::{entry, hand_out};
+use crate::input::{array, each, flag, optional, options, path, text};
 use crate::output::One;
 use crate::status::Failure;
 use crate::types::{BakeChoices, MeshHandle};
-use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
+use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
 use bvh_query::Bvh;
 use std::ffi::c_char;
 use std::path::PathBuf;
@@ -42,7 +42,7 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
     // SAFETY: the caller vouches for it.
     let given = unsafe { options("options", pointer) }?;
     // SAFETY: as above.
-    let text = |name: &str, text: *const c_char| unsafe { optional_text(name, text) };
+    let text = |name: &str, of: *const c_char| optional(of, |of| unsafe { text(name, of) });
     let encodings = TriangleEncoding::ALL;
     let profile = text("options.profile", given.profile)?;
     let triangles = text("options.triangles", given.triangles)?;
@@ -66,17 +66,12 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         .ids(!flag("options.no_ids", given.no_ids)?)
         .turning_slabs(!flag("options.no_turning_slabs", given.no_turning_slabs)?)
         .topology(!flag("options.no_topology", given.no_topology)?);
-    let scratch = if given.scratch.is_null() {
-        None
-    } else {
-        // SAFETY: as above.
-        Some(unsafe { path("options.scratch", given.scratch) }?)
-    };
+    // SAFETY: as above.
+    let scratch = optional(given.scratch, |folder| unsafe { path("options.scratch", folder) })?;
     let max_memory = Some(given.max_memory).filter(|&bytes| bytes > 0);
     Ok(Choices { options, scratch, max_memory, force: flag("options.force", given.force)? })
 }
 
-/// `cbvh_bake`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_bake(
     vertices: *const f64,
@@ -86,14 +81,13 @@ pub unsafe extern "C" fn cbvh_bake(
     options: *const BakeChoices,
     mesh: *mut MeshHandle,
 ) -> i32 {
-    entry(|| {
+    let baked = || {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-        // SAFETY: the header asks for it.
-        let (out, choices) = unsafe {
-            let out = new_mesh("mesh", mesh)?;
-            rows_of_three("vertices", vertices, vertex_count, &mut positions)?;
-            rows_of_three("faces", faces, face_count, &mut triangles)?;
-            (out, choices(options)?)
+        // SAFETY: the header asks for it; three values in an array are aligned as one is.
+        let choices = unsafe {
+            each("vertices", vertices.cast(), vertex_count, &mut positions, |of: &[f64; 3]| Ok(*of))?;
+            each("faces", faces.cast(), face_count, &mut triangles, |of: &[u32; 3]| Ok(*of))?;
+            choices(options)?
         };
         for (name, is_set) in [
             ("scene", choices.options.scene),
@@ -109,12 +103,12 @@ pub unsafe extern "C" fn cbvh_bake(
         let source = bvh_bake::mesh::Mesh::from_triangles(positions, triangles);
         let (bytes, _) = cores::work(|| Ok(to_bytes(&source, &choices.options)?))?;
         drop(source);
-        let opened = Bvh::from_bytes(bytes);
-        hand_out(out, opened.map_err(|error| Failure::from(bvh_bake::BakeError::from(error)))?.into())
-    })
+        Ok(Bvh::from_bytes(bytes).map_err(BakeError::from)?.into())
+    };
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("mesh", mesh), &MESHES, baked) }
 }
 
-/// `cbvh_bake_files`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_bake_files(
     inputs: *const *const c_char,
@@ -123,24 +117,16 @@ pub unsafe extern "C" fn cbvh_bake_files(
     options: *const BakeChoices,
     was_up_to_date: *mut i32,
 ) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it; pointers are numbers until they are followed.
-        let addresses = unsafe { array("inputs", inputs.cast::<Address>(), input_count) }?;
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let addresses = array("inputs", inputs, input_count)?;
         if addresses.is_empty() {
             return Err(Failure::argument("inputs", "at least one path", "none"));
         }
-        // SAFETY: as above.
-        let read =
-            |(number, input): (usize, &Address)| unsafe { path(&format!("inputs[{number}]"), input.0) };
+        let read = |(number, input): (usize, &*const c_char)| path(&format!("inputs[{number}]"), *input);
         let inputs: Vec<PathBuf> = addresses.iter().enumerate().map(read).collect::<Result<_, _>>()?;
-        // SAFETY: as above.
-        let (output, choices) = unsafe { (path("output", output)?, choices(options)?) };
-        let up_to_date = if was_up_to_date.is_null() {
-            None
-        } else {
-            // SAFETY: as above.
-            Some(unsafe { One::new("was_up_to_date", was_up_to_date) }?)
-        };
+        let (output, choices) = (path("output", output)?, choices(options)?);
+        let up_to_date = optional(was_up_to_date, |_| One::new("was_up_to_date", was_up_to_date))?;
         let outcome = cores::work(|| {
             let bake = FileBake::new(inputs, output).options(choices.options);
             let bake = bake.max_memory(choices.max_memory).scratch(choices.scratch).force(choices.force);
@@ -152,10 +138,3 @@ pub unsafe extern "C" fn cbvh_bake_files(
         Ok(())
     })
 }
-
-/// The address of a text.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-struct Address(*const c_char);
-// SAFETY: a pointer is a number until it is followed.
-unsafe impl crate::input::Plain for Address {}

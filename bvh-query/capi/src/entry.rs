@@ -1,8 +1,10 @@
 //! The boundary: runs a function in the default state of floating-point arithmetic, catches panics, and keeps the message
 //! of the last failure of each thread. Functions of the caller run in the caller's state, which is kept meanwhile.
 
+use crate::input::Plain;
 use crate::output::One;
 use crate::status::{Failure, Status};
+use crate::table::Table;
 use bvh_query::{FloatState, with_default_floats};
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -86,8 +88,6 @@ fn keep(message: String) {
     let _ = MESSAGE.try_with(|last| *last.borrow_mut() = bytes);
 }
 
-/// Returns this thread's last message: text in UTF-8 that ends with a zero byte, valid until the next failure of a
-/// function of the interface on this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_last_message() -> *const c_char {
     let kept = MESSAGE.try_with(|last| {
@@ -98,17 +98,65 @@ pub extern "C" fn cbvh_last_message() -> *const c_char {
 }
 
 /// The number of the binary interface, which is part of the name of the shared library: `build.rs` has it, too.
-pub(crate) const ABI: u32 = 0;
+pub const ABI: u32 = 0;
 
-/// `cbvh_abi`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_abi(abi: *mut u32) -> i32 {
+    // SAFETY: the header asks for it.
+    entry(|| unsafe { write("abi", abi, || Ok(ABI)) })
+}
+
+/// Writes one value, which is made after its place was checked.
+///
+/// # Safety
+/// As for `One::new`.
+pub(crate) unsafe fn write<T: Copy>(
+    name: &str,
+    to: *mut T,
+    make: impl FnOnce() -> Result<T, Failure>,
+) -> Result<(), Failure> {
+    // SAFETY: the caller vouches for it.
+    let mut out = unsafe { One::new(name, to) }?;
+    out.set(make()?);
+    Ok(())
+}
+
+/// Makes a value, and writes a handle of it, which is 0 until then.
+///
+/// # Safety
+/// As for `One::new`.
+pub(crate) unsafe fn hand_out<T: Clone, H: Plain + From<u64>>(
+    (name, handle): (&str, *mut H),
+    table: &Table<T>,
+    make: impl FnOnce() -> Result<T, Failure>,
+) -> i32 {
     entry(|| {
-        // SAFETY: the header asks for it.
-        unsafe { One::new("abi", abi) }?.set(ABI);
+        // SAFETY: the caller vouches for it.
+        let mut out = unsafe { One::new(name, handle) }?;
+        out.set(H::NONE);
+        out.set(table.insert(make()?).into());
         Ok(())
     })
 }
+
+/// Defines a family of functions. First come the arguments that all of them start with, and the question that is made of
+/// these: it has a method `each`. Each entry then defines a function: its name, its own arguments, the type of its answers,
+/// and what it passes to `each` after the pointer to the answers.
+macro_rules! questions {
+    ($common:tt => $asked:expr; $($name:ident $own:tt -> $row:ty: $($how:expr),+;)*) => { $(
+        crate::entry::question! { $name $common $own $row, $asked, $($how),+ }
+    )* };
+}
+macro_rules! question {
+    ($name:ident ($($common:tt)*) ($($own:tt)*) $row:ty, $asked:expr, $($how:expr),+) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name($($common)* $($own)* answers: *mut $row) -> i32 {
+            // SAFETY: the header asks for it.
+            unsafe { $asked.each(answers, $($how),+) }
+        }
+    };
+}
+pub(crate) use {question, questions};
 
 #[cfg(test)]
 mod tests {

@@ -3,25 +3,31 @@
 use crate::status::{Failure, Status};
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
+use std::ptr;
 
-/// Structures of C that may have any bytes, as all numbers may.
+/// Types of C that may have any bytes, as all numbers may.
 ///
 /// # Safety
 /// Every pattern of bytes is a valid value of the type.
-pub(crate) unsafe trait Plain: Copy {}
+pub(crate) unsafe trait Plain: Copy {
+    /// What stands where there is no value: NaN or 0.
+    const NONE: Self;
+}
 
-// SAFETY: all patterns of bytes are numbers.
-unsafe impl Plain for u8 {}
-// SAFETY: as above.
-unsafe impl Plain for u32 {}
-// SAFETY: as above.
-unsafe impl Plain for u64 {}
-// SAFETY: as above.
-unsafe impl Plain for f64 {}
-// SAFETY: as above.
-unsafe impl Plain for [f64; 3] {}
-// SAFETY: as above.
-unsafe impl Plain for [u32; 3] {}
+macro_rules! plain {
+    ($($type:ty: $none:expr),*) => { $(
+        // SAFETY: all patterns of bytes are numbers, and pointers are numbers until they are followed.
+        unsafe impl Plain for $type {
+            const NONE: Self = $none;
+        }
+    )* };
+}
+plain!(u8: 0, u32: 0, i32: 0, u64: 0, usize: 0, f64: f64::NAN, *const c_char: ptr::null());
+
+// SAFETY: there are no bytes between the elements.
+unsafe impl<T: Plain, const N: usize> Plain for [T; N] {
+    const NONE: Self = [T::NONE; N];
+}
 
 /// Refuses a pointer that `count` values of `T` cannot be at. No values may be anywhere.
 pub(crate) fn check_pointer<T>(name: &str, pointer: *const T, count: usize) -> Result<(), Failure> {
@@ -60,6 +66,27 @@ pub(crate) unsafe fn array<'a, T: Plain>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
+/// Reads an array into memory that is used again and again, and makes something of each element.
+///
+/// # Safety
+/// As for `array`.
+pub(crate) unsafe fn each<'a, T: Plain, R>(
+    name: &str,
+    pointer: *const T,
+    count: usize,
+    into: &'a mut Vec<R>,
+    make: impl Fn(&T) -> Result<R, Failure>,
+) -> Result<&'a [R], Failure> {
+    // SAFETY: the caller vouches for it.
+    let values = unsafe { array(name, pointer, count) }?;
+    into.clear();
+    reserve(name, count, into)?;
+    for (number, value) in values.iter().enumerate() {
+        into.push(make(value).map_err(|failure| failure.at(format_args!("{name}[{number}]")))?);
+    }
+    Ok(into)
+}
+
 /// Reads one value.
 ///
 /// # Safety
@@ -70,22 +97,15 @@ pub(crate) unsafe fn value<T: Plain>(name: &str, pointer: *const T) -> Result<T,
     Ok(unsafe { pointer.read() })
 }
 
-/// Structures that start with their size, so that later versions may have more fields.
+/// Reads options, a structure that starts with its size, so that later versions may have more fields. All fields are 0
+/// where there are no options.
 ///
 /// # Safety
-/// As for `Plain`, and the first field is a `usize`.
-pub(crate) unsafe trait Options: Plain {
-    /// What a null pointer stands for.
-    const DEFAULT: Self;
-}
-
-/// Reads options, which are the defaults where there are none.
-///
-/// # Safety
-/// If the pointer is aligned and not null, as many bytes are there as its first field says.
-pub(crate) unsafe fn options<T: Options>(name: &str, pointer: *const T) -> Result<T, Failure> {
+/// The first field of `T` is a `usize`. If the pointer is aligned and not null, as many bytes are there as it says.
+pub(crate) unsafe fn options<T: Plain>(name: &str, pointer: *const T) -> Result<T, Failure> {
     if pointer.is_null() {
-        return Ok(T::DEFAULT);
+        // SAFETY: any bytes are a value.
+        return Ok(unsafe { std::mem::zeroed() });
     }
     check_pointer(name, pointer, 1)?;
     // SAFETY: the first field is a size, which every version of the structure has.
@@ -113,18 +133,6 @@ pub(crate) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a 
     })
 }
 
-/// Reads text, or nothing from a null pointer.
-///
-/// # Safety
-/// As for `text`.
-pub(crate) unsafe fn optional_text<'a>(
-    name: &str,
-    pointer: *const c_char,
-) -> Result<Option<&'a str>, Failure> {
-    // SAFETY: the caller vouches for it.
-    if pointer.is_null() { Ok(None) } else { unsafe { text(name, pointer) }.map(Some) }
-}
-
 /// Reads the path of a file: any bytes where the system has such paths, else UTF-8.
 ///
 /// # Safety
@@ -146,6 +154,14 @@ pub(crate) unsafe fn path(name: &str, pointer: *const c_char) -> Result<PathBuf,
     }
 }
 
+/// Reads something that a pointer leads to, by `read`, or nothing from a null pointer.
+pub(crate) fn optional<T, R>(
+    pointer: *const T,
+    read: impl FnOnce(*const T) -> Result<R, Failure>,
+) -> Result<Option<R>, Failure> {
+    if pointer.is_null() { Ok(None) } else { read(pointer).map(Some) }
+}
+
 /// Reads a choice of no and yes.
 pub(crate) fn flag(name: &str, value: i32) -> Result<bool, Failure> {
     match value {
@@ -155,57 +171,10 @@ pub(crate) fn flag(name: &str, value: i32) -> Result<bool, Failure> {
     }
 }
 
-/// Reads three numbers.
-///
-/// # Safety
-/// As for `array`, of three numbers.
-pub(crate) unsafe fn triple(name: &str, pointer: *const f64) -> Result<[f64; 3], Failure> {
-    // SAFETY: the caller vouches for it.
-    let found = unsafe { array(name, pointer, 3) }?;
-    Ok([found[0], found[1], found[2]])
-}
-
 /// Makes room for as many more elements, or fails where memory runs out.
 pub(crate) fn reserve<T>(name: &str, more: usize, of: &mut Vec<T>) -> Result<(), Failure> {
     of.try_reserve(more).map_err(|_| {
         let bytes = more.saturating_mul(size_of::<T>());
         Failure::new(Status::Limit, format!("{name}: expected {bytes} bytes of memory, found less"))
     })
-}
-
-/// Reads points, of which something is asked within a distance, into memory that is used again and again.
-///
-/// # Safety
-/// As for `rows_of_three`.
-pub(crate) unsafe fn points_within(
-    points: *const f64,
-    count: usize,
-    within: f64,
-    into: &mut Vec<[f64; 3]>,
-) -> Result<(), Failure> {
-    // SAFETY: the caller vouches for it.
-    unsafe { rows_of_three("points", points, count, into) }?;
-    // Up to infinity.
-    if within >= 0.0 { Ok(()) } else { Err(Failure::argument("within", "a distance of at least 0", within)) }
-}
-
-/// Reads rows of three values each into memory that is used again and again.
-///
-/// # Safety
-/// As for `array`, of three times as many values.
-pub(crate) unsafe fn rows_of_three<T: Plain>(
-    name: &str,
-    pointer: *const T,
-    count: usize,
-    into: &mut Vec<[T; 3]>,
-) -> Result<(), Failure>
-where
-    [T; 3]: Plain,
-{
-    // SAFETY: the caller vouches for it; three values in an array are aligned as one is.
-    let rows = unsafe { array(name, pointer.cast::<[T; 3]>(), count) }?;
-    into.clear();
-    reserve(name, count, into)?;
-    into.extend_from_slice(rows);
-    Ok(())
 }

@@ -1,7 +1,8 @@
 //! The C interface of cbvh: what `include/cbvh.h` declares, function by function.
 //!
-//! The header documents every function for its users, and is written by hand; `tests/header.py` compares it with what
-//! is here. Below the functions there are four ideas:
+//! The header documents every function for its users, and says what callers must ensure; it is written by hand, and
+//! `tests/header.py` compares it with what is here. Functions that differ in little are lines of `questions!`. Below the
+//! functions there are four ideas:
 //!
 //! - `entry`: nothing unwinds out of a function; it returns a status, and a message stays with the thread.
 //! - `table`: a handle is a number, looked up in a table, so that a freed or foreign one is recognised and never
@@ -15,8 +16,6 @@ mod bake;
 mod cores;
 mod entry;
 mod input;
-#[cfg(test)]
-mod layout;
 mod mesh;
 mod motions;
 mod output;

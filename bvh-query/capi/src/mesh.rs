@@ -1,32 +1,16 @@
 //! Meshes: opened files, whole or object by object.
 
 use crate::at_hand::MESHES;
-use crate::entry::{caller_floats, entry};
-use crate::input::{array, path, text};
-use crate::output::{self, List, One, Room};
+use crate::entry::{caller_floats, entry, hand_out, write};
+use crate::input::{self, array, text};
+use crate::output::{self, List, One};
 use crate::status::{Failure, Status};
 use crate::types::{MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, READ};
-use bvh_query::{Bvh, OpenError, OwnedShape, ReadAhead};
+use bvh_query::{Bvh, OwnedShape, ReadAhead};
 use std::ffi::{c_char, c_void};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-
-/// Room for the handle of a new mesh, which holds no handle until there is one.
-///
-/// # Safety
-/// As for `One::new`.
-pub(crate) unsafe fn new_mesh<'a>(name: &str, out: *mut MeshHandle) -> Result<One<'a, MeshHandle>, Failure> {
-    // SAFETY: the caller vouches for it.
-    let mut out = unsafe { One::new(name, out) }?;
-    out.set(MeshHandle { id: 0 });
-    Ok(out)
-}
-
-pub(crate) fn hand_out(mut out: One<'_, MeshHandle>, shape: OwnedShape) -> Result<(), Failure> {
-    out.set(MeshHandle { id: MESHES.insert(shape)? });
-    Ok(())
-}
 
 /// Refuses what is there and is no regular file: the system would wait for somebody to write to a pipe.
 pub(crate) fn check_regular(file: &Path) -> Result<(), Failure> {
@@ -44,34 +28,38 @@ fn damaged(error: bvh_query::FormatError) -> Failure {
     Failure::new(Status::Damaged, format!("bytes: {error}"))
 }
 
-/// `cbvh_mesh_open`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_open(file: *const c_char, mode: i32, mesh: *mut MeshHandle) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let (out, file) = unsafe { (new_mesh("mesh", mesh)?, path("path", file)?) };
-        check_regular(&file)?;
-        // SAFETY: the header asks that nobody changes a mapped file.
-        let map = |read_ahead| unsafe { Bvh::map_with(&file, read_ahead) };
-        let opened: Result<Bvh, OpenError> = match mode {
-            MAP => map(ReadAhead::Usual),
-            MAP_SPARSE => map(ReadAhead::Sparse),
-            MAP_WHOLE => map(ReadAhead::Whole),
-            READ => Bvh::read(&file),
-            _ => return Err(Failure::argument("mode", "a number of cbvh_open_mode, 0 to 3", mode)),
-        };
-        hand_out(out, opened?.into())
-    })
+pub unsafe extern "C" fn cbvh_mesh_open(path: *const c_char, mode: i32, mesh: *mut MeshHandle) -> i32 {
+    // SAFETY: the header asks for it, and that nobody changes a mapped file.
+    unsafe {
+        hand_out(("mesh", mesh), &MESHES, || {
+            let file = input::path("path", path)?;
+            check_regular(&file)?;
+            let opened = match mode {
+                MAP => Bvh::map_with(&file, ReadAhead::Usual),
+                MAP_SPARSE => Bvh::map_with(&file, ReadAhead::Sparse),
+                MAP_WHOLE => Bvh::map_with(&file, ReadAhead::Whole),
+                READ => Bvh::read(&file),
+                _ => return Err(Failure::argument("mode", "a number of cbvh_open_mode, 0 to 3", mode)),
+            };
+            Ok(opened?.into())
+        })
+    }
 }
 
-/// `cbvh_mesh_from_bytes`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_from_bytes(bytes: *const u8, size: usize, mesh: *mut MeshHandle) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let (out, bytes) = unsafe { (new_mesh("mesh", mesh)?, array("bytes", bytes, size)?) };
-        hand_out(out, Bvh::from_bytes(bytes.to_vec()).map_err(damaged)?.into())
-    })
+pub unsafe extern "C" fn cbvh_mesh_from_bytes(
+    bytes: *const c_void,
+    size: usize,
+    mesh: *mut MeshHandle,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe {
+        hand_out(("mesh", mesh), &MESHES, || {
+            let bytes = array("bytes", bytes.cast::<u8>(), size)?;
+            Ok(Bvh::from_bytes(bytes.to_vec()).map_err(damaged)?.into())
+        })
+    }
 }
 
 /// The function that tells a caller that something of it is no longer used.
@@ -124,29 +112,28 @@ pub(crate) unsafe fn call_release(release: Release, user: *mut c_void) {
     }
 }
 
-/// `cbvh_mesh_borrow_bytes`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_borrow_bytes(
-    bytes: *const u8,
+    bytes: *const c_void,
     size: usize,
-    release: Release,
+    release: Option<unsafe extern "C" fn(user: *mut c_void)>,
     user: *mut c_void,
     mesh: *mut MeshHandle,
 ) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let (out, bytes) = unsafe { (new_mesh("mesh", mesh)?, array("bytes", bytes, size)?) };
-        let state = Arc::new(AtomicU8::new(OPENING));
-        let borrowed = Borrowed { start: bytes.as_ptr(), size, release, user, state: state.clone() };
-        let bvh = Bvh::from_bytes(borrowed).map_err(damaged)?;
-        hand_out(out, bvh.into())?;
-        // A large file has been copied to large pages by now.
-        if state.swap(TAKEN, Ordering::AcqRel) == DROPPED {
-            // SAFETY: as in `drop`.
-            unsafe { call_release(release, user) };
-        }
-        Ok(())
-    })
+    // SAFETY: the header asks for it.
+    unsafe {
+        hand_out(("mesh", mesh), &MESHES, || {
+            let start = array("bytes", bytes.cast::<u8>(), size)?.as_ptr();
+            let state = Arc::new(AtomicU8::new(OPENING));
+            let borrowed = Borrowed { start, size, release, user, state: state.clone() };
+            let bvh = Bvh::from_bytes(borrowed).map_err(damaged)?;
+            // Nothing can fail after this. A large file has been copied to large pages by now.
+            if state.swap(TAKEN, Ordering::AcqRel) == DROPPED {
+                call_release(release, user);
+            }
+            Ok(bvh.into())
+        })
+    }
 }
 
 fn no_object(objects: usize, number: usize) -> Failure {
@@ -158,36 +145,28 @@ fn ask(mesh: MeshHandle, ask: impl FnOnce(OwnedShape) -> Result<(), Failure>) ->
     entry(|| ask(MESHES.share("mesh", mesh.id)?))
 }
 
-/// `cbvh_mesh_clone`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_clone(mesh: MeshHandle, other: *mut MeshHandle) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let out = unsafe { new_mesh("other", other) }?;
-        hand_out(out, MESHES.share("mesh", mesh.id)?)
-    })
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("other", other), &MESHES, || MESHES.share("mesh", mesh.id)) }
 }
 
-/// `cbvh_mesh_free`.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_mesh_free(mesh: MeshHandle) -> i32 {
-    entry(|| if mesh.id == 0 { Ok(()) } else { MESHES.remove("mesh", mesh.id).map(drop) })
+    entry(|| MESHES.free("mesh", mesh.id))
 }
 
-/// `cbvh_mesh_object`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_object(mesh: MeshHandle, number: usize, object: *mut MeshHandle) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let out = unsafe { new_mesh("object", object) }?;
+    let found = || {
         let bvh = MESHES.share("mesh", mesh.id)?.bvh().clone();
         let objects = bvh.objects().len();
-        let object = OwnedShape::object(bvh, number);
-        hand_out(out, object.ok_or_else(|| no_object(objects, number))?)
-    })
+        OwnedShape::object(bvh, number).ok_or_else(|| no_object(objects, number))
+    };
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("object", object), &MESHES, found) }
 }
 
-/// `cbvh_mesh_find`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_find(mesh: MeshHandle, name: *const c_char, number: *mut usize) -> i32 {
     ask(mesh, |shape| {
@@ -201,17 +180,12 @@ pub unsafe extern "C" fn cbvh_mesh_find(mesh: MeshHandle, name: *const c_char, n
     })
 }
 
-/// `cbvh_mesh_object_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_object_count(mesh: MeshHandle, count: *mut usize) -> i32 {
-    ask(mesh, |shape| {
-        // SAFETY: the header asks for it.
-        unsafe { One::new("count", count) }?.set(shape.bvh().objects().len());
-        Ok(())
-    })
+    // SAFETY: the header asks for it.
+    ask(mesh, |shape| unsafe { write("count", count, || Ok(shape.bvh().objects().len())) })
 }
 
-/// `cbvh_mesh_object_name`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_object_name(
     mesh: MeshHandle,
@@ -224,21 +198,16 @@ pub unsafe extern "C" fn cbvh_mesh_object_name(
         let objects = shape.bvh().objects();
         let object = objects.get(number).ok_or_else(|| no_object(objects.len(), number))?;
         // SAFETY: the header asks for it.
-        unsafe { output::text("buffer", object.name(), buffer, capacity, length) }
+        unsafe { output::text(object.name(), buffer, capacity, length) }
     })
 }
 
-/// `cbvh_mesh_triangle_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_triangle_count(mesh: MeshHandle, count: *mut u64) -> i32 {
-    ask(mesh, |shape| {
-        // SAFETY: the header asks for it.
-        unsafe { One::new("count", count) }?.set(shape.shape().triangles());
-        Ok(())
-    })
+    // SAFETY: the header asks for it.
+    ask(mesh, |shape| unsafe { write("count", count, || Ok(shape.shape().triangles())) })
 }
 
-/// `cbvh_mesh_duplicates`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_duplicates(
     mesh: MeshHandle,
@@ -250,44 +219,31 @@ pub unsafe extern "C" fn cbvh_mesh_duplicates(
     ask(mesh, |shape| {
         // SAFETY: the header asks for it.
         let mut list = unsafe { List::new("triangles", triangles, capacity, count) }?;
-        shape.bvh().duplicates_of(triangle)?.for_each(|id| list.push(id));
+        list.add(shape.bvh().duplicates_of(triangle)?);
         list.finish()
     })
 }
 
-/// `cbvh_mesh_bytes`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_mesh_bytes(
     mesh: MeshHandle,
-    buffer: *mut u8,
+    buffer: *mut c_void,
     capacity: usize,
     size: *mut usize,
 ) -> i32 {
-    ask(mesh, |shape| {
-        let bytes = shape.bvh().bytes();
-        // SAFETY: the header asks for it.
-        let (mut size, room) = unsafe { (One::new("size", size)?, Room::new("buffer", buffer, capacity)?) };
-        size.set(bytes.len());
-        room.fill(&bytes[..bytes.len().min(capacity)]);
-        if bytes.len() <= capacity {
-            return Ok(());
-        }
-        let message = format!("buffer: expected room for {} bytes, found room for {capacity}", bytes.len());
-        Err(Failure::new(Status::BufferTooSmall, message))
-    })
+    // SAFETY: the header asks for it.
+    ask(mesh, |shape| unsafe { output::bytes(shape.bvh().bytes(), buffer.cast(), capacity, size) })
 }
 
-/// `cbvh_mesh_save`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, file: *const c_char) -> i32 {
+pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, path: *const c_char) -> i32 {
     ask(mesh, |shape| {
         // SAFETY: the header asks for it.
-        let file = unsafe { path("path", file) }?;
+        let file = unsafe { input::path("path", path) }?;
         Ok(bvh_bake::write_atomically(&file, shape.bvh().bytes())?)
     })
 }
 
-/// `cbvh_mesh_validate`.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_mesh_validate(mesh: MeshHandle) -> i32 {
     ask(mesh, |shape| Ok(shape.bvh().validate()?))

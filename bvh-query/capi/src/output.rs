@@ -31,11 +31,28 @@ impl<T: Copy> Room<'_, T> {
         }
     }
 
-    /// Writes the first values. Beyond the room nothing is written.
-    pub(crate) fn fill(&self, values: &[T]) {
+    /// Writes what `row` makes of values, from the first on, up to a failure. Beyond the room nothing is written.
+    pub(crate) fn fill<V, E: Into<Failure>>(
+        &mut self,
+        values: impl IntoIterator<Item = Result<V, E>>,
+        row: impl Fn(V) -> T,
+    ) -> Result<(), Failure> {
+        for (index, value) in values.into_iter().enumerate() {
+            self.set(index, row(value.map_err(Into::into)?));
+        }
+        Ok(())
+    }
+
+    /// Writes the first values, all at once. Beyond the room nothing is written.
+    fn copy(&mut self, values: &[T]) {
         let count = values.len().min(self.count);
         // SAFETY: that many values are there and fit; the memory may overlap with anything.
         unsafe { std::ptr::copy(values.as_ptr(), self.start, count) };
+    }
+
+    fn too_small(&self, name: &str, needed: usize, unit: &str) -> Failure {
+        let message = format!("{name}: expected room for {needed} {unit}, found room for {}", self.count);
+        Failure::new(Status::BufferTooSmall, message)
     }
 }
 
@@ -82,20 +99,19 @@ impl<T: Copy> List<'_, T> {
         Ok(Self { name, room: room?, count, written: 0 })
     }
 
-    pub(crate) fn push(&mut self, value: T) {
-        self.room.set(self.written, value);
-        self.written += 1;
+    /// Adds values, of which there are as many as the list says in the end.
+    pub(crate) fn add(&mut self, values: impl IntoIterator<Item = impl Into<T>>) {
+        for value in values {
+            self.room.set(self.written, value.into());
+            self.written += 1;
+        }
     }
 
     /// Writes how many values there are, and fails if there was too little room.
     pub(crate) fn finish(mut self) -> Result<(), Failure> {
         self.count.set(self.written);
-        if self.written <= self.room.count {
-            return Ok(());
-        }
-        let (name, written, count) = (self.name, self.written, self.room.count);
-        let message = format!("{name}: expected room for {written} elements, found room for {count}");
-        Err(Failure::new(Status::BufferTooSmall, message))
+        let fits = self.written <= self.room.count;
+        if fits { Ok(()) } else { Err(self.room.too_small(self.name, self.written, "elements")) }
     }
 }
 
@@ -129,11 +145,24 @@ impl<T: Copy> Lists<'_, T> {
     }
 
     /// Adds the list of a question, of which there are `count` values and no fewer of them here than fit.
-    pub(crate) fn add(&mut self, question: usize, values: impl IntoIterator<Item = T>, count: usize) {
+    pub(crate) fn add(&mut self, question: usize, values: Vec<impl Into<T>>, count: usize) {
         self.counts.set(question, count);
         let before = self.list.written;
-        values.into_iter().take(self.room()).for_each(|value| self.list.push(value));
+        self.list.add(values.into_iter().take(self.room()));
         self.list.written = before + count;
+    }
+
+    /// Adds the lists of all questions, and finishes.
+    pub(crate) fn finish_with<V: Into<T>, E: Into<Failure>>(
+        mut self,
+        lists: impl IntoIterator<Item = Result<Vec<V>, E>>,
+    ) -> Result<(), Failure> {
+        for (question, values) in lists.into_iter().enumerate() {
+            let values = values.map_err(Into::into)?;
+            let count = values.len();
+            self.add(question, values, count);
+        }
+        self.finish()
     }
 
     /// Writes how many values there are, and fails if there was too little room.
@@ -142,12 +171,28 @@ impl<T: Copy> Lists<'_, T> {
     }
 }
 
+/// Writes bytes into a caller's buffer, and how many there are.
+///
+/// # Safety
+/// As for `List::new`.
+pub(crate) unsafe fn bytes(
+    of: &[u8],
+    buffer: *mut u8,
+    capacity: usize,
+    size: *mut usize,
+) -> Result<(), Failure> {
+    // SAFETY: the caller vouches for it.
+    let (mut size, mut room) = unsafe { (One::new("size", size)?, Room::new("buffer", buffer, capacity)?) };
+    size.set(of.len());
+    room.copy(of);
+    if of.len() <= capacity { Ok(()) } else { Err(room.too_small("buffer", of.len(), "bytes")) }
+}
+
 /// Writes text into a caller's buffer: its bytes, and a zero byte that is not counted.
 ///
 /// # Safety
 /// As for `List::new`.
 pub(crate) unsafe fn text(
-    name: &'static str,
     of: &str,
     buffer: *mut c_char,
     capacity: usize,
@@ -155,17 +200,12 @@ pub(crate) unsafe fn text(
 ) -> Result<(), Failure> {
     // SAFETY: the caller vouches for it.
     let (mut count, mut room) =
-        unsafe { (One::new("length", length)?, Room::new(name, buffer.cast::<u8>(), capacity)?) };
+        unsafe { (One::new("length", length)?, Room::new("buffer", buffer.cast::<u8>(), capacity)?) };
     count.set(of.len());
     // What does not fit is cut between characters, so that text ends in the buffer whatever its size.
     let most = of.len().min(capacity.saturating_sub(1));
     let fits = (0..=most).rev().find(|&end| of.is_char_boundary(end)).unwrap_or(0);
-    of.bytes().take(fits).enumerate().for_each(|(at, byte)| room.set(at, byte));
+    room.copy(&of.as_bytes()[..fits]);
     room.set(fits, 0);
-    if of.len() < capacity {
-        return Ok(());
-    }
-    let needed = of.len() + 1;
-    let message = format!("{name}: expected room for {needed} bytes, found room for {capacity}");
-    Err(Failure::new(Status::BufferTooSmall, message))
+    if of.len() < capacity { Ok(()) } else { Err(room.too_small("buffer", of.len() + 1, "bytes")) }
 }

@@ -1,11 +1,11 @@
 //! Questions about two meshes in many poses.
 
 use crate::at_hand::MESHES;
-use crate::entry::entry;
-use crate::input::{options, reserve};
-use crate::output::{Lists, One, Room};
-use crate::poses::{pose, poses};
-use crate::queriers::{Asker, QUERIERS};
+use crate::entry::{entry, questions, write};
+use crate::input::{self, reserve};
+use crate::output::{Lists, Room};
+use crate::poses;
+use crate::queriers::{self, Asker};
 use crate::status::Failure;
 use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle, relation};
 use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
@@ -21,33 +21,52 @@ struct Question {
 }
 
 impl Question {
-    /// Checks what is given, and calls `ask`.
+    /// Checks what is given, and calls `ask`, with a batch if all cores may be used.
     ///
     /// # Safety
-    /// As for `poses`.
+    /// As for `poses::read_many`.
     unsafe fn ask(
         &self,
         ask: impl FnOnce(&mut Querier, Option<Batch<'_>>, [Shape<'_>; 2], &[Pose]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let mut held = QUERIERS.hold("querier", self.querier.id)?;
-        let asker = &mut **held.value()?;
-        let parallel = asker.uses_all_cores();
-        let Asker { querier, budget, at_hand, probes, .. } = asker;
-        let (a, b) = at_hand.pair(self.a, self.b)?;
-        // SAFETY: the caller vouches for it.
-        unsafe { poses("poses", self.poses, self.count, &mut probes.poses) }?;
-        let batch = parallel.then(|| {
-            let mut batch = Batch::with_backend(a, b, querier.backend());
-            batch.set_budget(*budget);
-            batch
-        });
-        ask(querier, batch, [a, b], &probes.poses)
+        queriers::with(self.querier, |asker| {
+            let parallel = asker.uses_all_cores();
+            let Asker { querier, budget, at_hand, probes, .. } = asker;
+            let (a, b) = at_hand.pair(self.a, self.b)?;
+            // SAFETY: the caller vouches for it.
+            let poses = unsafe { poses::read_many("poses", self.poses, self.count, &mut probes.poses) }?;
+            let batch = parallel.then(|| batch(a, b, querier, *budget));
+            ask(querier, batch, [a, b], poses)
+        })
     }
 
-    /// Asks about each pose, and writes an answer for each.
+    /// Asks about each pose, and writes an answer for each. Only exact questions are for all cores.
     ///
     /// # Safety
-    /// As for `poses`, and for `Room::new`.
+    /// As for `poses::read_many` and `Room::new`.
+    unsafe fn answer<T, R: Copy>(
+        &self,
+        (answers, is_exact): (*mut R, bool),
+        all: impl FnOnce(&Batch<'_>, &[Pose]) -> Result<Vec<T>, QueryError>,
+        one: impl Fn(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError>,
+        row: impl Fn(T) -> R,
+    ) -> Result<(), Failure> {
+        // SAFETY: the caller vouches for it.
+        unsafe {
+            self.ask(|querier, batch, meshes, poses| {
+                let mut room = Room::new("answers", answers, poses.len())?;
+                match batch.filter(|_| is_exact) {
+                    Some(batch) => room.fill(all(&batch, poses)?.into_iter().map(Ok::<_, QueryError>), row),
+                    None => room.fill(poses.iter().map(|pose| one(querier, meshes, pose)), row),
+                }
+            })
+        }
+    }
+
+    /// Asks an exact question, as `answer` does.
+    ///
+    /// # Safety
+    /// As for `answer`.
     unsafe fn each<T, R: Copy>(
         &self,
         answers: *mut R,
@@ -55,76 +74,29 @@ impl Question {
         one: impl Fn(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError>,
         row: impl Fn(T) -> R,
     ) -> i32 {
-        entry(|| {
-            // SAFETY: the caller vouches for it.
-            unsafe {
-                self.ask(|querier, batch, meshes, poses| {
-                    let mut room = Room::new("answers", answers, poses.len())?;
-                    if let Some(batch) = batch {
-                        let answers = all(&batch, poses)?.into_iter().enumerate();
-                        answers.for_each(|(number, answer)| room.set(number, row(answer)));
-                        return Ok(());
-                    }
-                    for (number, pose) in poses.iter().enumerate() {
-                        room.set(number, row(one(querier, meshes, pose)?));
-                    }
-                    Ok(())
-                })
-            }
-        })
+        // SAFETY: the caller vouches for it.
+        entry(|| unsafe { self.answer((answers, true), all, one, row) })
     }
 }
 
-/// `cbvh_collide`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_collide(
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    answers: *mut bool,
-) -> i32 {
-    let one = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], pose: &Pose| querier.collide(a, b, pose);
-    let question = Question { querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    unsafe { question.each(answers, |batch, poses| batch.collide(poses), one, |answer| answer) }
+/// Makes what asks about two meshes on all cores.
+pub(crate) fn batch<'a>(a: Shape<'a>, b: Shape<'a>, querier: &Querier, budget: u64) -> Batch<'a> {
+    let mut batch = Batch::with_backend(a, b, querier.backend());
+    batch.set_budget(budget);
+    batch
 }
 
-/// `cbvh_within`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_within(
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    d: f64,
-    answers: *mut bool,
-) -> i32 {
-    let one = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], pose: &Pose| querier.within(a, b, pose, d);
-    let question = Question { querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    unsafe { question.each(answers, |batch, poses| batch.within(poses, d), one, |answer| answer) }
+questions! {
+    (querier: QuerierHandle, a: MeshHandle, b: MeshHandle, poses: *const PoseRows, count: usize,)
+        => Question { querier, a, b, poses, count };
+    cbvh_collide() -> bool:
+        |batch, poses| batch.collide(poses), |querier, [a, b], pose| querier.collide(a, b, pose), bool::from;
+    cbvh_within(d: f64,) -> bool:
+        |batch, poses| batch.within(poses, d), |querier, [a, b], pose| querier.within(a, b, pose, d), bool::from;
+    cbvh_relations() -> i32:
+        |batch, poses| batch.relations(poses), |querier, [a, b], pose| querier.relation(a, b, pose), relation;
 }
 
-/// `cbvh_relations`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_relations(
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    answers: *mut i32,
-) -> i32 {
-    let one = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], pose: &Pose| querier.relation(a, b, pose);
-    let question = Question { querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    unsafe { question.each(answers, |batch, poses| batch.relations(poses), one, relation) }
-}
-
-/// `cbvh_distances`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_distances(
     querier: QuerierHandle,
@@ -132,30 +104,19 @@ pub unsafe extern "C" fn cbvh_distances(
     b: MeshHandle,
     poses: *const PoseRows,
     count: usize,
-    choices: *const DistanceChoices,
+    options: *const DistanceChoices,
     answers: *mut DistanceRow,
 ) -> i32 {
-    let question = Question { querier, a, b, poses, count };
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let choices = unsafe { options("options", choices) }?;
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let choices = input::options("options", options)?;
         let exactness = choices.read();
-        // SAFETY: the header asks for it.
-        unsafe {
-            question.ask(|querier, batch, [a, b], poses| {
-                let mut room = Room::new("answers", answers, poses.len())?;
-                // A batch knows exact distances only.
-                if let Some(batch) = batch.filter(|_| choices.is_exact()) {
-                    let answers = batch.distances(poses)?.into_iter().enumerate();
-                    answers.for_each(|(number, answer)| room.set(number, answer.into()));
-                    return Ok(());
-                }
-                for (number, pose) in poses.iter().enumerate() {
-                    room.set(number, querier.distance_with(a, b, pose, &exactness)?.into());
-                }
-                Ok(())
-            })
-        }
+        Question { querier, a, b, poses, count }.answer(
+            (answers, choices.is_exact()),
+            |batch, poses| batch.distances(poses),
+            |querier, [a, b], pose| querier.distance_with(a, b, pose, &exactness),
+            DistanceRow::from,
+        )
     })
 }
 
@@ -203,7 +164,6 @@ impl<T: Ord + Copy> Least<T> {
     }
 }
 
-/// `cbvh_contacts`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_contacts(
     querier: QuerierHandle,
@@ -217,33 +177,26 @@ pub unsafe extern "C" fn cbvh_contacts(
     count: *mut usize,
 ) -> i32 {
     let question = Question { querier, a, b, poses, count: pose_count };
-    entry(|| {
-        // SAFETY: the header asks for it.
-        unsafe {
-            question.ask(|querier, batch, [a, b], poses| {
-                let mut lists = Lists::new(("contacts", contacts, capacity, count), counts, poses.len())?;
-                if let Some(batch) = batch.filter(|_| poses.len() > 1) {
-                    for (number, found) in batch.contacts(poses)?.into_iter().enumerate() {
-                        let count = found.len();
-                        lists.add(number, found.into_iter().map(ContactRow::from), count);
-                    }
-                    return lists.finish();
-                }
-                for (number, pose) in poses.iter().enumerate() {
-                    let mut least = Least::new(lists.room());
-                    let visited = querier.visit_contacts(a, b, pose, |contact| least.add(contact));
-                    least.check()?;
-                    visited?;
-                    let (found, count) = least.finish();
-                    lists.add(number, found.into_iter().map(ContactRow::from), count);
-                }
-                lists.finish()
-            })
-        }
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        question.ask(|querier, batch, [a, b], poses| {
+            let mut lists = Lists::new(("contacts", contacts, capacity, count), counts, poses.len())?;
+            if let Some(batch) = batch.filter(|_| poses.len() > 1) {
+                return lists.finish_with(batch.contacts(poses)?.into_iter().map(Ok::<_, QueryError>));
+            }
+            for (number, pose) in poses.iter().enumerate() {
+                let mut least = Least::new(lists.room());
+                let visited = querier.visit_contacts(a, b, pose, |contact| least.add(contact));
+                least.check()?;
+                visited?;
+                let (found, count) = least.finish();
+                lists.add(number, found, count);
+            }
+            lists.finish()
+        })
     })
 }
 
-/// `cbvh_first_collision`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_first_collision(
     querier: QuerierHandle,
@@ -254,30 +207,25 @@ pub unsafe extern "C" fn cbvh_first_collision(
     number: *mut usize,
 ) -> i32 {
     let question = Question { querier, a, b, poses, count };
-    entry(|| {
-        // SAFETY: the header asks for it.
-        unsafe {
-            question.ask(|querier, batch, [a, b], poses| {
-                let mut out = One::new("number", number)?;
-                let mut first = None;
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        question.ask(|querier, batch, [a, b], poses| {
+            let first = || {
                 if let Some(batch) = batch {
-                    first = batch.first_collision(poses)?;
-                } else {
-                    for (number, pose) in poses.iter().enumerate() {
-                        if querier.collide(a, b, pose)? {
-                            first = Some(number);
-                            break;
-                        }
+                    return Ok(batch.first_collision(poses)?.unwrap_or(poses.len()));
+                }
+                for (number, pose) in poses.iter().enumerate() {
+                    if querier.collide(a, b, pose)? {
+                        return Ok(number);
                     }
                 }
-                out.set(first.unwrap_or(poses.len()));
-                Ok(())
-            })
-        }
+                Ok(poses.len())
+            };
+            write("number", number, first)
+        })
     })
 }
 
-/// `cbvh_displacement`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_displacement(
     b: MeshHandle,
@@ -285,14 +233,11 @@ pub unsafe extern "C" fn cbvh_displacement(
     to: *const PoseRows,
     bound: *mut f64,
 ) -> i32 {
-    entry(|| {
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
         let shape = MESHES.share("b", b.id)?;
-        // SAFETY: the header asks for it.
-        unsafe {
-            let (from, to) = (pose("from", from)?, pose("to", to)?);
-            One::new("bound", bound)?.set(displacement(&shape, &from, &to));
-        }
-        Ok(())
+        let (from, to) = (poses::read("from", from)?, poses::read("to", to)?);
+        write("bound", bound, || Ok(displacement(&shape, &from, &to)))
     })
 }
 

@@ -1,11 +1,10 @@
 //! Paths: motions between poses, screws, polylines, and functions of the caller.
 
 use crate::at_hand::MESHES;
-use crate::entry::{caller_floats, entry};
-use crate::input::{reserve, text, triple};
+use crate::entry::{caller_floats, entry, hand_out, write};
+use crate::input::{Plain, reserve, text, value};
 use crate::mesh::{Release, call_release};
-use crate::output::One;
-use crate::poses::{pose, poses};
+use crate::poses;
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{MeshHandle, PathHandle, PoseRows};
@@ -15,24 +14,24 @@ use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// All paths that are open.
-pub(crate) static PATHS: Table<Arc<PathValue>> = Table::new(Kind::Path);
+static PATHS: Table<Arc<PathValue>> = Table::new(Kind::Path);
 
-/// `cbvh_pose_function`.
-type PoseFunction = unsafe extern "C" fn(user: *mut c_void, t: f64, pose: *mut PoseRows) -> i32;
-/// `cbvh_sagitta_function`.
-type SagittaFunction = unsafe extern "C" fn(user: *mut c_void, radius: f64, t0: f64, t1: f64) -> f64;
+/// Writes the pose at a time.
+pub type PoseFunction = Option<unsafe extern "C" fn(user: *mut c_void, t: f64, pose: *mut PoseRows) -> i32>;
+/// Returns a bound of the sagitta between two times.
+pub type SagittaFunction =
+    Option<unsafe extern "C" fn(user: *mut c_void, radius: f64, t0: f64, t1: f64) -> f64>;
 
 /// What the handle of a path stands for.
 pub(crate) enum PathValue {
-    Motion(Box<Motion>),
-    Polyline(Polyline),
+    Known(Box<dyn RigidPath + Send + Sync>),
     Caller(CallerPath),
 }
 
 /// Functions of the caller.
 pub(crate) struct CallerPath {
-    pose: PoseFunction,
-    sagitta: SagittaFunction,
+    pose: unsafe extern "C" fn(*mut c_void, f64, *mut PoseRows) -> i32,
+    sagitta: unsafe extern "C" fn(*mut c_void, f64, f64, f64) -> f64,
     release: Release,
     user: *mut c_void,
 }
@@ -76,7 +75,7 @@ impl CallerPath {
 
     fn pose(&self, floats: FloatState, t: f64) -> Result<Pose, Failure> {
         // What the function leaves as it is, is no pose.
-        let mut found = PoseRows { rows: [f64::NAN; 12] };
+        let mut found = PoseRows::NONE;
         let into = &raw mut found;
         // SAFETY: the header asks for a function that may be called so.
         let code = unsafe { Self::call(floats, || (self.pose)(self.user, t, into)) };
@@ -144,8 +143,7 @@ impl AskedPath {
 impl RigidPath for AskedPath {
     fn pose(&self, t: f64) -> Pose {
         match &*self.path {
-            PathValue::Motion(motion) => motion.pose(t),
-            PathValue::Polyline(polyline) => polyline.pose(t),
+            PathValue::Known(path) => path.pose(t),
             // After a failure the answer does not matter, only that it comes soon: what stands still is soon decided.
             PathValue::Caller(_) if self.has_failed() => Pose::IDENTITY,
             PathValue::Caller(caller) => {
@@ -156,8 +154,7 @@ impl RigidPath for AskedPath {
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         match &*self.path {
-            PathValue::Motion(motion) => motion.sagitta(radius, t0, t1),
-            PathValue::Polyline(polyline) => polyline.sagitta(radius, t0, t1),
+            PathValue::Known(path) => path.sagitta(radius, t0, t1),
             PathValue::Caller(_) if self.has_failed() => 0.0,
             PathValue::Caller(caller) => {
                 let found = caller.sagitta(self.floats, radius, t0, t1);
@@ -170,35 +167,28 @@ impl RigidPath for AskedPath {
 /// Makes a path, and hands it out.
 ///
 /// # Safety
-/// As for `One::new`.
+/// As for `hand_out`.
 unsafe fn make(path: *mut PathHandle, make: impl FnOnce() -> Result<PathValue, Failure>) -> i32 {
-    entry(|| {
-        // SAFETY: the caller vouches for it.
-        let mut out = unsafe { One::new("path", path) }?;
-        out.set(PathHandle { id: 0 });
-        out.set(PathHandle { id: PATHS.insert(Arc::new(make()?))? });
-        Ok(())
-    })
+    // SAFETY: the caller vouches for it.
+    unsafe { hand_out(("path", path), &PATHS, || Ok(Arc::new(make()?))) }
 }
 
-/// `cbvh_path_between`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_path_between(
     start: *const PoseRows,
     end: *const PoseRows,
     path: *mut PathHandle,
 ) -> i32 {
-    let made = || {
-        // SAFETY: the header asks for it.
-        let (start, end) = unsafe { (pose("start", start)?, pose("end", end)?) };
-        let made = Motion::between(&start, &end).map_err(|error| Failure::from(error).at("start and end"));
-        made.map(|motion| PathValue::Motion(Box::new(motion)))
-    };
     // SAFETY: the header asks for it.
-    unsafe { make(path, made) }
+    unsafe {
+        make(path, || {
+            let (start, end) = (poses::read("start", start)?, poses::read("end", end)?);
+            let made = Motion::between(&start, &end);
+            Ok(PathValue::Known(Box::new(made.map_err(|error| Failure::from(error).at("start and end"))?)))
+        })
+    }
 }
 
-/// `cbvh_path_screw`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_path_screw(
     start: *const PoseRows,
@@ -208,59 +198,51 @@ pub unsafe extern "C" fn cbvh_path_screw(
     shift: f64,
     path: *mut PathHandle,
 ) -> i32 {
-    let made = || {
-        // SAFETY: the header asks for it.
-        let (start, point, direction) =
-            unsafe { (pose("start", start)?, triple("point", point)?, triple("direction", direction)?) };
-        Ok(PathValue::Motion(Box::new(Motion::screw(&start, point, direction, angle, shift)?)))
-    };
     // SAFETY: the header asks for it.
-    unsafe { make(path, made) }
+    unsafe {
+        make(path, || {
+            let start = poses::read("start", start)?;
+            let (point, direction) = (value("point", point.cast())?, value("direction", direction.cast())?);
+            Ok(PathValue::Known(Box::new(Motion::screw(&start, point, direction, angle, shift)?)))
+        })
+    }
 }
 
-/// `cbvh_path_polyline`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_path_polyline(
-    through: *const PoseRows,
+    poses: *const PoseRows,
     count: usize,
     path: *mut PathHandle,
 ) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe {
+        make(path, || {
+            let mut knots = Vec::new();
+            let made = Polyline::new(poses::read_many("poses", poses, count, &mut knots)?);
+            Ok(PathValue::Known(Box::new(made.map_err(|error| Failure::from(error).at("poses"))?)))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_path_from_functions(
+    pose: PoseFunction,
+    sagitta: SagittaFunction,
+    release: Option<unsafe extern "C" fn(user: *mut c_void)>,
+    user: *mut c_void,
+    path: *mut PathHandle,
+) -> i32 {
+    let missing = |name: &str| Failure::argument(name, "a function", "NULL");
     let made = || {
-        let mut knots = Vec::new();
-        // SAFETY: the header asks for it.
-        unsafe { poses("poses", through, count, &mut knots) }?;
-        let made = Polyline::new(&knots).map_err(|error| Failure::from(error).at("poses"));
-        made.map(PathValue::Polyline)
+        let pose = pose.ok_or_else(|| missing("pose"))?;
+        let sagitta = sagitta.ok_or_else(|| missing("sagitta"))?;
+        // A failure releases nothing: nothing can fail after this.
+        Ok(PathValue::Caller(CallerPath { pose, sagitta, release, user }))
     };
     // SAFETY: the header asks for it.
     unsafe { make(path, made) }
 }
 
-/// `cbvh_path_from_functions`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_path_from_functions(
-    pose_function: Option<PoseFunction>,
-    sagitta_function: Option<SagittaFunction>,
-    release: Release,
-    user: *mut c_void,
-    path: *mut PathHandle,
-) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let mut out = unsafe { One::new("path", path) }?;
-        out.set(PathHandle { id: 0 });
-        let missing = |name: &str| Failure::argument(name, "a function", "NULL");
-        let pose = pose_function.ok_or_else(|| missing("pose"))?;
-        let sagitta = sagitta_function.ok_or_else(|| missing("sagitta"))?;
-        // A failure releases nothing: the value is made only when there is a place for it.
-        let handle =
-            PATHS.insert_with(|| Arc::new(PathValue::Caller(CallerPath { pose, sagitta, release, user })))?;
-        out.set(PathHandle { id: handle });
-        Ok(())
-    })
-}
-
-/// `cbvh_callback_message`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_callback_message(message: *const c_char) -> i32 {
     entry(|| {
@@ -271,30 +253,30 @@ pub unsafe extern "C" fn cbvh_callback_message(message: *const c_char) -> i32 {
     })
 }
 
-/// `cbvh_path_free`.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_path_free(path: PathHandle) -> i32 {
-    entry(|| if path.id == 0 { Ok(()) } else { PATHS.remove("path", path.id).map(drop) })
+    entry(|| PATHS.free("path", path.id))
 }
 
-/// `cbvh_path_pose`.
+fn check_time(name: &str, t: f64, (from, expected): (f64, &str)) -> Result<(), Failure> {
+    if (from..=1.0).contains(&t) { Ok(()) } else { Err(Failure::argument(name, expected, t)) }
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_path_pose(path: PathHandle, t: f64, result: *mut PoseRows) -> i32 {
     entry(|| {
         let asked = AskedPath::new("path", path)?;
+        let pose = || {
+            check_time("t", t, (0.0, "a time from 0 to 1"))?;
+            let pose = asked.pose(t);
+            asked.failure()?;
+            Ok(PoseRows::from(&pose))
+        };
         // SAFETY: the header asks for it.
-        let mut out = unsafe { One::new("result", result) }?;
-        if !(0.0..=1.0).contains(&t) {
-            return Err(Failure::argument("t", "a time from 0 to 1", t));
-        }
-        let pose = asked.pose(t);
-        asked.failure()?;
-        out.set(PoseRows::from(&pose));
-        Ok(())
+        unsafe { write("result", result, pose) }
     })
 }
 
-/// `cbvh_path_reach`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_path_reach(
     b: MeshHandle,
@@ -305,17 +287,14 @@ pub unsafe extern "C" fn cbvh_path_reach(
 ) -> i32 {
     entry(|| {
         let (shape, asked) = (MESHES.share("b", b.id)?, AskedPath::new("path", path)?);
+        let reach = || {
+            check_time("t0", t0, (0.0, "a time from 0 to 1"))?;
+            check_time("t1", t1, (t0, "a time from t0 to 1"))?;
+            let reach = path_reach(&shape, &asked, t0, t1);
+            asked.failure()?;
+            Ok(reach)
+        };
         // SAFETY: the header asks for it.
-        let mut out = unsafe { One::new("bound", bound) }?;
-        if !(0.0..=1.0).contains(&t0) {
-            return Err(Failure::argument("t0", "a time from 0 to 1", t0));
-        }
-        if !(t0..=1.0).contains(&t1) {
-            return Err(Failure::argument("t1", "a time from t0 to 1", t1));
-        }
-        let reach = path_reach(&shape, &asked, t0, t1);
-        asked.failure()?;
-        out.set(reach);
-        Ok(())
+        unsafe { write("bound", bound, reach) }
     })
 }

@@ -1,13 +1,16 @@
-//! Questions about one mesh and many points, rays or segments.
+//! Questions about many points, rays or segments, and one mesh or all instances of a scene.
 
-use crate::entry::entry;
-use crate::input::{array, points_within, reserve};
+use crate::entry::{entry, questions};
+use crate::input::{each, optional};
 use crate::output::{Lists, Room};
-use crate::poses::pose_or_identity;
-use crate::queriers::{Asker, Probes, QUERIERS};
+use crate::poses;
+use crate::queriers::{self, Asker, Probes};
+use crate::scene;
 use crate::status::Failure;
-use crate::types::{ClosestRow, HitRow, MeshHandle, PoseRows, QuerierHandle, RayRow, SegmentRow, side};
-use bvh_query::{PlacedShape, ProbeBatch, Querier, QueryError, Ray};
+use crate::types::{
+    ClosestRow, HitRow, MeshHandle, PoseRows, QuerierHandle, RayRow, SceneHandle, SegmentRow, side,
+};
+use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, Scene, SceneError};
 
 /// A querier, a mesh, and where it stands in the frame of the probes.
 struct Question {
@@ -17,226 +20,159 @@ struct Question {
 }
 
 impl Question {
-    /// Checks what is given, reads the probes, and calls `ask`.
+    /// Checks what is given, reads the probes, and calls `ask`, with a batch if all cores may be used.
     ///
     /// # Safety
-    /// As for `pose_or_identity`.
-    unsafe fn ask(
+    /// As for `poses::read`.
+    unsafe fn ask<P>(
         &self,
-        read: impl FnOnce(&mut Probes) -> Result<(), Failure>,
-        ask: impl FnOnce(&mut Querier, Option<ProbeBatch<'_>>, PlacedShape<'_>, &Probes) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        let mut held = QUERIERS.hold("querier", self.querier.id)?;
-        let asker = &mut **held.value()?;
-        let parallel = asker.uses_all_cores();
-        let Asker { querier, budget, at_hand, probes, .. } = asker;
-        let shape = at_hand.one("mesh", self.mesh)?;
-        // SAFETY: the caller vouches for it.
-        let placed = shape.at(&unsafe { pose_or_identity("pose", self.pose) }?);
-        read(probes)?;
-        let batch = parallel.then(|| {
-            let mut batch = ProbeBatch::with_backend(placed, querier.backend());
-            batch.set_budget(*budget);
-            batch
-        });
-        ask(querier, batch, placed, probes)
+        read: impl FnOnce(&mut Probes) -> Result<&[P], Failure>,
+        ask: impl FnOnce(&mut Querier, Option<ProbeBatch<'_>>, PlacedShape<'_>, &[P]) -> Result<(), Failure>,
+    ) -> i32 {
+        let ask = |asker: &mut Asker| {
+            let parallel = asker.uses_all_cores();
+            let Asker { querier, budget, at_hand, probes, .. } = asker;
+            let shape = at_hand.one("mesh", self.mesh)?;
+            // SAFETY: the caller vouches for it.
+            let pose = optional(self.pose, |pose| unsafe { poses::read("pose", pose) })?;
+            let placed = shape.at(&pose.unwrap_or(Pose::IDENTITY));
+            let probes = read(probes)?;
+            let batch = parallel.then(|| {
+                let mut batch = ProbeBatch::with_backend(placed, querier.backend());
+                batch.set_budget(*budget);
+                batch
+            });
+            ask(querier, batch, placed, probes)
+        };
+        entry(|| queriers::with(self.querier, ask))
     }
 
     /// Asks about each probe, and writes an answer for each.
     ///
     /// # Safety
-    /// As for `pose_or_identity`, and for `Room::new`.
+    /// As for `poses::read` and `Room::new`.
     unsafe fn each<P: Copy, T, R: Copy>(
         &self,
-        (answers, read, probes): (
-            *mut R,
-            impl FnOnce(&mut Probes) -> Result<(), Failure>,
-            impl Fn(&Probes) -> &Vec<P>,
-        ),
+        answers: *mut R,
+        read: impl FnOnce(&mut Probes) -> Result<&[P], Failure>,
         all: impl FnOnce(&ProbeBatch<'_>, &[P]) -> Result<Vec<T>, QueryError>,
         one: impl Fn(&mut Querier, PlacedShape<'_>, P) -> Result<T, QueryError>,
         row: impl Fn(T) -> R,
     ) -> i32 {
-        let ask =
-            |querier: &mut Querier, batch: Option<ProbeBatch<'_>>, placed: PlacedShape<'_>, of: &Probes| {
-                let probes = probes(of);
-                // SAFETY: the caller vouches for it.
-                let mut room = unsafe { Room::new("answers", answers, probes.len()) }?;
-                if let Some(batch) = batch {
-                    let answers = all(&batch, probes)?.into_iter().enumerate();
-                    answers.for_each(|(number, answer)| room.set(number, row(answer)));
-                    return Ok(());
+        // SAFETY: the caller vouches for it.
+        unsafe {
+            self.ask(read, |querier, batch, placed, probes| {
+                let mut room = Room::new("answers", answers, probes.len())?;
+                match batch {
+                    Some(batch) => room.fill(all(&batch, probes)?.into_iter().map(Ok::<_, QueryError>), row),
+                    None => room.fill(probes.iter().map(|&probe| one(querier, placed, probe)), row),
                 }
-                for (number, probe) in probes.iter().enumerate() {
-                    room.set(number, row(one(querier, placed, *probe)?));
-                }
-                Ok(())
-            };
-        // SAFETY: as above.
-        entry(|| unsafe { self.ask(read, ask) })
+            })
+        }
     }
 }
 
-/// Reads points.
+/// A question about all instances of a scene.
+struct SceneQuestion(SceneHandle);
+
+impl SceneQuestion {
+    /// Asks about all probes, and writes an answer for each.
+    ///
+    /// # Safety
+    /// As for `Room::new`.
+    unsafe fn each<P: Copy, T, R: Copy>(
+        self,
+        answers: *mut R,
+        read: impl FnOnce(&mut Probes) -> Result<&[P], Failure>,
+        all: impl FnOnce(&mut Scene, &[P]) -> Result<Vec<T>, SceneError>,
+        row: impl Fn(T) -> R,
+    ) -> i32 {
+        scene::with(self.0, |scene| {
+            let mut probes = Probes::default();
+            let probes = read(&mut probes)?;
+            // SAFETY: the caller vouches for it.
+            let mut room = unsafe { Room::new("answers", answers, probes.len()) }?;
+            room.fill(all(scene, probes)?.into_iter().map(Ok::<_, SceneError>), row)
+        })
+    }
+}
+
+/// Reads points, of which something is asked within a distance.
 ///
 /// # Safety
 /// As for `array`, of three numbers per point.
 unsafe fn read_points(
-    points: *const f64,
-    count: usize,
-    within: f64,
-) -> impl FnOnce(&mut Probes) -> Result<(), Failure> {
-    // SAFETY: the caller vouches for it.
-    move |probes| unsafe { points_within(points, count, within, &mut probes.points) }
+    (points, count, within): (*const f64, usize, f64),
+    into: &mut Probes,
+) -> Result<&[[f64; 3]], Failure> {
+    // SAFETY: the caller vouches for it; three numbers in an array are aligned as one is.
+    let read =
+        unsafe { each("points", points.cast(), count, &mut into.points, |point: &[f64; 3]| Ok(*point)) }?;
+    // Up to infinity.
+    if within >= 0.0 {
+        Ok(read)
+    } else {
+        Err(Failure::argument("within", "a distance of at least 0", within))
+    }
 }
 
 /// Reads rays.
 ///
 /// # Safety
 /// As for `array`.
-pub(crate) unsafe fn rays(rays: *const RayRow, count: usize, into: &mut Vec<Ray>) -> Result<(), Failure> {
+unsafe fn read_rays(rays: *const RayRow, count: usize, into: &mut Probes) -> Result<&[Ray], Failure> {
     // SAFETY: the caller vouches for it.
-    let rows = unsafe { array("rays", rays, count) }?;
-    into.clear();
-    reserve("rays", count, into)?;
-    into.extend(rows.iter().map(Ray::from));
-    Ok(())
-}
-
-/// Reads rays of a question about one mesh.
-///
-/// # Safety
-/// As for `array`.
-unsafe fn read_rays(given: *const RayRow, count: usize) -> impl FnOnce(&mut Probes) -> Result<(), Failure> {
-    // SAFETY: the caller vouches for it.
-    move |probes| unsafe { rays(given, count, &mut probes.rays) }
+    unsafe { each("rays", rays, count, &mut into.rays, |ray| Ok(Ray::from(ray))) }
 }
 
 /// Reads segments.
 ///
 /// # Safety
 /// As for `array`.
-pub(crate) unsafe fn segments(
+unsafe fn read_segments(
     segments: *const SegmentRow,
     count: usize,
-    into: &mut Vec<[[f64; 3]; 2]>,
-) -> Result<(), Failure> {
+    into: &mut Probes,
+) -> Result<&[[[f64; 3]; 2]], Failure> {
     // SAFETY: the caller vouches for it.
-    let rows = unsafe { array("segments", segments, count) }?;
-    into.clear();
-    reserve("segments", count, into)?;
-    into.extend(rows.iter().map(|row| [row.from, row.to]));
-    Ok(())
+    unsafe { each("segments", segments, count, &mut into.segments, |row| Ok([row.from, row.to])) }
 }
 
-/// `cbvh_closest_points`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_closest_points(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    points: *const f64,
-    count: usize,
-    within: f64,
-    answers: *mut ClosestRow,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count, within), |probes: &Probes| &probes.points),
-            |batch, points| batch.closest_points(points, within),
-            |querier, shape, point| querier.closest_point(shape, point, within),
-            ClosestRow::from,
-        )
-    }
+/// Defines each question twice: about one mesh, and about a scene.
+macro_rules! probes {
+    ($($name:ident, $of_scene:ident $own:tt -> $row:ty: $read:expr, $all:expr, $one:expr, $make:expr;)*) => {
+        questions! {
+            (querier: QuerierHandle, mesh: MeshHandle, pose: *const PoseRows,) => Question { querier, mesh, pose };
+            $($name $own -> $row: $read, $all, $one, $make;)*
+        }
+        questions! {
+            (scene: SceneHandle,) => SceneQuestion(scene);
+            $($of_scene $own -> $row: $read, $all, $make;)*
+        }
+    };
 }
 
-/// `cbvh_sides`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_sides(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    points: *const f64,
-    count: usize,
-    answers: *mut i32,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count, f64::INFINITY), |probes: &Probes| &probes.points),
-            |batch, points| batch.sides(points),
-            |querier, shape, point| querier.side(shape, point),
-            side,
-        )
-    }
+probes! {
+    cbvh_closest_points, cbvh_scene_closest_points(points: *const f64, count: usize, within: f64,) -> ClosestRow:
+        |into| read_points((points, count, within), into), |of, points| of.closest_points(points, within),
+        |querier, mesh, point| querier.closest_point(mesh, point, within), ClosestRow::from;
+    cbvh_sides, cbvh_scene_sides(points: *const f64, count: usize,) -> i32:
+        |into| read_points((points, count, f64::INFINITY), into), |of, points| of.sides(points),
+        |querier, mesh, point| querier.side(mesh, point), side;
+    cbvh_signed_distances, cbvh_scene_signed_distances(points: *const f64, count: usize, within: f64,) -> ClosestRow:
+        |into| read_points((points, count, within), into), |of, points| of.signed_distances(points, within),
+        |querier, mesh, point| querier.signed_distance(mesh, point, within), ClosestRow::from;
+    cbvh_first_hits, cbvh_scene_first_hits(rays: *const RayRow, count: usize,) -> HitRow:
+        |into| read_rays(rays, count, into), |of, rays| of.first_hits(rays),
+        |querier, mesh, ray| querier.first_hit(mesh, &ray), HitRow::from;
+    cbvh_any_hits, cbvh_scene_any_hits(rays: *const RayRow, count: usize,) -> bool:
+        |into| read_rays(rays, count, into), |of, rays| of.any_hits(rays),
+        |querier, mesh, ray| querier.any_hit(mesh, &ray), bool::from;
+    cbvh_segment_hits, cbvh_scene_segment_hits(segments: *const SegmentRow, count: usize,) -> bool:
+        |into| read_segments(segments, count, into), |of, segments| of.segment_hits(segments),
+        |querier, mesh, [from, to]| querier.segment_hit(mesh, from, to), bool::from;
 }
 
-/// `cbvh_signed_distances`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_signed_distances(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    points: *const f64,
-    count: usize,
-    within: f64,
-    answers: *mut ClosestRow,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read_points(points, count, within), |probes: &Probes| &probes.points),
-            |batch, points| batch.signed_distances(points, within),
-            |querier, shape, point| querier.signed_distance(shape, point, within),
-            ClosestRow::from,
-        )
-    }
-}
-
-/// `cbvh_first_hits`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_first_hits(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    rays: *const RayRow,
-    count: usize,
-    answers: *mut HitRow,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read_rays(rays, count), |probes: &Probes| &probes.rays),
-            |batch, rays| batch.first_hits(rays),
-            |querier, shape, ray| querier.first_hit(shape, &ray),
-            HitRow::from,
-        )
-    }
-}
-
-/// `cbvh_any_hits`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_any_hits(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    rays: *const RayRow,
-    count: usize,
-    answers: *mut bool,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read_rays(rays, count), |probes: &Probes| &probes.rays),
-            |batch, rays| batch.any_hits(rays),
-            |querier, shape, ray| querier.any_hit(shape, &ray),
-            |answer| answer,
-        )
-    }
-}
-
-/// `cbvh_all_hits`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_all_hits(
     querier: QuerierHandle,
@@ -249,46 +185,41 @@ pub unsafe extern "C" fn cbvh_all_hits(
     capacity: usize,
     count: *mut usize,
 ) -> i32 {
-    let ask = |querier: &mut Querier, batch: Option<ProbeBatch<'_>>, placed: PlacedShape<'_>, of: &Probes| {
-        // SAFETY: the header asks for it.
-        let mut lists = unsafe { Lists::new(("hits", hits, capacity, count), counts, of.rays.len()) }?;
-        let mut add = |number, found: Vec<bvh_query::RayHit>| {
-            let count = found.len();
-            lists.add(number, found.into_iter().map(HitRow::from), count);
-        };
-        if let Some(batch) = batch {
-            let found = batch.all_hits(&of.rays)?.into_iter().enumerate();
-            found.for_each(|(number, found)| add(number, found));
-        } else {
-            for (number, ray) in of.rays.iter().enumerate() {
-                add(number, querier.all_hits(placed, ray)?);
-            }
-        }
-        lists.finish()
-    };
-    // SAFETY: the header asks for it.
-    entry(|| unsafe { Question { querier, mesh, pose }.ask(read_rays(rays, ray_count), ask) })
-}
-
-/// `cbvh_segment_hits`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_segment_hits(
-    querier: QuerierHandle,
-    mesh: MeshHandle,
-    pose: *const PoseRows,
-    given: *const SegmentRow,
-    count: usize,
-    answers: *mut bool,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    let read = |probes: &mut Probes| unsafe { segments(given, count, &mut probes.segments) };
     // SAFETY: the header asks for it.
     unsafe {
-        Question { querier, mesh, pose }.each(
-            (answers, read, |probes: &Probes| &probes.segments),
-            |batch, segments| batch.segment_hits(segments),
-            |querier, shape, [from, to]| querier.segment_hit(shape, from, to),
-            |answer| answer,
+        let question = Question { querier, mesh, pose };
+        question.ask(
+            |into| read_rays(rays, ray_count, into),
+            |querier, batch, placed, rays| {
+                let lists = Lists::new(("hits", hits, capacity, count), counts, rays.len())?;
+                match batch {
+                    Some(batch) => {
+                        lists.finish_with(batch.all_hits(rays)?.into_iter().map(Ok::<_, QueryError>))
+                    }
+                    None => lists.finish_with(rays.iter().map(|ray| querier.all_hits(placed, ray))),
+                }
+            },
         )
     }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_all_hits(
+    scene: SceneHandle,
+    rays: *const RayRow,
+    ray_count: usize,
+    counts: *mut usize,
+    hits: *mut HitRow,
+    capacity: usize,
+    count: *mut usize,
+) -> i32 {
+    scene::with(scene, |scene| {
+        let mut probes = Probes::default();
+        // SAFETY: the header asks for it.
+        let (rays, lists) = unsafe {
+            let rays = read_rays(rays, ray_count, &mut probes)?;
+            (rays, Lists::new(("hits", hits, capacity, count), counts, ray_count)?)
+        };
+        lists.finish_with(scene.all_hits(rays)?.into_iter().map(Ok::<_, SceneError>))
+    })
 }

@@ -45,7 +45,6 @@ impl Failure {
     }
 }
 
-/// The status of a question that has no answer.
 fn of_query(error: &QueryError) -> Status {
     match error {
         QueryError::Damaged(_) => Status::Damaged,
@@ -69,46 +68,25 @@ fn of_open(error: &OpenError) -> Status {
     if matches!(error, OpenError::Io { .. }) { Status::System } else { Status::Damaged }
 }
 
-impl From<QueryError> for Failure {
-    fn from(error: QueryError) -> Self {
-        Self::new(of_query(&error), error.to_string())
+fn of_bake(error: &BakeError) -> Status {
+    match error {
+        BakeError::Write { .. } | BakeError::Scratch { .. } | BakeError::Room { .. } => Status::System,
+        BakeError::Read(ReadError::Io { .. }) => Status::System,
+        BakeError::Read(ReadError::Limit { .. }) => Status::Limit,
+        BakeError::Memory { .. } | BakeError::Limit(_) => Status::Limit,
+        BakeError::Unproved(_) => Status::Internal,
+        _ => Status::BakeFailed,
     }
 }
 
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::new(of_scene(&error), error.to_string())
-    }
+macro_rules! failures {
+    ($($error:ty: $status:expr),*) => { $(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::new($status(&error), error.to_string())
+            }
+        }
+    )* };
 }
-
-impl From<OpenError> for Failure {
-    fn from(error: OpenError) -> Self {
-        Self::new(of_open(&error), error.to_string())
-    }
-}
-
-impl From<PoseError> for Failure {
-    fn from(error: PoseError) -> Self {
-        Self::new(Status::InvalidArgument, error.to_string())
-    }
-}
-
-impl From<MotionError> for Failure {
-    fn from(error: MotionError) -> Self {
-        Self::new(Status::InvalidArgument, error.to_string())
-    }
-}
-
-impl From<BakeError> for Failure {
-    fn from(error: BakeError) -> Self {
-        let status = match &error {
-            BakeError::Write { .. } | BakeError::Scratch { .. } | BakeError::Room { .. } => Status::System,
-            BakeError::Read(ReadError::Io { .. }) => Status::System,
-            BakeError::Read(ReadError::Limit { .. }) => Status::Limit,
-            BakeError::Memory { .. } | BakeError::Limit(_) => Status::Limit,
-            BakeError::Unproved(_) => Status::Internal,
-            _ => Status::BakeFailed,
-        };
-        Self::new(status, error.to_string())
-    }
-}
+failures!(QueryError: of_query, SceneError: of_scene, OpenError: of_open, BakeError: of_bake);
+failures!(PoseError: |_| Status::InvalidArgument, MotionError: |_| Status::InvalidArgument);

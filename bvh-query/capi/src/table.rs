@@ -1,203 +1,78 @@
 //! Tables of what handles stand for.
 //!
-//! A handle is a number and never an address: 8 bits for its kind, 24 for its place in the table of that kind, and 32
-//! for how often the place was freed before. A number that no table knows is refused, whoever made it up, and a freed
-//! handle is refused even after its place is taken again; after 2^32 uses a place is given up. Nothing is ever read
-//! through a handle, so that all of this is sound.
+//! A handle is a number and never an address: 8 bits for its kind, and 56 that count the handles of this kind, so that no
+//! number is ever given twice. A number that its table lacks is refused, whoever made it up. Nothing is ever read through a
+//! handle, so that all of this is sound.
 //!
-//! Places never move. They are found without a lock, and each has a lock of its own: threads that use different handles
-//! do not wait for each other.
+//! A table is divided by the lowest bits of the numbers. Each part has a lock, which is held only while a number is looked
+//! up, so that threads that use different handles do not wait for each other.
 
 use crate::status::{Failure, Status};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard, TryLockError};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError, RwLock, TryLockError};
 
 /// What a handle stands for, by the highest byte of its number.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
+#[derive(Clone, Copy)]
 pub(crate) enum Kind {
-    Mesh = 0xC1,
-    Querier = 0xC2,
-    Tracker = 0xC3,
-    Path = 0xC4,
-    Scene = 0xC5,
+    Mesh,
+    Querier,
+    Tracker,
+    Path,
+    Scene,
 }
 
-impl Kind {
-    const ALL: [Self; 5] = [Self::Mesh, Self::Querier, Self::Tracker, Self::Path, Self::Scene];
+/// The highest byte of the first kind.
+const FIRST_KIND: u64 = 0xC1;
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Mesh => "mesh",
-            Self::Querier => "querier",
-            Self::Tracker => "tracker",
-            Self::Path => "path",
-            Self::Scene => "scene",
-        }
-    }
+/// Returns the name of the kind that a handle has, if it is one.
+fn name_of_kind(handle: u64) -> Option<&'static str> {
+    let kind = (handle >> 56).checked_sub(FIRST_KIND)?;
+    ["mesh", "querier", "tracker", "path", "scene"].get(kind as usize).copied()
 }
 
-/// The places of a table come in chunks of 1, 2, 4 and so on, so that the bits of a number tell the chunk.
-const CHUNKS: usize = 24;
+const PARTS: usize = 64;
 
-struct Slot<T> {
-    /// How often the place was freed. It changes under the lock only; without it, it tells whether a handle is stale.
-    generation: AtomicU32,
-    value: RwLock<Option<T>>,
-}
+/// A part of a table, on cache lines of its own.
+#[repr(align(128))]
+struct Part<T>(RwLock<BTreeMap<u64, T>>);
 
+/// Values that many threads may use at the same time. Each gets a copy, which outlives the handle.
 pub(crate) struct Table<T> {
-    kind: Kind,
-    chunks: [OnceLock<Box<[Slot<T>]>>; CHUNKS],
-    free: Mutex<Free>,
+    /// The next handle.
+    next: AtomicU64,
     /// How many handles were freed.
     removals: AtomicU64,
+    parts: [Part<T>; PARTS],
 }
 
-/// Places that can be taken.
-struct Free {
-    freed: Vec<u32>,
-    /// The first place that was never taken.
-    next: u32,
-}
-
-/// The value of a handle, while nobody else may use or free it.
-pub(crate) struct Held<'a, T>(RwLockWriteGuard<'a, Option<T>>);
-
-/// The value of a handle, while nobody may change or free it.
-pub(crate) struct Seen<'a, T>(RwLockReadGuard<'a, Option<T>>);
-
-impl<T> Seen<'_, T> {
-    /// Returns the value, as `Held` does.
-    pub(crate) fn value(&self) -> Result<&T, Failure> {
-        self.0.as_ref().ok_or_else(|| Failure::new(Status::Internal, "a handle without a value"))
-    }
-}
-
-impl<T> Held<'_, T> {
-    /// Returns the value. It is there: a place without one has no handle of its generation.
-    pub(crate) fn value(&mut self) -> Result<&mut T, Failure> {
-        self.0.as_mut().ok_or_else(|| Failure::new(Status::Internal, "a handle without a value"))
-    }
-}
-
-impl<T> Table<T> {
+impl<T: Clone> Table<T> {
     pub(crate) const fn new(kind: Kind) -> Self {
-        let free = Mutex::new(Free { freed: Vec::new(), next: 0 });
-        Self { kind, chunks: [const { OnceLock::new() }; CHUNKS], free, removals: AtomicU64::new(0) }
+        let first = (FIRST_KIND + kind as u64) << 56 | 1;
+        let parts = [const { Part(RwLock::new(BTreeMap::new())) }; PARTS];
+        Self { next: AtomicU64::new(first), removals: AtomicU64::new(0), parts }
     }
 
-    fn slot(&self, place: u32) -> Option<&Slot<T>> {
-        let number = place + 1;
-        let chunk = number.ilog2();
-        self.chunks.get(chunk as usize)?.get()?.get((number - (1 << chunk)) as usize)
+    fn part(&self, handle: u64) -> &RwLock<BTreeMap<u64, T>> {
+        &self.parts[handle as usize % PARTS].0
     }
 
     /// Keeps a value, and returns its handle.
-    pub(crate) fn insert(&self, value: T) -> Result<u64, Failure> {
-        self.insert_with(|| value)
+    pub(crate) fn insert(&self, value: T) -> u64 {
+        let handle = self.next.fetch_add(1, Ordering::Relaxed);
+        self.part(handle).write().unwrap_or_else(PoisonError::into_inner).insert(handle, value);
+        handle
     }
 
-    /// Keeps a value that is made only if there is a place for it, and returns its handle.
-    pub(crate) fn insert_with(&self, value: impl FnOnce() -> T) -> Result<u64, Failure> {
-        let place = {
-            let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-            match free.freed.pop() {
-                Some(place) => place,
-                None => {
-                    let place = free.next;
-                    let chunk = (place + 1).ilog2();
-                    let Some(places) = self.chunks.get(chunk as usize) else {
-                        let kind = self.kind.name();
-                        let most = (1 << CHUNKS) - 1;
-                        let message = format!("expected at most {most} open handles of a {kind}, found more");
-                        return Err(Failure::new(Status::Limit, message));
-                    };
-                    let slot = || Slot { generation: AtomicU32::new(0), value: RwLock::new(None) };
-                    places.get_or_init(|| (0..1u32 << chunk).map(|_| slot()).collect());
-                    free.next += 1;
-                    place
-                }
-            }
-        };
-        let Some(slot) = self.slot(place) else {
-            return Err(Failure::new(Status::Internal, "a place beyond its table"));
-        };
-        let mut room = slot.value.write().unwrap_or_else(PoisonError::into_inner);
-        *room = Some(value());
-        // It changes under the lock only.
-        let generation = slot.generation.load(Ordering::Acquire);
-        drop(room);
-        Ok(u64::from(self.kind as u8) << 56 | u64::from(place) << 32 | u64::from(generation))
+    /// Returns a copy of the value of a handle, which stays usable when the handle is freed.
+    pub(crate) fn share(&self, name: &str, handle: u64) -> Result<T, Failure> {
+        let part = self.part(handle).read().unwrap_or_else(PoisonError::into_inner);
+        part.get(&handle).cloned().ok_or_else(|| self.stale(name, handle))
     }
 
-    /// Returns the place of a handle, if it is of this kind and not known to be freed.
-    fn find(&self, name: &str, handle: u64) -> Result<(u32, &Slot<T>), Failure> {
-        let place = (handle >> 32) as u32 & 0xFF_FFFF;
-        if (handle >> 56) as u8 == self.kind as u8
-            && let Some(slot) = self.slot(place)
-            && slot.generation.load(Ordering::Acquire) == handle as u32
-        {
-            return Ok((place, slot));
-        }
-        Err(self.stale(name, handle))
-    }
-
-    #[cold]
-    fn stale(&self, name: &str, handle: u64) -> Failure {
-        let kind = self.kind.name();
-        let place = (handle >> 32) as u32 & 0xFF_FFFF;
-        let other = Kind::ALL.into_iter().find(|kind| (handle >> 56) as u8 == *kind as u8);
-        let found = match other {
-            _ if handle == 0 => "0, no handle".to_owned(),
-            Some(other) if other != self.kind => format!("the handle of a {}", other.name()),
-            Some(_)
-                if self
-                    .slot(place)
-                    .is_some_and(|slot| (handle as u32) < slot.generation.load(Ordering::Acquire)) =>
-            {
-                format!("one of a {kind} that was freed")
-            }
-            _ => format!("{handle:#x}, which this library never gave out"),
-        };
-        Failure::new(
-            Status::InvalidHandle,
-            format!("{name}: expected the handle of an open {kind}, found {found}"),
-        )
-    }
-
-    /// Returns whether a handle has not been freed. It is cheap, and threads that ask it do not disturb each other.
+    /// Returns whether a handle stands for something.
     pub(crate) fn is_open(&self, handle: u64) -> bool {
-        let place = (handle >> 32) as u32 & 0xFF_FFFF;
-        let slot = self.slot(place);
-        slot.is_some_and(|slot| slot.generation.load(Ordering::Acquire) == handle as u32)
-    }
-
-    /// Returns the value of a handle for use by this thread alone.
-    pub(crate) fn hold(&self, name: &str, handle: u64) -> Result<Held<'_, T>, Failure> {
-        let (_, slot) = self.find(name, handle)?;
-        match slot.value.try_write() {
-            // It may have been freed before it was locked.
-            Ok(value) if slot.generation.load(Ordering::Acquire) == handle as u32 && value.is_some() => {
-                Ok(Held(value))
-            }
-            Ok(_) => Err(self.stale(name, handle)),
-            Err(TryLockError::WouldBlock) => Err(self.busy(name)),
-            Err(TryLockError::Poisoned(_)) => Err(defect(name)),
-        }
-    }
-
-    /// Returns the value of a handle for threads that only look at it, of which there may be many at the same time.
-    pub(crate) fn see(&self, name: &str, handle: u64) -> Result<Seen<'_, T>, Failure> {
-        let (_, slot) = self.find(name, handle)?;
-        match slot.value.try_read() {
-            Ok(value) if slot.generation.load(Ordering::Acquire) == handle as u32 && value.is_some() => {
-                Ok(Seen(value))
-            }
-            Ok(_) => Err(self.stale(name, handle)),
-            Err(TryLockError::WouldBlock) => Err(self.busy(name)),
-            Err(TryLockError::Poisoned(_)) => Err(defect(name)),
-        }
+        self.part(handle).read().unwrap_or_else(PoisonError::into_inner).contains_key(&handle)
     }
 
     /// Returns how many handles were freed: a number that is the same as before says that none was meanwhile.
@@ -205,59 +80,110 @@ impl<T> Table<T> {
         self.removals.load(Ordering::Acquire)
     }
 
-    #[cold]
-    fn busy(&self, name: &str) -> Failure {
-        let kind = self.kind.name();
-        let message =
-            format!("{name}: expected a {kind} that nobody uses, found it in use; make one for each thread");
-        Failure::new(Status::Busy, message)
-    }
-
-    /// Frees a handle, and returns its value, which is to be dropped.
-    pub(crate) fn remove(&self, name: &str, handle: u64) -> Result<T, Failure> {
-        let (place, slot) = self.find(name, handle)?;
-        let mut value = match slot.value.try_write() {
-            Ok(value) => value,
-            // Values that are shared are held for moments only.
-            Err(TryLockError::WouldBlock) if matches!(self.kind, Kind::Mesh | Kind::Path) => {
-                slot.value.write().unwrap_or_else(PoisonError::into_inner)
-            }
-            Err(TryLockError::WouldBlock) => return Err(self.busy(name)),
-            Err(TryLockError::Poisoned(value)) => {
-                slot.value.clear_poison();
-                value.into_inner()
-            }
-        };
-        if slot.generation.load(Ordering::Acquire) != handle as u32 {
-            return Err(self.stale(name, handle));
+    /// Frees a handle, unless it is 0.
+    pub(crate) fn free(&self, name: &str, handle: u64) -> Result<(), Failure> {
+        if handle == 0 {
+            return Ok(());
         }
-        let Some(taken) = value.take() else { return Err(self.stale(name, handle)) };
-        let next = (handle as u32).wrapping_add(1);
-        slot.generation.store(next, Ordering::Release);
+        let removed = self.part(handle).write().unwrap_or_else(PoisonError::into_inner).remove(&handle);
+        // The lock is released before the value is dropped.
+        let value = removed.ok_or_else(|| self.stale(name, handle))?;
         self.removals.fetch_add(1, Ordering::Release);
         drop(value);
-        if next != 0 {
-            self.free.lock().unwrap_or_else(PoisonError::into_inner).freed.push(place);
-        }
-        Ok(taken)
+        Ok(())
+    }
+
+    fn kind(&self) -> &'static str {
+        name_of_kind(self.next.load(Ordering::Relaxed)).unwrap_or_default()
+    }
+
+    #[cold]
+    fn stale(&self, name: &str, handle: u64) -> Failure {
+        let kind = self.kind();
+        let found = match name_of_kind(handle) {
+            _ if handle == 0 => "0, no handle".to_owned(),
+            Some(other) if other != kind => format!("the handle of a {other}"),
+            Some(_) if handle << 8 != 0 && handle < self.next.load(Ordering::Relaxed) => {
+                format!("one of a {kind} that was freed")
+            }
+            _ => format!("{handle:#x}, which this library never gave out"),
+        };
+        let expected = format!("expected the handle of an open {kind}");
+        Failure::new(Status::InvalidHandle, format!("{name}: {expected}, found {found}"))
     }
 }
 
-#[cold]
-fn defect(name: &str) -> Failure {
-    let message = format!("{name}: a defect of cbvh ended its last use; free it, and make another one");
-    Failure::new(Status::Internal, message)
+/// A value that one thread at a time may change or free, and that many may look at together. `None` once it is freed.
+pub(crate) struct Exclusive<V>(Arc<RwLock<Option<V>>>);
+
+impl<V> Exclusive<V> {
+    pub(crate) fn new(value: V) -> Self {
+        Self(Arc::new(RwLock::new(Some(value))))
+    }
 }
 
-impl<T: Clone> Table<T> {
-    /// Returns a copy of the value of a handle, which stays usable when the handle is freed.
-    pub(crate) fn share(&self, name: &str, handle: u64) -> Result<T, Failure> {
-        let (_, slot) = self.find(name, handle)?;
-        let value = slot.value.read().unwrap_or_else(PoisonError::into_inner);
-        if slot.generation.load(Ordering::Acquire) != handle as u32 {
-            return Err(self.stale(name, handle));
+impl<V> Clone for Exclusive<V> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<V> Table<Exclusive<V>> {
+    /// Uses the value of a handle, which nobody else may use or free meanwhile.
+    pub(crate) fn hold<R>(
+        &self,
+        name: &str,
+        handle: u64,
+        act: impl FnOnce(&mut V) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let slot = self.share(name, handle)?;
+        let mut value = slot.0.try_write().map_err(|error| self.refuse(name, error))?;
+        act(value.as_mut().ok_or_else(|| self.stale(name, handle))?)
+    }
+
+    /// Looks at the value of a handle, which nobody may change or free meanwhile.
+    pub(crate) fn see<R>(
+        &self,
+        name: &str,
+        handle: u64,
+        act: impl FnOnce(&V) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let slot = self.share(name, handle)?;
+        let value = slot.0.try_read().map_err(|error| self.refuse(name, error))?;
+        act(value.as_ref().ok_or_else(|| self.stale(name, handle))?)
+    }
+
+    /// Frees a handle that nobody uses, unless it is 0.
+    pub(crate) fn free_unused(&self, name: &str, handle: u64) -> Result<(), Failure> {
+        if handle == 0 {
+            return Ok(());
         }
-        value.clone().ok_or_else(|| self.stale(name, handle))
+        let slot = self.share(name, handle)?;
+        let value = match slot.0.try_write() {
+            Ok(mut value) => value.take(),
+            Err(TryLockError::Poisoned(value)) => value.into_inner().take(),
+            Err(error) => return Err(self.refuse(name, error)),
+        };
+        self.free(name, handle)?;
+        drop(value);
+        Ok(())
+    }
+
+    #[cold]
+    fn refuse<G>(&self, name: &str, error: TryLockError<G>) -> Failure {
+        let kind = self.kind();
+        match error {
+            TryLockError::WouldBlock => Failure::new(
+                Status::Busy,
+                format!(
+                    "{name}: expected a {kind} that nobody uses, found it in use; make one for each thread"
+                ),
+            ),
+            TryLockError::Poisoned(_) => Failure::new(
+                Status::Internal,
+                format!("{name}: a defect of cbvh ended its last use; free it, and make another one"),
+            ),
+        }
     }
 }
 
@@ -269,12 +195,14 @@ mod tests {
     #[test]
     fn freed_and_foreign_handles_are_refused() {
         let table = Table::<String>::new(Kind::Mesh);
-        let handles: Vec<u64> = (0..100).map(|n| table.insert(n.to_string()).unwrap()).collect();
+        let handles: Vec<u64> = (0..100).map(|n| table.insert(n.to_string())).collect();
         for (n, &handle) in handles.iter().enumerate() {
             assert_eq!(table.share("a", handle).unwrap(), n.to_string());
         }
-        assert_eq!(table.remove("a", handles[7]).unwrap(), "7");
-        for refused in [table.share("a", handles[7]), table.remove("a", handles[7])] {
+        assert_eq!(table.removals(), 0);
+        table.free("a", handles[7]).unwrap();
+        assert_eq!(table.removals(), 1);
+        for refused in [table.share("a", handles[7]).map(drop), table.free("a", handles[7])] {
             let failure = refused.unwrap_err();
             assert_eq!(failure.status, Status::InvalidHandle);
             assert_eq!(
@@ -282,70 +210,70 @@ mod tests {
                 "a: expected the handle of an open mesh, found one of a mesh that was freed"
             );
         }
-        let again = table.insert("again".to_owned()).unwrap();
-        assert_eq!(again >> 32, handles[7] >> 32, "the place is taken again");
+        let again = table.insert("again".to_owned());
+        assert!(!handles.contains(&again), "no number is given twice");
         assert!(!table.is_open(handles[7]) && table.is_open(again));
-        assert!(table.share("a", handles[7]).is_err());
-        let path = u64::from(Kind::Path as u8) << 56;
+        assert_eq!(table.removals(), 1, "what is refused is not freed");
+        let path = (FIRST_KIND + Kind::Path as u64) << 56;
         for (handle, found) in [
             (0, "0, no handle"),
             (path, "the handle of a path"),
             (again + 1, "never gave out"),
             (u64::MAX, "never gave out"),
+            (handles[0] - 1, "never gave out"),
             (handles[99] + (1 << 32), "never gave out"),
             (handles[0] | 0xFF_FFFF << 32, "never gave out"),
         ] {
             let failure = table.share("a", handle).unwrap_err();
             assert!(failure.message.contains(found), "{}", failure.message);
         }
+        assert!(table.free("a", 0).is_ok());
     }
 
     #[test]
     fn what_one_thread_uses_another_one_may_not() {
         let table = Table::new(Kind::Querier);
-        let handle = table.insert(1).unwrap();
-        let mut held = table.hold("querier", handle).unwrap();
-        *held.value().unwrap() += 1;
-        assert_eq!(table.hold("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
-        assert_eq!(table.remove("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
-        drop(held);
+        let handle = table.insert(Exclusive::new(1));
+        let is_busy = |refused: Result<(), Failure>| refused.unwrap_err().status == Status::Busy;
+        let held = table.hold("querier", handle, |value| {
+            *value += 1;
+            assert!(is_busy(table.hold("querier", handle, |_| Ok(()))));
+            assert!(is_busy(table.see("querier", handle, |_| Ok(()))));
+            assert!(is_busy(table.free_unused("querier", handle)));
+            Ok(*value)
+        });
+        assert_eq!(held.unwrap(), 2);
         // Many may look at it together, but not while one changes it.
-        let seen = [(); 2].map(|()| table.see("querier", handle).unwrap());
-        assert_eq!(table.hold("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
-        assert_eq!(seen.map(|seen| *seen.value().unwrap()), [2, 2]);
-        let held = table.hold("querier", handle).unwrap();
-        assert_eq!(table.see("querier", handle).err().map(|failure| failure.status), Some(Status::Busy));
-        drop(held);
-        assert_eq!(table.removals(), 0);
-        assert_eq!(table.remove("querier", handle).unwrap(), 2);
-        assert_eq!(table.removals(), 1);
+        let seen = table.see("querier", handle, |value| {
+            assert!(is_busy(table.hold("querier", handle, |_| Ok(()))));
+            assert!(is_busy(table.free_unused("querier", handle)));
+            table.see("querier", handle, |again| Ok([*value, *again]))
+        });
+        assert_eq!(seen.unwrap(), [2, 2]);
+        // A thread that found the value before it was freed, and locks it only then.
+        let slot = table.share("querier", handle).unwrap();
+        table.free_unused("querier", handle).unwrap();
+        assert!(slot.0.try_read().unwrap().is_none());
+        for refused in [table.hold("querier", handle, |_| Ok(())), table.free_unused("querier", handle)] {
+            assert!(refused.unwrap_err().message.ends_with("one of a querier that was freed"));
+        }
     }
 
     #[test]
     fn after_a_panic_a_handle_can_only_be_freed() {
         let table = Table::new(Kind::Scene);
-        let handle = table.insert(1).unwrap();
+        let handle = table.insert(Exclusive::new(1));
         let panicked = std::thread::scope(|scope| {
             let use_it = || {
-                let _held = table.hold("scene", handle);
-                std::panic::resume_unwind(Box::new(()));
+                table.hold("scene", handle, |_| -> Result<(), _> { std::panic::resume_unwind(Box::new(())) })
             };
             scope.spawn(use_it).join()
         });
         assert!(panicked.is_err());
-        assert_eq!(table.hold("scene", handle).err().map(|failure| failure.status), Some(Status::Internal));
-        assert_eq!(table.remove("scene", handle).unwrap(), 1);
-        let next = table.insert(2).unwrap();
-        assert!(table.hold("scene", next).is_ok());
-    }
-
-    #[test]
-    fn a_place_is_given_up_after_its_last_generation() {
-        let table = Table::new(Kind::Mesh);
-        let handle = table.insert(1).unwrap();
-        table.slot(0).unwrap().generation.store(u32::MAX, Ordering::Release);
-        assert_eq!(table.remove("a", handle | u64::from(u32::MAX)).unwrap(), 1);
-        let next = table.insert(2).unwrap();
-        assert_eq!((next >> 32) as u32 & 0xFF_FFFF, 1);
+        assert_eq!(table.hold("scene", handle, |_| Ok(())).unwrap_err().status, Status::Internal);
+        assert_eq!(table.see("scene", handle, |_| Ok(())).unwrap_err().status, Status::Internal);
+        assert!(table.free_unused("scene", handle).is_ok());
+        let next = table.insert(Exclusive::new(2));
+        assert!(table.hold("scene", next, |_| Ok(())).is_ok());
     }
 }

@@ -1,33 +1,25 @@
 //! Trackers: questions about poses that follow a path.
 
-use crate::entry::entry;
-use crate::output::{One, Room};
-use crate::poses::poses;
-use crate::queriers::{Asker, QUERIERS};
-use crate::status::Failure;
-use crate::table::{Kind, Table};
+use crate::entry::{entry, hand_out, questions};
+use crate::output::Room;
+use crate::poses;
+use crate::queriers::{self, Asker};
+use crate::table::{Exclusive, Kind, Table};
 use crate::types::{DistanceRow, MeshHandle, PoseRows, QuerierHandle, TrackerHandle};
 use bvh_query::{Pose, Querier, QueryError, Shape, Tracker};
 
 /// All trackers that are open.
-static TRACKERS: Table<Box<Tracker>> = Table::new(Kind::Tracker);
+static TRACKERS: Table<Exclusive<Tracker>> = Table::new(Kind::Tracker);
 
-/// `cbvh_tracker_new`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_tracker_new(tracker: *mut TrackerHandle) -> i32 {
-    entry(|| {
-        // SAFETY: the header asks for it.
-        let mut out = unsafe { One::new("tracker", tracker) }?;
-        out.set(TrackerHandle { id: 0 });
-        out.set(TrackerHandle { id: TRACKERS.insert(Box::default())? });
-        Ok(())
-    })
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("tracker", tracker), &TRACKERS, || Ok(Exclusive::new(Tracker::default()))) }
 }
 
-/// `cbvh_tracker_free`.
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_tracker_free(tracker: TrackerHandle) -> i32 {
-    entry(|| if tracker.id == 0 { Ok(()) } else { TRACKERS.remove("tracker", tracker.id).map(drop) })
+    entry(|| TRACKERS.free_unused("tracker", tracker.id))
 }
 
 /// Who is asked about what.
@@ -44,82 +36,34 @@ impl Question {
     /// Asks about each pose, in order.
     ///
     /// # Safety
-    /// As for `poses`, and for `Room::new`.
-    unsafe fn each<R: Copy>(
+    /// As for `poses::read_many` and `Room::new`.
+    unsafe fn each<T, R: Copy + From<T>>(
         &self,
         answers: *mut R,
-        one: impl Fn(&mut Tracker, &mut Querier, [Shape<'_>; 2], &Pose) -> Result<R, QueryError>,
-    ) -> Result<(), Failure> {
-        let mut held = TRACKERS.hold("tracker", self.tracker.id)?;
-        let tracker = held.value()?;
-        let mut held = QUERIERS.hold("querier", self.querier.id)?;
-        let Asker { querier, at_hand, probes, .. } = &mut **held.value()?;
-        let (a, b) = at_hand.pair(self.a, self.b)?;
-        // SAFETY: the caller vouches for it.
-        let mut room = unsafe {
-            poses("poses", self.poses, self.count, &mut probes.poses)?;
-            Room::new("answers", answers, self.count)?
+        one: impl Fn(&mut Tracker, &mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError>,
+    ) -> i32 {
+        let ask = |tracker: &mut Tracker, Asker { querier, at_hand, probes, .. }: &mut Asker| {
+            let (a, b) = at_hand.pair(self.a, self.b)?;
+            // SAFETY: the caller vouches for it.
+            let (poses, mut room) = unsafe {
+                let poses = poses::read_many("poses", self.poses, self.count, &mut probes.poses)?;
+                (poses, Room::new("answers", answers, self.count)?)
+            };
+            room.fill(poses.iter().map(|pose| one(tracker, querier, [a, b], pose)), R::from)
         };
-        for (number, pose) in probes.poses.iter().enumerate() {
-            room.set(number, one(tracker, querier, [a, b], pose)?);
-        }
-        Ok(())
+        entry(|| {
+            TRACKERS.hold("tracker", self.tracker.id, |tracker| {
+                queriers::with(self.querier, |asker| ask(tracker, asker))
+            })
+        })
     }
 }
 
-/// `cbvh_tracker_collide`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_tracker_collide(
-    tracker: TrackerHandle,
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    answers: *mut bool,
-) -> i32 {
-    let question = Question { tracker, querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        question.each(answers, |tracker, querier, [a, b], pose| tracker.collide(querier, a, b, pose))
-    })
-}
-
-/// `cbvh_tracker_within`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_tracker_within(
-    tracker: TrackerHandle,
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    d: f64,
-    answers: *mut bool,
-) -> i32 {
-    let question = Question { tracker, querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        question.each(answers, |tracker, querier, [a, b], pose| tracker.within(querier, a, b, pose, d))
-    })
-}
-
-/// `cbvh_tracker_distance`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_tracker_distance(
-    tracker: TrackerHandle,
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
-    answers: *mut DistanceRow,
-) -> i32 {
-    let question = Question { tracker, querier, a, b, poses, count };
-    // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        question.each(answers, |tracker, querier, [a, b], pose| {
-            tracker.distance(querier, a, b, pose).map(DistanceRow::from)
-        })
-    })
+questions! {
+    (tracker: TrackerHandle, querier: QuerierHandle, a: MeshHandle, b: MeshHandle,
+        poses: *const PoseRows, count: usize,)
+        => Question { tracker, querier, a, b, poses, count };
+    cbvh_tracker_collide() -> bool: |tracker, querier, [a, b], pose| tracker.collide(querier, a, b, pose);
+    cbvh_tracker_within(d: f64,) -> bool: |tracker, querier, [a, b], pose| tracker.within(querier, a, b, pose, d);
+    cbvh_tracker_distance() -> DistanceRow: |tracker, querier, [a, b], pose| tracker.distance(querier, a, b, pose);
 }

@@ -1,58 +1,158 @@
 //! The structures and numbers that the header declares, and what they are made from.
 //!
-//! Structures have no bytes that are not part of a field, so that answers can be compared as bytes.
-//! `tests/header.py` compares sizes, offsets and numbers with those that a C compiler sees.
+//! `tests/header.py` compares them with the header, whose names for them `cbindgen.toml` lists.
 
-use crate::input::{Options, Plain};
+use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
     Backend, ClosestPoint, Contact, Distance, DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Pose,
-    QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer,
-    ScenePair, SceneRayHit, Side, SignedDistance,
+    QueryError, QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance,
+    SceneMotionAnswer, ScenePair, SceneRayHit, Side, SignedDistance,
 };
 use std::ffi::c_char;
 
-macro_rules! handles {
-    ($($name:ident),*) => { $(
-        /// A handle: see the header.
-        #[derive(Clone, Copy, Debug, PartialEq)]
+/// Defines structures that have no bytes outside their fields, so that answers can be compared as bytes.
+macro_rules! structures {
+    ($($name:ident { $($field:ident: $type:ty),* $(,)? })*) => { $(
+        #[derive(Clone, Copy, Debug)]
         #[repr(C)]
         pub struct $name {
-            pub(crate) id: u64,
+            $(pub(crate) $field: $type,)*
         }
-        // SAFETY: a number.
-        unsafe impl Plain for $name {}
+        #[cfg(target_pointer_width = "64")]
+        const _: () = assert!(size_of::<$name>() == $(size_of::<$type>() +)* 0);
+        // SAFETY: all fields may have any bytes, as their types are plain.
+        unsafe impl Plain for $name {
+            const NONE: Self = Self { $($field: <$type as Plain>::NONE),* };
+        }
     )* };
+}
+
+macro_rules! handles {
+    ($($name:ident),*) => {
+        structures! { $($name { id: u64 })* }
+        $(
+            impl From<u64> for $name {
+                fn from(id: u64) -> Self {
+                    Self { id }
+                }
+            }
+        )*
+    };
 }
 handles!(MeshHandle, QuerierHandle, TrackerHandle, PathHandle, SceneHandle, Instance);
 
-/// Makes the row of an answer, which has the fields of the first list, and `NONE`, the row where there is no answer. A
-/// field of the second list has a value of its own, and another one after `=>` where there is an answer.
-macro_rules! row {
-    ($row:ident from $answer:ident { $($field:ident: $none:expr),* }
-        and { $($other:ident: $without:expr $(=> $with:expr)?),* }) => {
-        impl $row {
-            const NONE: Self = Self { $($field: $none,)* $($other: $without),* };
-        }
+structures! {
+    PoseRows { rows: [f64; 12] }
+    DistanceChoices { size: usize, rel_err: f64, abs_err: f64 }
+    MotionChoices { size: usize, clearance: f64, tolerance: f64 }
+    BakeChoices {
+        size: usize,
+        profile: *const c_char,
+        triangles: *const c_char,
+        effort: *const c_char,
+        scratch: *const c_char,
+        max_error: f64,
+        max_memory: u64,
+        split_objects: i32,
+        scene: i32,
+        no_ids: i32,
+        no_turning_slabs: i32,
+        no_topology: i32,
+        force: i32,
+    }
+    RayRow { origin: [f64; 3], direction: [f64; 3], until: f64 }
+    SegmentRow { from: [f64; 3], to: [f64; 3] }
+    StatsRow { node_tests: u64, packet_tests: u64, exact_tests: u64, pairs: u64 }
+    ContactRow { object_a: u32, triangle_a: u32, object_b: u32, triangle_b: u32 }
+    DistanceRow {
+        distance: f64,
+        lower: f64,
+        upper: f64,
+        point_a: [f64; 3],
+        point_b: [f64; 3],
+        object_a: u32,
+        triangle_a: u32,
+        object_b: u32,
+        triangle_b: u32,
+    }
+    MotionRow {
+        outcome: i32,
+        reserved: i32,
+        free_until: f64,
+        at: f64,
+        instance_a: Instance,
+        instance_b: Instance,
+        nearest: DistanceRow,
+    }
+    ClosestRow {
+        distance: f64,
+        lower: f64,
+        upper: f64,
+        point: [f64; 3],
+        instance: Instance,
+        object: u32,
+        triangle: u32,
+        found: i32,
+        side: i32,
+    }
+    HitRow {
+        t: f64,
+        lower: f64,
+        upper: f64,
+        point: [f64; 3],
+        instance: Instance,
+        object: u32,
+        triangle: u32,
+        found: i32,
+        reserved: i32,
+    }
+    PairRow { a: Instance, b: Instance }
+    SceneDistanceRow { pair: PairRow, nearest: DistanceRow, found: i32, reserved: i32 }
+    SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
+    SceneContactRow { pair: PairRow, contact: ContactRow }
+}
 
-        impl From<$answer> for $row {
-            fn from(of: $answer) -> Self {
-                Self { $($field: of.$field,)* $($other: row!($without $(=> $with)?)),* }
-            }
-        }
+macro_rules! numbers {
+    ($($name:ident = $number:expr),*) => { $(pub const $name: i32 = $number;)* };
+}
+numbers!(MAP = 0, MAP_SPARSE = 1, MAP_WHOLE = 2, READ = 3);
+numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3);
+numbers!(TOUCHING = 0, APART = 1, A_IN_B = 2, B_IN_A = 3, MIXED = 4, RELATION_UNDEFINED = 5);
+numbers!(FREE = 0, HIT = 1, NEAR = 2);
+numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 3);
+
+/// Reads `cbvh_backend`.
+pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
+    let backend = match number {
+        BACKEND_BEST => return Ok(Backend::detect().map_err(QueryError::from)?),
+        BACKEND_SCALAR => Backend::Scalar,
+        BACKEND_AVX2 => Backend::Avx2,
+        BACKEND_AVX512 => Backend::Avx512,
+        _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 3", number)),
     };
-    ($without:expr => $with:expr) => { $with };
-    ($without:expr) => { $without };
+    Ok(Backend::from_name(backend.name()).map_err(QueryError::from)?)
 }
 
-/// `cbvh_pose`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct PoseRows {
-    pub(crate) rows: [f64; 12],
+pub(crate) fn relation(of: Relation) -> i32 {
+    match of {
+        Relation::Touching => TOUCHING,
+        Relation::Apart => APART,
+        Relation::AInB => A_IN_B,
+        Relation::BInA => B_IN_A,
+        Relation::Mixed => MIXED,
+        Relation::Undefined => RELATION_UNDEFINED,
+    }
 }
-// SAFETY: numbers.
-unsafe impl Plain for PoseRows {}
+
+pub(crate) fn side(of: Side) -> i32 {
+    match of {
+        Side::Outside => OUTSIDE,
+        Side::On => ON,
+        Side::Inside => INSIDE,
+        Side::Undefined => SIDE_UNDEFINED,
+    }
+}
 
 impl From<&Pose> for PoseRows {
     fn from(pose: &Pose) -> Self {
@@ -61,63 +161,10 @@ impl From<&Pose> for PoseRows {
     }
 }
 
-/// `cbvh_contact`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct ContactRow {
-    pub(crate) object_a: u32,
-    pub(crate) triangle_a: u32,
-    pub(crate) object_b: u32,
-    pub(crate) triangle_b: u32,
-}
-
-impl From<Contact> for ContactRow {
-    fn from(of: Contact) -> Self {
-        let Contact { object_a, triangle_a, object_b, triangle_b } = of;
-        Self { object_a, triangle_a, object_b, triangle_b }
+impl From<&RayRow> for Ray {
+    fn from(row: &RayRow) -> Self {
+        Self::new(row.origin, row.direction).until(row.until)
     }
-}
-
-/// `cbvh_distance_answer`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct DistanceRow {
-    pub(crate) distance: f64,
-    pub(crate) lower: f64,
-    pub(crate) upper: f64,
-    pub(crate) point_a: [f64; 3],
-    pub(crate) point_b: [f64; 3],
-    pub(crate) object_a: u32,
-    pub(crate) triangle_a: u32,
-    pub(crate) object_b: u32,
-    pub(crate) triangle_b: u32,
-}
-
-row!(DistanceRow from Distance {
-    distance: f64::NAN,
-    lower: f64::NAN,
-    upper: f64::NAN,
-    point_a: [f64::NAN; 3],
-    point_b: [f64::NAN; 3],
-    object_a: 0,
-    triangle_a: 0,
-    object_b: 0,
-    triangle_b: 0
-} and {});
-
-/// `cbvh_distance_options`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct DistanceChoices {
-    pub(crate) size: usize,
-    pub(crate) rel_err: f64,
-    pub(crate) abs_err: f64,
-}
-// SAFETY: numbers.
-unsafe impl Plain for DistanceChoices {}
-// SAFETY: it starts with a size.
-unsafe impl Options for DistanceChoices {
-    const DEFAULT: Self = Self { size: size_of::<Self>(), rel_err: 0.0, abs_err: 0.0 };
 }
 
 impl DistanceChoices {
@@ -130,303 +177,11 @@ impl DistanceChoices {
     }
 }
 
-/// `cbvh_motion_options`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct MotionChoices {
-    pub(crate) size: usize,
-    pub(crate) clearance: f64,
-    pub(crate) tolerance: f64,
-}
-// SAFETY: numbers.
-unsafe impl Plain for MotionChoices {}
-// SAFETY: it starts with a size.
-unsafe impl Options for MotionChoices {
-    const DEFAULT: Self = Self { size: size_of::<Self>(), clearance: 0.0, tolerance: 0.0 };
-}
-
 impl MotionChoices {
     pub(crate) fn read(&self) -> MotionOptions {
         let tolerance = if self.tolerance == 0.0 { None } else { Some(self.tolerance) };
         MotionOptions::new().clearance(self.clearance).tolerance(tolerance)
     }
-}
-
-/// `cbvh_bake_options`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct BakeChoices {
-    pub(crate) size: usize,
-    pub(crate) profile: *const c_char,
-    pub(crate) triangles: *const c_char,
-    pub(crate) effort: *const c_char,
-    pub(crate) scratch: *const c_char,
-    pub(crate) max_error: f64,
-    pub(crate) max_memory: u64,
-    pub(crate) split_objects: i32,
-    pub(crate) scene: i32,
-    pub(crate) no_ids: i32,
-    pub(crate) no_turning_slabs: i32,
-    pub(crate) no_topology: i32,
-    pub(crate) force: i32,
-}
-// SAFETY: numbers, and pointers, which are numbers until they are followed.
-unsafe impl Plain for BakeChoices {}
-// SAFETY: it starts with a size.
-unsafe impl Options for BakeChoices {
-    const DEFAULT: Self = Self {
-        size: size_of::<Self>(),
-        profile: std::ptr::null(),
-        triangles: std::ptr::null(),
-        effort: std::ptr::null(),
-        scratch: std::ptr::null(),
-        max_error: 0.0,
-        max_memory: 0,
-        split_objects: 0,
-        scene: 0,
-        no_ids: 0,
-        no_turning_slabs: 0,
-        no_topology: 0,
-        force: 0,
-    };
-}
-
-/// `cbvh_closest_point`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct ClosestRow {
-    pub(crate) distance: f64,
-    pub(crate) lower: f64,
-    pub(crate) upper: f64,
-    pub(crate) point: [f64; 3],
-    pub(crate) instance: Instance,
-    pub(crate) object: u32,
-    pub(crate) triangle: u32,
-    pub(crate) found: i32,
-    pub(crate) side: i32,
-}
-
-/// No instance: the answer is about one mesh, or there is none.
-const NO_INSTANCE: Instance = Instance { id: 0 };
-/// `CBVH_SIDE_NOT_ASKED`.
-pub(crate) const SIDE_NOT_ASKED: i32 = 3;
-
-row!(ClosestRow from ClosestPoint {
-    distance: f64::NAN,
-    lower: f64::NAN,
-    upper: f64::NAN,
-    point: [f64::NAN; 3],
-    object: 0,
-    triangle: 0
-} and { instance: NO_INSTANCE, found: 0 => 1, side: SIDE_NOT_ASKED });
-
-impl From<Option<ClosestPoint>> for ClosestRow {
-    fn from(of: Option<ClosestPoint>) -> Self {
-        of.map_or(Self::NONE, Self::from)
-    }
-}
-
-impl From<Option<SignedDistance>> for ClosestRow {
-    fn from(of: Option<SignedDistance>) -> Self {
-        of.map_or(Self::NONE, |of| Self { side: side(of.side), ..of.closest.into() })
-    }
-}
-
-impl From<Option<SceneClosestPoint>> for ClosestRow {
-    fn from(of: Option<SceneClosestPoint>) -> Self {
-        of.map_or(Self::NONE, |of| Self { instance: of.instance.into(), ..of.closest.into() })
-    }
-}
-
-impl From<Option<(InstanceId, SignedDistance)>> for ClosestRow {
-    fn from(of: Option<(InstanceId, SignedDistance)>) -> Self {
-        of.map_or(Self::NONE, |(instance, of)| Self { instance: instance.into(), ..Some(of).into() })
-    }
-}
-
-/// `cbvh_ray`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct RayRow {
-    pub(crate) origin: [f64; 3],
-    pub(crate) direction: [f64; 3],
-    pub(crate) until: f64,
-}
-// SAFETY: numbers.
-unsafe impl Plain for RayRow {}
-
-impl From<&RayRow> for Ray {
-    fn from(row: &RayRow) -> Self {
-        Self::new(row.origin, row.direction).until(row.until)
-    }
-}
-
-/// `cbvh_segment`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct SegmentRow {
-    pub(crate) from: [f64; 3],
-    pub(crate) to: [f64; 3],
-}
-// SAFETY: numbers.
-unsafe impl Plain for SegmentRow {}
-
-/// `cbvh_ray_hit`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct HitRow {
-    pub(crate) t: f64,
-    pub(crate) lower: f64,
-    pub(crate) upper: f64,
-    pub(crate) point: [f64; 3],
-    pub(crate) instance: Instance,
-    pub(crate) object: u32,
-    pub(crate) triangle: u32,
-    pub(crate) found: i32,
-    pub(crate) reserved: i32,
-}
-
-row!(HitRow from RayHit {
-    t: f64::NAN,
-    lower: f64::NAN,
-    upper: f64::NAN,
-    point: [f64::NAN; 3],
-    object: 0,
-    triangle: 0
-} and { instance: NO_INSTANCE, found: 0 => 1, reserved: 0 });
-
-impl From<SceneRayHit> for HitRow {
-    fn from(of: SceneRayHit) -> Self {
-        Self { instance: of.instance.into(), ..of.hit.into() }
-    }
-}
-
-impl<T: Into<Self>> From<Option<T>> for HitRow {
-    fn from(of: Option<T>) -> Self {
-        of.map_or(Self::NONE, Into::into)
-    }
-}
-
-/// `cbvh_motion_answer`, and what its numbers mean.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct MotionRow {
-    pub(crate) outcome: i32,
-    pub(crate) reserved: i32,
-    pub(crate) free_until: f64,
-    pub(crate) at: f64,
-    pub(crate) instance_a: Instance,
-    pub(crate) instance_b: Instance,
-    pub(crate) nearest: DistanceRow,
-}
-
-/// `CBVH_FREE`, `CBVH_HIT` and `CBVH_NEAR`.
-pub(crate) const FREE: i32 = 0;
-pub(crate) const HIT: i32 = 1;
-pub(crate) const NEAR: i32 = 2;
-
-impl MotionRow {
-    const FREE: Self = Self {
-        outcome: FREE,
-        reserved: 0,
-        free_until: 1.0,
-        at: f64::NAN,
-        instance_a: NO_INSTANCE,
-        instance_b: NO_INSTANCE,
-        nearest: DistanceRow::NONE,
-    };
-}
-
-impl MotionRow {
-    fn ended(outcome: i32, free_until: f64, at: f64, nearest: Distance) -> Self {
-        Self { outcome, free_until, at, nearest: nearest.into(), ..Self::FREE }
-    }
-
-    fn of(self, pair: ScenePair) -> Self {
-        Self { instance_a: pair.a.into(), instance_b: pair.b.into(), ..self }
-    }
-}
-
-impl From<MotionAnswer> for MotionRow {
-    fn from(of: MotionAnswer) -> Self {
-        match of {
-            MotionAnswer::Free => Self::FREE,
-            MotionAnswer::Hit { free_until, touching_at, nearest } => {
-                Self::ended(HIT, free_until, touching_at, nearest)
-            }
-            MotionAnswer::Near { free_until, at, nearest } => Self::ended(NEAR, free_until, at, nearest),
-        }
-    }
-}
-
-impl From<SceneMotionAnswer> for MotionRow {
-    fn from(of: SceneMotionAnswer) -> Self {
-        match of {
-            SceneMotionAnswer::Free => Self::FREE,
-            SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
-                Self::ended(HIT, free_until, touching_at, nearest.nearest).of(nearest.pair)
-            }
-            SceneMotionAnswer::Near { free_until, at, nearest } => {
-                Self::ended(NEAR, free_until, at, nearest.nearest).of(nearest.pair)
-            }
-        }
-    }
-}
-
-/// The number of a relation.
-pub(crate) fn relation(of: Relation) -> i32 {
-    match of {
-        Relation::Touching => 0,
-        Relation::Apart => 1,
-        Relation::AInB => 2,
-        Relation::BInA => 3,
-        Relation::Mixed => 4,
-        Relation::Undefined => 5,
-    }
-}
-
-/// The number of a side.
-pub(crate) fn side(of: Side) -> i32 {
-    match of {
-        Side::Outside => -1,
-        Side::On => 0,
-        Side::Inside => 1,
-        Side::Undefined => 2,
-    }
-}
-
-/// The numbers of `cbvh_open_mode`.
-pub(crate) const MAP: i32 = 0;
-pub(crate) const MAP_SPARSE: i32 = 1;
-pub(crate) const MAP_WHOLE: i32 = 2;
-pub(crate) const READ: i32 = 3;
-
-/// The numbers of `cbvh_backend`.
-pub(crate) const BACKEND_BEST: i32 = 0;
-pub(crate) const BACKEND_SCALAR: i32 = 1;
-pub(crate) const BACKEND_AVX2: i32 = 2;
-pub(crate) const BACKEND_AVX512: i32 = 3;
-
-/// Reads `cbvh_backend`.
-pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
-    let backend = match number {
-        BACKEND_BEST => return Ok(Backend::detect().map_err(bvh_query::QueryError::from)?),
-        BACKEND_SCALAR => Backend::Scalar,
-        BACKEND_AVX2 => Backend::Avx2,
-        BACKEND_AVX512 => Backend::Avx512,
-        _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 3", number)),
-    };
-    Ok(Backend::from_name(backend.name()).map_err(bvh_query::QueryError::from)?)
-}
-
-/// `cbvh_stats`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct StatsRow {
-    pub(crate) node_tests: u64,
-    pub(crate) packet_tests: u64,
-    pub(crate) exact_tests: u64,
-    pub(crate) pairs: u64,
 }
 
 impl StatsRow {
@@ -448,27 +203,61 @@ impl From<Instance> for InstanceId {
     }
 }
 
-/// `cbvh_scene_pair`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct PairRow {
-    pub(crate) a: Instance,
-    pub(crate) b: Instance,
+/// Makes a row of an answer: its fields, and some that have other values.
+macro_rules! row {
+    ($answer:ident { $($field:ident),* } => $row:ident { $($other:ident: $value:expr),* }) => {
+        impl From<$answer> for $row {
+            fn from(of: $answer) -> Self {
+                Self { $($other: $value,)* $($field: of.$field.into()),* }
+            }
+        }
+    };
 }
+row!(ScenePair { a, b } => PairRow {});
+row!(Contact { object_a, triangle_a, object_b, triangle_b } => ContactRow {});
+row!(SceneContact { pair, contact } => SceneContactRow {});
+row!(SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
+row!(Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
+    => DistanceRow {});
+row!(ClosestPoint { distance, lower, upper, point, object, triangle }
+    => ClosestRow { instance: Instance::NONE, found: 1, side: SIDE_NOT_ASKED });
+row!(RayHit { t, lower, upper, point, object, triangle }
+    => HitRow { instance: Instance::NONE, found: 1, reserved: 0 });
 
-impl From<ScenePair> for PairRow {
-    fn from(of: ScenePair) -> Self {
-        Self { a: of.a.into(), b: of.b.into() }
+/// Makes a row of what may be no answer.
+macro_rules! found {
+    ($($row:ident: $none:expr),*) => { $(
+        impl<T: Into<$row>> From<Option<T>> for $row {
+            fn from(of: Option<T>) -> Self {
+                of.map_or($none, Into::into)
+            }
+        }
+    )* };
+}
+found!(SceneDistanceRow: Self::NONE, HitRow: Self::NONE, ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
+
+impl From<SignedDistance> for ClosestRow {
+    fn from(of: SignedDistance) -> Self {
+        Self { side: side(of.side), ..of.closest.into() }
     }
 }
 
-/// `cbvh_scene_relation`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct SceneRelationRow {
-    pub(crate) pair: PairRow,
-    pub(crate) relation: i32,
-    pub(crate) reserved: i32,
+impl From<SceneClosestPoint> for ClosestRow {
+    fn from(of: SceneClosestPoint) -> Self {
+        Self { instance: of.instance.into(), ..of.closest.into() }
+    }
+}
+
+impl From<(InstanceId, SignedDistance)> for ClosestRow {
+    fn from((instance, of): (InstanceId, SignedDistance)) -> Self {
+        Self { instance: instance.into(), ..of.into() }
+    }
+}
+
+impl From<SceneRayHit> for HitRow {
+    fn from(of: SceneRayHit) -> Self {
+        Self { instance: of.instance.into(), ..of.hit.into() }
+    }
 }
 
 impl From<(ScenePair, Relation)> for SceneRelationRow {
@@ -477,36 +266,30 @@ impl From<(ScenePair, Relation)> for SceneRelationRow {
     }
 }
 
-/// `cbvh_scene_contact`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct SceneContactRow {
-    pub(crate) pair: PairRow,
-    pub(crate) contact: ContactRow,
-}
-
-impl From<SceneContact> for SceneContactRow {
-    fn from(of: SceneContact) -> Self {
-        Self { pair: of.pair.into(), contact: of.contact.into() }
+impl From<MotionAnswer> for MotionRow {
+    fn from(of: MotionAnswer) -> Self {
+        let (outcome, free_until, at, nearest) = match of {
+            MotionAnswer::Free => return Self { outcome: FREE, free_until: 1.0, ..Self::NONE },
+            MotionAnswer::Hit { free_until, touching_at, nearest } => (HIT, free_until, touching_at, nearest),
+            MotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, nearest),
+        };
+        Self { outcome, free_until, at, nearest: nearest.into(), ..Self::NONE }
     }
 }
 
-/// `cbvh_scene_distance_answer`.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct SceneDistanceRow {
-    pub(crate) pair: PairRow,
-    pub(crate) nearest: DistanceRow,
-    pub(crate) found: i32,
-    pub(crate) reserved: i32,
-}
-
-impl From<Option<SceneDistance>> for SceneDistanceRow {
-    fn from(of: Option<SceneDistance>) -> Self {
-        let none = PairRow { a: NO_INSTANCE, b: NO_INSTANCE };
-        match of {
-            Some(of) => Self { pair: of.pair.into(), nearest: of.nearest.into(), found: 1, reserved: 0 },
-            None => Self { pair: none, nearest: DistanceRow::NONE, found: 0, reserved: 0 },
-        }
+impl From<SceneMotionAnswer> for MotionRow {
+    fn from(of: SceneMotionAnswer) -> Self {
+        let (of, pair) = match of {
+            SceneMotionAnswer::Free => return MotionAnswer::Free.into(),
+            SceneMotionAnswer::Hit {
+                free_until,
+                touching_at,
+                nearest: SceneDistance { pair, nearest, .. },
+            } => (MotionAnswer::Hit { free_until, touching_at, nearest }, pair),
+            SceneMotionAnswer::Near { free_until, at, nearest: SceneDistance { pair, nearest, .. } } => {
+                (MotionAnswer::Near { free_until, at, nearest }, pair)
+            }
+        };
+        Self { instance_a: pair.a.into(), instance_b: pair.b.into(), ..of.into() }
     }
 }

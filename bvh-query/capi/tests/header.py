@@ -1,73 +1,51 @@
-"""Compares the header with the library: layouts and numbers as C sees them with those of Rust, and the functions that
-it declares with those that are exported, both ways.
+"""Compares the header with what cbindgen makes of the library's source: functions with the names and types of their
+arguments, structures with their fields in order, and numbers. Then compares its functions with those that the library
+exports. Each has what the other one has.
 
-    header.py HEADER LAYOUT LIBRARY CC
-
-LAYOUT is what `src/layout.rs` writes, LIBRARY the shared library, and CC a C compiler.
+    header.py HEADER GENERATED LIBRARY
 """
 
 import pathlib
 import re
 import subprocess
 import sys
-import tempfile
 
 
 def declared(header):
-    """The structures of a header with their fields, its named numbers, and its functions."""
+    """The declarations of a header and its named numbers, as words between single spaces."""
     text = re.sub(r"/\*.*?\*/", " ", header.read_text(), flags=re.S)
-    structures = {}
-    for fields, name in re.findall(r"typedef struct \w+ \{(.*?)\} (\w+);", text, flags=re.S):
-        structures[name] = re.findall(r"(\w+)(?:\[\d+\])?;", fields)
-    numbers = ["CBVH_ABI"]
-    for body in re.findall(r"enum \{(.*?)\};", text, flags=re.S):
-        numbers += re.findall(r"(\w+) = ", body)
-    functions = re.findall(r"^(?:cbvh_status|const char \*) ?(cbvh_\w+)\(", text, flags=re.M)
-    # What the patterns above do not understand must not go unseen.
-    called = set(re.findall(r"\b(cbvh_\w+)\(", text))
-    if called != set(functions) or text.count("struct cbvh_") != len(structures):
-        sys.exit(f"{header}: expected declarations in the usual form, found others: {called ^ set(functions)}")
-    return structures, numbers, functions
+    text = re.sub(r"^#ifdef __cplusplus.*?^#endif", " ", text, flags=re.S | re.M)
+    # The version of the library does not belong to the interface.
+    numbers = re.findall(r"^#define (CBVH_(?!VERSION)\w+) (-?\d+)$", text, flags=re.M)
+    text = re.sub(r"^#.*$|\bstruct\b", " ", text, flags=re.M)
+    enums = r"\benum\b[^;{]*\{([^}]*)\}"
+    for body in re.findall(enums, text):
+        numbers += re.findall(r"(\w+) = (-?\d+)", body)
+    text = re.sub(enums, " ", text)
+    # The header has names for what numbers are about.
+    for name in re.findall(r"typedef int32_t (\w+);", text):
+        text = re.sub(rf"\b{name}\b", "int32_t", text)
+    text = re.sub(r"typedef (int32_t|enum \w+) int32_t;", " ", text)
+    declarations = (" ".join(re.findall(r"\w+|[^\w\s]", part)) for part in re.split(r";(?![^{]*\})", text))
+    return {part for part in declarations if part} | {f"{name} = {number}" for name, number in numbers}
 
 
-def as_c_sees(header, compiler, structures, numbers):
-    """The lines that `src/layout.rs` writes, by a program in C."""
-    lines = []
-    for name, fields in structures.items():
-        alignment = f"offsetof(struct {{ char c; {name} x; }}, x)"
-        lines.append(f'printf("{name} %zu %zu\\n", sizeof({name}), {alignment});')
-        for field in fields:
-            size = f"sizeof((({name} *)0)->{field})"
-            lines.append(f'printf("{name}.{field} %zu %zu\\n", offsetof({name}, {field}), {size});')
-    lines += [f'printf("{number} %d\\n", (int){number});' for number in numbers]
-    program = "\n".join(["#include <cbvh.h>", "#include <stdio.h>", "int main(void) {", *lines, "return 0;", "}", ""])
-    with tempfile.TemporaryDirectory() as folder:
-        source, binary = pathlib.Path(folder, "layout.c"), pathlib.Path(folder, "layout")
-        source.write_text(program)
-        subprocess.run([compiler, "-std=c99", f"-I{header.parent}", str(source), "-o", str(binary)], check=True)
-        return subprocess.run([str(binary)], check=True, capture_output=True, text=True).stdout.splitlines()
-
-
-def exported(library):
-    """The functions that a shared library exports."""
-    listed = subprocess.run(["nm", "-D", "--defined-only", str(library)], check=True, capture_output=True, text=True)
-    return [line.split()[-1] for line in listed.stdout.splitlines()]
-
-
-def compare(what, in_header, in_library):
-    """Ends the program unless both lists have the same elements."""
-    differences = sorted(set(in_header) ^ set(in_library))
-    if differences or not in_header:
-        places = {line: "the header" if line in set(in_header) else "the library" for line in differences}
-        sys.exit("\n".join([f"{what} differ:", *(f"    {line}: in {place} only" for line, place in places.items())]))
+def compare(in_header, in_library):
+    """Ends the program unless both sets are the same."""
+    if in_header != in_library or not in_header:
+        differences = sorted((line, line in in_header) for line in in_header ^ in_library)
+        places = {True: "the header", False: "the library"}
+        sys.exit("\n".join(["header: ", *(f"    {line}: in {places[place]} only" for line, place in differences)]))
 
 
 def main():
-    header, layout, library = map(pathlib.Path, sys.argv[1:4])
-    structures, numbers, functions = declared(header)
-    compare("layouts and numbers", as_c_sees(header, sys.argv[4], structures, numbers), layout.read_text().splitlines())
-    compare("functions", functions, exported(library))
-    print(f"header: {len(structures)} structures, {len(numbers)} numbers, {len(functions)} functions as in the library")
+    header, generated, library = map(pathlib.Path, sys.argv[1:])
+    declarations = declared(header)
+    compare(declarations, declared(generated))
+    functions = {re.search(r"(\w+) \(", line)[1] for line in declarations if re.match(r"(?!typedef).*\(", line)}
+    listed = subprocess.run(["nm", "-D", "--defined-only", str(library)], check=True, capture_output=True, text=True)
+    compare(functions, {line.split()[-1] for line in listed.stdout.splitlines()})
+    print(f"header: {len(functions)} functions, {len(declarations) - len(functions)} types and numbers as in the library")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 //! Questions about all pairs of a scene, in poses and on ways.
 
 use super::with;
+use crate::entry::write;
 use crate::input::{array, options, reserve};
 use crate::output::{List, One};
 use crate::paths::AskedPath;
@@ -15,17 +16,31 @@ use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 ///
 /// # Safety
 /// As for `One::new`.
-unsafe fn one<R: Copy>(
+unsafe fn one<T: Into<R>, R: Copy>(
     scene: SceneHandle,
     answer: *mut R,
-    ask: impl FnOnce(&mut Scene) -> Result<R, SceneError>,
+    ask: impl FnOnce(&mut Scene) -> Result<T, SceneError>,
 ) -> i32 {
-    with(scene, |scene| {
-        // SAFETY: the caller vouches for it.
-        let mut out = unsafe { One::new("answer", answer) }?;
-        out.set(ask(scene)?);
-        Ok(())
-    })
+    // SAFETY: the caller vouches for it.
+    with(scene, |scene| unsafe { write("answer", answer, || Ok(ask(scene)?.into())) })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_collide(scene: SceneHandle, answer: *mut bool) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { one(scene, answer, Scene::collide) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_within(scene: SceneHandle, d: f64, answer: *mut bool) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { one(scene, answer, |scene| scene.within(d)) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_distance(scene: SceneHandle, answer: *mut SceneDistanceRow) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { one(scene, answer, Scene::distance) }
 }
 
 /// Asks a question with a list of answers.
@@ -40,79 +55,31 @@ unsafe fn list<T: Into<R>, R: Copy>(
     with(scene, |scene| {
         // SAFETY: the caller vouches for it.
         let mut list = unsafe { List::new(name, rows, capacity, count) }?;
-        ask(scene)?.into_iter().for_each(|found| list.push(found.into()));
+        list.add(ask(scene)?);
         list.finish()
     })
 }
 
-/// `cbvh_scene_collide`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_collide(scene: SceneHandle, answer: *mut bool) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, Scene::collide) }
+macro_rules! lists {
+    ($($name:ident ($($own:tt)*) -> $rows:ident: $row:ty, $ask:expr;)*) => { $(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            scene: SceneHandle,
+            $($own)*
+            $rows: *mut $row,
+            capacity: usize,
+            count: *mut usize,
+        ) -> i32 {
+            // SAFETY: the header asks for it.
+            unsafe { list(scene, (stringify!($rows), $rows, capacity, count), $ask) }
+        }
+    )* };
 }
-
-/// `cbvh_scene_within`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_within(scene: SceneHandle, d: f64, answer: *mut bool) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, |scene| scene.within(d)) }
-}
-
-/// `cbvh_scene_distance`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_distance(scene: SceneHandle, answer: *mut SceneDistanceRow) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, |scene| scene.distance().map(SceneDistanceRow::from)) }
-}
-
-/// `cbvh_scene_pairs_in_contact`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_pairs_in_contact(
-    scene: SceneHandle,
-    pairs: *mut PairRow,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { list(scene, ("pairs", pairs, capacity, count), Scene::pairs_in_contact) }
-}
-
-/// `cbvh_scene_pairs_within`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_pairs_within(
-    scene: SceneHandle,
-    d: f64,
-    pairs: *mut PairRow,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { list(scene, ("pairs", pairs, capacity, count), |scene| scene.pairs_within(d)) }
-}
-
-/// `cbvh_scene_relations`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_relations(
-    scene: SceneHandle,
-    relations: *mut SceneRelationRow,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { list(scene, ("relations", relations, capacity, count), Scene::relations) }
-}
-
-/// `cbvh_scene_contacts`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_contacts(
-    scene: SceneHandle,
-    contacts: *mut SceneContactRow,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { list(scene, ("contacts", contacts, capacity, count), Scene::contacts) }
+lists! {
+    cbvh_scene_pairs_in_contact() -> pairs: PairRow, Scene::pairs_in_contact;
+    cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow, |scene| scene.pairs_within(d);
+    cbvh_scene_relations() -> relations: SceneRelationRow, Scene::relations;
+    cbvh_scene_contacts() -> contacts: SceneContactRow, Scene::contacts;
 }
 
 /// Refuses an instance that is named twice: only one of its ways would be looked at.
@@ -131,80 +98,69 @@ fn each_once(instances: &[Instance]) -> Result<(), Failure> {
     }
 }
 
-/// Instances, and the paths that they follow.
-struct Ways {
-    instances: *const Instance,
-    paths: *const PathHandle,
-    count: usize,
+/// Asks a question about instances and the paths that they follow.
+///
+/// # Safety
+/// As for `array`, `options` and `One::new`.
+unsafe fn on_ways<T: Into<R>, R: Copy>(
+    (scene, instances, paths, count): (SceneHandle, *const Instance, *const PathHandle, usize),
     choices: *const MotionChoices,
+    answer: *mut R,
+    ask: impl FnOnce(
+        &mut Scene,
+        &[(InstanceId, &(dyn RigidPath + Sync))],
+        &MotionOptions,
+    ) -> Result<T, SceneError>,
+) -> i32 {
+    with(scene, |scene| {
+        // SAFETY: the caller vouches for it.
+        let (instances, paths, options, mut out) = unsafe {
+            (
+                array("instances", instances, count)?,
+                array("paths", paths, count)?,
+                options("options", choices)?.read(),
+                One::new("answer", answer)?,
+            )
+        };
+        each_once(instances)?;
+        let asked = AskedPath::many("paths", paths)?;
+        let ids = instances.iter().map(|&instance| InstanceId::from(instance));
+        let ways: Vec<_> = ids.zip(asked.iter().map(|path| path as &(dyn RigidPath + Sync))).collect();
+        let found = ask(scene, &ways, &options);
+        asked.iter().try_for_each(AskedPath::failure)?;
+        out.set(found?.into());
+        Ok(())
+    })
 }
 
-impl Ways {
-    /// Asks a question about the ways.
-    ///
-    /// # Safety
-    /// As for `array`, `options` and `One::new`.
-    unsafe fn ask<R: Copy>(
-        &self,
-        scene: SceneHandle,
-        answer: *mut R,
-        ask: impl FnOnce(
-            &mut Scene,
-            &[(InstanceId, &(dyn RigidPath + Sync))],
-            &MotionOptions,
-        ) -> Result<R, SceneError>,
-    ) -> i32 {
-        with(scene, |scene| {
-            // SAFETY: the caller vouches for it.
-            let (instances, paths, options, mut out) = unsafe {
-                (
-                    array("instances", self.instances, self.count)?,
-                    array("paths", self.paths, self.count)?,
-                    options("options", self.choices)?.read(),
-                    One::new("answer", answer)?,
-                )
-            };
-            each_once(instances)?;
-            let asked: Vec<AskedPath> = AskedPath::many("paths", paths)?;
-            let path = |path| path as &(dyn RigidPath + Sync);
-            let ids = instances.iter().map(|&instance| InstanceId::from(instance));
-            let ways: Vec<_> = ids.zip(asked.iter().map(path)).collect();
-            let found = ask(scene, &ways, &options);
-            asked.iter().try_for_each(AskedPath::failure)?;
-            out.set(found.map_err(Failure::from)?);
-            Ok(())
-        })
-    }
-}
-
-/// `cbvh_scene_motion`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_motion(
     scene: SceneHandle,
     instances: *const Instance,
     paths: *const PathHandle,
     count: usize,
-    choices: *const MotionChoices,
+    options: *const MotionChoices,
     answer: *mut MotionRow,
 ) -> i32 {
-    let ways = Ways { instances, paths, count, choices };
     // SAFETY: the header asks for it.
     unsafe {
-        ways.ask(scene, answer, |scene, ways, options| scene.motion(ways, options).map(MotionRow::from))
+        on_ways((scene, instances, paths, count), options, answer, |scene, ways, how| scene.motion(ways, how))
     }
 }
 
-/// `cbvh_scene_is_free`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_is_free(
     scene: SceneHandle,
     instances: *const Instance,
     paths: *const PathHandle,
     count: usize,
-    choices: *const MotionChoices,
+    options: *const MotionChoices,
     answer: *mut bool,
 ) -> i32 {
-    let ways = Ways { instances, paths, count, choices };
     // SAFETY: the header asks for it.
-    unsafe { ways.ask(scene, answer, |scene, ways, options| scene.is_free(ways, options)) }
+    unsafe {
+        on_ways((scene, instances, paths, count), options, answer, |scene, ways, how| {
+            scene.is_free(ways, how)
+        })
+    }
 }
