@@ -72,7 +72,7 @@ pub use bvh_format::source::Source;
 pub use bvh_format::{FormatError, Layout};
 pub use check::prove::{prove_bounds, validate_in_parallel};
 pub use check::verify::{VerifyError, VerifyOptions, VerifyReport, verify, verify_files};
-pub use error::{BakeError, InputError, Place, ReadError};
+pub use error::{BakeError, InputError, LimitError, Place, ReadError};
 pub use input::{MeshFormat, mesh, read_meshes};
 pub use options::{Effort, Options};
 pub use progress::{Progress, Stage, Step, Traffic};

@@ -52,7 +52,6 @@ impl Failure {
         let named = format!("{inputs}: {error}");
         match error {
             BakeError::Read(ReadError::Io { path, source }) => Self::from_input(path, source),
-            BakeError::Read(read) if read.is_system() => Self::System(error.to_string()),
             BakeError::Read(read) if read.is_limit() => Self::Limit(error.to_string()),
             BakeError::Read(_) => Self::Invalid(error.to_string()),
             BakeError::Input(input) if input.is_limit() => Self::Limit(named),

@@ -5,7 +5,7 @@ mod provenance;
 pub(crate) mod report;
 
 use crate::check::prove::prove;
-use crate::error::BakeError;
+use crate::error::{BakeError, LimitError};
 use crate::input::gather::Gatherer;
 use crate::input::mesh::Mesh;
 use crate::options::Options;
@@ -179,10 +179,10 @@ impl<'a> Baker<'a> {
         resources.progress.reach(Step::Bake(Stage::Build), self.kept);
         let (first_page, page_count) = (self.contents.page_count(), pages.page_count());
         if (first_page + page_count) as u64 > MAX_PAGES {
-            return Err(BakeError::Limit("2^26 pages".into()));
+            return Err(LimitError::Pages.into());
         }
         if packets >= 1 << 30 {
-            return Err(BakeError::Limit("2^30 leaf packets".into()));
+            return Err(LimitError::Packets.into());
         }
         let record = ObjectRecord {
             origin: origin.map(Into::into),

@@ -66,11 +66,12 @@ pub enum BakeError {
     },
     /// The allowed error of quantisation is no length, or too large for an object: most of its triangles would collapse.
     #[error(
-        "{object}expected a max error from 0 to {limit:.2e}, a hundredth of the diagonal {diagonal:.2e} of the object's box, \
-         found {allowed:e}; a larger one would collapse most triangles"
+        "{}expected a max error from 0 to {limit:.2e}, a hundredth of the diagonal {diagonal:.2e} of the object's box, \
+         found {allowed:e}; a larger one would collapse most triangles",
+        of_object(object)
     )]
     MaxError {
-        /// The object's name as the message shows it; empty if the object has no name.
+        /// The object's name, shortened; empty if it has none.
         object: String,
         /// The allowed error, in mesh units.
         allowed: f64,
@@ -92,12 +93,31 @@ pub enum BakeError {
     /// The function for build scripts was called outside a build script.
     #[error("expected the environment variable OUT_DIR of a build script, found none")]
     NoOutDir,
-    /// The mesh exceeds a limit of the format or a given limit.
-    #[error("the mesh needs more than {0}")]
-    Limit(String),
+    /// The mesh exceeds a limit of the format.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The output failed its own proof. This is a defect of the baker, never of the input.
     #[error("the baked bytes fail their proof, please report this: {0}")]
     Unproved(#[from] FormatError),
+}
+
+/// The limit of the format that a mesh exceeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LimitError {
+    /// The pages of all objects together.
+    #[error("the mesh needs more than 2^26 pages")]
+    Pages,
+    /// The leaf packets of one object.
+    #[error("the mesh needs more than 2^30 leaf packets")]
+    Packets,
+    /// Equal triangles, less those of the opposite orientation.
+    #[error("the mesh needs more than 2^31 equal triangles")]
+    EqualTriangles,
+}
+
+fn of_object(name: &str) -> String {
+    if name.is_empty() { String::new() } else { format!("object \"{name}\": ") }
 }
 
 fn counted(triangles: u64) -> String {

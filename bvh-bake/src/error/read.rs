@@ -77,11 +77,6 @@ impl fmt::Display for Place {
 }
 
 impl ReadError {
-    /// Returns whether the system is to blame (no such file, no permission) rather than the content of the file.
-    pub fn is_system(&self) -> bool {
-        matches!(self, ReadError::Io { .. })
-    }
-
     /// Returns whether the file exceeds a limit of the reader or the format, rather than being malformed.
     pub fn is_limit(&self) -> bool {
         match self {

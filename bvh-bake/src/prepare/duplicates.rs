@@ -8,7 +8,7 @@
 //! If all hashes are in memory, a bitmap first drops most hashes that occur once, because sorting all of them takes ten
 //! times as long.
 
-use crate::error::BakeError;
+use crate::error::{BakeError, LimitError};
 use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
@@ -112,7 +112,7 @@ impl Group {
             return Ok(());
         }
         if net.abs() > MAX_NET {
-            return Err(BakeError::Limit("2^31 equal triangles".into()));
+            return Err(LimitError::EqualTriangles.into());
         }
         let [a, b, c] = [0, 3, 6].map(|at| [kept[at], kept[at + 1], kept[at + 2]]);
         let corners = if kept[TURN] == 0 { [a, b, c] } else { [a, c, b] };

@@ -35,11 +35,7 @@ pub(crate) fn grid_error(options: &Options, object: &str, diagonal: f64) -> Resu
     // NaN is no length either.
     let is_length = allowed >= 0.0;
     if !is_length || allowed > limit && diagonal > 0.0 {
-        let object = if object.is_empty() {
-            String::new()
-        } else {
-            format!("object \"{}\": ", excerpt(object.as_bytes()))
-        };
+        let object = excerpt(object.as_bytes());
         return Err(BakeError::MaxError { object, allowed, limit, diagonal });
     }
     Ok(Some(allowed).filter(|&error| error > 0.0))
