@@ -86,7 +86,9 @@ pub use file::files::{Files, SceneShape};
 pub use file::mapped::ReadAhead;
 pub use file::owned_shape::OwnedShape;
 pub use file::shape::Shape;
-pub use isa::floats::{FloatState, with_default_floats};
+/// For the bindings alone: programs in other languages may compute in another state than Rust does.
+#[doc(hidden)]
+pub use isa::floats;
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, MotionError, Polyline, RelativePath, RigidPath};
 pub use pose::{Pose, PoseError};

@@ -4,7 +4,8 @@
 //! copy: another thread may change an array while a question runs, and numpy fills large arrays without the lock.
 
 use crate::errors::pose_error;
-use bvh_query::{Pose, PoseError, with_default_floats};
+use bvh_query::floats::with_default_floats;
+use bvh_query::{Pose, PoseError};
 use numpy::npyffi::NPY_ORDER;
 use numpy::{
     PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,

@@ -5,7 +5,8 @@
 
 use crate::arguments::reserved;
 use crate::errors::query_error;
-use bvh_query::{Querier, with_default_floats};
+use bvh_query::Querier;
+use bvh_query::floats::with_default_floats;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};

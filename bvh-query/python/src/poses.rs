@@ -3,7 +3,8 @@
 use crate::answers::Answers;
 use crate::arguments::{many_matrices, poses, rows};
 use crate::errors::pose_error;
-use bvh_query::{Pose, PoseError, with_default_floats};
+use bvh_query::floats::with_default_floats;
+use bvh_query::{Pose, PoseError};
 use pyo3::prelude::*;
 
 /// Poses of positions of shape (3,) or (N, 3) and quaternions of shape (4,) or (N, 4).

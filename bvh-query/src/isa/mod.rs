@@ -48,7 +48,7 @@ pub(crate) mod avx2;
 #[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
 pub(crate) mod avx512;
 #[allow(unsafe_code, reason = "registers of the CPU; each block says why it is sound")]
-pub(crate) mod floats;
+pub mod floats;
 pub(crate) mod scalar;
 
 use bvh_format::slabs::Group;
