@@ -45,10 +45,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         scene.set_poses(robot.poses(&values)?)?;
         let touching = scene.pairs_in_contact()?;
         if touching.is_empty() {
-            let Some(nearest) = scene.distance()? else { continue };
-            let (a, b) = (scene.name(nearest.pair.a)?, scene.name(nearest.pair.b)?);
+            let Some(found) = scene.distance()? else { continue };
+            let (a, b) = (scene.name(found.pair.a)?, scene.name(found.pair.b)?);
             let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
-            println!("{time:.2}: free; {a} and {b} are {:.4} m apart", nearest.nearest.distance);
+            println!("{time:.2}: free; {a} and {b} are {:.4} m apart", found.nearest.distance);
         }
         for pair in touching {
             let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
@@ -60,10 +60,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             .collect();
         let paths: Vec<(InstanceId, &(dyn bvh_query::RigidPath + Sync))> =
             paths.iter().map(|path| (robot.parts[path.part].2, path as _)).collect();
-        if let SceneMotionAnswer::Hit { free_until, nearest, .. } =
+        if let SceneMotionAnswer::Hit { free_until, pair, .. } =
             scene.motion(&paths, &MotionOptions::new())?
         {
-            let (a, b) = (scene.name(nearest.pair.a)?, scene.name(nearest.pair.b)?);
+            let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
             let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
             println!(
                 "      the way to the next step is free for {free_until:.4} of it, until {a} and {b} touch"

@@ -628,8 +628,8 @@ fn motions_in_pieces_are_those_of_all_pairs() {
         there.iter().map(|(id, path)| (*id, path as &(dyn RigidPath + Sync))).collect();
     let moving = *paths.last().unwrap();
     let alone = scene.motion(&[moving], options).unwrap();
-    let SceneMotionAnswer::Hit { nearest, .. } = alone else { panic!("{alone:?}") };
-    assert_eq!(nearest.pair.b, last);
+    let SceneMotionAnswer::Hit { pair, .. } = alone else { panic!("{alone:?}") };
+    assert_eq!(pair.b, last);
     assert_eq!(scene.is_free(&[moving], options), Ok(false));
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

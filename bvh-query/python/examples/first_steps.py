@@ -40,6 +40,6 @@ with tempfile.TemporaryDirectory() as folder:
     ids = [scene.add(robot, pose, member=2, meets=1) for pose in poses[::100]]
     print(f"{len(scene.pairs_in_contact())} pairs of {len(scene)} instances touch")
     scene.set_poses(ids, poses[1::100])
-    nearest = scene.distance()
-    assert nearest is not None
-    print(f"after they moved, the nearest pair is {nearest.nearest.distance} apart")
+    found = scene.distance()
+    assert found is not None
+    print(f"after they moved, the nearest pair is {found.nearest.distance} apart")

@@ -6,7 +6,7 @@ use crate::asking::{detached, on_pool};
 use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State, scene_error};
-use bvh_query::{InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
+use bvh_query::{Distance, InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -16,9 +16,9 @@ type Pairs<'py> = Bound<'py, PyArray2<i64>>;
 /// A pair and its distance, or `None` where there is no pair.
 type Nearest<'py> = Option<(i64, i64, Bound<'py, PyTuple>)>;
 
-fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], SceneDistance)>) -> PyResult<Nearest<'py>> {
-    let Some(([a, b], found)) = found else { return Ok(None) };
-    let nearest = answers::distances(Answers { py, one: true }, std::iter::once(Some(found.nearest)))?;
+fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], Distance)>) -> PyResult<Nearest<'py>> {
+    let Some(([a, b], nearest)) = found else { return Ok(None) };
+    let nearest = answers::distances(Answers { py, one: true }, std::iter::once(Some(nearest)))?;
     Ok(Some((a, b, nearest)))
 }
 
@@ -81,8 +81,9 @@ pub(crate) fn scene_contacts<'py>(
 
 #[pyfunction]
 pub(crate) fn scene_distance<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Nearest<'py>> {
-    let read =
-        |state: &State, found: Option<SceneDistance>| found.map(|found| (state.pair(found.pair), found));
+    let read = |state: &State, found: Option<SceneDistance>| {
+        found.map(|found| (state.pair(found.pair), found.nearest))
+    };
     nearest(py, scene.ask(py, |scene| scene.distance(), read)?)
 }
 
@@ -139,14 +140,13 @@ pub(crate) fn scene_motion<'py>(
 ) -> PyResult<(u8, f64, f64, Nearest<'py>)> {
     let ways = Ways { numbers, paths: AnyPath::read(paths) };
     let options = options(clearance, tolerance)?;
-    let read = |state: &State, answer: SceneMotionAnswer| {
-        let of = |found: SceneDistance| Some((state.pair(found.pair), found));
-        match answer {
-            SceneMotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
-            SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
-                (HIT, free_until, touching_at, of(nearest))
-            }
-            SceneMotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, of(nearest)),
+    let read = |state: &State, answer: SceneMotionAnswer| match answer {
+        SceneMotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
+        SceneMotionAnswer::Hit { free_until, touching_at, pair, nearest } => {
+            (HIT, free_until, touching_at, Some((state.pair(pair), nearest)))
+        }
+        SceneMotionAnswer::Near { free_until, at, pair, nearest } => {
+            (NEAR, free_until, at, Some((state.pair(pair), nearest)))
         }
     };
     let (kind, free_until, at, found) =

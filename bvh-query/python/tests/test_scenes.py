@@ -88,17 +88,17 @@ class Pairs(unittest.TestCase):
         contacts = scene.contacts()
         rows = [[a, b, *row] for a, b, rows in asked.of(lambda a, b, pose: a.contacts(b, pose)) for row in rows.tolist()]
         self.assertEqual(np.hstack([contacts.pairs, contacts.triangles]).tolist(), rows)
-        nearest = scene.distance()
-        self.assertEqual([nearest.a, nearest.b], touching[0])
-        self.assertEqual(nearest.nearest.distance, 0.0)
+        least = scene.distance()
+        self.assertEqual([least.a, least.b], touching[0])
+        self.assertEqual(least.nearest.distance, 0.0)
         # Without those, the nearest is somewhere else.
         for a, b in touching:
             scene.set_allowed(a, b)
         apart = min((of.distance, a, b) for a, b, of in Asked(scene).of(lambda a, b, pose: a.distance(b, pose)))
-        nearest = scene.distance()
-        self.assertEqual((nearest.a, nearest.b), apart[1:])
-        self.assertAlmostEqual(nearest.nearest.distance, apart[0], places=12)
-        between = nearest.nearest.point_a - nearest.nearest.point_b
+        least = scene.distance()
+        self.assertEqual((least.a, least.b), apart[1:])
+        self.assertAlmostEqual(least.nearest.distance, apart[0], places=12)
+        between = least.nearest.point_a - least.nearest.point_b
         self.assertAlmostEqual(np.linalg.norm(between), apart[0], places=12)
         self.assertIs(scene.collide(), False)
         for a, b in touching:
@@ -266,12 +266,13 @@ class Ways(unittest.TestCase):
         # At 8 t = 2 they touch.
         self.assertIs(hit.kind, MotionKind.HIT)
         self.assertTrue(hit.free_until <= 0.25 <= hit.at < 0.25 + 1e-6)
-        self.assertEqual((hit.nearest.a, hit.nearest.b, hit.nearest.nearest.distance), (self.wall, self.part, 0.0))
+        self.assertEqual((hit.a, hit.b, hit.nearest.distance), (self.wall, self.part, 0.0))
         self.assertIs(self.scene.is_free(way), False)
         # The wall moves away as fast.
         way[self.wall] = cbvh.Motion.between(*shifts((3, 0, 0), (11, 0, 0)))
         free = self.scene.motion(way)
-        self.assertEqual((free.kind, free.free_until, free.nearest), (MotionKind.FREE, 1.0, None))
+        self.assertEqual((free.kind, free.free_until), (MotionKind.FREE, 1.0))
+        self.assertEqual((free.a, free.b, free.nearest), (None, None, None))
         self.assertIs(self.scene.is_free(way), True)
         self.assertIs(self.scene.is_free(way, clearance=2.0), False)
         self.assertIs(self.scene.is_free(way, clearance=1.9), True)

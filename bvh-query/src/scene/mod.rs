@@ -71,7 +71,7 @@ use world_box::WorldBox;
 /// let floor = scene.add(bvh.clone(), at(0.0)?)?;
 /// let part = scene.add(bvh, at(2.0)?)?;
 /// assert!(!scene.collide()?);
-/// assert_eq!(scene.distance()?.map(|nearest| nearest.nearest.distance), Some(2.0));
+/// assert_eq!(scene.distance()?.map(|found| found.nearest.distance), Some(2.0));
 /// scene.set_pose(part, at(0.0)?)?;
 /// assert_eq!(scene.pairs_in_contact()?.len(), 1);
 /// scene.set_allowed(floor, part, true)?;

@@ -7,10 +7,11 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::{RelativePath, RigidPath};
+use crate::query::answers::Distance;
 use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
 use crate::query::querier::Querier;
 use crate::scene::instance::{Instance, InstanceId};
-use crate::scene::question::{MAX_KNOWN_PAIRS, SceneDistance, ScenePair};
+use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
 use crate::scene::{Scene, SceneError, check_world};
 use std::collections::BTreeMap;
@@ -32,8 +33,10 @@ pub enum SceneMotionAnswer {
         free_until: f64,
         /// A time at which the pair is within the clearance: the earliest one found.
         touching_at: f64,
-        /// The pair, and its distance at that time. If there are several such pairs, it is the first.
-        nearest: SceneDistance,
+        /// The pair. If there are several such pairs, it is the first.
+        pair: ScenePair,
+        /// The distance of the pair at that time.
+        nearest: Distance,
     },
     /// A pair comes near, but it is undecided whether it comes within the clearance, as for [`MotionAnswer::Near`].
     Near {
@@ -41,8 +44,10 @@ pub enum SceneMotionAnswer {
         free_until: f64,
         /// The time of the first undecided poses.
         at: f64,
-        /// The pair, and its distance at that time.
-        nearest: SceneDistance,
+        /// The pair.
+        pair: ScenePair,
+        /// The distance of the pair at that time.
+        nearest: Distance,
     },
 }
 
@@ -332,9 +337,9 @@ impl Ways<'_> {
 /// The answers about pairs so far, put together; pairs that are free add nothing.
 struct Together {
     free_until: f64,
-    /// The earliest, with its time, and of equally early ones the first pair.
-    hit: Option<(f64, SceneDistance)>,
-    near: Option<(f64, SceneDistance)>,
+    /// The earliest, and of equally early ones the first pair.
+    hit: Option<(f64, ScenePair, Distance)>,
+    near: Option<(f64, ScenePair, Distance)>,
     /// In ascending order of the pairs; each search ended earlier than those of all pairs before.
     errors: Vec<(ScenePair, EndedByError)>,
 }
@@ -348,14 +353,13 @@ impl Default for Together {
 impl Together {
     fn add(&mut self, answers: Vec<(ScenePair, Result<MotionAnswer, EndedByError>)>) {
         for (pair, answer) in answers {
-            let of = |time: f64, distance| (time, SceneDistance { pair, nearest: distance });
-            let (free_until, found, first) = match answer {
+            let (free_until, time, nearest, first) = match answer {
                 Ok(MotionAnswer::Free) => continue,
                 Ok(MotionAnswer::Hit { free_until, touching_at, nearest }) => {
-                    (free_until, of(touching_at, nearest), &mut self.hit)
+                    (free_until, touching_at, nearest, &mut self.hit)
                 }
                 Ok(MotionAnswer::Near { free_until, at, nearest }) => {
-                    (free_until, of(at, nearest), &mut self.near)
+                    (free_until, at, nearest, &mut self.near)
                 }
                 Err(ended) => {
                     self.errors.push((pair, ended));
@@ -363,9 +367,8 @@ impl Together {
                 }
             };
             self.free_until = self.free_until.min(free_until);
-            let order = |&(time, ref distance): &(f64, SceneDistance)| (time, distance.pair);
-            if first.as_ref().is_none_or(|first| order(&found) < order(first)) {
-                *first = Some(found);
+            if first.is_none_or(|(first_time, first_pair, _)| (time, pair) < (first_time, first_pair)) {
+                *first = Some((time, pair, nearest));
             }
         }
         // Which of the errors is the answer depends on the earliest hit. None is where an earlier pair ended no later.
@@ -381,7 +384,7 @@ impl Together {
     /// Takes the error of the first pair that has no answer before the earliest hit. Errors after that do not matter: searches
     /// may end there before they meet them.
     fn first_error(&mut self) -> Option<(ScenePair, QueryError)> {
-        let last = self.hit.as_ref().map_or(f64::INFINITY, |(time, _)| *time);
+        let last = self.hit.map_or(f64::INFINITY, |(time, ..)| time);
         let first = self.errors.iter().position(|(_, ended)| ended.decided_until <= last)?;
         let (pair, ended) = self.errors.swap_remove(first);
         Some((pair, ended.error))
@@ -390,8 +393,10 @@ impl Together {
     fn answer(&self) -> SceneMotionAnswer {
         let free_until = self.free_until;
         match (self.hit, self.near) {
-            (Some((touching_at, nearest)), _) => SceneMotionAnswer::Hit { free_until, touching_at, nearest },
-            (None, Some((at, nearest))) => SceneMotionAnswer::Near { free_until, at, nearest },
+            (Some((touching_at, pair, nearest)), _) => {
+                SceneMotionAnswer::Hit { free_until, touching_at, pair, nearest }
+            }
+            (None, Some((at, pair, nearest))) => SceneMotionAnswer::Near { free_until, at, pair, nearest },
             (None, None) => SceneMotionAnswer::Free,
         }
     }

@@ -32,14 +32,15 @@ impl Placed {
 type Told = (bool, f64, f64, (InstanceId, InstanceId), Distance);
 
 fn told(answer: SceneMotionAnswer) -> Option<Told> {
-    let (is_hit, free_until, time, of) = match answer {
-        SceneMotionAnswer::Free => return None,
-        SceneMotionAnswer::Hit { free_until, touching_at, nearest } => {
-            (true, free_until, touching_at, nearest)
+    match answer {
+        SceneMotionAnswer::Free => None,
+        SceneMotionAnswer::Hit { free_until, touching_at, pair, nearest } => {
+            Some((true, free_until, touching_at, (pair.a, pair.b), nearest))
         }
-        SceneMotionAnswer::Near { free_until, at, nearest } => (false, free_until, at, nearest),
-    };
-    Some((is_hit, free_until, time, (of.pair.a, of.pair.b), of.nearest))
+        SceneMotionAnswer::Near { free_until, at, pair, nearest } => {
+            Some((false, free_until, at, (pair.a, pair.b), nearest))
+        }
+    }
 }
 
 /// The answers about all pairs, put together: the earliest hit, else the earliest undecided pose.

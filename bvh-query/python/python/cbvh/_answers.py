@@ -200,14 +200,18 @@ class SceneMotionAnswer(NamedTuple):
     - ``free_until``: before this time, from 0 to 1, certainly no pair is within the clearance. 1 if the paths are free.
     - ``at``: for HIT, the earliest time found at which a pair is within the clearance; for NEAR, the time of the first
       undecided pose; else NaN.
-    - ``nearest``: the pair, and its distance at that time. A is the instance that stands still or, if both move, the
-      first one. None if the paths are free.
+    - ``a``: the number of an instance of that pair: the one that stands still or, if both move, the first one. None if
+      the paths are free.
+    - ``b``: the number of the other instance.
+    - ``nearest``: the distance of the pair at that time, with points in A's frame.
     """
 
     kind: MotionKind
     free_until: float
     at: float
-    nearest: SceneDistance | None
+    a: int | None
+    b: int | None
+    nearest: Distance | None
 
 
 class SceneClosestPoint(NamedTuple):

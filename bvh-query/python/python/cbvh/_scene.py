@@ -396,8 +396,9 @@ class Scene:
         change.
         """
         numbers, ways = self._ways(paths)
-        kind, until, at, nearest = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
-        return SceneMotionAnswer(MotionKind(kind), until, at, _nearest(nearest))
+        kind, until, at, found = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
+        a, b, nearest = _nearest(found) or (None, None, None)
+        return SceneMotionAnswer(MotionKind(kind), until, at, a, b, nearest)
 
     def is_free(
         self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None

@@ -324,11 +324,11 @@ class CollisionManager:
         self, scene: Scene, own: _Names, others: _OtherNames
     ) -> tuple[float, tuple[Hashable, Hashable] | None, DistanceData | None]:
         """The least distance in a scene; names, first of own objects, then of others; and what is known of it."""
-        nearest = scene.distance()
-        if nearest is None:
+        least = scene.distance()
+        if least is None:
             return float("inf"), None, None
-        found, pose = nearest.nearest, scene.pose(nearest.a)
-        names, is_swapped = _ordered(nearest.a, nearest.b, own, others)
+        found, pose = least.nearest, scene.pose(least.a)
+        names, is_swapped = _ordered(least.a, least.b, own, others)
         points = [pose[:3, :3] @ point + pose[:3, 3] for point in (found.point_a, found.point_b)]
         rows = list(zip((found.triangle_a, found.triangle_b), points))
         return found.distance, names, DistanceData(dict(zip(names, rows[::-1] if is_swapped else rows)), found.distance)
