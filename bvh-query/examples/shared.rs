@@ -9,7 +9,7 @@
 #![allow(clippy::print_stdout, reason = "a program prints its answers")]
 
 use bvh_bake::mesh::Mesh;
-use bvh_query::{Bvh, Pose, Querier, QueryError};
+use bvh_query::{Bvh, Pose, Querier};
 use std::error::Error;
 use std::sync::Arc;
 
@@ -21,14 +21,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tetrahedron = Bvh::from_bytes(bytes.clone())?;
 
     let gaps = [0.25, 0.5, 1.0];
-    let answers: Vec<Result<bool, QueryError>> = std::thread::scope(|scope| {
+    let answers: Vec<Result<bool, bvh_query::Error>> = std::thread::scope(|scope| {
         let ask = |gap: f64| {
             let tetrahedron = &tetrahedron;
             scope.spawn(move || {
                 // A pose of B in A's frame: here a shift along x, past the far corner.
-                let pose = Pose::new(*Pose::IDENTITY.rotation(), [1.0 + gap, 0.0, 0.0]);
-                let pose = pose.map_err(|error| error.to_string()).expect("a shift is rigid");
-                Querier::new()?.within(tetrahedron, tetrahedron, &pose, 0.5)
+                let pose = Pose::new(*Pose::IDENTITY.rotation(), [1.0 + gap, 0.0, 0.0])?;
+                Ok(Querier::new()?.within(tetrahedron, tetrahedron, &pose, 0.5)?)
             })
         };
         let threads = gaps.map(ask);

@@ -1,10 +1,8 @@
 //! What can go wrong when a file is opened and when a question is asked.
 
-use crate::isa::BackendError;
-use crate::pose::PoseError;
-use bvh_format::FormatError;
+use bvh_format::{FormatError, Rule};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Why a file cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -28,18 +26,7 @@ pub enum OpenError {
     },
 }
 
-impl OpenError {
-    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
-        Self::Io { path: path.to_owned(), source }
-    }
-
-    pub(crate) fn format(path: &Path, source: FormatError) -> Self {
-        Self::Format { path: path.to_owned(), source }
-    }
-}
-
-/// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget, a missing backend or a number
-/// that means nothing.
+/// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget or an invalid number.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QueryError {
@@ -52,31 +39,76 @@ pub enum QueryError {
         /// The budget.
         visits: u64,
     },
-    /// A number given with the question means nothing, such as a distance of NaN.
-    #[error("{name}: expected {expected}, found {found}")]
-    Number {
-        /// The parameter.
-        name: &'static str,
-        /// The numbers that are allowed.
-        expected: &'static str,
-        /// The number given.
-        found: f64,
-    },
-    /// Two poses have no relative pose.
+    /// A number given with the question is invalid, such as a distance of NaN.
     #[error(transparent)]
-    Pose(#[from] PoseError),
-    /// A file that is opened at first need is not there, or has changed since its header was read.
+    Number(#[from] NumberError),
+    /// A file that [`crate::Files`] opens at first need is no longer what it was when its header was read.
     #[error("{}: expected the file as it was when it was added, found {found}; bring it back, or add what is there now", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// What became of it.
-        found: String,
+        found: FileChange,
     },
     /// The file does not state which of its objects are closed.
     #[error("this file does not say which objects are closed; bake it again with topology")]
     NoTopology,
-    /// The backend asked for is not available.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
+}
+
+/// An invalid number, by the parameter that it was given for.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NumberError {
+    /// There is no object of this number.
+    #[error("object: expected the number of an object of the file, found {0}")]
+    Object(usize),
+    /// A coordinate of a point.
+    #[error("point: expected finite coordinates of at most 2^120, found {0}")]
+    Point(f64),
+    /// The largest component of a ray's direction.
+    #[error(
+        "direction: expected numbers the largest of which is from 2^-500 to 2^500 in magnitude, found {0}"
+    )]
+    Direction(f64),
+    /// The parameter at which a ray ends.
+    #[error("until: expected a number of at least 0, or infinity, found {0}")]
+    Until(f64),
+    /// The limit of a search for a closest point.
+    #[error("within: expected a distance of at least 0, or infinity, found {0}")]
+    Within(f64),
+    /// The distance to compare with.
+    #[error("d: expected a finite distance of at least 0, found {0}")]
+    Distance(f64),
+    /// The relative error of a distance.
+    #[error("rel_err: expected a finite fraction of at least 0, found {0}")]
+    RelErr(f64),
+    /// The absolute error of a distance.
+    #[error("abs_err: expected a finite length of at least 0, found {0}")]
+    AbsErr(f64),
+    /// The clearance of a motion.
+    #[error("clearance: expected a finite length of at least 0, found {0}")]
+    Clearance(f64),
+    /// The tolerance of a motion.
+    #[error("tolerance: expected a finite length above 0, found {0}")]
+    Tolerance(f64),
+    /// A tolerance, given or by default, that the poses of a path do not resolve.
+    #[error(
+        "tolerance: expected more than B moves in 2^-45 of the time, and than its poses are rounded by, found {0}"
+    )]
+    Unresolved(f64),
+}
+
+/// What became of a file after its header was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileChange {
+    /// The system refuses it.
+    #[error("a file that cannot be read ({0})")]
+    Unreadable(io::ErrorKind),
+    /// It breaks a rule of the format.
+    #[error("a breach of {0}")]
+    Damaged(Rule),
+    /// It is another file.
+    #[error("other contents")]
+    Replaced,
 }

@@ -21,7 +21,7 @@
 //! rays and segments. Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds
 //! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`]. Points,
 //! rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the
-//! world.
+//! world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2 or
 //! portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have the same bits on
@@ -80,7 +80,7 @@ mod query;
 mod scene;
 mod traverse;
 
-pub use error::{OpenError, QueryError};
+pub use error::{FileChange, NumberError, OpenError, QueryError};
 pub use file::bvh::Bvh;
 pub use file::files::{Files, SceneShape};
 pub use file::mapped::ReadAhead;
@@ -90,7 +90,7 @@ pub use file::shape::Shape;
 #[doc(hidden)]
 pub use isa::floats;
 pub use isa::{Backend, BackendError};
-pub use motion::{Motion, MotionError, Polyline, RelativePath, RigidPath};
+pub use motion::{Motion, PathError, Polyline, RelativePath, RigidPath};
 pub use pose::{Pose, PoseError};
 pub use query::answers::{
     ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, Side, SignedDistance,
@@ -107,8 +107,8 @@ pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceId, InstanceLabel, Scene, SceneClosestPoint, SceneContact, SceneDistance, SceneError,
-    SceneMotionAnswer, ScenePair, SceneRayHit,
+    Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClosestPoint, SceneContact, SceneDistance,
+    SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
@@ -136,6 +136,41 @@ pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::Object;
 pub use bvh_format::profile::Profile;
 pub use bvh_format::{FormatError, Layout, Rule};
+
+/// Any error of this crate: each operation has an error of its own, and `?` turns all of them into this one.
+///
+/// ```
+/// use bvh_query::{Bvh, Error, Pose, Querier};
+///
+/// fn touch(room: &str, robot: &str, robot_in_room: &[f64; 12]) -> Result<bool, Error> {
+///     let (room, robot) = (Bvh::read(room)?, Bvh::read(robot)?);
+///     Ok(Querier::new()?.collide(&room, &robot, &Pose::from_rows(robot_in_room)?)?)
+/// }
+/// assert!(matches!(touch("nowhere.cbvh", "nowhere.cbvh", &[0.0; 12]), Err(Error::Open(_))));
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file cannot be opened.
+    Open(#[from] OpenError),
+    /// Bytes in memory are no valid `.cbvh` file.
+    Format(#[from] FormatError),
+    /// A backend is not available.
+    Backend(#[from] BackendError),
+    /// Numbers make no pose.
+    Pose(#[from] PoseError),
+    /// Poses or numbers make no path.
+    Path(#[from] PathError),
+    /// A question about meshes has no answer.
+    Query(#[from] QueryError),
+    /// A file makes no scene.
+    SceneFile(#[from] SceneFileError),
+    /// A scene refuses an instance, or does not have it.
+    Instance(#[from] InstanceError),
+    /// A question about a scene has no answer.
+    Scene(#[from] SceneError),
+}
 
 /// Compiles the examples of the crate's README, some of which use all cores.
 #[cfg(all(doctest, feature = "parallel"))]

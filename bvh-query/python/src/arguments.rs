@@ -3,7 +3,7 @@
 //! Messages begin with the name of the argument. Everything is copied while Python's lock is held, and checked in the
 //! copy: another thread may change an array while a question runs, and numpy fills large arrays without the lock.
 
-use crate::errors::pose_error;
+use crate::errors::value_error;
 use bvh_query::floats::with_default_floats;
 use bvh_query::{Pose, PoseError};
 use numpy::npyffi::NPY_ORDER;
@@ -206,7 +206,9 @@ pub(crate) fn many_matrices(
     let array = numbers(value, name)?;
     let one = expect_rows(&array, name, &[4, 4])?;
     let matrices = array.as_slice()?.as_chunks::<4>().0.as_chunks::<4>().0;
-    Rows::read(matrices, one, name, |matrix, place| make(matrix).map_err(|error| pose_error(&place(), error)))
+    Rows::read(matrices, one, name, |matrix, place| {
+        make(matrix).map_err(|error| value_error(&place(), error))
+    })
 }
 
 /// Reads poses of shape (N, 4, 4).
@@ -220,7 +222,7 @@ pub(crate) fn pose(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Pose> {
     let array = numbers(value, name)?;
     let matrix = array.as_slice()?.as_chunks::<4>().0.first_chunk().filter(|_| array.shape() == [4, 4]);
     let matrix = matrix.ok_or_else(|| shape_error(name, "(4, 4)", array.shape()))?;
-    pose_of(matrix).map_err(|error| pose_error(name, error))
+    pose_of(matrix).map_err(|error| value_error(name, error))
 }
 
 /// Reads a pose of shape (4, 4), or `None` for the identity.

@@ -4,7 +4,7 @@
 //! one it comes from, so that it starts its own.
 
 use crate::arguments::reserved;
-use crate::errors::query_error;
+use crate::errors::backend_error;
 use bvh_query::Querier;
 use bvh_query::floats::with_default_floats;
 use pyo3::exceptions::PyRuntimeError;
@@ -22,7 +22,7 @@ fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> PyResult<T>) -> PyResult<T>
     let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
     let mut querier = match kept {
         Some(querier) => querier,
-        None => Box::new(Querier::new().map_err(query_error)?),
+        None => Box::new(Querier::new().map_err(backend_error)?),
     };
     let answer = ask(&mut querier);
     // After an error, which is rare, a querier may be in the middle of a question.

@@ -1,10 +1,11 @@
 //! Errors of the libraries as exceptions with the same messages.
 
 use bvh_bake::ReadError;
-use bvh_query::{MotionError, OpenError, PoseError, QueryError};
+use bvh_query::{BackendError, OpenError, QueryError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
+use std::fmt::Display;
 use std::path::Path;
 
 create_exception!(cbvh, FormatError, PyValueError, "A file is not a valid .cbvh file, or is damaged.");
@@ -34,16 +35,21 @@ fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr 
 
 /// The exception of a question that has no answer.
 pub(crate) fn query_error(error: QueryError) -> PyErr {
+    question_error(&error, error.to_string())
+}
+
+/// The exception of a question that has no answer, with a message that says more.
+pub(crate) fn question_error(error: &QueryError, message: String) -> PyErr {
     match error {
-        QueryError::Damaged(_) => FormatError::new_err(error.to_string()),
-        QueryError::File { .. } => PyOSError::new_err(error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
+        QueryError::Damaged(_) => FormatError::new_err(message),
+        QueryError::File { .. } => PyOSError::new_err(message),
+        _ => PyValueError::new_err(message),
     }
 }
 
-/// The exception of a matrix that is not a pose.
-pub(crate) fn pose_error(place: &str, error: PoseError) -> PyErr {
-    PyValueError::new_err(format!("{place}: {error}"))
+/// The exception of a backend that `CBVH_ISA` names and that is not there.
+pub(crate) fn backend_error(error: BackendError) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// The exception of a mesh that cannot be baked, or of a file that the system refuses.
@@ -58,7 +64,7 @@ pub(crate) fn bake_error(error: bvh_bake::BakeError) -> PyErr {
     }
 }
 
-/// The exception of poses or numbers that make no motion.
-pub(crate) fn path_error(place: &str, error: &MotionError) -> PyErr {
+/// The exception of numbers that make no pose, or of poses or numbers that make no path.
+pub(crate) fn value_error(place: &str, error: impl Display) -> PyErr {
     PyValueError::new_err(format!("{place}: {error}"))
 }

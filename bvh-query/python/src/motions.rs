@@ -3,10 +3,10 @@
 use crate::answers::{self, Answers};
 use crate::arguments::{flag, number};
 use crate::asking::{on_all_cores, one_by_one};
-use crate::errors::query_error;
+use crate::errors::{backend_error, query_error};
 use crate::mesh::Mesh;
 use crate::paths::{AnyPath, until_raised};
-use bvh_query::{Batch, MotionOptions, Querier, QueryError};
+use bvh_query::{Batch, MotionOptions, Querier, QueryError, Shape};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -15,12 +15,14 @@ fn ask<T: Send>(
     py: Python<'_>,
     paths: &[AnyPath],
     parallel: bool,
-    batch: impl Fn(&[AnyPath]) -> Result<Vec<T>, QueryError> + Sync,
+    [a, b]: [Shape<'_>; 2],
+    batch: impl Fn(&Batch<'_>, &[AnyPath]) -> Result<Vec<T>, QueryError> + Sync,
     one: impl Fn(&mut Querier, &AnyPath) -> Result<T, QueryError> + Sync,
 ) -> PyResult<Vec<T>> {
     // Without paths, too, the other arguments are checked.
     if paths.is_empty() || parallel && !paths.iter().any(AnyPath::is_called) {
-        return on_all_cores(py, paths, |paths| batch(paths).map_err(query_error));
+        let all = Batch::new(a, b).map_err(backend_error)?;
+        return on_all_cores(py, paths, |paths| batch(&all, paths).map_err(query_error));
     }
     one_by_one(py, paths, |querier, path| {
         until_raised([path].into_iter(), || one(querier, path))?.map_err(query_error)
@@ -49,8 +51,9 @@ pub(crate) fn motion<'py>(
 ) -> PyResult<Bound<'py, PyTuple>> {
     let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let (options, parallel) = (options(clearance, tolerance)?, flag(parallel, "parallel")?);
-    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.motions(paths, &options);
-    let found = ask(py, &paths, parallel, batch, |querier, path| querier.motion(a, b, path, &options))?;
+    let batch = |batch: &Batch<'_>, paths: &[AnyPath]| batch.motions(paths, &options);
+    let one_of = |querier: &mut Querier, path: &AnyPath| querier.motion(a, b, path, &options);
+    let found = ask(py, &paths, parallel, [a, b], batch, one_of)?;
     answers::motions(Answers { py, one }, &found)
 }
 
@@ -67,7 +70,8 @@ pub(crate) fn is_free<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (a, b, one, paths) = (a.shape().shape(), b.shape().shape(), paths.1, AnyPath::read(paths.0));
     let (options, parallel) = (options(clearance, tolerance)?, flag(parallel, "parallel")?);
-    let batch = |paths: &[AnyPath]| Batch::new(a, b)?.are_free(paths, &options);
-    let found = ask(py, &paths, parallel, batch, |querier, path| querier.is_free(a, b, path, &options))?;
+    let batch = |batch: &Batch<'_>, paths: &[AnyPath]| batch.are_free(paths, &options);
+    let one_of = |querier: &mut Querier, path: &AnyPath| querier.is_free(a, b, path, &options);
+    let found = ask(py, &paths, parallel, [a, b], batch, one_of)?;
     Answers { py, one }.values(found.into_iter())
 }

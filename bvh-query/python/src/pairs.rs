@@ -3,7 +3,7 @@
 use crate::answers::{self, Answers, table};
 use crate::arguments::{self, Rows, flag, number};
 use crate::asking::{on_all_cores, one_by_one};
-use crate::errors::query_error;
+use crate::errors::{backend_error, query_error};
 use crate::mesh::Mesh;
 use bvh_query::{Batch, Contact, DistanceOptions, Pose, Querier, QueryError, Shape};
 use pyo3::exceptions::PyValueError;
@@ -39,7 +39,7 @@ impl<'py, 'a> Question<'py, 'a> {
         let (a, b, poses) = (self.a, self.b, &self.poses.rows);
         // Without poses, too, the other arguments are checked.
         if self.parallel || poses.is_empty() {
-            let all = Batch::new(a, b).map_err(query_error)?;
+            let all = Batch::new(a, b).map_err(backend_error)?;
             return on_all_cores(self.py, poses, |poses| batch(&all, poses).map_err(query_error));
         }
         one_by_one(self.py, poses, |querier, pose| one(querier, [a, b], pose).map_err(query_error))

@@ -3,7 +3,7 @@
 use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
 use crate::asking::detached;
-use crate::errors::path_error;
+use crate::errors::value_error;
 use bvh_query::floats::with_default_floats;
 use bvh_query::{Motion, Polyline, Pose, RigidPath};
 use numpy::PyUntypedArrayMethods;
@@ -51,7 +51,7 @@ impl Paths {
     fn between(start: &Bound<'_, PyAny>, end: &Bound<'_, PyAny>) -> PyResult<Self> {
         let made =
             poses(start, "start")?.with("start", (&poses(end, "end")?, "end"), |start, end, place| {
-                Motion::between(start, end).map(Own::Motion).map_err(|error| path_error(&place(), &error))
+                Motion::between(start, end).map(Own::Motion).map_err(|error| value_error(&place(), error))
             })?;
         Ok(Self { paths: made.rows, one: made.one })
     }
@@ -69,7 +69,7 @@ impl Paths {
         let start = pose(start, "start")?;
         let (point, direction) = (vector(point, "point")?, vector(direction, "direction")?);
         let motion = with_default_floats(|_| Motion::screw(&start, point, direction, angle, shift));
-        motion.map(|motion| Self::of(Own::Motion(motion))).map_err(|error| path_error("screw", &error))
+        motion.map(|motion| Self::of(Own::Motion(motion))).map_err(|error| value_error("screw", error))
     }
 
     /// A path through poses.
@@ -77,7 +77,7 @@ impl Paths {
     fn through(knots: &Bound<'_, PyAny>) -> PyResult<Self> {
         let knots = many_poses(knots, "poses")?;
         let polyline =
-            with_default_floats(|_| Polyline::new(&knots)).map_err(|error| path_error("poses", &error))?;
+            with_default_floats(|_| Polyline::new(&knots)).map_err(|error| value_error("poses", error))?;
         Ok(Self::of(Own::Polyline(Arc::new(polyline))))
     }
 

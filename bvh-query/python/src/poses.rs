@@ -2,7 +2,7 @@
 
 use crate::answers::Answers;
 use crate::arguments::{many_matrices, poses, rows};
-use crate::errors::pose_error;
+use crate::errors::value_error;
 use bvh_query::floats::with_default_floats;
 use bvh_query::{Pose, PoseError};
 use pyo3::prelude::*;
@@ -16,7 +16,7 @@ pub(crate) fn poses_of<'py>(
     let (positions, quaternions) = (rows(position, "position")?, rows(quaternion, "quaternion")?);
     let made =
         positions.with("position", (&quaternions, "quaternion"), |&position, &quaternion, place| {
-            Pose::from_quaternion(quaternion, position).map_err(|error| pose_error(&place(), error))
+            Pose::from_quaternion(quaternion, position).map_err(|error| value_error(&place(), error))
         })?;
     Answers { py: position.py(), one: made.one }.poses(&made.rows)
 }
@@ -28,7 +28,7 @@ pub(crate) fn relative_poses<'py>(
     b: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let made = poses(a, "a")?.with("a", (&poses(b, "b")?, "b"), |a, b, place| {
-        Pose::relative(a, b).map_err(|error| pose_error(&place(), error))
+        Pose::relative(a, b).map_err(|error| value_error(&place(), error))
     })?;
     Answers { py: a.py(), one: made.one }.poses(&made.rows)
 }

@@ -3,7 +3,7 @@
 use crate::answers::{self, Answers};
 use crate::arguments::{Rows, flag, number, numbers, points as read_points, pose_or_identity, shape_error};
 use crate::asking::{on_all_cores, one_by_one};
-use crate::errors::query_error;
+use crate::errors::{backend_error, query_error};
 use crate::mesh::Mesh;
 use crate::scene::{Scene, State};
 use bvh_query::{
@@ -71,7 +71,7 @@ impl<'py, P: Sync> Question<'py, P> {
         let placed = mesh.shape().shape().at(&self.pose);
         // Without probes, too, the other arguments are checked.
         let found = if self.parallel || probes.is_empty() {
-            let all = ProbeBatch::new(placed).map_err(query_error)?;
+            let all = ProbeBatch::new(placed).map_err(backend_error)?;
             on_all_cores(self.py, probes, |probes| batch(&all, probes).map_err(query_error))
         } else {
             one_by_one(self.py, probes, |querier, probe| one(querier, placed, probe).map_err(query_error))

@@ -7,11 +7,12 @@
 use crate::answers::{Answers, array, table};
 use crate::arguments::{self, pose_or_identity};
 use crate::asking::{detached, on_pool};
-use crate::errors::{FormatError, open_error, query_error};
+use crate::errors::{FormatError, backend_error, open_error, query_error, question_error, value_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
 use bvh_query::{
-    Bvh, Groups, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair, SceneShape,
+    Bvh, Groups, InstanceError, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair,
+    SceneShape,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -37,12 +38,6 @@ pub(crate) struct State {
     next: i64,
     pub(crate) parallel: bool,
     tracking: bool,
-}
-
-/// Why a scene refuses something: what callers have to be told is made of it while the scene is locked.
-pub(crate) struct Refused {
-    error: Box<SceneError>,
-    message: String,
 }
 
 impl State {
@@ -90,39 +85,28 @@ impl State {
         }
     }
 
-    /// Returns an error with a message that names instances as callers know them.
-    pub(crate) fn refused(&self, error: SceneError) -> Refused {
-        let message = match &error {
+    /// The exception of what the scene refuses, which names instances as callers know them.
+    pub(crate) fn refused(&self, error: impl Into<SceneError>) -> PyErr {
+        match error.into() {
             SceneError::Pair { a, b, source } => {
-                format!("instances {} and {}: {source}", self.called(a), self.called(b))
+                let message = format!("instances {} and {}: {source}", self.called(&a), self.called(&b));
+                question_error(&source, message)
             }
             SceneError::Instance { instance, source } => {
-                format!("instance {}: {source}", self.called(instance))
+                question_error(&source, format!("instance {}: {source}", self.called(&instance)))
             }
-            SceneError::Pose { instance, what, found } => {
-                format!("instance {}: expected {what}, found {found:e}", self.called(instance))
+            SceneError::Query(source) => query_error(source),
+            SceneError::Refused(InstanceError::Pose { instance, source }) => {
+                value_error(&format!("instance {}", self.called(&instance)), source)
             }
-            error => error.to_string(),
-        };
-        Refused { error: Box::new(error), message }
+            error => PyValueError::new_err(error.to_string()),
+        }
     }
 }
 
 /// The exception of a number that names no instance, or no longer.
 fn no_instance(name: &str, found: i64) -> PyErr {
     PyKeyError::new_err(format!("{name}: expected an instance of the scene, found {found}; was it removed?"))
-}
-
-/// The exception of what a scene refuses.
-pub(crate) fn scene_error(Refused { error, message }: Refused) -> PyErr {
-    match *error {
-        SceneError::Pair { source, .. } | SceneError::Instance { source, .. } => {
-            let kind = query_error(source);
-            Python::attach(|py| PyErr::from_type(kind.get_type(py), message))
-        }
-        SceneError::Query(source) => query_error(source),
-        _ => PyValueError::new_err(message),
-    }
 }
 
 /// Many placed meshes.
@@ -140,11 +124,11 @@ impl Scene {
         &self,
         py: Python<'_>,
         number: i64,
-        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, SceneError> + Send,
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, InstanceError> + Send,
     ) -> PyResult<T> {
         self.with(py, |state| {
             let id = state.id(number, "id")?;
-            work(&mut state.scene, id).map_err(|error| scene_error(state.refused(error)))
+            work(&mut state.scene, id).map_err(|error| state.refused(error))
         })
     }
 
@@ -160,7 +144,7 @@ impl Scene {
                 if state.parallel { on_pool(|| ask(&mut state.scene))? } else { ask(&mut state.scene) };
             match answer {
                 Ok(answer) => Ok(read(state, answer)),
-                Err(error) => Err(scene_error(state.refused(error))),
+                Err(error) => Err(state.refused(error)),
             }
         })
     }
@@ -170,7 +154,7 @@ impl Scene {
 impl Scene {
     #[new]
     fn new() -> PyResult<Self> {
-        let scene = bvh_query::Scene::new().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let scene = bvh_query::Scene::new().map_err(backend_error)?;
         Ok(Self(Mutex::new(State::new(scene))))
     }
 
@@ -220,7 +204,7 @@ impl Scene {
             // In the order of the scene, each once.
             ids.sort_unstable();
             ids.dedup();
-            let made = bvh_query::Scene::new().map_err(|error| PyValueError::new_err(error.to_string()))?;
+            let made = bvh_query::Scene::new().map_err(backend_error)?;
             let mut only = State::new(made);
             only.parallel = state.parallel;
             only.scene.set_parallel(state.parallel);
@@ -232,7 +216,7 @@ impl Scene {
                         None => only.scene.add(shape, pose),
                     }
                 })();
-                let added = known.map_err(|error| scene_error(state.refused(error)))?;
+                let added = known.map_err(|error| state.refused(error))?;
                 let number = state.number(id);
                 let mesh = Arc::clone(&state.entry(number, "instances")?.mesh);
                 only.entries.insert(number, Entry { id: added, mesh });
@@ -257,29 +241,28 @@ impl Scene {
         let pose = pose_or_identity(pose.as_ref(), "pose")?;
         let shape = SceneShape::from(mesh.shape().clone());
         let groups = Groups { member: groups[0], meets: groups[1] };
-        let added = self.with(py, |state| {
+        self.with(py, |state| {
             let added = match name {
                 Some(name) => state.scene.add_named(name, shape, pose),
                 None => state.scene.add(shape, pose),
             };
             let id = added.map_err(|error| match error {
-                SceneError::Pose { what, found, .. } => format!("pose: expected {what}, found {found:e}"),
-                SceneError::NameTaken(name) => {
-                    format!("name: expected one that no instance has, found {name:?}")
+                InstanceError::Pose { source, .. } => value_error("pose", source),
+                InstanceError::NameTaken(name) => {
+                    value_error("name", format!("expected one that no instance has, found {name:?}"))
                 }
-                error => state.refused(error).message,
+                error => state.refused(error),
             })?;
             // The instance is there.
-            state.scene.set_groups(id, groups).map_err(|error| error.to_string())?;
+            state.scene.set_groups(id, groups).map_err(|error| state.refused(error))?;
             Ok(state.enter(number, id, known))
-        });
-        added.map_err(|message: String| PyValueError::new_err(message))
+        })
     }
 
     fn remove(&self, py: Python<'_>, number: i64) -> PyResult<()> {
         self.with(py, |state| {
             let id = state.id(number, "id")?;
-            state.scene.remove(id).map_err(|error| scene_error(state.refused(error)))?;
+            state.scene.remove(id).map_err(|error| state.refused(error))?;
             state.numbers.remove(&id);
             state.entries.remove(&number);
             Ok(())
@@ -307,7 +290,7 @@ impl Scene {
         self.with(py, |state| {
             let ids = numbers.iter().map(|&number| state.id(number, "ids")).collect::<PyResult<Vec<_>>>()?;
             let moved = state.scene.set_poses(ids.into_iter().zip(poses));
-            moved.map_err(|error| scene_error(state.refused(error)))
+            moved.map_err(|error| state.refused(error))
         })
     }
 
@@ -324,7 +307,7 @@ impl Scene {
         self.with(py, |state| {
             let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
             let allowed = state.scene.set_allowed(first, second, allowed);
-            allowed.map_err(|error| scene_error(state.refused(error)))
+            allowed.map_err(|error| state.refused(error))
         })
     }
 

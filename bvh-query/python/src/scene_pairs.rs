@@ -5,7 +5,7 @@ use crate::arguments::number;
 use crate::asking::{detached, on_pool};
 use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
-use crate::scene::{Scene, State, scene_error};
+use crate::scene::{Scene, State};
 use bvh_query::{Distance, InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -116,7 +116,7 @@ impl Ways {
             };
             match answer {
                 Ok(answer) => Ok(read(state, answer)),
-                Err(error) => Err(scene_error(state.refused(error))),
+                Err(error) => Err(state.refused(error)),
             }
         };
         if !self.paths.iter().any(AnyPath::is_called) {

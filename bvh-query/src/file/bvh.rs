@@ -81,7 +81,7 @@ impl Bvh {
         let map = Arc::new(map);
         let advised = sparse.then(|| map.clone());
         let opened = Self::new(Bytes::from_owner(MapOwner(map)), advised);
-        opened.map_err(|source| OpenError::format(path, source))
+        opened.map_err(|source| OpenError::Format { path: path.to_owned(), source })
     }
 
     /// Reads a whole file into memory and opens the copy. Later changes of the file have no effect: use this where
@@ -94,8 +94,9 @@ impl Bvh {
     /// break a rule of the format.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        let bytes = memory::read(path).map_err(|source| OpenError::io(path, source))?;
-        Self::new(Bytes::from_owner(bytes), None).map_err(|source| OpenError::format(path, source))
+        let bytes = memory::read(path).map_err(|source| OpenError::Io { path: path.to_owned(), source })?;
+        Self::new(Bytes::from_owner(bytes), None)
+            .map_err(|source| OpenError::Format { path: path.to_owned(), source })
     }
 
     /// Opens the bytes of a file in memory, such as those that `bvh_bake::to_bytes` returns.

@@ -1,6 +1,6 @@
 //! Files that are opened when a scene first needs them. The number that stay open is limited.
 
-use crate::error::{OpenError, QueryError};
+use crate::error::{FileChange, OpenError, QueryError};
 use crate::file::bvh::{Bvh, WeakBvh};
 use crate::file::owned_shape::OwnedShape;
 use bvh_format::object::Object;
@@ -177,15 +177,15 @@ impl Files {
 
 impl Known {
     fn open_again(&self, open_file: fn(&Path) -> Result<Bvh, OpenError>) -> Result<Bvh, QueryError> {
-        let failed = |found: String| QueryError::File { path: self.path.clone(), found };
+        let failed = |found| QueryError::File { path: self.path.clone(), found };
         let bvh = open_file(&self.path).map_err(|error| {
             failed(match error {
-                OpenError::Io { source, .. } => source.to_string(),
-                OpenError::Format { source, .. } => format!("a breach of {}", source.rule),
+                OpenError::Io { source, .. } => FileChange::Unreadable(source.kind()),
+                OpenError::Format { source, .. } => FileChange::Damaged(source.rule),
             })
         })?;
         let is_same = bvh.layout().content_checksum == self.content_checksum && bvh.objects() == self.objects;
-        if is_same { Ok(bvh) } else { Err(failed("other contents".to_owned())) }
+        if is_same { Ok(bvh) } else { Err(failed(FileChange::Replaced)) }
     }
 }
 

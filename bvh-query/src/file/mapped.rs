@@ -65,7 +65,8 @@ impl Bvh {
     pub unsafe fn map_with(path: impl AsRef<Path>, read_ahead: ReadAhead) -> Result<Self, OpenError> {
         let path = path.as_ref();
         // SAFETY: the caller vouches for the same.
-        let map = unsafe { map(path, read_ahead) }.map_err(|source| OpenError::io(path, source))?;
+        let map = unsafe { map(path, read_ahead) }
+            .map_err(|source| OpenError::Io { path: path.to_owned(), source })?;
         Self::of_map(path, map, read_ahead == ReadAhead::Sparse)
     }
 }

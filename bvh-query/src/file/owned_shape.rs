@@ -16,7 +16,8 @@ use crate::file::shape::Shape;
 /// # let bvh = Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?.0)?;
 /// let shape = OwnedShape::from(bvh);
 /// let other = shape.clone();
-/// let touching = std::thread::spawn(move || Querier::new()?.collide(&other, &other, &Pose::IDENTITY));
+/// let mut querier = Querier::new()?;
+/// let touching = std::thread::spawn(move || querier.collide(&other, &other, &Pose::IDENTITY));
 /// assert!(touching.join().unwrap()?);
 /// assert_eq!(shape.shape().triangles(), 1);
 /// # Ok(())

@@ -4,7 +4,7 @@
 //! The section is checked when it is first needed. A triangle is named there by its place, which counts the lanes of all
 //! packets of the object; pages are searched for it by the number of their first packet.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::file::bvh::Bvh;
 use crate::file::place::TrianglePlace;
 use bvh_format::leaf::PACKET;
@@ -66,10 +66,7 @@ impl Bvh {
         if all.is_empty() {
             return Err(QueryError::NoTopology);
         }
-        let found = object as f64;
-        let none =
-            QueryError::Number { name: "object", expected: "the number of an object of the file", found };
-        let of_object: &ObjectTopology = all.get(object).ok_or(none)?;
+        let of_object: &ObjectTopology = all.get(object).ok_or(NumberError::Object(object))?;
         Ok(Topology {
             closed: of_object.closed,
             of_object,
@@ -198,7 +195,7 @@ mod tests {
         assert!(error.to_string().contains("bake it again with topology"), "{error}");
         let with = baked(&cells(3), &Options::default());
         assert_eq!(with.is_closed(0), Ok(true));
-        assert!(matches!(with.is_closed(1), Err(QueryError::Number { name: "object", .. })));
+        assert!(matches!(with.is_closed(1), Err(QueryError::Number(NumberError::Object(1)))));
     }
 
     /// Any first packets of pages lead to an error or a triangle, and never to a panic.

@@ -4,5 +4,5 @@ mod linear;
 mod path;
 mod relative;
 
-pub use path::{Motion, MotionError, Polyline, RigidPath};
+pub use path::{Motion, PathError, Polyline, RigidPath};
 pub use relative::RelativePath;

@@ -48,23 +48,28 @@ const LINE_ERROR: f64 = 1.0 / (1u64 << 51) as f64;
 /// The least cosine of half the angle between two poses for which it is certain which rotation is the shorter one.
 const MIN_HALF_COSINE: f64 = 1e-9;
 
-/// Why there is no motion between two poses.
+/// Why poses or numbers make no path.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum MotionError {
+pub enum PathError {
     /// The poses are half a turn apart, so that neither way round is the shorter one.
     #[error("expected a turn of less than half a circle, found {0} radians; divide it by a pose between")]
     HalfTurn(f64),
-    /// A number that is not finite, or a direction of length 0.
-    #[error("{name}: expected {expected}, found {found}")]
-    Number {
-        /// The parameter.
-        name: &'static str,
-        /// What is allowed.
-        expected: &'static str,
-        /// The number given.
-        found: f64,
-    },
+    /// The direction of an axis, by its largest component.
+    #[error("direction: expected a finite direction of a length above 0, found {0}")]
+    Direction(f64),
+    /// A coordinate of a point on an axis.
+    #[error("point: expected finite coordinates, found {0}")]
+    Point(f64),
+    /// The angle of a screw, in radians.
+    #[error("angle: expected a finite number of at most 1e9 radians, found {0}")]
+    Angle(f64),
+    /// The shift of a screw.
+    #[error("shift: expected a finite number, found {0}")]
+    Shift(f64),
+    /// How far from A's origin a screw may take B.
+    #[error("point: expected an axis and a shift with which B stays within 2^120, found {0}")]
+    TooFar(f64),
     /// A pose on the way that no query takes.
     #[error(transparent)]
     Pose(#[from] PoseError),
@@ -108,15 +113,15 @@ impl Motion {
     /// and the difference from it is interpolated linearly.
     ///
     /// # Errors
-    /// [`MotionError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
-    pub fn between(start: &Pose, end: &Pose) -> Result<Self, MotionError> {
+    /// [`PathError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
+    pub fn between(start: &Pose, end: &Pose) -> Result<Self, PathError> {
         let nearest = |pose: &Pose| Pose::nearest(*pose.rotation(), [0.0; 3]).map(|pose| *pose.rotation());
         let (first, last) = (nearest(start)?, nearest(end)?);
         let [x, y, z, w] = quaternion(&product(&last, &transposed(&first)));
         let sine = (x * x + y * y + z * z).sqrt();
         let angle = 2.0 * libm::atan2(sine, w);
         if w < MIN_HALF_COSINE {
-            return Err(MotionError::HalfTurn(angle));
+            return Err(PathError::HalfTurn(angle));
         }
         let axis = if sine > 0.0 { [x / sine, y / sine, z / sine] } else { [1.0, 0.0, 0.0] };
         let reached = product(&rodrigues(axis, angle), &first);
@@ -136,35 +141,36 @@ impl Motion {
     /// turns. The shift is by `shift` mesh units.
     ///
     /// # Errors
-    /// [`MotionError::Number`] if a number is not finite or the direction has length 0, [`MotionError::Pose`] if the
-    /// end is not a valid pose.
+    /// [`PathError::Direction`], [`PathError::Point`], [`PathError::Angle`] and [`PathError::Shift`] for a number that is
+    /// not finite, a direction of length 0 or an angle beyond 1e9 radians; [`PathError::TooFar`] and [`PathError::Pose`]
+    /// if the screw takes B farther away than poses may be.
     pub fn screw(
         start: &Pose,
         point: [f64; 3],
         direction: [f64; 3],
         angle: f64,
         shift: f64,
-    ) -> Result<Self, MotionError> {
+    ) -> Result<Self, PathError> {
         let most = direction.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-        let wrong = |name, expected, found| MotionError::Number { name, expected, found };
         let length = direction.map(|value| value / most);
         let length = (length[0] * length[0] + length[1] * length[1] + length[2] * length[2]).sqrt();
         if !(most > 0.0 && length.is_finite()) {
-            return Err(wrong("direction", "a finite direction of a length above 0", most));
+            return Err(PathError::Direction(most));
         }
         if let Some(&found) = point.iter().find(|value| !value.is_finite()) {
-            return Err(wrong("point", "finite coordinates", found));
+            return Err(PathError::Point(found));
         }
-        for (name, found) in [("angle", angle), ("shift", shift)] {
-            if !found.is_finite() || found.abs() > 1e9 && name == "angle" {
-                return Err(wrong(name, "a finite number, an angle of at most 1e9 radians", found));
-            }
+        if angle.is_nan() || angle.abs() > 1e9 {
+            return Err(PathError::Angle(angle));
+        }
+        if !shift.is_finite() {
+            return Err(PathError::Shift(shift));
         }
         // On its way, B's origin stays within this of A's origin along each axis.
         let from = start.translation();
         let far = (0..3).map(|k| 2.0 * point[k].abs() + from[k].abs()).sum::<f64>() + shift.abs();
         if far > MAX_COORDINATE {
-            return Err(wrong("point", "an axis and a shift with which B stays within 2^120", far));
+            return Err(PathError::TooFar(far));
         }
         let mut screw = Self {
             start: *start,
@@ -251,7 +257,7 @@ impl RigidPath for Motion {
             return self.end;
         }
         let (rotation, translation) = self.parts(t);
-        Pose::between_valid(rotation, translation)
+        Pose::of_valid(rotation, translation)
     }
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
@@ -300,10 +306,10 @@ impl Polyline {
     /// Returns the path through the poses, with [`Motion::between`] from each to the next.
     ///
     /// # Errors
-    /// [`MotionError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
-    pub fn new(poses: &[Pose]) -> Result<Self, MotionError> {
+    /// [`PathError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
+    pub fn new(poses: &[Pose]) -> Result<Self, PathError> {
         if poses.len() < 2 {
-            return Err(MotionError::TooFewPoses(poses.len()));
+            return Err(PathError::TooFewPoses(poses.len()));
         }
         let motions = poses.windows(2).map(|pair| Motion::between(&pair[0], &pair[1]));
         Ok(Self { motions: motions.collect::<Result<_, _>>()? })
@@ -481,7 +487,7 @@ pub(super) mod tests {
             }
         }
         let half = pose([0.0, 0.0, 1.0], std::f64::consts::PI, [0.0; 3]);
-        assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(MotionError::HalfTurn(_))));
+        assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PathError::HalfTurn(_))));
         let most = pose([0.0, 0.0, 1.0], 179.9f64.to_radians(), [0.0; 3]);
         let motion = Motion::between(&Pose::IDENTITY, &most).unwrap();
         let middle = pose([0.0, 0.0, 1.0], 89.95f64.to_radians(), [0.0; 3]);

@@ -39,10 +39,16 @@ impl Pose {
     /// [`PoseError`] if the result is beyond a limit of [`Pose::new`]. It is not if both rotations are within 2^-23 of rigid
     /// and no translation exceeds 2^118.
     pub fn relative(world_a: &Self, world_b: &Self) -> Result<Self, PoseError> {
+        let relative = Self::relative_of_instances(world_a, world_b);
+        Self::new(relative.rotation, relative.translation)
+    }
+
+    /// Returns [`Pose::relative`] of two instances of a scene, which takes no poses without one.
+    pub(crate) fn relative_of_instances(world_a: &Self, world_b: &Self) -> Self {
         let inverse = inverse(&world_a.rotation);
         let (a, b) = (world_a.translation, world_b.translation);
         let between = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        Self::new(product(&inverse, &world_b.rotation), turn(&inverse, between))
+        Self::of_valid(product(&inverse, &world_b.rotation), turn(&inverse, between))
     }
 }
 

@@ -71,12 +71,13 @@ impl Pose {
         if handedness(&rotation) < 0.0 {
             return Err(PoseError::Reflection);
         }
-        Ok(Self::between_valid(rotation, translation))
+        Ok(Self::of_valid(rotation, translation))
     }
 
-    /// Makes a pose between valid ones. In the spectral norm, its rotation departs from a rigid one by at most as much as
-    /// theirs may, three times the limit for an entry; that bounds the stretch, which is what queries charge.
-    pub(crate) fn between_valid(rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Self {
+    /// Creates a pose from parts that are known to be valid, or that lie between those of valid poses. In the spectral
+    /// norm, its rotation departs from a rigid one by at most three times the limit for an entry, as theirs may. That
+    /// bounds the stretch, which is what queries charge.
+    pub(crate) fn of_valid(rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Self {
         let flush = |tiny: f64| move |v: f64| if v.abs() < tiny { 0.0 } else { v };
         Self {
             rotation: rotation.map(|row| row.map(flush(MIN_ROTATION_ENTRY))),

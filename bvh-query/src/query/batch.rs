@@ -10,7 +10,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::isa::Backend;
+use crate::isa::{Backend, BackendError};
 use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
@@ -64,8 +64,8 @@ impl<'a> Batch<'a> {
     /// names.
     ///
     /// # Errors
-    /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
-    pub fn new(a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>) -> Result<Self, QueryError> {
+    /// [`BackendError`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new(a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>) -> Result<Self, BackendError> {
         Ok(Self::with_backend(a, b, Backend::detect()?))
     }
 

@@ -1,6 +1,6 @@
 //! The numbers that a caller gives with a question, and the checks on them.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 
 /// How exact a distance has to be. By default it is exact.
 ///
@@ -41,17 +41,17 @@ impl DistanceOptions {
 
     /// Refuses invalid errors.
     pub(super) fn check(&self) -> Result<(), QueryError> {
-        check("rel_err", "a finite fraction of at least 0", self.rel_err)?;
-        check("abs_err", "a finite length of at least 0", self.abs_err)
+        check(NumberError::RelErr, self.rel_err)?;
+        check(NumberError::AbsErr, self.abs_err)
     }
 }
 
 /// Refuses a distance to compare with that is NaN, infinite or negative.
 pub(crate) fn check_distance(d: f64) -> Result<(), QueryError> {
-    check("d", "a finite distance of at least 0", d)
+    check(NumberError::Distance, d)
 }
 
 /// Refuses a number that is NaN, infinite or negative.
-pub(crate) fn check(name: &'static str, expected: &'static str, found: f64) -> Result<(), QueryError> {
-    if found.is_finite() && found >= 0.0 { Ok(()) } else { Err(QueryError::Number { name, expected, found }) }
+pub(crate) fn check(wrong: fn(f64) -> NumberError, found: f64) -> Result<(), QueryError> {
+    if found.is_finite() && found >= 0.0 { Ok(()) } else { Err(wrong(found).into()) }
 }

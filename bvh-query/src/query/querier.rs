@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::isa::Backend;
+use crate::isa::{Backend, BackendError};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
@@ -59,8 +59,8 @@ impl Querier {
     /// names.
     ///
     /// # Errors
-    /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
-    pub fn new() -> Result<Self, QueryError> {
+    /// [`BackendError`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new() -> Result<Self, BackendError> {
         Ok(Self::with_backend(Backend::detect()?))
     }
 

@@ -17,7 +17,7 @@ mod trackers;
 mod workers;
 mod world_box;
 
-pub use error::{InstanceLabel, SceneError};
+pub use error::{InstanceError, InstanceLabel, SceneError, SceneFileError, WorldPoseError};
 pub use groups::Groups;
 pub use instance::InstanceId;
 pub use motion::SceneMotionAnswer;
@@ -27,12 +27,11 @@ pub use question::{SceneContact, SceneDistance, ScenePair};
 use crate::file::bvh::Bvh;
 use crate::file::files::SceneShape;
 use crate::file::owned_shape::OwnedShape;
-use crate::isa::Backend;
+use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
 use crate::query::motion::size;
 use broad_phase::BroadPhase;
-use bvh_format::FormatError;
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
 use std::collections::HashMap;
@@ -100,9 +99,9 @@ impl Scene {
     /// `CBVH_ISA` names.
     ///
     /// # Errors
-    /// [`SceneError::Query`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
-    pub fn new() -> Result<Self, SceneError> {
-        Ok(Self::with_backend(Backend::detect().map_err(|error| SceneError::Query(error.into()))?))
+    /// [`BackendError`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new() -> Result<Self, BackendError> {
+        Ok(Self::with_backend(Backend::detect()?))
     }
 
     /// Creates an empty scene with a backend. The portable backend replaces one that the CPU lacks.
@@ -120,16 +119,16 @@ impl Scene {
         }
     }
 
-    /// Creates a scene from the instances of a file, in their order. `cbvh bake --scene` makes such files.
+    /// Creates a scene from the instances of a file, in their order. A bake with the option `scene` makes such files.
     ///
     /// Cost: reading the instances, and some 0.5 to 1.5 us per instance. The rest of the file is read when a question
     /// needs it.
     ///
     /// # Errors
-    /// [`SceneError::NoInstances`] if the file has no instances; [`SceneError::Query`] if its instances break a rule of
-    /// the format, or as for [`Scene::new`].
-    pub fn of_file(bvh: Bvh) -> Result<Self, SceneError> {
-        Self::of_file_with_backend(bvh, Backend::detect().map_err(|error| SceneError::Query(error.into()))?)
+    /// [`SceneFileError::NoInstances`] if the file has no instances; [`SceneFileError::Damaged`] if its instances break
+    /// a rule of the format; [`SceneFileError::Backend`] as for [`Scene::new`].
+    pub fn of_file(bvh: Bvh) -> Result<Self, SceneFileError> {
+        Self::of_file_with_backend(bvh, Backend::detect()?)
     }
 
     /// Creates a scene from the instances of a file, as [`Scene::of_file`] does, with a backend. The portable backend
@@ -137,21 +136,19 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::of_file`], except those of the backend.
-    pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneError> {
-        let damaged = |error: FormatError| SceneError::Query(error.into());
-        let instances = bvh.layout().read_instances(bvh.bytes()).map_err(damaged)?;
+    pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneFileError> {
+        let instances = bvh.layout().read_instances(bvh.bytes())?;
         if instances.is_empty() {
-            return Err(SceneError::NoInstances);
+            return Err(SceneFileError::NoInstances);
         }
         let mut scene = Self::with_backend(backend);
         for instance in instances {
-            // The instance is of an object of the file by rule 41, and rigid by rule 42.
+            // The instance is of an object of the file (rule 41), rigid (rule 42), and has a name of its own (rule 43).
             let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
-            let world = Pose::new(instance.rotation, instance.translation);
-            let world = world.map_err(|error| SceneError::Query(error.into()))?;
+            let world = Pose::of_valid(instance.rotation, instance.translation);
             let name = Some(instance.name).filter(|name| !name.is_empty());
             let groups = Groups { member: instance.member, meets: instance.meets };
-            scene.insert(name, shape.unwrap_or_else(|| bvh.clone().into()).into(), world, groups)?;
+            scene.insert(name, shape.unwrap_or_else(|| bvh.clone().into()).into(), world, groups);
         }
         Ok(scene)
     }
@@ -195,43 +192,52 @@ impl Scene {
     /// Adds an instance. It is in all groups, and no other instance is allowed to touch it.
     ///
     /// # Errors
-    /// [`SceneError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an axis:
-    /// within these limits every pair of instances has a relative pose. [`Pose::nearest`] orthonormalises a rotation.
-    pub fn add(&mut self, shape: impl Into<SceneShape>, world: Pose) -> Result<InstanceId, SceneError> {
-        self.insert(None, shape.into(), world, Groups::ALL)
+    /// [`InstanceError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an
+    /// axis: within these limits every pair of instances has a relative pose. [`Pose::nearest`] orthonormalises a
+    /// rotation.
+    pub fn add(&mut self, shape: impl Into<SceneShape>, world: Pose) -> Result<InstanceId, InstanceError> {
+        self.add_checked(None, shape.into(), world)
     }
 
     /// Adds an instance with a name of its own.
     ///
     /// # Errors
-    /// [`SceneError::NameTaken`] if another instance has the name, and the errors of [`Scene::add`].
+    /// [`InstanceError::NameTaken`] if another instance has the name, and the errors of [`Scene::add`].
     pub fn add_named(
         &mut self,
         name: impl Into<String>,
         shape: impl Into<SceneShape>,
         world: Pose,
-    ) -> Result<InstanceId, SceneError> {
-        self.insert(Some(name.into()), shape.into(), world, Groups::ALL)
+    ) -> Result<InstanceId, InstanceError> {
+        self.add_checked(Some(name.into()), shape.into(), world)
     }
 
-    fn insert(
+    fn add_checked(
         &mut self,
         name: Option<String>,
         shape: SceneShape,
         world: Pose,
-        groups: Groups,
-    ) -> Result<InstanceId, SceneError> {
+    ) -> Result<InstanceId, InstanceError> {
+        if let Err(source) = check_world(&world) {
+            let instance = InstanceLabel { id: self.next_id(), name: name.map(Box::from) };
+            return Err(InstanceError::Pose { instance, source });
+        }
+        match name {
+            Some(name) if self.names.contains_key(&name) => Err(InstanceError::NameTaken(name)),
+            name => Ok(self.insert(name, shape, world, Groups::ALL)),
+        }
+    }
+
+    /// Returns the identifier that the next instance gets.
+    fn next_id(&self) -> InstanceId {
         let (place, generation) = self.free.last().copied().unwrap_or((self.instances.len() as u32, 0));
-        let id = InstanceId { place, generation };
-        check_world(&world).map_err(|(what, found)| SceneError::Pose {
-            instance: InstanceLabel { id, name: name.as_deref().map(Box::from) },
-            what,
-            found,
-        })?;
+        InstanceId { place, generation }
+    }
+
+    /// Adds an instance that the scene does not refuse.
+    fn insert(&mut self, name: Option<String>, shape: SceneShape, world: Pose, groups: Groups) -> InstanceId {
+        let id @ InstanceId { place, generation } = self.next_id();
         if let Some(name) = &name {
-            if self.names.contains_key(name) {
-                return Err(SceneError::NameTaken(name.clone()));
-            }
             self.names.insert(name.clone(), place);
         }
         let bounds = WorldBox::of(shape.objects(), &world);
@@ -243,14 +249,14 @@ impl Scene {
             self.instances.push(Some(instance));
         }
         self.broad.replace(place);
-        Ok(id)
+        id
     }
 
     /// Removes an instance, and its permissions to touch others.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`] if the scene never had such an instance, or no longer has it.
-    pub fn remove(&mut self, id: InstanceId) -> Result<(), SceneError> {
+    /// [`InstanceError::NoInstance`] if the scene never had such an instance, or no longer has it.
+    pub fn remove(&mut self, id: InstanceId) -> Result<(), InstanceError> {
         let place = self.place(id)?;
         if let Some(instance) = self.instances[place].take() {
             for other in instance.allowed {
@@ -274,8 +280,8 @@ impl Scene {
     /// Moves an instance.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`], or [`SceneError::Pose`] as for [`Scene::add`]. Then nothing has moved.
-    pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), SceneError> {
+    /// [`InstanceError::NoInstance`], or [`InstanceError::Pose`] as for [`Scene::add`]. Then nothing has moved.
+    pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), InstanceError> {
         self.set_poses([(id, world)])
     }
 
@@ -286,15 +292,10 @@ impl Scene {
     pub fn set_poses(
         &mut self,
         poses: impl IntoIterator<Item = (InstanceId, Pose)>,
-    ) -> Result<(), SceneError> {
+    ) -> Result<(), InstanceError> {
         let poses: Vec<(InstanceId, Pose)> = poses.into_iter().collect();
         for &(id, ref world) in &poses {
-            self.place(id)?;
-            check_world(world).map_err(|(what, found)| SceneError::Pose {
-                instance: self.label(id),
-                what,
-                found,
-            })?;
+            self.check_pose(id, world)?;
         }
         for (id, world) in poses {
             if let Some(instance) = &mut self.instances[id.place as usize] {
@@ -309,8 +310,8 @@ impl Scene {
     /// Puts an instance into groups.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn set_groups(&mut self, id: InstanceId, groups: Groups) -> Result<(), SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn set_groups(&mut self, id: InstanceId, groups: Groups) -> Result<(), InstanceError> {
         let place = self.place(id)?;
         if let Some(instance) = &mut self.instances[place] {
             instance.groups = groups;
@@ -323,8 +324,8 @@ impl Scene {
     /// or a part and its gripper.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn set_allowed(&mut self, a: InstanceId, b: InstanceId, allowed: bool) -> Result<(), SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn set_allowed(&mut self, a: InstanceId, b: InstanceId, allowed: bool) -> Result<(), InstanceError> {
         let places = [(self.place(a)?, b.place), (self.place(b)?, a.place)];
         for (own, other) in places {
             let Some(instance) = &mut self.instances[own] else { continue };
@@ -349,32 +350,32 @@ impl Scene {
     /// Returns the name of an instance, if it has one.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn name(&self, id: InstanceId) -> Result<Option<&str>, SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn name(&self, id: InstanceId) -> Result<Option<&str>, InstanceError> {
         Ok(self.instance(id)?.name.as_deref())
     }
 
     /// Returns the shape of an instance.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn shape(&self, id: InstanceId) -> Result<&SceneShape, SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn shape(&self, id: InstanceId) -> Result<&SceneShape, InstanceError> {
         Ok(&self.instance(id)?.shape)
     }
 
     /// Returns the pose of an instance in the world.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn pose(&self, id: InstanceId) -> Result<&Pose, SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn pose(&self, id: InstanceId) -> Result<&Pose, InstanceError> {
         Ok(&self.instance(id)?.world)
     }
 
     /// Returns the groups of an instance.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`].
-    pub fn groups(&self, id: InstanceId) -> Result<Groups, SceneError> {
+    /// [`InstanceError::NoInstance`].
+    pub fn groups(&self, id: InstanceId) -> Result<Groups, InstanceError> {
         Ok(self.instance(id)?.groups)
     }
 
@@ -417,13 +418,19 @@ impl Scene {
         self.pairs_asked
     }
 
-    fn instance(&self, id: InstanceId) -> Result<&Instance, SceneError> {
+    fn instance(&self, id: InstanceId) -> Result<&Instance, InstanceError> {
         let instance = self.instances.get(id.place as usize).and_then(Option::as_ref);
-        instance.filter(|instance| instance.generation == id.generation).ok_or(SceneError::NoInstance(id))
+        instance.filter(|instance| instance.generation == id.generation).ok_or(InstanceError::NoInstance(id))
     }
 
-    fn place(&self, id: InstanceId) -> Result<usize, SceneError> {
+    fn place(&self, id: InstanceId) -> Result<usize, InstanceError> {
         self.instance(id).map(|_| id.place as usize)
+    }
+
+    /// Refuses a pose of an instance with which a pair may have no relative pose.
+    fn check_pose(&self, id: InstanceId, world: &Pose) -> Result<(), InstanceError> {
+        self.place(id)?;
+        check_world(world).map_err(|source| InstanceError::Pose { instance: self.label(id), source })
     }
 
     /// Names an instance for an error.
@@ -444,15 +451,13 @@ impl Scene {
     }
 }
 
-/// Refuses a pose with which a pair may have no relative pose. Returns what is wrong with it and by how much.
-fn check_world(world: &Pose) -> Result<(), (&'static str, f64)> {
+/// Refuses a pose with which a pair may have no relative pose.
+fn check_world(world: &Pose) -> Result<(), WorldPoseError> {
     let far = world.translation().into_iter().find(|t| t.abs() > MAX_WORLD);
     let error = departure(world.rotation(), 1.0);
     match far {
-        Some(far) => Err(("a translation of at most 2^118 along each axis, nearer to the origin", far)),
-        None if error > MAX_RIGID_ERROR => {
-            Err(("a rotation within 2^-23 of orthonormal, with more digits or orthonormalised", error))
-        }
+        Some(far) => Err(WorldPoseError::TooFar(far)),
+        None if error > MAX_RIGID_ERROR => Err(WorldPoseError::NotRigid(error)),
         None => Ok(()),
     }
 }

@@ -13,7 +13,7 @@ use crate::query::querier::Querier;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
-use crate::scene::{Scene, SceneError, check_world};
+use crate::scene::{Scene, SceneError};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -100,9 +100,9 @@ impl Scene {
     /// both instances of a pair turn, more intervals are needed than if one stands still.
     ///
     /// # Errors
-    /// [`SceneError::NoInstance`]; [`SceneError::Pose`] as for [`Scene::add`], for a path's start and end;
-    /// [`SceneError::Query`] for an invalid clearance or tolerance; and [`SceneError::Pair`] with the first pair whose
-    /// question has no answer before the earliest hit.
+    /// [`SceneError::Refused`] for an identifier of no instance, and for a start or an end of a path that
+    /// [`Scene::set_pose`] refuses; [`SceneError::Query`] for an invalid clearance or tolerance; and
+    /// [`SceneError::Pair`] with the first pair whose question has no answer before the earliest hit.
     pub fn motion(
         &mut self,
         paths: &[(InstanceId, WorldPath<'_>)],
@@ -181,14 +181,8 @@ impl Scene {
     ) -> Result<Ways<'a>, SceneError> {
         options.check()?;
         for &(id, path) in paths {
-            self.place(id)?;
-            for world in [path.pose(0.0), path.pose(1.0)] {
-                check_world(&world).map_err(|(what, found)| SceneError::Pose {
-                    instance: self.label(id),
-                    what,
-                    found,
-                })?;
-            }
+            self.check_pose(id, &path.pose(0.0))?;
+            self.check_pose(id, &path.pose(1.0))?;
         }
         self.start();
         Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })

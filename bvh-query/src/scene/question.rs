@@ -482,7 +482,7 @@ impl Scene {
         let scene = &*self;
         let found = scene.workers.each(near_pairs, &mut stats, |querier, near_pair| {
             let Some((a, b)) = scene.both(near_pair) else { return Ok(None) };
-            let pose = Pose::relative(&a.world, &b.world)?;
+            let pose = Pose::relative_of_instances(&a.world, &b.world);
             let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
             let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);

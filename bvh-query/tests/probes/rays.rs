@@ -5,7 +5,7 @@ use crate::common::{Random, bake, mesh, note, stored};
 use crate::hard::{direction, in_poses, point, stored_at};
 use crate::labels::{each_label, number, queriers};
 use crate::rationals::{Rational, first};
-use bvh_query::{Querier, QueryError, Ray};
+use bvh_query::{NumberError, Querier, QueryError, Ray};
 use cbvh_testkit::depth::rounds;
 
 const MESHES: [&str; 5] = ["ball", "bunny", "nao", "apollo", "dragon"];
@@ -174,20 +174,20 @@ fn numbers_that_mean_nothing_are_refused() {
     let bvh = bake(&mesh(&crate::common::shapes::cube()), &bvh_bake::Options::default());
     for querier in &mut queriers() {
         let mut refused = |ray: Ray| match querier.first_hit(&bvh, &ray) {
-            Err(QueryError::Number { name, .. }) => name,
+            Err(QueryError::Number(wrong)) => wrong,
             other => panic!("{other:?}"),
         };
         let (o, d) = ([0.0; 3], [1.0, 0.0, 0.0]);
         for bad in [f64::NAN, f64::INFINITY, 2f64.powi(121)] {
-            assert_eq!(refused(Ray::new([0.0, bad, 0.0], d)), "point");
+            assert!(matches!(refused(Ray::new([0.0, bad, 0.0], d)), NumberError::Point(_)));
         }
         for bad in
             [[0.0; 3], [f64::NAN, 1.0, 1.0], [f64::INFINITY, 0.0, 0.0], [1e-200, 0.0, 0.0], [0.0, 1e200, 0.0]]
         {
-            assert_eq!(refused(Ray::new(o, bad)), "direction", "{bad:?}");
+            assert!(matches!(refused(Ray::new(o, bad)), NumberError::Direction(_)), "{bad:?}");
         }
         for bad in [f64::NAN, -1.0] {
-            assert_eq!(refused(Ray::new(o, d).until(bad)), "until");
+            assert!(matches!(refused(Ray::new(o, d).until(bad)), NumberError::Until(_)));
         }
         let far = Ray::new([2f64.powi(120), 0.0, 0.0], [-(2f64.powi(500)), 0.0, 0.0]);
         assert_eq!(querier.first_hit(&bvh, &far).unwrap().unwrap().t, 2f64.powi(-380));

@@ -11,8 +11,8 @@ mod shared;
 mod trackers;
 
 use bvh_query::{
-    Backend, Bvh, Contact, Distance, Groups, InstanceId, OwnedShape, Pose, Querier, QueryError, QueryStats,
-    Scene, SceneError, ScenePair,
+    Backend, Bvh, Contact, Distance, Groups, InstanceError, InstanceId, NumberError, OwnedShape, Pose,
+    Querier, QueryError, QueryStats, Scene, SceneError, ScenePair,
 };
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::section;
@@ -184,7 +184,7 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
                 placed.iter_mut().for_each(|other| other.allowed.retain(|id| *id != gone.id));
                 for scene in &mut scenes {
                     scene.remove(gone.id).unwrap();
-                    assert_eq!(scene.pose(gone.id), Err(SceneError::NoInstance(gone.id)));
+                    assert_eq!(scene.pose(gone.id), Err(InstanceError::NoInstance(gone.id)));
                 }
             }
             let mut moves = Vec::new();
@@ -407,13 +407,13 @@ fn an_empty_scene_and_one_instance_have_no_pairs() {
     assert_eq!(ask(&mut scene), Answers::default());
     // The place is taken again, under another identifier.
     let next = scene.add(shape(&sphere(1)), Pose::IDENTITY).unwrap();
-    assert!(next != id && scene.remove(id) == Err(SceneError::NoInstance(id)));
+    assert!(next != id && scene.remove(id) == Err(InstanceError::NoInstance(id)));
     assert_eq!(scene.instances().collect::<Vec<_>>(), [next]);
     // Numbers stand for identifiers, removed ones included.
     assert_eq!([id, next].map(|id| InstanceId::from_bits(id.to_bits())), [id, next]);
     assert_eq!((id.to_bits(), next.to_bits()), (0, 1 << 32));
     let never = InstanceId::from_bits(u64::MAX);
-    assert_eq!(scene.remove(never), Err(SceneError::NoInstance(never)));
+    assert_eq!(scene.remove(never), Err(InstanceError::NoInstance(never)));
 }
 
 #[test]
@@ -425,7 +425,7 @@ fn bad_instances_are_refused_and_change_nothing() {
     assert_eq!((scene.find("base"), scene.find("tip")), (Some(base), None));
     assert_eq!(scene.name(base), Ok(Some("base")));
     let again = scene.add_named("base", shape.clone(), Pose::IDENTITY);
-    assert_eq!(again, Err(SceneError::NameTaken("base".into())));
+    assert_eq!(again, Err(InstanceError::NameTaken("base".into())));
     assert_eq!(scene.len(), 1);
     let sheared = Pose::new([[1.0, 1.5e-7, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
     let far = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 2f64.powi(118).next_up(), 0.0]).unwrap();
@@ -447,14 +447,15 @@ fn bad_instances_are_refused_and_change_nothing() {
         scene.set_allowed(tip, base, true),
         scene.remove(tip),
     ] {
-        assert_eq!(refused, Err(SceneError::NoInstance(tip)));
+        assert_eq!(refused, Err(InstanceError::NoInstance(tip)));
     }
     assert_eq!(scene.find("tip"), None);
     // An identifier of another scene may by chance be one of this scene.
     assert!(scene.pose(other).is_ok());
     for d in [f64::NAN, -1.0, f64::INFINITY] {
-        assert!(matches!(scene.within(d), Err(SceneError::Query(QueryError::Number { .. }))));
-        assert!(matches!(scene.pairs_within(d), Err(SceneError::Query(QueryError::Number { .. }))));
+        for refused in [scene.within(d).map(drop), scene.pairs_within(d).map(drop)] {
+            assert!(matches!(refused, Err(SceneError::Query(QueryError::Number(NumberError::Distance(_))))));
+        }
     }
     scene.add_named("tip", shape, Pose::IDENTITY).unwrap();
     // The broad phase looks at four pairs of boxes.

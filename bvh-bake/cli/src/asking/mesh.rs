@@ -139,7 +139,6 @@ pub(crate) fn blame(mesh_a: &LoadedMesh, mesh_b: Option<&LoadedMesh>, error: Que
         &*other.unwrap_or(mesh_a).path
     };
     match error {
-        QueryError::Backend(error) => error.into(),
         QueryError::Budget { .. } => Failure::Limit(error.to_string()),
         QueryError::Damaged(breach) => {
             let damaged = |mesh: &LoadedMesh| bvh_format::validate::validate(mesh.bvh.bytes()).is_err();

@@ -5,7 +5,7 @@ use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
 use crate::console::Failure;
 use crate::map::map;
 use crate::options::LayoutArguments;
-use bvh_query::{Backend, Groups, InstanceId, Pose, ReadAhead, Scene};
+use bvh_query::{Backend, Groups, InstanceId, Pose, ReadAhead, Scene, SceneFileError};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -177,7 +177,10 @@ pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
     let bvh = map(path, ReadAhead::Usual)?;
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
-    let scene = scene.map_err(|error| Failure::invalid(path, error))?;
+    let scene = scene.map_err(|error| match error {
+        SceneFileError::NoInstances => Failure::invalid(path, format_args!("{error}: cbvh bake --scene")),
+        error => Failure::invalid(path, error),
+    })?;
     Ok(LoadedScene {
         moving: scene.instances().collect(),
         scene,

@@ -8,7 +8,9 @@ use crate::asking::runner::Run;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure};
 use crate::options::not_negative;
-use bvh_query::{Backend, Pose, Querier, QueryError, Relation, Scene, SceneDistance, SceneError, ScenePair};
+use bvh_query::{
+    Backend, InstanceError, Pose, Querier, QueryError, Relation, Scene, SceneDistance, SceneError, ScenePair,
+};
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
 use record::Told;
@@ -258,7 +260,7 @@ fn blame(error: &SceneError, frame: &Frame, arguments: &SceneArguments) -> Failu
         SceneError::Pair { source: QueryError::Budget { .. }, .. } => {
             Failure::Limit(format!("frame {number}: {error}"))
         }
-        SceneError::Pose { .. } => {
+        SceneError::Refused(InstanceError::Pose { .. }) => {
             let frames = arguments.frames.as_ref().unwrap_or(&arguments.scene);
             Failure::invalid(frames, format_args!("line {line}: {error}"))
         }

@@ -57,7 +57,7 @@ pub(super) fn round(seed: u64, counts: &mut Counts) -> Result<Vec<Finding>, Fail
             let answer = match querier.motion(&a, &b, &way, &options) {
                 Ok(answer) => answer,
                 // Which errors there are may depend on the backend.
-                Err(QueryError::Budget { .. } | QueryError::Number { .. }) => {
+                Err(QueryError::Budget { .. } | QueryError::Number(_)) => {
                     counts.add("answers that a budget ended", 1);
                     continue;
                 }

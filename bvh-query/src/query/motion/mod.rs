@@ -23,7 +23,7 @@ mod sweep;
 pub(crate) use question::{radius, size, tolerance};
 pub(crate) use search::Earliest;
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::motion::RigidPath;
 use crate::pose::Pose;
@@ -68,11 +68,9 @@ impl MotionOptions {
 impl MotionOptions {
     /// Refuses invalid numbers.
     pub(crate) fn check(&self) -> Result<(), QueryError> {
-        check("clearance", "a finite length of at least 0", self.clearance)?;
+        check(NumberError::Clearance, self.clearance)?;
         match self.tolerance {
-            Some(found) if !found.is_finite() || found <= 0.0 => {
-                Err(QueryError::Number { name: "tolerance", expected: "a finite length above 0", found })
-            }
+            Some(found) if !found.is_finite() || found <= 0.0 => Err(NumberError::Tolerance(found).into()),
             _ => Ok(()),
         }
     }

@@ -13,7 +13,7 @@
 //! Descending is a guess, and a wrong guess costs little. The search does not assume that the time before the cell is
 //! free: it sweeps that time or searches it. The time after the cell waits.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::pairs::{Kept, Sweep};
@@ -341,11 +341,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// Halves an interval.
     fn halves(&self, interval: &Interval, middle: &Middle) -> Result<[Interval; 2], QueryError> {
         if interval.depth == MAX_DEPTH {
-            return Err(QueryError::Number {
-                name: "tolerance",
-                expected: "more than B moves in 2^-45 of the time, and than its poses are rounded by",
-                found: self.question.tolerance,
-            });
+            return Err(NumberError::Unresolved(self.question.tolerance).into());
         }
         let Stretch { times: [t0, t1], poses: [start, end] } = interval.stretch;
         let half = |times, poses, ends_within| Interval {

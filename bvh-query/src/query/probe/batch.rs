@@ -4,7 +4,7 @@
 //! Each thread takes runs of them. Answers are in the order of the probes, and do not depend on the number of threads.
 
 use crate::error::QueryError;
-use crate::isa::Backend;
+use crate::isa::{Backend, BackendError};
 use crate::query::answers::{ClosestPoint, RayHit, Side, SignedDistance};
 use crate::query::probe::closest::check_within;
 use crate::query::probe::placed::PlacedShape;
@@ -34,8 +34,8 @@ impl<'a> ProbeBatch<'a> {
     /// names.
     ///
     /// # Errors
-    /// [`QueryError::Backend`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
-    pub fn new(shape: impl Into<PlacedShape<'a>>) -> Result<Self, QueryError> {
+    /// [`BackendError`] if `CBVH_ISA` names no backend, or one that the CPU lacks.
+    pub fn new(shape: impl Into<PlacedShape<'a>>) -> Result<Self, BackendError> {
         Ok(Self::with_backend(shape, Backend::detect()?))
     }
 

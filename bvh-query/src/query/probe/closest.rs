@@ -4,7 +4,7 @@
 //! at the end, nearest first. Pruning is strict, as in [`crate::query::search`], so the answer does not depend on the
 //! order of visits.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
@@ -98,11 +98,7 @@ impl Querier {
 
 /// Refuses an invalid limit. Infinity means that there is no limit.
 pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
-    if within >= 0.0 {
-        return Ok(());
-    }
-    let expected = "a distance of at least 0, or infinity";
-    Err(QueryError::Number { name: "within", expected, found: within })
+    if within >= 0.0 { Ok(()) } else { Err(NumberError::Within(within).into()) }
 }
 
 /// What is known of a point, over all objects.

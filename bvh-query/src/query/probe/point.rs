@@ -1,6 +1,6 @@
 //! The points that questions may be about.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::narrow::Point;
 use bvh_format::object::MAX_COORDINATE;
 
@@ -11,8 +11,7 @@ const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
 /// Refuses a point beyond the range of files. Coordinates too small for exact arithmetic become 0.
 pub(crate) fn check_point(point: &Point) -> Result<Point, QueryError> {
     if let Some(&found) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-        let expected = "finite coordinates of at most 2^120";
-        return Err(QueryError::Number { name: "point", expected, found });
+        return Err(NumberError::Point(found).into());
     }
     Ok(point.map(|x| if x.abs() < LEAST_COORDINATE { 0.0 } else { x }))
 }

@@ -1,6 +1,6 @@
 //! What a ray hits: the first hit, any hit, or all hits.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::narrow::{self, Crossing, Triangle};
 use crate::query::answers::RayHit;
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
@@ -112,12 +112,10 @@ impl Scaled {
         let largest =
             ray.direction.iter().fold(0.0f64, |most, v| if v.abs() <= most { most } else { v.abs() });
         if !LENGTHS.contains(&largest) || ray.direction.iter().any(|v| v.is_nan()) {
-            let expected = "numbers the largest of which is from 2^-500 to 2^500 in magnitude";
-            return Err(QueryError::Number { name: "direction", expected, found: largest });
+            return Err(NumberError::Direction(largest).into());
         }
         if ray.until.is_nan() || ray.until < 0.0 {
-            let expected = "a number of at least 0, or infinity";
-            return Err(QueryError::Number { name: "until", expected, found: ray.until });
+            return Err(NumberError::Until(ray.until).into());
         }
         // The exponent of the largest component, negated.
         let unit = f64::from_bits((2046 - (largest.to_bits() >> 52)) << 52);
