@@ -5,7 +5,7 @@ use crate::input::Plain;
 use crate::output::One;
 use crate::status::{Failure, Status};
 use crate::table::Table;
-use bvh_query::{FloatState, with_default_floats};
+use bvh_query::floats::{FloatState, with_default_floats};
 use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::ffi::c_char;

@@ -1,7 +1,9 @@
 //! What a function returns when it fails: a status for the program, and a message for a person.
 
 use bvh_bake::{BakeError, ReadError};
-use bvh_query::{MotionError, OpenError, PoseError, QueryError, SceneError};
+use bvh_query::{
+    BackendError, InstanceError, OpenError, PathError, PoseError, QueryError, SceneError, SceneFileError,
+};
 use std::fmt::Display;
 
 /// The numbers of `cbvh_status`.
@@ -59,9 +61,17 @@ fn of_scene(error: &SceneError) -> Status {
         SceneError::Pair { source, .. } | SceneError::Instance { source, .. } | SceneError::Query(source) => {
             of_query(source)
         }
-        SceneError::NoInstance(_) => Status::NotFound,
+        SceneError::Refused(error) => of_instance(error),
         _ => Status::InvalidArgument,
     }
+}
+
+fn of_instance(error: &InstanceError) -> Status {
+    if matches!(error, InstanceError::NoInstance(_)) { Status::NotFound } else { Status::InvalidArgument }
+}
+
+fn of_scene_file(error: &SceneFileError) -> Status {
+    if matches!(error, SceneFileError::Damaged(_)) { Status::Damaged } else { Status::InvalidArgument }
 }
 
 fn of_open(error: &OpenError) -> Status {
@@ -89,4 +99,5 @@ macro_rules! failures {
     )* };
 }
 failures!(QueryError: of_query, SceneError: of_scene, OpenError: of_open, BakeError: of_bake);
-failures!(PoseError: |_| Status::InvalidArgument, MotionError: |_| Status::InvalidArgument);
+failures!(InstanceError: of_instance, SceneFileError: of_scene_file, BackendError: |_| Status::InvalidArgument);
+failures!(PoseError: |_| Status::InvalidArgument, PathError: |_| Status::InvalidArgument);

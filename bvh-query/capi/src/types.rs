@@ -6,8 +6,8 @@ use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
     Backend, ClosestPoint, Contact, Distance, DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Pose,
-    QueryError, QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneMotionAnswer, ScenePair, SceneRayHit, Side, SignedDistance,
+    QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer,
+    ScenePair, SceneRayHit, Side, SignedDistance,
 };
 use std::ffi::c_char;
 
@@ -125,13 +125,13 @@ numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 
 /// Reads `cbvh_backend`.
 pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
     let backend = match number {
-        BACKEND_BEST => return Ok(Backend::detect().map_err(QueryError::from)?),
+        BACKEND_BEST => return Ok(Backend::detect()?),
         BACKEND_SCALAR => Backend::Scalar,
         BACKEND_AVX2 => Backend::Avx2,
         BACKEND_AVX512 => Backend::Avx512,
         _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 3", number)),
     };
-    Ok(Backend::from_name(backend.name()).map_err(QueryError::from)?)
+    Ok(Backend::from_name(backend.name())?)
 }
 
 pub(crate) fn relation(of: Relation) -> i32 {
@@ -281,12 +281,10 @@ impl From<SceneMotionAnswer> for MotionRow {
     fn from(of: SceneMotionAnswer) -> Self {
         let (of, pair) = match of {
             SceneMotionAnswer::Free => return MotionAnswer::Free.into(),
-            SceneMotionAnswer::Hit {
-                free_until,
-                touching_at,
-                nearest: SceneDistance { pair, nearest, .. },
-            } => (MotionAnswer::Hit { free_until, touching_at, nearest }, pair),
-            SceneMotionAnswer::Near { free_until, at, nearest: SceneDistance { pair, nearest, .. } } => {
+            SceneMotionAnswer::Hit { free_until, touching_at, pair, nearest } => {
+                (MotionAnswer::Hit { free_until, touching_at, nearest }, pair)
+            }
+            SceneMotionAnswer::Near { free_until, at, pair, nearest } => {
                 (MotionAnswer::Near { free_until, at, nearest }, pair)
             }
         };
