@@ -4,6 +4,7 @@
 //! A fuzzer needs such a compact description. If it changed the bytes of a file directly, nearly all changes would
 //! hit zeros between structures or break the first rule.
 
+use crate::Random;
 use crate::seal::{put, put_together};
 use bvh_format::ids::encode_ids;
 use bvh_format::instances::{Instance, write_instances};
@@ -65,6 +66,13 @@ const MAX_TREELETS_PER_PAGE: usize = 12;
 const MAX_SHORT_TREELETS_PER_PAGE: u8 = 12;
 const MAX_ROOTS_PER_PAGE: usize = 4;
 const MAX_REMOTES_PER_PAGE: usize = 16;
+
+/// Returns a file of a random description. Most of its numbers are small, so that they exceed limits rarely enough for some
+/// files to be valid.
+pub fn forge_any(random: &mut Random) -> Vec<u8> {
+    let mut byte = || if random.below(40) == 0 { random.bits() as u8 } else { random.below(64) as u8 };
+    forge(&mut Input(&[(); 1200].map(|()| byte())))
+}
 
 /// Returns a file of one object with one to four pages.
 pub fn forge(input: &mut Input) -> Vec<u8> {

@@ -80,6 +80,43 @@ pub fn seal(bytes: &mut [u8]) {
     seal_header(bytes);
 }
 
+/// The checksums that are corrected in a damaged file, more from each to the next but for those of the header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Seal {
+    /// None.
+    None,
+    /// That of the header and the section table only.
+    Header,
+    /// Those of blocks and pages.
+    Pages,
+    /// Those of sections and the content as well.
+    Sections,
+    /// All.
+    All,
+}
+
+impl Seal {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::None, Self::Header, Self::Pages, Self::Sections, Self::All];
+
+    /// Corrects these checksums. What is too short for a header stays as it is.
+    pub fn apply(self, bytes: &mut [u8]) {
+        if bytes.len() < 64 {
+            return;
+        }
+        if self >= Self::Pages {
+            seal_blocks(bytes);
+            seal_pages(bytes);
+        }
+        if self >= Self::Sections {
+            seal_sections(bytes);
+        }
+        if self == Self::Header || self == Self::All {
+            seal_header(bytes);
+        }
+    }
+}
+
 /// Corrects the checksums of leaf and id blocks, which are stored in the page headers.
 pub fn seal_blocks(bytes: &mut [u8]) {
     let (leaves, ids) = (section(bytes, 3), section(bytes, 4));

@@ -1,6 +1,5 @@
 //! The command line.
 
-use crate::search::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -38,27 +37,24 @@ pub(crate) struct HardArguments {
     pub(crate) every: u16,
 }
 
-/// The search continues from its record. It saves the record at least once a minute, so it may be killed at any time.
-/// The kind and number of a round determine everything in it. A wrong answer, a panic, or a round that takes minutes is
-/// a finding. Findings are shrunk and kept in the record. If there are any, the exit code is 1.
+/// The search does the rounds that its record lacks. The number of a round determines everything in it. Each round adds
+/// a line of JSON to the record, so the search may be killed at any time. A wrong answer, a panic, or a round that takes
+/// minutes is a finding. Findings are shrunk and kept in the record. If there are any, the exit code is 1.
 #[derive(Debug, Args)]
 pub(crate) struct SearchArguments {
-    /// The record, a JSON file; it is created if it does not exist
-    #[arg(long, value_name = "FILE", default_value = "target/lab/search.json")]
+    /// The record; it is created if it does not exist
+    #[arg(long, value_name = "FILE", default_value = "target/search.jsonl")]
     pub(crate) record: PathBuf,
     /// The time to search
     #[arg(long, value_name = "N", default_value = "1")]
     pub(crate) hours: f64,
-    /// The kinds of rounds, which share the time
-    #[arg(long, value_name = "KIND[,KIND...]", value_delimiter = ',', default_values = ["pairs", "hostile", "probes", "motions"])]
-    pub(crate) kinds: Vec<Kind>,
     /// The number of threads, up to 256
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(crate) threads: u16,
-    /// The largest number of rounds of this run [default: as many as the time allows]
+    /// The largest number of rounds to do [default: as many as the time allows]
     #[arg(long, value_name = "N")]
-    pub(crate) rounds: Option<u64>,
-    /// Run only this round of each kind again, without a record, and print what it finds
+    pub(crate) rounds: Option<usize>,
+    /// Repeat this round, without a record, and print what it finds
     #[arg(long, value_name = "ROUND")]
     pub(crate) again: Option<u64>,
 }

@@ -7,6 +7,14 @@ mod arguments;
 /// What the tests of queries share: oracles, and all questions about a file of any bytes.
 #[path = "../../tests/common/mod.rs"]
 mod common;
+/// The comparison of answers with the exact oracle, as the tests make it.
+#[path = "../../tests/exact"]
+#[allow(dead_code, reason = "the search asks about poses, and the tests walk to the boundary")]
+mod exact {
+    pub(crate) mod ask;
+    pub(crate) mod tally;
+    pub(crate) mod truth;
+}
 mod hard;
 mod output;
 mod search;

@@ -6,37 +6,41 @@ use common::{lab, names};
 use std::fs;
 
 #[test]
-fn a_search_goes_on_where_its_record_ends() {
+fn a_search_does_the_rounds_that_its_record_lacks() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("record.json");
+    let path = folder.path().join("record.jsonl");
     let record = path.to_str().unwrap();
-    let json = || -> serde_json::Value { serde_json::from_slice(&fs::read(&path).unwrap()).unwrap() };
-    let mut pairs = 0;
-    for rounds in [2, 4] {
-        let ended =
-            lab(&["search", "--kinds", "pairs", "--threads", "2", "--rounds", "2", "--record", record]);
+    for all in [2, 4] {
+        let ended = lab(&["search", "--threads", "2", "--rounds", "2", "--record", record]);
         assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
-        let json = json();
-        assert_eq!(json["kinds"]["pairs"]["rounds"], serde_json::json!([[0, rounds]]));
-        let counted = json["kinds"]["pairs"]["counts"]["pairs"].as_u64().unwrap();
-        assert!(counted > pairs && json["findings"].as_array().unwrap().is_empty());
-        pairs = counted;
+        let said = String::from_utf8(ended.stdout).unwrap();
+        assert!(said.contains(&format!("record.jsonl: {all} rounds in ")), "{said}");
+        let text = fs::read_to_string(&path).unwrap();
+        let done = |line| {
+            let done: serde_json::Value = serde_json::from_str(line).unwrap();
+            assert!(done["wrong"].is_null(), "{line}");
+            // Each kind of round counts its own things.
+            let counted = ["pairs", "files"].map(|name| done["counts"][name].as_u64().unwrap_or(0) > 0);
+            let round = done["round"].as_u64().unwrap();
+            assert_eq!(counted, [round % 2 == 0, round % 2 == 1], "{line}");
+            round
+        };
+        let mut rounds: Vec<_> = text.lines().map(done).collect();
+        rounds.sort_unstable();
+        assert_eq!(rounds, (0..all).collect::<Vec<_>>());
     }
-    assert_eq!(names(folder.path()), ["record.json"]);
-    assert_eq!(json()["sessions"].as_array().unwrap().len(), 2);
+    assert_eq!(names(folder.path()), ["record.jsonl"]);
     fs::write(&path, "[]").unwrap();
     let ended = lab(&["search", "--record", record]);
-    assert!(
-        !ended.status.success()
-            && String::from_utf8_lossy(&ended.stderr).contains("expected the record of a search")
-    );
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(!ended.status.success() && said.contains("line 1: expected a round of a search"), "{said}");
     assert_eq!(fs::read(&path).unwrap(), b"[]");
 }
 
 #[test]
-fn every_kind_of_round_is_repeated_by_its_number() {
-    for kind in ["pairs", "hostile", "probes", "motions"] {
-        let [first, again] = [(); 2].map(|()| lab(&["search", "--kinds", kind, "--again", "1"]));
+fn a_round_is_repeated_by_its_number() {
+    for round in ["0", "1"] {
+        let [first, again] = [(); 2].map(|()| lab(&["search", "--again", round]));
         assert!(first.status.success() && first.stdout == again.stdout, "{first:?}");
     }
 }

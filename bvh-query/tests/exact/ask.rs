@@ -146,7 +146,7 @@ impl Asked<'_> {
 }
 
 /// Says which contacts of the answer are wrong and which are missing.
-fn difference(answer: &[Contact], expected: &[Contact]) -> String {
+pub(crate) fn difference(answer: &[Contact], expected: &[Contact]) -> String {
     let pairs = |these: &[Contact], those: &[Contact]| -> Vec<_> {
         let missing = these.iter().filter(|contact| those.binary_search(contact).is_err());
         missing.map(|contact| (contact.triangle_a, contact.triangle_b)).take(4).collect()

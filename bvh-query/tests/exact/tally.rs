@@ -32,7 +32,7 @@ pub(crate) struct Tally {
     /// The number of intervals of `distance` that do not contain the true distance.
     pub(crate) missed: u64,
     /// The first of these intervals.
-    first_missed: Option<String>,
+    pub(crate) first_missed: Option<String>,
 }
 
 impl Tally {

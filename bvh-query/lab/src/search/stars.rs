@@ -5,12 +5,12 @@
 //! sides of the plane touch in every pair of triangles: corner on corner, corner on edge, edge across edge, face on face,
 //! shared edges and so on. Moving one by a few roundings parts them, or lets them cross.
 //!
-//! All corners are small integers times a power of two. B is stored as the pose's inverse takes it. For rotations with
-//! rational entries, which integer quaternions give, it is stored exactly, at any number of places; `f64` entries and the
-//! arithmetic of placing then move each placed corner by a few roundings of its own. Other rotations round B's corners to
-//! `f32`, so the pose brings the centre of a single star to its place.
+//! All corners are small integers times a power of two. B is stored as the pose's inverse takes it, which is exact for
+//! rotations with rational entries; integer quaternions give these. `f64` entries and the arithmetic of placing then move
+//! each placed corner by a few roundings of its own.
 
-use crate::common::rotation;
+use bvh_query::Pose;
+use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
 use cbvh_testkit::{Random, Triangle};
 
 type Integer = [i64; 3];
@@ -39,103 +39,122 @@ const SHAPES: [(usize, [usize; 2]); 8] = [
     (400, [3, 3]),
 ];
 
+/// How near the boundary a pair has to be, in units of 2^-53 of the largest magnitude that occurs in placing a corner. A
+/// placed corner is within four of its exact place, and poses are moved by up to six.
+const ROUNDINGS: f64 = 32.0;
+const UNIT: f64 = f64::EPSILON / 2.0;
+
 /// The largest coordinate of a corner around its star's centre, before it is multiplied by the rotation's denominator.
 const REACH: i64 = 96;
 
-/// A rotation that maps integers to integers over `whole`.
-struct Rational {
-    numerators: [[i64; 3]; 3],
-    whole: i64,
-}
-
-impl Rational {
-    /// Returns the rotation of a small integer quaternion: the axes turned, 3-4-5, or a denominator up to 36.
-    fn new(random: &mut Random) -> Self {
-        let most = [0, 1, 1, 2, 3][random.below(5)];
-        loop {
-            let [x, y, z, w] = [(); 4].map(|()| random.below(2 * most as usize + 1) as i64 - most);
-            if most == 0 {
-                return Self { numerators: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], whole: 1 };
-            }
-            let whole = x * x + y * y + z * z + w * w;
-            if whole > 0 {
-                let numerators = [
-                    [w * w + x * x - y * y - z * z, 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                    [2 * (x * y + z * w), w * w - x * x + y * y - z * z, 2 * (y * z - x * w)],
-                    [2 * (x * z - y * w), 2 * (y * z + x * w), w * w - x * x - y * y + z * z],
-                ];
-                return Self { numerators, whole };
-            }
-        }
-    }
-
-    /// Takes a point whose coordinates are multiples of `whole` back, exactly.
-    fn back(&self, p: Integer) -> Integer {
-        [0, 1, 2].map(|j| (0..3).map(|i| self.numerators[i][j] * (p[i] / self.whole)).sum())
-    }
+/// Returns a rotation that maps integers to integers over a denominator: that of a quaternion of integers up to `most`. Small
+/// ones turn the axes or make 3-4-5.
+fn rotation(random: &mut Random, most: usize) -> ([Integer; 3], i64) {
+    let mut number = || random.below(2 * most + 1) as i64 - most as i64;
+    let [x, y, z, w] = [(); 4].map(|()| number());
+    let w = if [x, y, z, w] == [0; 4] { 1 } else { w };
+    let numerators = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), w * w - x * x + y * y - z * z, 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), w * w - x * x - y * y + z * z],
+    ];
+    (numerators, x * x + y * y + z * z + w * w)
 }
 
 impl Stars {
     pub(super) fn new(random: &mut Random) -> Self {
-        let rational = Rational::new(random);
-        let is_rational = random.below(4) != 0;
-        let (count, mut sizes) = if is_rational { SHAPES[random.below(8)] } else { SHAPES[random.below(2)] };
+        let (count, mut sizes) = SHAPES[random.below(8)];
         if random.below(2) == 0 {
             sizes.reverse();
         }
-        let n = rational.whole;
+        // Corners of B have to fit in f32, and those of a single star are small.
+        let most = if count == 1 { [1, 3, 40][random.below(3)] } else { random.below(4) };
+        let (numerators, n) = rotation(random, most);
         let normal = loop {
             let normal = [(); 3].map(|()| [0, 0, 1, -1, 2, -3][random.below(6)]);
             if normal != [0; 3] {
                 break normal;
             }
         };
-        let centres = centres(random, count);
-        // Rounded to f32, only what is a corner of B is where it should be; in some rounds that does not matter.
-        let kinds = if is_rational || random.below(4) == 0 { [16, 16] } else { [16, 4] };
         let (mut a, mut b) = (Vec::new(), Vec::new());
-        for centre in centres {
+        for centre in centres(random, count) {
             let star = Star::new(random, normal);
-            let [of_a, of_b] =
-                [(-1, sizes[0], kinds[0]), (1, sizes[1], kinds[1])].map(|(side, size, kinds)| {
-                    (0..size).map(|_| star.triangle(random, side, kinds)).collect::<Vec<_>>()
-                });
-            let at = |t: [Integer; 3]| t.map(|p| [0, 1, 2].map(|k| n * (centre[k] + p[k])));
-            a.extend(of_a.into_iter().map(at));
-            b.extend(of_b.into_iter().map(at));
+            let at = |t: [Integer; 3]| t.map(|p| [0, 1, 2].map(|k| centre[k] + p[k]));
+            a.extend((0..sizes[0]).map(|_| at(star.triangle(random, -1))));
+            b.extend((0..sizes[1]).map(|_| at(star.triangle(random, 1))));
         }
         // Far places lose bits of what is stored and placed: A's, and B's before it is placed.
         let unit = 2f64.powi(random.below(180) as i32 - 100);
         let mut far = || {
             let bits = [0, 0, 10, 20, 28][random.below(5)];
-            [(); 3].map(|()| n * if bits == 0 { 0 } else { random.below(2 << bits) as i64 - (1 << bits) })
+            [(); 3].map(|()| if bits == 0 { 0 } else { random.below(2 << bits) as i64 - (1 << bits) })
         };
         let (far_a, far_b) = (far(), far());
         let float = |p: Integer| p.map(|x| x as f64 * unit);
-        let plus = |p: Integer, q: Integer| [0, 1, 2].map(|k| p[k] + q[k]);
-        let placed_a: Vec<_> = a.iter().map(|t| t.map(|p| float(plus(p, far_a)))).collect();
-        let normal = normal.map(|x| x as f64);
-        if is_rational {
-            let b = b.iter().map(|t| t.map(|p| float(rational.back(plus(p, far_b))))).collect();
-            let rotation = rational.numerators.map(|row| row.map(|x| x as f64 / n as f64));
-            let translation = float([0, 1, 2].map(|k| far_a[k] - far_b[k]));
-            return Self { a: placed_a, b, rotation, translation, sizes, normal };
+        let of_a = |p: Integer| float([0, 1, 2].map(|k| n * (p[k] + far_a[k])));
+        let back = |j: usize, p: &Integer| (0..3).map(|i| numerators[i][j] * (p[i] + far_b[i])).sum();
+        let of_b = |p: Integer| float([0, 1, 2].map(|j| back(j, &p)));
+        Self {
+            a: a.into_iter().map(|t: [Integer; 3]| t.map(of_a)).collect(),
+            b: b.into_iter().map(|t: [Integer; 3]| t.map(of_b)).collect(),
+            rotation: numerators.map(|row| row.map(|x| x as f64 / n as f64)),
+            translation: float([0, 1, 2].map(|k| n * (far_a[k] - far_b[k]))),
+            sizes,
+            normal: normal.map(|x| x as f64),
         }
-        let rotation = rotation(random.quaternion());
-        let back = |p: [f64; 3]| {
-            [0, 1, 2].map(|j| f64::from((0..3).map(|i| rotation[i][j] * p[i]).sum::<f64>() as f32))
+    }
+
+    /// Returns the number of pairs of triangles around common centres.
+    pub(super) fn pairs(&self) -> usize {
+        self.a.len() * self.sizes[1]
+    }
+
+    /// Returns the numbers of two triangles around a common centre.
+    pub(super) fn any_pair(&self, random: &mut Random) -> (usize, usize) {
+        let star = random.below(self.a.len() / self.sizes[0]);
+        let [i, j] = [0, 1].map(|side| star * self.sizes[side] + random.below(self.sizes[side]));
+        (i, j)
+    }
+
+    /// Returns the pose of the construction, or one whose numbers are moved by a few roundings. The pose may be refused.
+    pub(super) fn nudged(&self, number: usize, random: &mut Random) -> Option<Pose> {
+        let (mut rotation, mut translation) = (self.rotation, self.translation);
+        let largest = self.largest_magnitude(&rotation, translation);
+        let mut step = |x: &mut f64, unit: f64| {
+            let steps = random.below(5) as f64 - 2.0;
+            *x += steps * if unit > 0.0 { unit } else { x.abs().next_up() - x.abs() };
         };
-        // The only star is around 0, which has no rounding; B's star may be stored around another point.
-        let centre = [0, 1, 2].map(|k| (far_b[k] / n % (1 << 12)) as f64 * unit);
-        let stored = |p: Integer| {
-            let q = back(float(p));
-            [0, 1, 2].map(|k| f64::from((q[k] + centre[k]) as f32))
-        };
-        let b = b.iter().map(|t| t.map(stored)).collect();
-        let placed = rotation.map(|row| (row[0] * centre[0] + row[1] * centre[1]) + row[2] * centre[2]);
-        let to = float(far_a);
-        let translation = [0, 1, 2].map(|k| to[k] - placed[k]);
-        Self { a: placed_a, b, rotation, translation, sizes, normal }
+        if number & 1 == 1 {
+            let unit = if number & 2 == 0 { 0.0 } else { UNIT * largest };
+            let axes = if number & 4 == 0 { 0..3 } else { number / 8 % 3..number / 8 % 3 + 1 };
+            translation[axes].iter_mut().for_each(|x| step(x, unit));
+        }
+        if number & 8 == 8 {
+            let unit = if number & 16 == 0 { 0.0 } else { UNIT };
+            rotation.as_flattened_mut().iter_mut().for_each(|x| step(x, unit));
+        }
+        Pose::new(rotation, translation).ok()
+    }
+
+    /// Returns whether moving B by [`ROUNDINGS`] of the largest magnitude in the pose parts a pair that touches, or whether the
+    /// pair is apart by no more than that. B's triangle is placed.
+    pub(super) fn is_near(&self, (a, b): (&Triangle, &Triangle), touching: bool, pose: &Pose) -> bool {
+        let off = ROUNDINGS * UNIT * self.largest_magnitude(pose.rotation(), pose.translation());
+        if !touching {
+            return Length::between(a, b).compare(off).is_le();
+        }
+        let length = self.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let moved = b.map(|p| [0, 1, 2].map(|k| p[k] + off * self.normal[k] / length));
+        !intersect(&Boxed::new(*a), &Boxed::new(moved), &mut Decided::default())
+    }
+
+    /// Returns the largest sum of the magnitudes of the terms of a placed coordinate, and of a coordinate of A.
+    fn largest_magnitude(&self, rotation: &[[f64; 3]; 3], translation: [f64; 3]) -> f64 {
+        let of_b = self.b.iter().flatten().flat_map(|p| {
+            let sum = move |k: usize| (0..3).map(|j| (rotation[k][j] * p[j]).abs()).sum::<f64>();
+            (0..3).map(move |k| sum(k) + translation[k].abs())
+        });
+        self.a.iter().flatten().flatten().map(|x| x.abs()).chain(of_b).fold(0.0, f64::max)
     }
 }
 
@@ -144,9 +163,8 @@ fn centres(random: &mut Random, count: usize) -> Vec<Integer> {
     let side = (count as f64).cbrt().ceil() as i64;
     let place = |number: i64| {
         let cell = [number % side, number / side % side, number / side / side];
-        cell.map(|x| {
-            4 * REACH * (x - side / 2) + random.below(if count == 1 { 1 } else { REACH as usize }) as i64
-        })
+        let spread = if count == 1 { 1 } else { REACH as usize };
+        cell.map(|x| 4 * REACH * (x - side / 2) + random.below(spread) as i64)
     };
     (0..count as i64).map(place).collect()
 }
@@ -185,20 +203,18 @@ impl Star {
         }
     }
 
-    /// Returns a triangle, segment or point on one side that contains the centre, of the first `kinds` kinds.
-    fn triangle(&self, random: &mut Random, side: i64, kinds: usize) -> [Integer; 3] {
+    /// Returns a triangle, segment or point on one side that contains the centre.
+    fn triangle(&self, random: &mut Random, side: i64) -> [Integer; 3] {
         let [e, f] = [random.below(4), random.below(4)].map(|i| self.flat[i]);
         let (u, v) = (self.off(random, side), self.off(random, side));
         let times = |p: Integer, x: i64| p.map(|y| x * y);
-        let minus = |p: Integer, q: Integer| [0, 1, 2].map(|k| -p[k] - q[k]);
         let zero = [0; 3];
         let lifted = [0, 1, 2].map(|k| e[k] + side * self.normal[k]);
-        let mut t = match random.below(kinds) {
+        let mut t = match random.below(16) {
             // The centre is a corner.
             0 | 1 => [zero, u, v],
             2 => [zero, u, [zero, u, times(u, 2)][random.below(3)]],
-            3 if random.below(4) == 0 => [zero; 3],
-            3 => [zero, u, v],
+            3 => [[zero; 3], [zero, u, v]][random.below(2)],
             4 | 5 => [zero, e, u],
             6 => [zero, e, f],
             // It is in an edge.
@@ -208,7 +224,7 @@ impl Star {
             11 => [e, times(e, -1), lifted],
             12 => [e, times(e, -1), [zero, e, times(e, 2)][random.below(3)]],
             // It is in the face, unless the triangle is a segment.
-            _ => [e, f, minus(e, f)],
+            _ => [e, f, [0, 1, 2].map(|k| -e[k] - f[k])],
         };
         t.rotate_left(random.below(3));
         if random.below(2) == 0 {
