@@ -1,7 +1,6 @@
 //! Hard cases: asks cbvh and, if their programs exist, other libraries, judges the answers, and writes three files.
 
 mod judge;
-mod libraries;
 mod markdown;
 mod own;
 mod peers;
@@ -18,7 +17,7 @@ use std::path::Path;
 
 pub(crate) fn run(arguments: &HardArguments) -> Result<String, Failure> {
     let out = &arguments.out;
-    let mut peers = arguments.peers.as_deref().map(libraries::find).transpose()?.unwrap_or_default();
+    let mut peers = arguments.peers.as_deref().map(Peer::find).transpose()?.unwrap_or_default();
     output::make_folder(out)?;
     let questions = Questions::new()?;
     let all: Vec<Case> = hard_cases::all().into_iter().step_by(usize::from(arguments.every)).collect();

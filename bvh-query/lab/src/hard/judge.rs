@@ -19,27 +19,15 @@ pub(super) enum Verdict {
     Timeout,
 }
 
-/// A verdict, with the error of a distance.
-pub(super) struct Judgement {
-    pub(super) verdict: Verdict,
-    /// The error as a fraction of the true distance; `None` for contact.
-    pub(super) of_distance: Option<f64>,
-    /// The error as a fraction of the size.
-    pub(super) of_size: Option<f64>,
-}
-
-/// Judges an answer to a mode; `scale` is the size of both meshes. A refused pose is never asked about.
-pub(super) fn judge(mode: &str, answer: f64, truth: &Truth, scale: f64) -> Judgement {
+/// Judges an answer to a mode; `scale` is the size of both meshes. A refused pose is never asked about. Returns the verdict,
+/// and the error of a distance as a fraction of the true one, if that is not 0, and of the size.
+pub(super) fn judge(mode: &str, answer: f64, truth: &Truth, scale: f64) -> (Verdict, [Option<f64>; 2]) {
     let (contacts, length) = match *truth {
         Truth::Touching { contacts } => (contacts, 0.0),
         Truth::Apart(length) => (0, length.floor()),
         Truth::Refused { .. } => (0, f64::NAN),
     };
-    let plain = |right: bool| Judgement {
-        verdict: if right { Verdict::Right } else { Verdict::Wrong },
-        of_distance: None,
-        of_size: None,
-    };
+    let plain = |right: bool| (if right { Verdict::Right } else { Verdict::Wrong }, [None; 2]);
     match mode {
         "collide" => plain((answer > 0.0) == (contacts > 0)),
         "contacts" => plain(answer == contacts as f64),
@@ -52,11 +40,7 @@ pub(super) fn judge(mode: &str, answer: f64, truth: &Truth, scale: f64) -> Judge
                 (false, true) => Verdict::Off,
                 (false, false) => Verdict::Wrong,
             };
-            Judgement {
-                verdict,
-                of_distance: (length > 0.0).then_some(error / length),
-                of_size: Some(error / scale),
-            }
+            (verdict, [(length > 0.0).then_some(error / length), Some(error / scale)])
         }
     }
 }
@@ -85,17 +69,17 @@ mod tests {
     #[test]
     fn distances_are_judged_by_themselves_and_by_size() {
         let truth = Truth::Apart(Length::Exactly(1e-3, ""));
-        let verdict = |answer: f64| judge("distance", answer, &truth, 10.0).verdict;
+        let verdict = |answer: f64| judge("distance", answer, &truth, 10.0).0;
         assert_eq!(verdict(1e-3), Verdict::Right);
         assert_eq!(verdict(1e-3 + 5e-10), Verdict::Right);
         assert_eq!(verdict(1e-3 + 5e-9), Verdict::Off);
         assert_eq!(verdict(2e-3), Verdict::Wrong);
         assert_eq!(verdict(f64::NAN), Verdict::Wrong);
         let touching = Truth::Touching { contacts: 2 };
-        assert_eq!(judge("distance", 1e-9, &touching, 1.0).verdict, Verdict::Off);
-        assert_eq!(judge("distance", 0.0, &touching, 1.0).verdict, Verdict::Right);
-        assert_eq!(judge("collide", 1.0, &touching, 1.0).verdict, Verdict::Right);
-        assert_eq!(judge("contacts", 1.0, &touching, 1.0).verdict, Verdict::Wrong);
-        assert_eq!(judge("collide", 1.0, &truth, 1.0).verdict, Verdict::Wrong);
+        assert_eq!(judge("distance", 1e-9, &touching, 1.0).0, Verdict::Off);
+        assert_eq!(judge("distance", 0.0, &touching, 1.0).0, Verdict::Right);
+        assert_eq!(judge("collide", 1.0, &touching, 1.0).0, Verdict::Right);
+        assert_eq!(judge("contacts", 1.0, &touching, 1.0).0, Verdict::Wrong);
+        assert_eq!(judge("collide", 1.0, &truth, 1.0).0, Verdict::Wrong);
     }
 }

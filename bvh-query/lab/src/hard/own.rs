@@ -1,8 +1,8 @@
 //! The answers of cbvh in every profile, in both lossless encodings and on every backend.
 
 use super::judge::span;
-use bvh_bake::mesh::Mesh;
-use bvh_bake::{Options, to_bytes};
+use crate::common::{mesh, options};
+use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
@@ -18,7 +18,7 @@ const ACCURACY: f64 = 1e-14;
 const SHARES: usize = 5;
 
 /// The answers to one order of a case.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(super) struct Own {
     /// The error message, if the pose was refused.
     pub(super) refusal: Option<String>,
@@ -49,17 +49,7 @@ struct Answers {
 
 /// Asks in all layouts, or in one share of them.
 pub(super) fn ask(case: &Case, order: &Ordered, share: Option<usize>) -> Own {
-    let mut own = Own {
-        refusal: None,
-        collide: None,
-        contacts: None,
-        distance: None,
-        lower: None,
-        upper: None,
-        asked: 0,
-        differ: Vec::new(),
-        wrong: Vec::new(),
-    };
+    let mut own = Own::default();
     let pose = match (Pose::from_rows(&order.pose), case.truth) {
         (Ok(pose), Truth::Touching { .. } | Truth::Apart(_)) => pose,
         (Ok(_), Truth::Refused { .. }) => {
@@ -122,10 +112,8 @@ impl Own {
 }
 
 fn bake(triangles: &[Triangle], profile: Profile, encoding: TriangleEncoding) -> Result<Bvh, String> {
-    let numbers = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let mesh = Mesh::from_triangles(triangles.iter().flatten().copied().collect(), numbers);
-    let options = Options::default().profile(profile).triangles(encoding);
-    let (bytes, report) = to_bytes(&mesh, &options).map_err(|error| error.to_string())?;
+    let baked = to_bytes(&mesh(triangles), &options(profile, encoding));
+    let (bytes, report) = baked.map_err(|error| error.to_string())?;
     if report.file.max_vertex_rounding > 0.0 {
         return Err(format!("baking moved a vertex by {:e}", report.file.max_vertex_rounding));
     }

@@ -15,11 +15,29 @@ use std::time::{Duration, Instant};
 /// The longest time for a question; the meshes are small.
 const MAX_TIME: Duration = Duration::from_secs(10);
 
+/// Name, program, variant, precision and modes of a library.
+type Known = (&'static str, &'static str, &'static str, &'static str, &'static [&'static str]);
+
+/// The libraries that can be asked.
+const KNOWN: [Known; 10] = [
+    ("coal-OBBRSS", "peer_coal", "OBBRSS", "f64", &["collide", "contacts", "distance"]),
+    ("coal-OBB", "peer_coal", "OBB", "f64", &["collide", "contacts"]),
+    ("fcl-OBBRSS", "peer_fcl", "OBBRSS", "f64", &["collide", "contacts", "distance"]),
+    ("fcl-OBB", "peer_fcl", "OBB", "f64", &["collide", "contacts"]),
+    ("parry3d", "peer_parry", "api", "f32", &["collide", "distance"]),
+    ("parry3d-f64", "peer_parry", "api-f64", "f64", &["collide", "distance"]),
+    ("cgal-rigid", "peer_cgal", "", "f64", &["collide"]),
+    ("bullet-gimpact", "peer_bullet", "", "f32", &["collide", "contacts"]),
+    ("ode-opcode", "peer_ode", "", "f32", &["collide"]),
+    // Embree has a tree of boxes; its program tests triangles itself, in f64.
+    ("embree-boxes", "peer_embree", "refit", "f32", &["collide", "contacts"]),
+];
+
 /// A library in one variant.
 pub(super) struct Peer {
     pub(super) name: &'static str,
     pub(super) precision: &'static str,
-    pub(super) modes: Vec<&'static str>,
+    pub(super) modes: &'static [&'static str],
     /// The version that its program states; empty before the first answer.
     pub(super) version: String,
     program: PathBuf,
@@ -40,14 +58,20 @@ pub(super) struct Other {
 }
 
 impl Peer {
-    pub(super) fn new(
-        name: &'static str,
-        program: PathBuf,
-        variant: &'static str,
-        precision: &'static str,
-        modes: &[&'static str],
-    ) -> Self {
-        Self { name, precision, modes: modes.to_vec(), version: String::new(), program, variant }
+    /// Returns all known programs in `build/bin`.
+    pub(super) fn find(build: &Path) -> Result<Vec<Self>, Failure> {
+        let bin = build.join("bin");
+        let there = KNOWN.into_iter().filter(|known| bin.join(known.1).is_file());
+        let peer = |(name, program, variant, precision, modes): Known| {
+            // The program runs in another folder.
+            let program = bin.join(program).canonicalize().unwrap_or_else(|_| bin.join(program));
+            Self { name, precision, modes, version: String::new(), program, variant }
+        };
+        let peers: Vec<_> = there.map(peer).collect();
+        if peers.is_empty() {
+            return Err(format!("{}: expected programs peer_*, found none", bin.display()).into());
+        }
+        Ok(peers)
     }
 
     /// Asks in all modes about the meshes and the pose that `questions` holds.
@@ -59,7 +83,7 @@ impl Peer {
     ) -> Result<Vec<Other>, Failure> {
         let scale = span(&order.a, &order.b, &order.pose);
         let mut others = Vec::new();
-        for mode in self.modes.clone() {
+        for &mode in self.modes {
             let failed = |error: io::Error| {
                 format!("{}: expected a program to run, found {error}", self.program.display())
             };
@@ -76,10 +100,9 @@ impl Peer {
                 error_of_size: None,
             };
             if let Some(answer) = ended.answer {
-                let judgement = judge(mode, answer, truth, scale);
-                other.verdict = judgement.verdict;
-                other.error_of_distance = judgement.of_distance.filter(|error| error.is_finite());
-                other.error_of_size = judgement.of_size.filter(|error| error.is_finite());
+                let (verdict, errors) = judge(mode, answer, truth, scale);
+                let [of_distance, of_size] = errors.map(|error| error.filter(|error| error.is_finite()));
+                other = Other { verdict, error_of_distance: of_distance, error_of_size: of_size, ..other };
             }
             others.push(other);
         }
