@@ -9,7 +9,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Backend, Batch, Bvh, Pose, Querier, QueryError, Tracker};
 use common::shapes::{cube, dirty, moved, soup, sphere, torus};
-use common::{Random, backends, bake, mesh, options, random_pose, translation};
+use common::{Random, backends, bake, baked, mesh, options, random_pose, translation};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 fn pools() -> Vec<ThreadPool> {
@@ -54,7 +54,7 @@ fn batches_answer_as_one_by_one() {
 /// Of many contacts, it must not matter which one some thread finds first.
 #[test]
 fn the_first_collision_is_the_first_wherever_it_is() {
-    let a = bake(&mesh(&sphere(3)), &Options::default());
+    let a = baked(&sphere(3));
     let (near, far) = (translation(1.5, 0.0, 0.0), translation(2.5, 0.0, 0.0));
     let batch = Batch::new(&a, &a).unwrap();
     let pools = pools();
@@ -94,7 +94,7 @@ fn half_damaged() -> Bvh {
 #[test]
 fn a_batch_ends_at_its_first_error_or_contact() {
     let a = half_damaged();
-    let b = bake(&mesh(&moved(&cube(), 0.5, [0.0; 3])), &Options::default());
+    let b = baked(&moved(&cube(), 0.5, [0.0; 3]));
     let (hit, free, error) =
         (translation(-3.0, 1.25, 0.0), translation(0.0, 50.0, 0.0), translation(3.0, 1.25, 0.0));
     let mut querier = Querier::new().unwrap();
@@ -139,7 +139,7 @@ fn the_error_is_that_of_the_first_pose() {
     let layout = good.layout();
     (1..layout.page_count()).for_each(|page| bytes[layout.page_offset(page) as usize + 200] ^= 1);
     let damaged = Bvh::from_bytes(bytes).unwrap();
-    let other = bake(&mesh(&moved(&cube(), 0.05, [0.0; 3])), &Options::default());
+    let other = baked(&moved(&cube(), 0.05, [0.0; 3]));
     let mut random = Random::new(2);
     let mut errors = Vec::new();
     for _ in 0..40 {
@@ -161,7 +161,7 @@ fn the_error_is_that_of_the_first_pose() {
 
 #[test]
 fn budgets_hold_for_each_pose_and_end_batches_alike_on_any_number_of_threads() {
-    let a = bake(&mesh(&soup(600, 4)), &Options::default());
+    let a = baked(&soup(600, 4));
     let mut random = Random::new(31);
     let poses = poses(&mut random, 200);
     let mut querier = Querier::with_backend(Backend::Scalar);

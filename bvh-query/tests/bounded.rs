@@ -18,11 +18,11 @@ use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::profile::Profile;
 use bvh_format::source::MAX_BLOCK_BYTES;
 use bvh_format::validate::validate;
-use bvh_query::{Backend, Bvh, Querier, QueryError};
+use bvh_query::{Bvh, Querier, QueryError};
 use cbvh_testkit::seal::{put, put_together, seal, seal_pages, take_apart};
 use common::forged::{blown_up, duplicated};
 use common::shapes::soup;
-use common::{mesh, options, translation};
+use common::{backends, mesh, options, translation};
 use counted::peak;
 use std::ops::ControlFlow;
 
@@ -45,7 +45,7 @@ fn a_walk_of_all_pairs_ends_in_bounded_memory() {
         let ((treelets_a, packets_a), (treelets_b, packets_b)) = (sizes(&a), sizes(&b));
         // The triangles themselves are far apart, and only their bounds overlap.
         let pose = translation(100.0, 0.0, 0.0);
-        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        for backend in backends() {
             let mut querier = Querier::with_backend(backend);
             let most_memory = 8192 * (treelets_a + treelets_b) + (4 << 20);
             let most_pairs = (treelets_a + packets_a) * (treelets_b + packets_b);

@@ -14,12 +14,12 @@ use bvh_query::{Bvh, DistanceOptions, Pose, Querier, QueryError};
 use cbvh_testkit::seal::{put, seal, section};
 use common::asked::ask;
 use common::shapes::{soup, sphere};
-use common::{mesh, options, queriers, translation};
+use common::{baked, mesh, options, queriers, translation};
 use std::path::Path;
 
 #[test]
 fn the_frozen_bad_files_do_no_harm() {
-    let good = Bvh::from_bytes(to_bytes(&mesh(&sphere(1)), &Options::default()).unwrap().0).unwrap();
+    let good = baked(&sphere(1));
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
     let mut queriers = queriers();
     let mut seen = 0;
@@ -49,7 +49,7 @@ fn the_frozen_bad_files_do_no_harm() {
 /// Links between pages are forged: a link and the root to which it leads must name each other.
 #[test]
 fn links_and_roots_have_to_name_each_other() {
-    let good = Bvh::from_bytes(to_bytes(&mesh(&sphere(1)), &Options::default()).unwrap().0).unwrap();
+    let good = baked(&sphere(1));
     let mesh = mesh(&soup(3000, 5));
     let file = to_bytes(&mesh, &options(Profile::Dop14U8, TriangleEncoding::F32)).unwrap().0;
     let layout = Layout::read(&file).unwrap();
@@ -96,7 +96,7 @@ fn links_and_roots_have_to_name_each_other() {
 /// Damage in one page does not affect queries that do not need that page.
 #[test]
 fn far_damage_goes_unnoticed_and_near_damage_does_not() {
-    let good = Bvh::from_bytes(to_bytes(&mesh(&sphere(1)), &Options::default()).unwrap().0).unwrap();
+    let good = baked(&sphere(1));
     let mut file = to_bytes(&mesh(&soup(20_000, 5)), &Options::default()).unwrap().0;
     let layout = Layout::read(&file).unwrap();
     let last = layout.page_count() - 1;

@@ -7,7 +7,7 @@
 
 mod common;
 
-use bvh_bake::{Options, prove_bounds, to_bytes};
+use bvh_bake::{prove_bounds, to_bytes};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::ObjectRecord;
 use bvh_format::profile::Profile;
@@ -19,7 +19,7 @@ use cbvh_testkit::loosen::{fill_unused_lanes, loosened, move_sphere, remote_root
 use common::asked::ask;
 use common::shapes::{plate, soup, sphere};
 use common::truth::Truth;
-use common::{Random, Stored, Triangle, bake, mesh, options, queriers, random_pose, stored};
+use common::{Random, Stored, Triangle, bake, baked, mesh, options, queriers, random_pose, stored};
 
 /// Checks every rule, bounds included.
 fn prove(bytes: &[u8]) -> Result<(), FormatError> {
@@ -254,7 +254,7 @@ fn lanes_without_triangles() {
 fn a_stored_slab_beyond_its_treelet_is_refused_at_first_touch() {
     let mesh = mesh(&soup(900, 3));
     let file = to_bytes(&mesh, &options(Profile::Dop14F32, TriangleEncoding::F32)).unwrap().0;
-    let other = bake(&common::mesh(&sphere(1)), &Options::default());
+    let other = baked(&sphere(1));
     for slab in 0..7 {
         // Only the anchors are as they were.
         let bytes = rewritten(

@@ -2,13 +2,12 @@
 
 mod common;
 
-use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Pose, Querier, QueryStats};
 use cbvh_testkit::depth::rounds;
 use common::shapes::{moved, rounded, sphere, terrain, torus};
-use common::{Random, backends, bake, mesh, options, random_pose};
+use common::{Random, backends, bake, baked, mesh, options, random_pose};
 
 /// The answers of a querier, and the work for each.
 fn ask(querier: &mut Querier, a: &Bvh, b: &Bvh, pose: &Pose) -> (String, [QueryStats; 3]) {
@@ -27,7 +26,7 @@ fn bodies() -> Vec<Bvh> {
     let large = sphere(4);
     let small = rounded(moved(&torus(24, 12), 0.2, [0.0; 3]));
     vec![
-        bake(&mesh(&large), &Options::default()),
+        baked(&large),
         bake(&mesh(&small), &options(Profile::Dop6U8, TriangleEncoding::Packed)),
         bake(&mesh(&terrain(30, 3)), &options(Profile::Dop14U8, TriangleEncoding::F32)),
     ]

@@ -4,25 +4,14 @@
 mod common;
 
 use bvh_query::{
-    Backend, Bvh, Motion, MotionAnswer, MotionOptions, NumberError, PathError, Polyline, Pose, Querier,
-    QueryError, RigidPath, displacement, path_reach,
+    Bvh, Motion, MotionAnswer, MotionOptions, NumberError, PathError, Polyline, Pose, Querier, QueryError,
+    RigidPath, displacement, path_reach,
 };
 use cbvh_testkit::depth::rounds;
 use common::shapes::{cube, plate, sphere, torus};
-use common::{Random, Triangle, bake, mesh, note, random_pose, shared, shared_mesh};
-
-fn baked(triangles: &[Triangle]) -> Bvh {
-    bake(&mesh(triangles), &bvh_bake::Options::default())
-}
-
-fn queriers() -> Vec<Querier> {
-    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    backends.map(Querier::with_backend).collect()
-}
-
-fn at(x: f64, y: f64, z: f64) -> Pose {
-    Pose::new(*Pose::IDENTITY.rotation(), [x, y, z]).unwrap()
-}
+use common::{
+    Random, Triangle, bake, baked, note, queriers, random_pose, shared, shared_mesh, translation as at,
+};
 
 /// The definition: cells in the order of time, each decided in its middle.
 fn plain(

@@ -3,19 +3,23 @@
 
 mod common;
 
-use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier};
 use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
 use common::truth::Truth;
 use common::{
-    Random, Triangle, bake, mesh, options, queriers, random_pose, rotation, shared_mesh, stored, translation,
+    Random, Triangle, bake, baked, mesh, options, queriers, random_pose, rotation, shared_mesh, stored,
+    translation,
 };
 use std::ops::ControlFlow;
 
-/// Bakes a mesh into one file per profile. The lossless encodings take turns.
-fn files(triangles: &[Triangle], encodings: &[TriangleEncoding]) -> Vec<Bvh> {
+/// Bakes a mesh into one file per profile and lossless encoding.
+fn files(triangles: &[Triangle]) -> Vec<Bvh> {
+    files_in(triangles, &LOSSLESS)
+}
+
+fn files_in(triangles: &[Triangle], encodings: &[TriangleEncoding]) -> Vec<Bvh> {
     let mesh = mesh(triangles);
     let all = Profile::ALL.into_iter().flat_map(|profile| encodings.iter().map(move |&e| (profile, e)));
     all.map(|(profile, encoding)| bake(&mesh, &options(profile, encoding))).collect()
@@ -25,7 +29,8 @@ const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding
 
 /// Queries every file of A against the same and one other file of B, on every backend. All answers must be right, and
 /// all must be equal, except that different triangles may be named when the meshes touch.
-fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose], queriers: &mut [Querier]) {
+fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose]) {
+    let mut queriers = queriers();
     let (stored_a, stored_b) = (stored(&a[0]), stored(&b[0]));
     for pose in poses {
         let truth = Truth::new(&stored_a, &stored_b, pose);
@@ -33,7 +38,7 @@ fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose], queriers: &mut [Querier]) {
         for i in 0..a.len().max(b.len()) {
             for other in [i, 7 * i + 3] {
                 let (a, b) = (&a[i % a.len()], &b[other % b.len()]);
-                let answer = truth.check(a, b, pose, queriers);
+                let answer = truth.check(a, b, pose, &mut queriers);
                 if answer.distance > 0.0 {
                     assert_eq!(*apart.get_or_insert(answer), answer, "file {i} against {other}");
                 }
@@ -45,7 +50,7 @@ fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose], queriers: &mut [Querier]) {
 #[test]
 fn baking_keeps_every_triangle() {
     for triangles in [dirty(&sphere(2), 1), soup(200, 2), comb(64), dirty(&plate(8), 3)] {
-        for file in files(&triangles, &LOSSLESS) {
+        for file in files(&triangles) {
             let stored = stored(&file);
             assert_eq!(stored.len(), triangles.len());
             for (id, (input, stored)) in triangles.iter().zip(&stored).enumerate() {
@@ -71,13 +76,12 @@ fn random_poses() {
         ("terrain", terrain(10, 7)),
         ("cube", cube()),
     ];
-    let files: Vec<_> = meshes.iter().map(|(_, triangles)| files(triangles, &LOSSLESS)).collect();
-    let mut queriers = queriers();
+    let files: Vec<_> = meshes.iter().map(|(_, triangles)| files(triangles)).collect();
     let mut random = Random::new(11);
     for (a, b) in [(0, 1), (1, 3), (2, 2), (3, 4), (4, 0), (5, 2), (6, 5), (3, 3), (1, 1), (6, 2)] {
         // The poses range from deep inside to a few sizes away.
-        let poses: Vec<_> = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random_pose(&mut random, reach)).to_vec();
-        check(&files[a], &files[b], &poses, &mut queriers);
+        let poses = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random_pose(&mut random, reach));
+        check(&files[a], &files[b], &poses);
     }
 }
 
@@ -88,16 +92,15 @@ fn in_place_turned_and_far() {
     poses.extend(half_turns.map(|q| Pose::new(rotation(q), [0.0; 3]).unwrap()));
     let third = Pose::new([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], [0.25, 0.0, 0.0]);
     poses.push(third.unwrap());
-    let mut queriers = queriers();
     for triangles in [dirty(&cube(), 2), plate(4), dirty(&sphere(1), 3), comb(24), soup(40, 9)] {
-        let files = files(&triangles, &LOSSLESS);
-        check(&files, &files, &poses, &mut queriers);
+        let files = files(&triangles);
+        check(&files, &files, &poses);
     }
 }
 
 #[test]
 fn touching_in_a_face_an_edge_a_corner_and_just_not() {
-    let cube = files(&cube(), &LOSSLESS);
+    let cube = files(&cube());
     let mut poses = Vec::new();
     for x in [2.0, -2.0] {
         poses.extend([translation(x, 0.0, 0.0), translation(x, 2.0, 0.0), translation(x, -2.0, 2.0)]);
@@ -112,59 +115,55 @@ fn touching_in_a_face_an_edge_a_corner_and_just_not() {
     let turned = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
     poses.push(Pose::new(turned, [2.4, 0.0, 0.0]).unwrap());
     poses.push(Pose::new(turned, [0.0, 0.0, 2.0]).unwrap());
-    let mut queriers = queriers();
-    check(&cube, &cube, &poses, &mut queriers);
+    check(&cube, &cube, &poses);
     // A corner of the octahedron is placed on faces, edges and corners of the plate, from above and from below.
-    let plate = files(&dirty(&plate(4), 1), &LOSSLESS);
-    let octahedron = files(&dirty(&sphere(0), 2), &LOSSLESS);
+    let plate = files(&dirty(&plate(4), 1));
+    let octahedron = files(&dirty(&sphere(0), 2));
     let above = |x: f64, y: f64| [1.0, 1.0 + 1e-15, 1.0 - 1e-15, -1.0].map(|z| translation(x, y, z));
     let poses: Vec<_> = [above(0.1, 0.2), above(0.5, 0.125), above(0.5, -0.5), above(1.0, 1.0)].concat();
-    check(&plate, &octahedron, &poses, &mut queriers);
+    check(&plate, &octahedron, &poses);
 }
 
 #[test]
 fn nested_surfaces_do_not_collide() {
-    let outer = files(&sphere(2), &LOSSLESS);
-    let inner = files(&moved(&sphere(1), 0.25, [0.125, 0.25, 0.0]), &LOSSLESS);
-    let mut queriers = queriers();
+    let outer = files(&sphere(2));
+    let inner = files(&moved(&sphere(1), 0.25, [0.125, 0.25, 0.0]));
+    let mut querier = Querier::new().unwrap();
     let mut random = Random::new(3);
     let poses: Vec<_> = (0..4).map(|_| random_pose(&mut random, 0.2)).collect();
     for pose in &poses {
-        assert!(!queriers[0].collide(&outer[0], &inner[0], pose).unwrap());
-        assert!(queriers[0].distance(&outer[0], &inner[0], pose).unwrap().distance > 0.1);
+        assert!(!querier.collide(&outer[0], &inner[0], pose).unwrap());
+        assert!(querier.distance(&outer[0], &inner[0], pose).unwrap().distance > 0.1);
     }
-    check(&outer, &inner, &poses, &mut queriers);
-    check(&inner, &outer, &poses[..1], &mut queriers);
+    check(&outer, &inner, &poses);
+    check(&inner, &outer, &poses[..1]);
 }
 
 #[test]
 fn a_few_triangles() {
-    let mut queriers = queriers();
     let mut random = Random::new(8);
     for count in 1..=5 {
         let (a, b) = (soup(count, 20 + count as u64), soup(6 - count, 30 + count as u64));
-        let poses: Vec<_> = [0.2, 0.6, 2.0].map(|reach| random_pose(&mut random, reach)).to_vec();
-        check(&files(&a, &LOSSLESS), &files(&b, &LOSSLESS), &poses, &mut queriers);
+        let poses = [0.2, 0.6, 2.0].map(|reach| random_pose(&mut random, reach));
+        check(&files(&a), &files(&b), &poses);
     }
     // Meshes of points and segments only.
     let point = vec![[[0.5, 0.25, 0.0]; 3]];
     let segments = vec![[[0.0; 3], [1.0, 0.5, 0.0], [0.0; 3]], [[0.0; 3], [2.0, 2.0, 2.0], [1.0; 3]]];
     let poses = [Pose::IDENTITY, translation(0.5, 0.25, 0.0), translation(-0.5, 0.0, 1e-7)];
     for (a, b) in [(&point, &point), (&point, &segments), (&segments, &segments), (&segments, &cube())] {
-        check(&files(a, &LOSSLESS), &files(b, &LOSSLESS), &poses, &mut queriers);
+        check(&files(a), &files(b), &poses);
     }
 }
 
 #[test]
 fn tiny_and_huge_meshes() {
-    let mut queriers = queriers();
     for scale in [1e-20, 1e-37, 1e15, 1e35] {
-        let a = files(&moved(&dirty(&sphere(1), 1), scale, [0.0; 3]), &LOSSLESS);
-        let b = files(&moved(&soup(40, 2), scale, [0.0; 3]), &LOSSLESS);
+        let a = files(&moved(&dirty(&sphere(1), 1), scale, [0.0; 3]));
+        let b = files(&moved(&soup(40, 2), scale, [0.0; 3]));
         let mut random = Random::new(5);
-        let poses: Vec<_> =
-            [0.5, 1.0, 2.0, 3.0].map(|reach| random_pose(&mut random, reach * scale)).to_vec();
-        check(&a, &b, &poses, &mut queriers);
+        let poses = [0.5, 1.0, 2.0, 3.0].map(|reach| random_pose(&mut random, reach * scale));
+        check(&a, &b, &poses);
     }
 }
 
@@ -173,28 +172,26 @@ fn a_mesh_of_several_bricks() {
     // The mesh has 320,000 triangles, more than the baker puts into one tree.
     let large = terrain(400, 21);
     let small = sphere(0);
-    let [large, small] = [large, small].map(|triangles| vec![bake(&mesh(&triangles), &Options::default())]);
-    let mut queriers = queriers();
+    let [large, small] = [large, small].map(|triangles| vec![baked(&triangles)]);
     let mut random = Random::new(22);
-    let poses: Vec<_> = [0.5, 1.5, 3.0].map(|reach| random_pose(&mut random, reach)).to_vec();
-    check(&large, &small, &poses, &mut queriers);
+    let poses = [0.5, 1.5, 3.0].map(|reach| random_pose(&mut random, reach));
+    check(&large, &small, &poses);
 }
 
 #[test]
 fn far_from_the_origin_in_f64() {
-    let mut queriers = queriers();
     let offset = [1e7, -3e7, 2e7];
     let far = |triangles: Vec<Triangle>| -> Vec<Triangle> {
         let point = |p: [f64; 3]| [0, 1, 2].map(|axis| p[axis] + offset[axis] + 0.1);
         triangles.into_iter().map(|t| t.map(point)).collect()
     };
-    let (a, b) = (files(&far(dirty(&sphere(1), 1)), &LOSSLESS), files(&far(soup(40, 3)), &LOSSLESS));
+    let (a, b) = (files(&far(dirty(&sphere(1), 1))), files(&far(soup(40, 3))));
     assert_ne!(a[0].objects()[0].origin()[0], 0.0);
-    let near = files(&soup(40, 3), &LOSSLESS);
+    let near = files(&soup(40, 3));
     let mut random = Random::new(6);
     let poses: Vec<_> =
         [0.5, 1.5, 4.0].map(|reach| translation(random.signed() * reach, 0.0, reach)).to_vec();
-    check(&a, &b, &poses, &mut queriers);
+    check(&a, &b, &poses);
     // The mesh is turned about its own place, because the translation brings it back.
     let turned: Vec<_> = [0.5, 1.0, 3.0]
         .map(|reach| {
@@ -204,21 +201,20 @@ fn far_from_the_origin_in_f64() {
             Pose::new(*pose.rotation(), translation).unwrap()
         })
         .to_vec();
-    check(&a, &b, &turned, &mut queriers);
-    check(&a, &near, &[Pose::IDENTITY, translation(offset[0], offset[1], offset[2])], &mut queriers);
-    check(&near, &a, &[Pose::IDENTITY, translation(-offset[0], -offset[1], -offset[2])], &mut queriers);
+    check(&a, &b, &turned);
+    check(&a, &near, &[Pose::IDENTITY, translation(offset[0], offset[1], offset[2])]);
+    check(&near, &a, &[Pose::IDENTITY, translation(-offset[0], -offset[1], -offset[2])]);
 }
 
 #[test]
 fn quantized_files_are_about_the_moved_triangles() {
-    let mut queriers = queriers();
     let mut random = Random::new(12);
-    let quantized = |triangles: &[Triangle]| files(triangles, &[TriangleEncoding::Quantized]);
+    let quantized = |triangles: &[Triangle]| files_in(triangles, &[TriangleEncoding::Quantized]);
     let (a, b) = (quantized(&dirty(&sphere(2), 1)), quantized(&soup(60, 3)));
-    let poses: Vec<_> = [0.3, 1.5, 3.0].map(|reach| random_pose(&mut random, reach)).to_vec();
-    check(&a, &b, &poses, &mut queriers);
-    check(&a, &files(&torus(8, 6), &LOSSLESS), &poses, &mut queriers);
-    check(&b, &b, &[Pose::IDENTITY], &mut queriers);
+    let poses = [0.3, 1.5, 3.0].map(|reach| random_pose(&mut random, reach));
+    check(&a, &b, &poses);
+    check(&a, &files(&torus(8, 6)), &poses);
+    check(&b, &b, &[Pose::IDENTITY]);
 }
 
 #[test]
@@ -234,17 +230,16 @@ fn several_objects_answer_as_one() {
         object.name = (*name).to_owned();
         split.objects.push(object);
     }
-    let other = files(&terrain(6, 4), &LOSSLESS);
-    let mut queriers = queriers();
+    let other = files(&terrain(6, 4));
+    let mut querier = Querier::new().unwrap();
     let mut random = Random::new(13);
-    let poses: Vec<_> = [0.5, 2.0, 4.0, 4.0].map(|reach| random_pose(&mut random, reach)).to_vec();
+    let poses = [0.5, 2.0, 4.0, 4.0].map(|reach| random_pose(&mut random, reach));
     let mut all = Vec::new();
     for profile in Profile::ALL {
         let one = bake(&split, &options(profile, TriangleEncoding::F32));
         let several = bake(&split, &options(profile, TriangleEncoding::Packed).split_objects(true));
         assert_eq!((one.objects().len(), several.objects().len()), (1, 3));
         for pose in &poses {
-            let querier = &mut queriers[0];
             let pairs = |contacts: Vec<bvh_query::Contact>| -> Vec<_> {
                 let mut pairs: Vec<_> = contacts.iter().map(|c| (c.triangle_a, c.triangle_b)).collect();
                 pairs.sort_unstable();
@@ -265,13 +260,12 @@ fn several_objects_answer_as_one() {
         assert_eq!(several.find("torus"), Some(2));
         all.push(several);
     }
-    check(&all, &other, &poses, &mut queriers);
-    check(&all, &all, &[Pose::IDENTITY, poses[3]], &mut queriers);
+    check(&all, &other, &poses);
+    check(&all, &all, &[Pose::IDENTITY, poses[3]]);
 }
 
 #[test]
 fn real_meshes() {
-    let mut queriers = queriers();
     let mut random = Random::new(14);
     for (a, b, reach) in [("fclenv", "fclrob", 3000.0), ("piano", "fclrob", 4000.0), ("piano", "piano", 60.0)]
     {
@@ -282,13 +276,12 @@ fn real_meshes() {
             (0..Profile::ALL.len()).map(|i| bake(mesh, &choose(i))).collect()
         };
         let poses: Vec<_> = (0..4).map(|_| random_pose(&mut random, reach)).collect();
-        check(&bakes(&a), &bakes(&b), &poses, &mut queriers);
+        check(&bakes(&a), &bakes(&b), &poses);
     }
 }
 
 #[test]
 fn without_ids_places_name_triangles() {
-    let mut queriers = queriers();
     let mut random = Random::new(15);
     for profile in Profile::ALL {
         let file = |triangles: &[Triangle]| {
@@ -296,13 +289,13 @@ fn without_ids_places_name_triangles() {
         };
         let (a, b) = (file(&dirty(&sphere(1), 1)), file(&torus(8, 4)));
         let poses = [0.5, 3.0].map(|reach| random_pose(&mut random, reach));
-        check(&[a], &[b], &poses, &mut queriers);
+        check(&[a], &[b], &poses);
     }
 }
 
 #[test]
 fn a_visit_of_contacts_ends_when_told() {
-    let file = bake(&mesh(&soup(80, 1)), &Options::default());
+    let file = baked(&soup(80, 1));
     for querier in &mut queriers() {
         let all = querier.contacts(&file, &file, &Pose::IDENTITY).unwrap();
         assert!(all.len() > 80);
@@ -331,11 +324,11 @@ fn beside(triangle: &Triangle, gap: f64, random: &mut Random) -> Pose {
 #[test]
 fn a_mesh_a_thousand_times_larger_than_the_other() {
     let (large, small) = (moved(&sphere(2), 1000.0, [0.0; 3]), sphere(4));
-    let (files_large, files_small) = (files(&large, &LOSSLESS), files(&small, &LOSSLESS));
+    let (files_large, files_small) = (files(&large), files(&small));
     let mut random = Random::new(31);
     let gaps = [-1.0, -0.01, 0.001, 0.3, 60.0];
     let poses: Vec<Pose> = gaps.iter().map(|&gap| beside(&large[37], gap, &mut random)).collect();
-    check(&files_large, &files_small, &poses, &mut queriers());
+    check(&files_large, &files_small, &poses);
     let inverse = |pose: &Pose| {
         let r = pose.rotation();
         let t = pose.translation();
@@ -343,7 +336,7 @@ fn a_mesh_a_thousand_times_larger_than_the_other() {
         Pose::new(rows, rows.map(|row| -(row[0] * t[0] + row[1] * t[1] + row[2] * t[2]))).unwrap()
     };
     let poses: Vec<Pose> = poses.iter().map(inverse).collect();
-    check(&files_small, &files_large, &poses, &mut queriers());
+    check(&files_small, &files_large, &poses);
 }
 
 /// Without bounds of single triangles, every packet of the small mesh is tested.
@@ -351,7 +344,7 @@ fn a_mesh_a_thousand_times_larger_than_the_other() {
 fn a_small_mesh_beside_a_large_triangle_takes_few_tests() {
     let (large, small) = (moved(&sphere(2), 1000.0, [0.0; 3]), sphere(5));
     let pose = beside(&large[37], 0.01, &mut Random::new(32));
-    let (large, small) = (bake(&mesh(&large), &Options::default()), bake(&mesh(&small), &Options::default()));
+    let (large, small) = (baked(&large), baked(&small));
     for mut querier in queriers() {
         assert!(!querier.collide(&large, &small, &pose).unwrap());
         let tests = querier.stats().packet_tests;

@@ -2,7 +2,6 @@
 
 mod common;
 
-use bvh_bake::Options;
 use bvh_bake::mesh::Mesh;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
@@ -10,7 +9,7 @@ use bvh_query::{Bvh, Distance, Pose, Querier, Shape, Tracker};
 use cbvh_testkit::damage::place_in_file;
 use common::asked::victims;
 use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
-use common::{Random, Triangle, bake, mesh, options, queriers, rotation, translation};
+use common::{Random, Triangle, bake, baked, mesh, options, queriers, rotation, translation};
 
 const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding::Packed];
 
@@ -154,8 +153,8 @@ fn several_objects_and_meshes_that_change_under_the_tracker() {
     let same = Bvh::from_bytes(a.bytes().to_vec()).unwrap();
     let fewer = several(&parts[1..], Profile::Dop26U4);
     let b = several(&[parts[2].clone(), parts[0].clone()], Profile::Dop6U8);
-    let small = bake(&mesh(&cube()[..1]), &Options::default());
-    let large = bake(&mesh(&soup(900, 3)), &Options::default());
+    let small = baked(&cube()[..1]);
+    let large = baked(&soup(900, 3));
     let sides = [
         (a.all(), b.all()),
         (same.all(), b.all()),
@@ -186,10 +185,10 @@ fn several_objects_and_meshes_that_change_under_the_tracker() {
 fn a_file_that_is_closed_leaves_nothing_behind() {
     let mut querier = Querier::new().unwrap();
     let mut tracker = Tracker::new();
-    let cube = bake(&mesh(&cube()), &Options::default());
+    let cube = baked(&cube());
     // A file may take the memory address of the one before. The cubes have different sizes.
     for size in [1.0, 0.25, 2.0, 0.125] {
-        let other = bake(&mesh(&moved(&common::shapes::cube(), size, [0.0; 3])), &Options::default());
+        let other = baked(&moved(&common::shapes::cube(), size, [0.0; 3]));
         for x in [3.5, 3.25] {
             let answer = tracker.distance(&mut querier, &cube, &other, &translation(x, 0.0, 0.0)).unwrap();
             assert_eq!(answer.distance, x - 1.0 - size);
@@ -208,7 +207,7 @@ fn a_file_that_is_closed_leaves_nothing_behind() {
 /// With one tracker for all files, damage either is refused or leaves the answers as they were.
 #[test]
 fn damaged_files_are_refused_or_answer_as_before() {
-    let good = bake(&mesh(&sphere(1)), &Options::default());
+    let good = baked(&sphere(1));
     let mut querier = Querier::new().unwrap();
     let mut random = Random::new(9);
     let mut tracker = Tracker::new();
@@ -238,8 +237,8 @@ fn damaged_files_are_refused_or_answer_as_before() {
 /// Checks the savings that a tracker is meant to bring, as far as they do not depend on the machine.
 #[test]
 fn small_steps_cost_less() {
-    let a = bake(&mesh(&terrain(40, 7)), &Options::default());
-    let b = bake(&mesh(&sphere(4)), &Options::default());
+    let a = baked(&terrain(40, 7));
+    let b = baked(&sphere(4));
     let mut querier = Querier::new().unwrap();
     let poses: Vec<_> = (0..200).map(|i| translation(-0.5 + f64::from(i) / 400.0, 0.25, 1.6)).collect();
     let [mut alone, mut tracked] = [[0; 3]; 2];

@@ -5,8 +5,8 @@ mod common;
 
 use bvh_bake::{Options, to_bytes};
 use bvh_query::{Bvh, OpenError, Pose, Querier};
-use common::mesh;
 use common::shapes::{soup, sphere};
+use common::{baked, mesh};
 use std::fs::OpenOptions;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ fn truncate(path: &Path) {
 }
 
 fn contacts(bvh: &Bvh) -> usize {
-    let good = Bvh::from_bytes(to_bytes(&mesh(&sphere(1)), &Options::default()).unwrap().0).unwrap();
+    let good = baked(&sphere(1));
     Querier::new().unwrap().contacts(bvh, &good, &Pose::IDENTITY).unwrap().len()
 }
 

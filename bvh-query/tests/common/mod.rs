@@ -51,6 +51,11 @@ pub(crate) fn bake(mesh: &Mesh, options: &Options) -> Bvh {
     Bvh::from_bytes(to_bytes(mesh, options).unwrap().0).unwrap()
 }
 
+/// Bakes triangles of one object with the default options.
+pub(crate) fn baked(triangles: &[Triangle]) -> Bvh {
+    bake(&mesh(triangles), &Options::default())
+}
+
 /// A stored triangle, as queries see it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stored {

@@ -4,8 +4,7 @@
 use super::ask::Asked;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
-use crate::common::{bake, mesh, queriers, stored};
-use bvh_bake::Options;
+use crate::common::{baked, queriers, stored};
 use bvh_query::Pose;
 
 /// In f64 the segment of B is the nearest, 7.6e-17 from the edge of A and certainly beyond 5.2e-17. But the triangle
@@ -22,7 +21,7 @@ fn an_edge_over_a_triangle_and_a_segment() {
     ];
     let translation = [1.1299171079459656, 1.5419387627434098, -6.428096199248133e-16];
     let pose = Pose::new(turn, translation).unwrap();
-    let [a, b] = [&[a][..], &[triangle, segment][..]].map(|t| bake(&mesh(t), &Options::default()));
+    let [a, b] = [&[a][..], &[triangle, segment][..]].map(|t| baked(t));
     let surfaces = [&a, &b].map(|file| Surface::new(stored(file)));
     let truth = Truth::new(&surfaces[0], &surfaces[1], &pose);
     let (mut tally, mut queriers) = (Tally::default(), queriers());

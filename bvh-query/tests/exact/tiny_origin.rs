@@ -4,8 +4,7 @@
 use super::ask::Asked;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
-use crate::common::{bake, mesh, queriers, stored};
-use bvh_bake::Options;
+use crate::common::{baked, queriers, stored};
 use bvh_query::Pose;
 
 /// Queries two equal triangles in parallel planes that are `gap` apart in the input. The truth is what the file
@@ -17,7 +16,7 @@ fn parallel_triangles_less_than_all_f32_apart() {
         for size_exponent in [0, -20, -40, -80, -140] {
             let (gap, size) = (2f64.powi(gap_exponent), 2f64.powi(size_exponent));
             let at = |x: f64| [[x, 0.0, 0.0], [x, size, 0.0], [x, 0.0, size]];
-            let [a, b] = [at(gap), at(0.0)].map(|t| bake(&mesh(&[t]), &Options::default()));
+            let [a, b] = [at(gap), at(0.0)].map(|t| baked(&[t]));
             let surfaces = [&a, &b].map(|file| Surface::new(stored(file)));
             let truth = Truth::new(&surfaces[0], &surfaces[1], &Pose::IDENTITY);
             let mut asked = Asked { a: &a, b: &b, queriers: &mut queriers };

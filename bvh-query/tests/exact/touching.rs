@@ -7,8 +7,7 @@ use super::ask::Asked;
 use super::kinds::exact_turns;
 use super::tally::Tally;
 use super::truth::{Surface, Truth};
-use crate::common::{Random, Triangle, bake, mesh, queriers, stored};
-use bvh_bake::Options;
+use crate::common::{Random, Triangle, baked, queriers, stored};
 use bvh_query::{Pose, Querier};
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::exact::Length;
@@ -93,7 +92,7 @@ impl Construction {
     }
 
     fn check(&self, queriers: &mut [Querier], tally: &mut Tally) -> Result<(), String> {
-        let [a, b] = [self.placed[0], self.stored_b].map(|t| bake(&mesh(&[t]), &Options::default()));
+        let [a, b] = [self.placed[0], self.stored_b].map(|t| baked(&[t]));
         let surfaces = [&a, &b].map(|file| Surface::new(stored(file)));
         let mut asked = Asked { a: &a, b: &b, queriers };
         for side in [0.0, 1.0, -1.0] {

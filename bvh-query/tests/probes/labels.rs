@@ -1,12 +1,7 @@
 //! Reads the labelled probes.
 
 use crate::common::{bake, shared};
-use bvh_query::{Backend, Bvh, Querier};
-
-pub(crate) fn queriers() -> Vec<Querier> {
-    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    backends.map(Querier::with_backend).collect()
-}
+use bvh_query::Bvh;
 
 /// Calls `check` with each labelled line about a mesh: its numbers, the words of its label and the line itself. The mesh is that
 /// of an OBJ rounded to f32, as the labels are about.

@@ -1,20 +1,11 @@
 //! Points: against labels from exact arithmetic, against the distance to a mesh that is a point, and where ties decide.
 
 use crate::common::shapes::{cube, moved, plate, sphere, torus};
-use crate::common::{Random, Triangle, bake, mesh, note, random_pose, shared};
+use crate::common::{Random, Triangle, bake, baked, mesh, note, queriers, random_pose, shared};
 #[cfg(feature = "parallel")]
 use bvh_query::ProbeBatch;
-use bvh_query::{Backend, Bvh, NumberError, Pose, Querier, QueryError};
+use bvh_query::{NumberError, Pose, Querier, QueryError};
 use cbvh_testkit::depth::rounds;
-
-fn baked(triangles: &[Triangle]) -> Bvh {
-    bake(&mesh(triangles), &bvh_bake::Options::default())
-}
-
-fn queriers() -> Vec<Querier> {
-    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    backends.map(Querier::with_backend).collect()
-}
 
 /// A label that is not the least distance, and what is: computed with rationals over all triangles near the point.
 const MISLABELLED: (&str, f64) =
@@ -195,8 +186,7 @@ fn batches_of_points_have_the_same_answers() {
     let random = &mut Random::new(43);
     let bvh = baked(&torus(24, 12));
     let mut points: Vec<[f64; 3]> = (0..999).map(|_| random.point().map(|v| 3.0 * v)).collect();
-    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    for backend in backends {
+    for backend in crate::common::backends() {
         let (mut querier, batch) = (Querier::with_backend(backend), ProbeBatch::with_backend(&bvh, backend));
         for within in [f64::INFINITY, 0.4] {
             let expected: Vec<_> =

@@ -1,9 +1,9 @@
 //! Rays and segments: labels, hard cases, and every corner and edge of closed meshes seen from inside.
 
 use crate::common::shapes::on_lattice;
-use crate::common::{Random, bake, mesh, note, stored};
+use crate::common::{Random, baked, note, queriers, stored};
 use crate::hard::{direction, in_poses, point, stored_at};
-use crate::labels::{each_label, number, queriers};
+use crate::labels::{each_label, number};
 use crate::rationals::{Rational, first};
 use bvh_query::{NumberError, Querier, QueryError, Ray};
 use cbvh_testkit::depth::rounds;
@@ -63,7 +63,7 @@ fn hard_rays_hit_what_rationals_say() {
     let mut queriers = queriers();
     let (mut asked, mut hits, mut shared) = (0, 0, 0);
     for (mesh_of, pose) in in_poses(random) {
-        let bvh = bake(&mesh(&mesh_of.triangles), &bvh_bake::Options::default());
+        let bvh = baked(&mesh_of.triangles);
         let (shape, stored, mesh_of) = (bvh.all().at(&pose), stored_at(&bvh, &pose), mesh_of.placed(&pose));
         for _ in 0..rounds(40) {
             let origin = point(random, &mesh_of);
@@ -116,7 +116,7 @@ fn hard_segments_meet_what_rationals_say() {
     let mut queriers = queriers();
     let (mut asked, mut met) = (0, 0);
     for (mesh_of, pose) in in_poses(random) {
-        let bvh = bake(&mesh(&mesh_of.triangles), &bvh_bake::Options::default());
+        let bvh = baked(&mesh_of.triangles);
         let (shape, stored, mesh_of) = (bvh.all().at(&pose), stored_at(&bvh, &pose), mesh_of.placed(&pose));
         for _ in 0..rounds(40) {
             let (from, to) = (point(random, &mesh_of), point(random, &mesh_of));
@@ -151,7 +151,7 @@ fn no_ray_escapes_through_a_corner_or_an_edge() {
         ("cube", crate::common::shapes::cube(), [0.25, -0.5, 0.125]),
     ];
     for (name, triangles, inside) in meshes {
-        let bvh = bake(&mesh(&triangles), &bvh_bake::Options::default());
+        let bvh = baked(&triangles);
         let mut asked = 0;
         for stored in stored(&bvh) {
             for i in 0..3 {
@@ -171,7 +171,7 @@ fn no_ray_escapes_through_a_corner_or_an_edge() {
 
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
-    let bvh = bake(&mesh(&crate::common::shapes::cube()), &bvh_bake::Options::default());
+    let bvh = baked(&crate::common::shapes::cube());
     for querier in &mut queriers() {
         let mut refused = |ray: Ray| match querier.first_hit(&bvh, &ray) {
             Err(QueryError::Number(wrong)) => wrong,

@@ -1,15 +1,12 @@
 //! How two meshes lie: nested, apart, touching and mixed, in poses; and what open meshes leave undefined.
 
 use crate::common::shapes::{cube, moved, on_lattice, outward, plate, sphere};
-use crate::common::{Random, Triangle, bake, mesh, note, placed, random_pose, stored, translation};
-use crate::labels::queriers;
+use crate::common::{
+    Random, Triangle, bake, baked, mesh, note, placed, queriers, random_pose, stored, translation,
+};
 use crate::rationals::winding;
 use bvh_query::{Bvh, Pose, QueryError, Relation};
 use cbvh_testkit::depth::rounds;
-
-fn baked(triangles: &[Triangle]) -> Bvh {
-    bake(&mesh(triangles), &bvh_bake::Options::default())
-}
 
 fn reversed(triangles: &[Triangle]) -> Vec<Triangle> {
     triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()

@@ -1,9 +1,9 @@
 //! Inside and outside: labels, and winding numbers of rationals where it is hard.
 
 use crate::common::shapes::{on_lattice, outward, sphere};
-use crate::common::{Random, Triangle, bake, mesh, note};
+use crate::common::{Random, Triangle, baked, note, queriers};
 use crate::hard::{in_poses, point};
-use crate::labels::{each_label, number, queriers};
+use crate::labels::{each_label, number};
 use crate::rationals::{first, winding};
 use bvh_query::Side;
 use cbvh_testkit::depth::rounds;
@@ -45,7 +45,7 @@ fn side(random: &mut Random, point: &[f64; 3], triangles: &[Triangle], is_closed
 #[test]
 fn a_point_outside_the_box_costs_no_walk() {
     let ball = outward(on_lattice(sphere(3)));
-    let bvh = bake(&mesh(&ball), &bvh_bake::Options::default());
+    let bvh = baked(&ball);
     let mut querier = bvh_query::Querier::new().unwrap();
     for axis in 0..3 {
         for far in [-2.0, 2.0, -1e6] {
@@ -65,7 +65,7 @@ fn hard_points_are_on_the_sides_that_rationals_say() {
     let mut queriers = queriers();
     let mut counts = [0; 4];
     for (mesh_of, pose) in in_poses(random) {
-        let bvh = bake(&mesh(&mesh_of.triangles), &bvh_bake::Options::default());
+        let bvh = baked(&mesh_of.triangles);
         let mesh_of = mesh_of.placed(&pose);
         for _ in 0..rounds(60) {
             let point = point(random, &mesh_of);

@@ -11,17 +11,17 @@ mod shared;
 mod trackers;
 
 use bvh_query::{
-    Backend, Bvh, Contact, Distance, Groups, InstanceError, InstanceId, NumberError, OwnedShape, Pose,
-    Querier, QueryError, QueryStats, Scene, SceneError, ScenePair,
+    Bvh, Contact, Distance, Groups, InstanceError, InstanceId, NumberError, OwnedShape, Pose, Querier,
+    QueryError, QueryStats, Scene, SceneError, ScenePair,
 };
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::section;
 use common::shapes::{cube, moved, plate, sphere, torus};
-use common::{Random, Triangle, bake, mesh, random_pose};
+use common::{Random, Triangle, backends, bake, baked, mesh, random_pose};
 use std::ops::ControlFlow;
 
 fn shape(triangles: &[Triangle]) -> OwnedShape {
-    bake(&mesh(triangles), &bvh_bake::Options::default()).into()
+    baked(triangles).into()
 }
 
 /// Shapes of different sizes, one of them far from its own origin, and one object of a file of two.
@@ -145,17 +145,14 @@ fn ask(scene: &mut Scene) -> Answers {
 
 /// Scenes with one thread and two on each backend, with trackers and without.
 fn scenes() -> Vec<Scene> {
-    let backends = Backend::ALL.into_iter().filter(|backend| backend.is_available());
-    backends
-        .flat_map(|backend| {
-            [(false, false), (false, true), (true, false), (true, true)].map(|(parallel, tracking)| {
-                let mut scene = Scene::with_backend(backend);
-                scene.set_parallel(parallel);
-                scene.set_tracking(tracking);
-                scene
-            })
-        })
-        .collect()
+    let scene = |backend, (parallel, tracking)| {
+        let mut scene = Scene::with_backend(backend);
+        scene.set_parallel(parallel);
+        scene.set_tracking(tracking);
+        scene
+    };
+    let ways = [(false, false), (false, true), (true, false), (true, true)];
+    backends().into_iter().flat_map(|backend| ways.map(|way| scene(backend, way))).collect()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Motions in scenes: against each pair along its relative path, put together; and against poses along the way.
 
 use super::common::shapes::{cube, plate, sphere, torus};
-use super::common::{Random, random_pose};
+use super::common::{Random, random_pose, translation as at};
 use super::{Triangle, shape};
 use bvh_query::{
     Backend, Distance, Groups, InstanceError, InstanceId, Motion, MotionAnswer, MotionOptions, NumberError,
@@ -9,10 +9,6 @@ use bvh_query::{
     WorldPoseError,
 };
 use cbvh_testkit::depth::rounds;
-
-fn at(x: f64, y: f64, z: f64) -> Pose {
-    Pose::new(*Pose::IDENTITY.rotation(), [x, y, z]).unwrap()
-}
 
 /// An instance of a scene, and what it is given.
 struct Placed {

@@ -1,7 +1,7 @@
 //! Points, rays and segments in the world: a scene answers as all its instances together do.
 
-use crate::common::Random;
 use crate::common::shapes::{moved, on_lattice, outward, plate, sphere, torus};
+use crate::common::{Random, backends};
 use crate::{place, shape};
 use bvh_query::{
     Backend, InstanceId, OwnedShape, Pose, Querier, QueryError, Ray, Relation, Scene, SceneError, Side,
@@ -46,7 +46,7 @@ fn probes_of_a_scene_are_those_of_its_instances() {
     let rays: Vec<Ray> = points.iter().map(|point| Ray::new(*point, random.point())).collect();
     let segments: Vec<[[f64; 3]; 2]> =
         points.iter().map(|point| [*point, [0, 1, 2].map(|k| point[k] + 2.0 * random.signed())]).collect();
-    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+    for backend in backends() {
         let (mut scene, instances) = scene(backend, 7);
         let mut querier = Querier::with_backend(backend);
         for parallel in [false, true] {
