@@ -6,7 +6,7 @@
 
 use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
-use super::{Stored, VerifyError, distance, each_triangle, place, tolerance};
+use super::{File, Stored, VerifyError, distance, place, tolerance};
 use crate::storage::Spill;
 use crate::storage::external_sort::{Ahead, Sorted, Sorter};
 use crate::storage::resources::Resources;
@@ -62,106 +62,95 @@ impl Claim {
     }
 }
 
-/// Checks that every triangle of the mesh is, exactly once, either stored or a duplicate of a stored one. Returns the
-/// largest distance between a corner and the place where it is stored, and the number of duplicates. Adds all triangles
-/// to the surfaces.
-pub(super) fn compare<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    input: &impl Input,
-    surfaces: &mut Surfaces,
-    resources: &Resources,
-) -> Result<(f64, u64), VerifyError>
+impl<S: Source + ?Sized> File<'_, S>
 where
     VerifyError: From<S::Error>,
 {
-    let spill = resources.scratch.spill();
-    let stored = stored_claims(layout, source, resources, &spill)?;
-    let dropped = dropped_claims(layout, source, &stored, resources, &spill)?;
-    let (mut stored, mut dropped) = (Ahead::of(&stored)?, Ahead::of(&dropped)?);
-    let mut verdict = Verdict::new(layout, input.counts().iter().sum());
-    input.visit(&mut |number, id, corners| {
-        let mut any = false;
-        // In the order of the leaves.
-        loop {
-            let claims =
-                if first_of(&stored, id) <= first_of(&dropped, id) { &mut stored } else { &mut dropped };
-            let Some(claim) = claims.next_if(|claim| claim.id == id)? else { break };
-            if let Some(way) = verdict.judge(&claim, Some((number, corners)), any) {
-                let ([object, ..], corners) = (claim.leaf, claim.stored().corners);
-                match claim.turn {
-                    0 => surfaces.add(object, &corners, way)?,
-                    _ => surfaces.add_duplicates(object, claim.place, &corners, way)?,
+    /// Checks that every triangle of the mesh is, exactly once, either stored or a duplicate of a stored one. Returns the
+    /// largest distance between a corner and the place where it is stored, and the number of duplicates. Adds all triangles
+    /// to the surfaces.
+    pub(super) fn compare_by_id(
+        &self,
+        input: &impl Input,
+        surfaces: &mut Surfaces,
+        resources: &Resources,
+    ) -> Result<(f64, u64), VerifyError> {
+        let spill = resources.scratch.spill();
+        let stored = self.stored_claims(resources, &spill)?;
+        let dropped = self.dropped_claims(&stored, resources, &spill)?;
+        let (mut stored, mut dropped) = (Ahead::of(&stored)?, Ahead::of(&dropped)?);
+        let mut verdict = Verdict::new(self.layout, input.counts().iter().sum());
+        input.visit(&mut |number, id, corners| {
+            let mut any = false;
+            // In the order of the leaves.
+            loop {
+                let claims =
+                    if first_of(&stored, id) <= first_of(&dropped, id) { &mut stored } else { &mut dropped };
+                let Some(claim) = claims.next_if(|claim| claim.id == id)? else { break };
+                if let Some(way) = verdict.judge(&claim, Some((number, corners)), any) {
+                    let ([object, ..], corners) = (claim.leaf, claim.stored().corners);
+                    match claim.turn {
+                        0 => surfaces.add(object, &corners, way)?,
+                        _ => surfaces.add_duplicates(object, claim.place, &corners, way)?,
+                    }
+                }
+                any = true;
+            }
+            if !any {
+                verdict.missing.get_or_insert(id);
+            }
+            Ok(())
+        })?;
+        // The remaining claims have ids that do not occur in the mesh.
+        for claims in [&mut stored, &mut dropped] {
+            while let Some(claim) = claims.next_if(|_| true)? {
+                verdict.judge(&claim, None, false);
+            }
+        }
+        verdict.finish()
+    }
+
+    fn stored_claims(&self, resources: &Resources, spill: &Spill) -> Result<Sorted<Claim>, VerifyError> {
+        let mut claims = Sorter::of_runs(resources.sorted_at_once::<Claim>(u64::MAX));
+        for (number, object) in (0..).zip(&self.layout.objects) {
+            self.each_triangle(object, |triangle| {
+                let Some(id) = triangle.id else { return Ok(()) };
+                Ok(claims.extend(&[Claim::of_stored(number, triangle, id)], spill)?)
+            })?;
+        }
+        Ok(claims.finish())
+    }
+
+    /// Returns the duplicates that were left out, each with the stored triangle that it equals. The pairs of the file
+    /// come in the order of the kept ids, as the stored triangles do.
+    fn dropped_claims(
+        &self,
+        stored: &Sorted<Claim>,
+        resources: &Resources,
+        spill: &Spill,
+    ) -> Result<Sorted<Claim>, VerifyError> {
+        let mut claims = Sorter::of_runs(resources.sorted_at_once::<Claim>(u64::MAX));
+        let section = self.layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
+        let Some(section) = section else { return Ok(claims.finish()) };
+        let mut merge = stored.merge();
+        let (mut now, mut turn) = (merge.next()?, 0);
+        for chunk in chunks(section.range.clone()) {
+            let bytes = self.source.read(chunk)?;
+            for pair in bytes.as_chunks::<8>().0 {
+                let [kept, dropped]: [[u8; 4]; 2] = zerocopy::transmute!(*pair);
+                let (kept, dropped) = (u32::from_le_bytes(kept), u32::from_le_bytes(dropped));
+                while now.is_some_and(|claim| claim.id < kept) {
+                    (now, turn) = (merge.next()?, 0);
+                }
+                // A pair that refers to no stored triangle claims nothing.
+                if let Some(claim) = now.filter(|claim| claim.id == kept) {
+                    turn += 1;
+                    claims.extend(&[Claim { id: dropped, turn, ..claim }], spill)?;
                 }
             }
-            any = true;
         }
-        if !any {
-            verdict.missing.get_or_insert(id);
-        }
-        Ok(())
-    })?;
-    // The remaining claims have ids that do not occur in the mesh.
-    for claims in [&mut stored, &mut dropped] {
-        while let Some(claim) = claims.next_if(|_| true)? {
-            verdict.judge(&claim, None, false);
-        }
+        Ok(claims.finish())
     }
-    verdict.finish()
-}
-
-fn stored_claims<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    resources: &Resources,
-    spill: &Spill,
-) -> Result<Sorted<Claim>, VerifyError>
-where
-    VerifyError: From<S::Error>,
-{
-    let mut claims = Sorter::of_runs(resources.sorted_at_once::<Claim>(u64::MAX));
-    for (number, object) in (0..).zip(&layout.objects) {
-        each_triangle(layout, source, object, |triangle| {
-            let Some(id) = triangle.id else { return Ok(()) };
-            Ok(claims.extend(&[Claim::of_stored(number, triangle, id)], spill)?)
-        })?;
-    }
-    Ok(claims.finish())
-}
-
-/// Returns the duplicates that were left out, each with the stored triangle that it equals. The pairs of the file
-/// come in the order of the kept ids, as the stored triangles do.
-fn dropped_claims<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    stored: &Sorted<Claim>,
-    resources: &Resources,
-    spill: &Spill,
-) -> Result<Sorted<Claim>, VerifyError>
-where
-    VerifyError: From<S::Error>,
-{
-    let mut claims = Sorter::of_runs(resources.sorted_at_once::<Claim>(u64::MAX));
-    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
-    let Some(section) = section else { return Ok(claims.finish()) };
-    let mut merge = stored.merge();
-    let (mut now, mut turn) = (merge.next()?, 0);
-    for chunk in chunks(section.range.clone()) {
-        let bytes = source.read(chunk)?;
-        for pair in bytes.as_chunks::<8>().0 {
-            let [kept, dropped]: [[u8; 4]; 2] = zerocopy::transmute!(*pair);
-            let (kept, dropped) = (u32::from_le_bytes(kept), u32::from_le_bytes(dropped));
-            while now.is_some_and(|claim| claim.id < kept) {
-                (now, turn) = (merge.next()?, 0);
-            }
-            // A pair that refers to no stored triangle claims nothing.
-            if let Some(claim) = now.filter(|claim| claim.id == kept) {
-                turn += 1;
-                claims.extend(&[Claim { id: dropped, turn, ..claim }], spill)?;
-            }
-        }
-    }
-    Ok(claims.finish())
 }
 
 /// Returns the place of the first claim to an id, or a place after all others if there is no such claim.

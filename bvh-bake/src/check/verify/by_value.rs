@@ -4,10 +4,9 @@
 
 use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
-use super::{VerifyError, distance, each_triangle, place, source_of, tolerance};
+use super::{File, VerifyError, distance, place, source_of, tolerance};
 use crate::storage::external_sort::{Ahead, Sorter};
 use crate::storage::resources::Resources;
-use bvh_format::Layout;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::Object;
 use bvh_format::source::Source;
@@ -45,63 +44,65 @@ impl Keyed {
     }
 }
 
-/// Checks each object of the file against the mesh objects from which it was made. Returns the largest distance
-/// between a corner and the place where it is stored, and the number of duplicates. Adds all triangles to the surfaces.
-pub(super) fn compare<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    input: &impl Input,
-    surfaces: &mut Surfaces,
-    resources: &Resources,
-) -> Result<(f64, u64), VerifyError>
+impl<S: Source + ?Sized> File<'_, S>
 where
     VerifyError: From<S::Error>,
 {
-    let spill = resources.scratch.spill();
-    let run = resources.sorted_at_once::<Keyed>(u64::MAX);
-    let mut stored = Sorter::of_runs(run);
-    let mut roundings: Vec<Rounding> = layout.objects.iter().map(Rounding::new).collect();
-    for (number, object) in (0..).zip(&layout.objects) {
-        each_triangle(layout, source, object, |triangle| {
-            let keyed = Keyed::new(number, &triangle.corners, triangle.place);
-            roundings[number as usize].add_stored(&keyed.key);
-            Ok(stored.extend(&[keyed], &spill)?)
-        })?;
-    }
-    if roundings.iter().any(|rounding| rounding.origin != [0.0; 3]) {
-        input.visit(&mut |mesh, _, corners| {
-            roundings[source_of(layout, mesh)].add_expected(corners);
-            Ok(())
-        })?;
-    }
-    roundings.iter_mut().for_each(Rounding::settle);
-    let mut expected = Sorter::of_runs(run);
-    let mut max_move = 0.0f64;
-    // The first difference in the order of the file's objects, then of the mesh's objects.
-    let mut first: Option<((usize, u32, u32), VerifyError)> = None;
-    input.visit(&mut |mesh, id, corners| {
-        let number = source_of(layout, mesh);
-        let (object, rounding) = (&layout.objects[number], &roundings[number]);
-        let rounded = corners.map(|corner| rounding.round(corner));
-        match check_moves(object, id, corners, &rounded) {
-            Ok(moved) => max_move = max_move.max(moved),
-            Err(error) if first.as_ref().is_none_or(|(at, _)| (number, mesh, id) < *at) => {
-                first = Some(((number, mesh, id), error));
+    /// Checks each object of the file against the mesh objects from which it was made. Returns the largest distance
+    /// between a corner and the place where it is stored, and the number of duplicates. Adds all triangles to the surfaces.
+    pub(super) fn compare_by_value(
+        &self,
+        input: &impl Input,
+        surfaces: &mut Surfaces,
+        resources: &Resources,
+    ) -> Result<(f64, u64), VerifyError> {
+        let layout = self.layout;
+        let spill = resources.scratch.spill();
+        let run = resources.sorted_at_once::<Keyed>(u64::MAX);
+        let mut stored = Sorter::of_runs(run);
+        let mut roundings: Vec<Rounding> = layout.objects.iter().map(Rounding::new).collect();
+        for (number, object) in (0..).zip(&layout.objects) {
+            self.each_triangle(object, |triangle| {
+                let keyed = Keyed::new(number, &triangle.corners, triangle.place);
+                roundings[number as usize].add_stored(&keyed.key);
+                Ok(stored.extend(&[keyed], &spill)?)
+            })?;
+        }
+        if roundings.iter().any(|rounding| rounding.origin != [0.0; 3]) {
+            input.visit(&mut |mesh, _, corners| {
+                roundings[source_of(layout, mesh)].add_expected(corners);
+                Ok(())
+            })?;
+        }
+        roundings.iter_mut().for_each(Rounding::settle);
+        let mut expected = Sorter::of_runs(run);
+        let mut max_move = 0.0f64;
+        // The first difference in the order of the file's objects, then of the mesh's objects.
+        let mut first: Option<((usize, u32, u32), VerifyError)> = None;
+        input.visit(&mut |mesh, id, corners| {
+            let number = source_of(layout, mesh);
+            let (object, rounding) = (&layout.objects[number], &roundings[number]);
+            let rounded = corners.map(|corner| rounding.round(corner));
+            match check_moves(object, id, corners, &rounded) {
+                Ok(moved) => max_move = max_move.max(moved),
+                Err(error) if first.as_ref().is_none_or(|(at, _)| (number, mesh, id) < *at) => {
+                    first = Some(((number, mesh, id), error));
+                }
+                Err(_) => {}
             }
-            Err(_) => {}
+            Ok(expected.extend(&[Keyed::new(number as u32, &rounded, 0)], &spill)?)
+        })?;
+        let (stored, expected) = (stored.finish(), expected.finish());
+        let (mut stored, mut expected) = (Ahead::of(&stored)?, Ahead::of(&expected)?);
+        let mut duplicates = 0;
+        for (number, object) in layout.objects.iter().enumerate() {
+            if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
+                return Err(error);
+            }
+            duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored, surfaces)?;
         }
-        Ok(expected.extend(&[Keyed::new(number as u32, &rounded, 0)], &spill)?)
-    })?;
-    let (stored, expected) = (stored.finish(), expected.finish());
-    let (mut stored, mut expected) = (Ahead::of(&stored)?, Ahead::of(&expected)?);
-    let mut duplicates = 0;
-    for (number, object) in layout.objects.iter().enumerate() {
-        if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
-            return Err(error);
-        }
-        duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored, surfaces)?;
+        Ok((max_move, duplicates))
     }
-    Ok((max_move, duplicates))
 }
 
 /// Returns the largest distance by which rounding moves a corner of a triangle of the mesh.

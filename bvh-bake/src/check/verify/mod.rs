@@ -112,7 +112,8 @@ impl VerifyError {
 pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
     mesh.check()?;
     let layout = Layout::read(bytes)?;
-    compare(&layout, bytes, || InMemory::new(mesh), &Resources::unlimited(&Progress::default()))
+    let file = File { layout: &layout, source: bytes };
+    file.compare(|| InMemory::new(mesh), &Resources::unlimited(&Progress::default()))
 }
 
 /// Options of [`verify_files`].
@@ -197,45 +198,121 @@ pub fn verify_files(
         second.compare(&triangles)?;
     }
     drop(inputs);
-    compare(&layout, &file, || Ok(triangles), &resources)
+    File { layout: &layout, source: &file }.compare(|| Ok(triangles), &resources)
 }
 
-/// Checks a file, and compares it with a mesh that has been checked.
-fn compare<S: Source + ?Sized, I: Input>(
-    layout: &Layout,
-    source: &S,
-    input: impl FnOnce() -> Result<I, VerifyError>,
-    resources: &Resources,
-) -> Result<VerifyReport, VerifyError>
+/// The file that is compared.
+struct File<'a, S: ?Sized> {
+    layout: &'a Layout,
+    source: &'a S,
+}
+
+impl<S: Source + ?Sized> File<'_, S>
 where
     VerifyError: From<S::Error>,
 {
-    validate_in_parallel(source)?;
-    let inflation = prove_bounds(layout, source)?;
-    let input = input()?;
-    match_objects(layout, input.counts())?;
-    match_instances(layout, source, &input.instances())?;
-    let all = input.counts().iter().sum();
-    for (number, object) in layout.objects.iter().enumerate() {
-        let own = if layout.objects.len() == 1 { all } else { input.counts()[number] };
-        check_counts(object, own, all)?;
-        check_hull(layout, source, object)?;
+    /// Checks a file, and compares it with a mesh that has been checked.
+    fn compare<I: Input>(
+        &self,
+        input: impl FnOnce() -> Result<I, VerifyError>,
+        resources: &Resources,
+    ) -> Result<VerifyReport, VerifyError> {
+        let Self { layout, source } = *self;
+        validate_in_parallel(source)?;
+        let inflation = prove_bounds(layout, source)?;
+        let input = input()?;
+        match_objects(layout, input.counts())?;
+        self.match_instances(&input.instances())?;
+        let all = input.counts().iter().sum();
+        for (number, object) in layout.objects.iter().enumerate() {
+            let own = if layout.objects.len() == 1 { all } else { input.counts()[number] };
+            check_counts(object, own, all)?;
+            self.check_hull(object)?;
+        }
+        let mut surfaces = Surfaces::new(layout, source, resources)?;
+        let (max_move, duplicates) = if layout.has_ids() {
+            self.compare_by_id(&input, &mut surfaces, resources)?
+        } else {
+            self.compare_by_value(&input, &mut surfaces, resources)?
+        };
+        surfaces.compare(source)?;
+        Ok(VerifyReport {
+            triangles: layout.objects.iter().map(|object| object.triangles()).sum(),
+            duplicates,
+            objects: layout.objects.len() as u64,
+            by_id: layout.has_ids(),
+            max_move,
+            inflation,
+        })
     }
-    let mut surfaces = Surfaces::new(layout, source, resources)?;
-    let (max_move, duplicates) = if layout.has_ids() {
-        by_id::compare(layout, source, &input, &mut surfaces, resources)?
-    } else {
-        by_value::compare(layout, source, &input, &mut surfaces, resources)?
-    };
-    surfaces.compare(source)?;
-    Ok(VerifyReport {
-        triangles: layout.objects.iter().map(|object| object.triangles()).sum(),
-        duplicates,
-        objects: layout.objects.len() as u64,
-        by_id: layout.has_ids(),
-        max_move,
-        inflation,
-    })
+
+    /// Checks that a file has the instances of the mesh, in their order.
+    fn match_instances(&self, expected: &[Instance]) -> Result<(), VerifyError> {
+        let found = self.layout.read_instances(self.source)?;
+        if found.len() != expected.len() {
+            return Err(VerifyError::differs("instances", expected.len(), found.len()));
+        }
+        match (0..).zip(expected.iter().zip(&found)).find(|(_, (expected, found))| expected != found) {
+            Some((number, (expected, found))) => {
+                let (what, expected, found) = difference(expected, found);
+                Err(VerifyError::differs(format!("{what} of instance {number}"), expected, found))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that the record's box and sphere contain all corners stored.
+    fn check_hull(&self, object: &Object) -> Result<(), VerifyError> {
+        let record = object.record();
+        let axes = [0, 1, 2];
+        let (lo, hi) = (axes.map(|a| record.box_lo[a].get()), axes.map(|a| record.box_hi[a].get()));
+        let centre = axes.map(|a| f64::from(record.sphere_centre[a].get()));
+        let radius = f64::from(record.sphere_radius.get());
+        self.each_triangle(object, |triangle| {
+            for (corner, v) in triangle.corners.iter().enumerate() {
+                let what = || format!("{}, corner {corner}", triangle.name());
+                if axes.iter().any(|&a| v[a] < lo[a] || v[a] > hi[a]) {
+                    return Err(VerifyError::differs(
+                        what(),
+                        format!("within {lo:?} to {hi:?}"),
+                        format!("{v:?}"),
+                    ));
+                }
+                let distance = axes.map(|a| (f64::from(v[a]) - centre[a]).powi(2)).iter().sum::<f64>().sqrt();
+                if distance > radius {
+                    let expected = format!("within {radius:e} of {centre:?}");
+                    return Err(VerifyError::differs(what(), expected, format!("{v:?}, at {distance:e}")));
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Calls `visit` for every triangle of an object of a validated file, in the order of the leaves.
+    fn each_triangle(
+        &self,
+        object: &Object,
+        mut visit: impl FnMut(&Stored) -> Result<(), VerifyError>,
+    ) -> Result<(), VerifyError> {
+        let Self { layout, source } = *self;
+        for number in object.pages() {
+            let bytes = layout.read_page(source, number)?;
+            let page = bytes.page(object);
+            let leaves = layout.read_leaf_block(source, page.header())?;
+            let ids = layout.read_id_block(source, page.header())?;
+            let (block, ids) = (leaves.bytes(), ids.bytes());
+            for (packet, count) in packets(&page) {
+                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
+                let first = PACKET as u32 * (page.header().first_packet.get() + u32::from(packet));
+                for lane in 0..count {
+                    let id = layout.has_ids().then(|| decode_id(ids, usize::from(packet), lane));
+                    let (place, corners) = (first + lane as u32, values.triangle(lane));
+                    visit(&Stored { place, page: number, packet, lane, id, corners })?;
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Checks that a file has one object for the whole mesh, or one for each object of the mesh that has triangles.
@@ -245,28 +322,6 @@ fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
         count if count == full.len() => Ok(()),
         count if layout.has_instances() => Err(VerifyError::differs("objects", full.len(), count)),
         count => Err(VerifyError::differs("objects", format!("1 or {}", full.len()), count)),
-    }
-}
-
-/// Checks that a file has the instances of the mesh, in their order.
-fn match_instances<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    expected: &[Instance],
-) -> Result<(), VerifyError>
-where
-    VerifyError: From<S::Error>,
-{
-    let found = layout.read_instances(source)?;
-    if found.len() != expected.len() {
-        return Err(VerifyError::differs("instances", expected.len(), found.len()));
-    }
-    match (0..).zip(expected.iter().zip(&found)).find(|(_, (expected, found))| expected != found) {
-        Some((number, (expected, found))) => {
-            let (what, expected, found) = difference(expected, found);
-            Err(VerifyError::differs(format!("{what} of instance {number}"), expected, found))
-        }
-        None => Ok(()),
     }
 }
 
@@ -314,36 +369,6 @@ fn check_counts(object: &Object, own: u64, all: u64) -> Result<(), VerifyError> 
     Ok(())
 }
 
-/// Checks that the record's box and sphere contain all corners stored.
-fn check_hull<S: Source + ?Sized>(layout: &Layout, source: &S, object: &Object) -> Result<(), VerifyError>
-where
-    VerifyError: From<S::Error>,
-{
-    let record = object.record();
-    let axes = [0, 1, 2];
-    let (lo, hi) = (axes.map(|a| record.box_lo[a].get()), axes.map(|a| record.box_hi[a].get()));
-    let centre = axes.map(|a| f64::from(record.sphere_centre[a].get()));
-    let radius = f64::from(record.sphere_radius.get());
-    each_triangle(layout, source, object, |triangle| {
-        for (corner, v) in triangle.corners.iter().enumerate() {
-            let what = || format!("{}, corner {corner}", triangle.name());
-            if axes.iter().any(|&a| v[a] < lo[a] || v[a] > hi[a]) {
-                return Err(VerifyError::differs(
-                    what(),
-                    format!("within {lo:?} to {hi:?}"),
-                    format!("{v:?}"),
-                ));
-            }
-            let distance = axes.map(|a| (f64::from(v[a]) - centre[a]).powi(2)).iter().sum::<f64>().sqrt();
-            if distance > radius {
-                let expected = format!("within {radius:e} of {centre:?}");
-                return Err(VerifyError::differs(what(), expected, format!("{v:?}, at {distance:e}")));
-            }
-        }
-        Ok(())
-    })
-}
-
 /// A stored triangle.
 struct Stored {
     /// Its place in the object.
@@ -364,35 +389,6 @@ impl Stored {
             None => format!("page {}, packet {}, lane {}", self.page, self.packet, self.lane),
         }
     }
-}
-
-/// Calls `visit` for every triangle of an object of a validated file, in the order of the leaves.
-fn each_triangle<S: Source + ?Sized>(
-    layout: &Layout,
-    source: &S,
-    object: &Object,
-    mut visit: impl FnMut(&Stored) -> Result<(), VerifyError>,
-) -> Result<(), VerifyError>
-where
-    VerifyError: From<S::Error>,
-{
-    for number in object.pages() {
-        let bytes = layout.read_page(source, number)?;
-        let page = bytes.page(object);
-        let leaves = layout.read_leaf_block(source, page.header())?;
-        let ids = layout.read_id_block(source, page.header())?;
-        let (block, ids) = (leaves.bytes(), ids.bytes());
-        for (packet, count) in packets(&page) {
-            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-            let first = PACKET as u32 * (page.header().first_packet.get() + u32::from(packet));
-            for lane in 0..count {
-                let id = layout.has_ids().then(|| decode_id(ids, usize::from(packet), lane));
-                let (place, corners) = (first + lane as u32, values.triangle(lane));
-                visit(&Stored { place, page: number, packet, lane, id, corners })?;
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Returns a stored vertex in mesh coordinates, which is exact by rule 37.

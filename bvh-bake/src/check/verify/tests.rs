@@ -196,7 +196,7 @@ fn the_first_difference_is_told() {
         ids.extend(triangle.id);
         Ok(())
     };
-    each_triangle(&layout, &bytes[..], object, &mut note).unwrap();
+    File { layout: &layout, source: &bytes[..] }.each_triangle(object, &mut note).unwrap();
     let mut other = mesh.clone();
     let all: Vec<(usize, u32)> = (0..mesh.objects.len())
         .flat_map(|object| mesh.objects[object].triangle_ids.iter().map(move |&id| (object, id)))

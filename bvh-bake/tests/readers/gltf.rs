@@ -1,0 +1,215 @@
+//! Reads glTF: nodes, buffers wherever they are, accessors of all kinds, and what is refused.
+
+use crate::{CORNERS, is_system, one_line, only, refusal, refused, try_bytes};
+use bvh_bake::input::{MeshFormat, ReadError, read};
+use bvh_bake::mesh::Mesh;
+use std::fs;
+use std::path::Path;
+
+/// Returns a document with one buffer: three u8 indices, a zero, three f32 positions, one sparse index, three zeros
+/// and one position.
+pub(crate) fn gltf(nodes: &str, primitive: &str, uri: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"meshes":[{{"name":"m","primitives":[{primitive}]}}],
+        "accessors":[
+            {{"bufferView":0,"componentType":5121,"count":3,"type":"SCALAR"}},
+            {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3"}},
+            {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3","sparse":{{"count":1,
+                "indices":{{"bufferView":2,"componentType":5121}},"values":{{"bufferView":3}}}}}},
+            {{"bufferView":1,"componentType":5126,"count":4000000000,"type":"VEC3"}},
+            {{"componentType":5126,"count":4000000000,"type":"VEC3","sparse":{{"count":1,
+                "indices":{{"bufferView":2,"componentType":5121}},"values":{{"bufferView":4}}}}}},
+            {{"componentType":5126,"count":3,"type":"VEC3","sparse":{{"count":1,
+                "indices":{{"bufferView":2,"componentType":5121}},"values":{{"bufferView":3}}}}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":3}},{{"buffer":0,"byteOffset":4,"byteLength":36}},
+            {{"buffer":0,"byteOffset":40,"byteLength":1}},{{"buffer":0,"byteOffset":44,"byteLength":12}},
+            {{"buffer":1,"byteLength":12}}],
+        "buffers":[{{"byteLength":56{uri}}},{{"byteLength":9000000000000000000,"uri":"data:;base64,"}}]}}"#
+    )
+}
+
+fn gltf_buffer() -> Vec<u8> {
+    let mut bytes = vec![2u8, 1, 0, 0];
+    [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+    bytes.extend([1, 0, 0, 0]);
+    [9.0f32, 8.0, 7.0].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+    bytes
+}
+
+/// Returns a binary file of a document and the buffer.
+pub(crate) fn glb(json: &str) -> Vec<u8> {
+    let blob = gltf_buffer();
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((12 + 8 + json.len() as u32 + 8 + blob.len() as u32).to_le_bytes());
+    bytes.extend((json.len() as u32).to_le_bytes());
+    bytes.extend(b"JSON");
+    bytes.extend(&json);
+    bytes.extend((blob.len() as u32).to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(&blob);
+    bytes
+}
+
+pub(crate) const INDEXED: &str = r#"{"attributes":{"POSITION":1},"indices":0}"#;
+
+#[test]
+fn gltf_nodes_are_placed_in_f64() {
+    let nodes = r#"{"children":[1],"translation":[10,0,0],"scale":[2,-2,2]},{"name":"n","mesh":0,"translation":[0,0,0.5]},
+                   {"mesh":0,"rotation":[0,0,0.70710677,0.70710677]}"#;
+    let mesh = try_bytes(&glb(&gltf(nodes, INDEXED, "")), MeshFormat::Gltf).unwrap();
+    assert_eq!(mesh.objects.len(), 2);
+    assert_eq!((&mesh.objects[0].name[..], &mesh.objects[1].name[..]), ("n", "m"));
+    assert_eq!(mesh.objects[0].positions, [[10.0, 0.0, 1.0], [12.0, 0.0, 1.0], [10.0, -2.0, 1.0]]);
+    assert_eq!(mesh.objects[0].triangles, [[2, 0, 1]], "mirrored, so turned");
+    assert_eq!(mesh.objects[1].triangles, [[2, 1, 0]]);
+    let [x, y, _] = mesh.objects[1].positions[1];
+    assert!(x.abs() < 1e-15 && (y - 1.0).abs() < 1e-15, "a quarter turn, normalised: {x} {y}");
+}
+
+#[test]
+fn gltf_buffers_are_found_wherever_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("my buffer.bin"), gltf_buffer()).unwrap();
+    let path = directory.path().join("a.gltf");
+    fs::write(&path, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"my%20buffer.bin""#)).unwrap();
+    assert_eq!(read(&path).unwrap().triangle_count(), 1);
+
+    fs::write(&path, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"missing.bin""#)).unwrap();
+    let error = read(&path).unwrap_err();
+    assert!(is_system(&error) && one_line(&error).contains("missing.bin"), "{error}");
+
+    let uri = r#","uri":"data:application/octet-stream;base64,AgEAAAAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAEAAAAAABBBAAAAQQAA4EA=""#;
+    let mesh = try_bytes(gltf(r#"{"mesh":0}"#, INDEXED, uri).as_bytes(), MeshFormat::Gltf).unwrap();
+    assert_eq!(only(&mesh).positions[2], [0.0, 1.0, 0.0]);
+    for uri in [r#","uri":"/etc/passwd""#, r#","uri":"http://x/y""#, r#","uri":"data:,x""#, ""] {
+        refusal(gltf(r#"{"mesh":0}"#, INDEXED, uri).as_bytes(), MeshFormat::Gltf);
+    }
+}
+
+/// Reads a file on a thread of its own, because a reader that waits for a pipe waits for ever.
+#[cfg(unix)]
+fn read_in_time(path: &Path) -> Result<Mesh, ReadError> {
+    let (send, receive) = std::sync::mpsc::channel();
+    let path = path.to_owned();
+    std::thread::spawn(move || send.send(read(&path)));
+    receive.recv_timeout(std::time::Duration::from_secs(60)).expect("the reader waits for ever")
+}
+
+#[cfg(unix)]
+#[test]
+fn gltf_names_lead_to_files_below_its_folder_only() {
+    use std::os::unix::fs::symlink;
+    let directory = tempfile::tempdir().unwrap();
+    let (outside, inside) = (directory.path().join("secret.bin"), directory.path().join("models"));
+    fs::create_dir_all(inside.join("sub")).unwrap();
+    fs::write(&outside, gltf_buffer()).unwrap();
+    fs::write(inside.join("sub/b.bin"), gltf_buffer()).unwrap();
+    symlink("../secret.bin", inside.join("link.bin")).unwrap();
+    symlink("..", inside.join("up")).unwrap();
+    symlink("/dev/zero", inside.join("zero.bin")).unwrap();
+    symlink("sub/b.bin", inside.join("inner.bin")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(inside.join("pipe")).status().unwrap().success());
+    let path = inside.join("a.gltf");
+    let read_with = |uri: &str| {
+        fs::write(&path, gltf(r#"{"mesh":0}"#, INDEXED, &format!(r#","uri":"{uri}""#))).unwrap();
+        read_in_time(&path)
+    };
+    for uri in ["sub/b.bin", "sub/../sub/b.bin", "sub%2fb.bin", "inner.bin", "up/models/sub/b.bin"] {
+        assert_eq!(read_with(uri).unwrap().triangle_count(), 1, "{uri}");
+    }
+    for uri in [
+        "../secret.bin",
+        "..%2fsecret.bin",
+        "%2e%2e/secret.bin",
+        "sub/../../secret.bin",
+        "link.bin",
+        "up/secret.bin",
+        "zero.bin",
+        outside.to_str().unwrap(),
+        "/dev/zero",
+        "file:///dev/zero",
+        "C:/secret.bin",
+        "C:secret.bin",
+        "sub/b.bin%00",
+    ] {
+        let error = read_with(uri).unwrap_err();
+        assert!(!is_system(&error) && one_line(&error).contains("expected a "), "{uri}: {error}");
+    }
+    for uri in ["pipe", "sub", "..%5csecret.bin"] {
+        let error = read_with(uri).unwrap_err();
+        assert!(is_system(&error), "{uri}: {error}");
+    }
+}
+
+/// Textures, and the materials of OBJ files, are none of a reader's business.
+#[cfg(unix)]
+#[test]
+fn what_no_triangle_needs_is_not_opened() {
+    let directory = tempfile::tempdir().unwrap();
+    let pipe = directory.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let path = directory.path().join("a.obj");
+    fs::write(&path, format!("mtllib pipe\n{CORNERS}usemtl a\nmap_Kd pipe\nf 1 2 3\n")).unwrap();
+    assert_eq!(read_in_time(&path).unwrap().triangle_count(), 1);
+    fs::write(directory.path().join("b.bin"), gltf_buffer()).unwrap();
+    let path = directory.path().join("a.gltf");
+    let document = gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"b.bin""#);
+    // A third buffer, which no accessor of a triangle uses, and a texture.
+    let document =
+        document.replace(r#""data:;base64,"}"#, r#""data:;base64,"},{"byteLength":9,"uri":"pipe"}"#);
+    let document = document.replacen('{', r#"{"images":[{"uri":"pipe"}],"textures":[{"source":0}],"#, 1);
+    fs::write(&path, document).unwrap();
+    assert_eq!(read_in_time(&path).unwrap().triangle_count(), 1);
+}
+
+#[test]
+fn gltf_reads_sparse_accessors_strips_and_no_indices() {
+    for (primitive, expected) in [
+        (r#"{"attributes":{"POSITION":2},"indices":0}"#, Some([9.0, 8.0, 7.0])),
+        (r#"{"attributes":{"POSITION":1},"mode":5}"#, Some([1.0, 0.0, 0.0])),
+        (r#"{"attributes":{"POSITION":1},"mode":6}"#, Some([1.0, 0.0, 0.0])),
+        (r#"{"attributes":{"POSITION":1},"mode":0}"#, None),
+        (r#"{"attributes":{"POSITION":3}}"#, None),
+        (r#"{"attributes":{"POSITION":4}}"#, None),
+        (r#"{"attributes":{"POSITION":5}}"#, Some([9.0, 8.0, 7.0])),
+        (r#"{"attributes":{"POSITION":77}}"#, None),
+        (r#"{"attributes":{"POSITION":0}}"#, None),
+        (r#"{"attributes":{"POSITION":1},"indices":1}"#, None),
+        (r#"{"attributes":{}}"#, None),
+    ] {
+        let mesh = try_bytes(&glb(&gltf(r#"{"mesh":0}"#, primitive, "")), MeshFormat::Gltf);
+        match (mesh, expected) {
+            (Ok(mesh), Some(position)) => assert_eq!(only(&mesh).positions[1], position, "{primitive}"),
+            (Err(error), None) => drop(one_line(&error)),
+            (other, _) => panic!("{primitive}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn gltf_that_is_no_tree_or_needs_an_extension_is_refused() {
+    let with =
+        |extra: &str, nodes: &str| glb(&gltf(nodes, INDEXED, "").replacen('{', &format!("{{{extra}"), 1));
+    let (plain, cycle) = (r#"{"mesh":0}"#, r#"{"children":[1],"mesh":0},{"children":[0]}"#);
+    for (extra, nodes, expected) in [
+        ("", r#"{"children":[1]},{"mesh":0},{"children":[1]}"#, "node 1 twice"),
+        ("", cycle, "at least one triangle"),
+        (r#""scenes":[{"nodes":[0]}],"#, cycle, "node 0 twice"),
+        (r#""extensionsRequired":["KHR_draco_mesh_compression"],"#, plain, "KHR_draco_mesh_compression"),
+    ] {
+        refused(&with(extra, nodes), MeshFormat::Gltf, expected);
+    }
+    let harmless = r#""extensionsRequired":["KHR_materials_unlit","KHR_mesh_quantization"],"#;
+    assert_eq!(try_bytes(&with(harmless, plain), MeshFormat::Gltf).unwrap().triangle_count(), 1);
+}
+
+#[test]
+fn gltf_instances_have_a_limit() {
+    // Many nodes place a mesh that draws its primitive many times.
+    let nodes = vec![r#"{"mesh":0}"#; 20_000].join(",");
+    let primitives = vec![INDEXED; 20_000].join(",");
+    let error = try_bytes(&glb(&gltf(&nodes, &primitives, "")), MeshFormat::Gltf).unwrap_err();
+    assert!(error.is_limit(), "{error}");
+}
