@@ -17,15 +17,15 @@ fn every_profile_and_encoding_verifies() {
         for triangles in ["auto", "f32", "packed", "quantized"] {
             let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--profile", profile, "--triangles", triangles];
             cbvh_in(directory, &[&bake[..], &["--force"]].concat()).done();
-            assert!(cbvh_in(directory, &["validate", "t.cbvh"]).done().out.starts_with("t.cbvh: valid"));
-            let verified = cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done().out;
+            assert!(directory.cbvh("validate t.cbvh").done().out.starts_with("t.cbvh: valid"));
+            let verified = directory.cbvh("verify t.cbvh torus.obj").done().out;
             assert!(verified.contains("1600 triangles of torus.obj"), "{verified}");
-            assert!(cbvh_in(directory, &["dump", "t.cbvh"]).done().out.contains("level"));
+            assert!(directory.cbvh("dump t.cbvh").done().out.contains("level"));
             for what in [&["--page", "0"][..], &["--treelet", "0"], &["--treelet", "7", "--json"]] {
                 cbvh_in(directory, &[&["dump", "t.cbvh"][..], what].concat()).done();
             }
             cbvh_in(directory, &[&bake[..], &["--force", "--no-ids", "-q"]].concat()).done();
-            cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done();
+            directory.cbvh("verify t.cbvh torus.obj").done();
         }
     }
 }
@@ -38,11 +38,12 @@ fn every_effort_verifies_and_is_noted() {
         let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q", "--effort", effort];
         assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], false);
         assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], true);
-        assert!(cbvh_in(directory, &["dump", "t.cbvh"]).done().out.contains(&format!("effort={effort}")));
-        cbvh_in(directory, &["verify", "t.cbvh", "torus.obj"]).done();
+        assert!(directory.cbvh("dump t.cbvh").done().out.contains(&format!("effort={effort}")));
+        directory.cbvh("verify t.cbvh torus.obj").done();
     }
-    let low = ["bake", "torus.obj", "-o", "t.cbvh", "--effort", "low"];
-    cbvh_in(directory, &low).failed(1, &["--effort", "expected fast or default"]);
+    directory
+        .cbvh("bake torus.obj -o t.cbvh --effort low")
+        .failed(1, &["--effort", "expected fast or default"]);
 }
 
 #[test]
@@ -50,7 +51,7 @@ fn the_report_has_the_fields_of_the_contract() {
     let directory = &place();
     let twice = cube() + "f 1 3 4 2\n";
     directory.write("cube.obj", twice);
-    let baked = cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json", "-q"]).done().json();
+    let baked = directory.cbvh("bake cube.obj -o c.cbvh --json -q").done().json();
     let size = fs::metadata(directory.join("c.cbvh")).unwrap().len();
     assert_eq!(baked["input"], "cube.obj");
     assert_eq!(baked["output"], "c.cbvh");
@@ -75,15 +76,15 @@ fn the_report_has_the_fields_of_the_contract() {
         !cfg!(target_os = "linux") || baked["peak_rss_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20)
     );
 
-    let again = cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json"]).done().json();
+    let again = directory.cbvh("bake cube.obj -o c.cbvh --json").done().json();
     assert_eq!(again["skipped"], true);
     for (field, value) in baked.as_object().unwrap() {
         let told = ["skipped", "reason", "seconds", "peak_rss_bytes"].contains(&field.as_str());
         let unknown = again[field].is_null();
         assert!(told || unknown || again[field] == *value, "{field}: {again}");
     }
-    assert!(cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh"]).done().out.contains("up to date"));
-    assert_eq!(cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "-q"]).done().out, "");
+    assert!(directory.cbvh("bake cube.obj -o c.cbvh").done().out.contains("up to date"));
+    assert_eq!(directory.cbvh("bake cube.obj -o c.cbvh -q").done().out, "");
     assert_eq!(names(directory), ["c.cbvh", "cube.obj"]);
 }
 
@@ -132,8 +133,7 @@ fn content_depends_on_neither_threads_nor_names() {
     directory.write("a.obj", torus(90, 60));
     directory.write("b.obj", torus(90, 60));
     let content = |input: &str, jobs: &str| {
-        let bake = ["bake", input, "-o", "o.cbvh", "--force", "--json", "-q", "--jobs", jobs];
-        cbvh_in(directory, &bake).done().json()["content_xxh3"].clone()
+        directory.cbvh(&format!("bake {input} -o o.cbvh --force --json -q --jobs {jobs}")).done().json()["content_xxh3"].clone()
     };
     let one = content("a.obj", "1");
     assert_eq!(one, content("a.obj", "2"));
@@ -149,15 +149,13 @@ fn several_inputs_are_baked_as_one() {
     let bake = ["bake", "cube.obj", "torus.obj", "-o", "both.cbvh", "--json", "-q"];
     let one = cbvh_in(directory, &bake).done().json();
     assert_eq!((&one["objects"], &one["triangles"]), (&1.into(), &172.into()));
-    cbvh_in(directory, &["verify", "both.cbvh", "cube.obj", "torus.obj"]).done();
-    cbvh_in(directory, &["verify", "both.cbvh", "torus.obj", "cube.obj"])
-        .failed(3, &["both.cbvh", "triangle"]);
+    directory.cbvh("verify both.cbvh cube.obj torus.obj").done();
+    directory.cbvh("verify both.cbvh torus.obj cube.obj").failed(3, &["both.cbvh", "triangle"]);
     let split = cbvh_in(directory, &[&bake[..], &["--split-objects"]].concat()).done().json();
     assert_eq!((&split["objects"], &split["triangles_in"]), (&2.into(), &172.into()));
-    let verified =
-        cbvh_in(directory, &["verify", "both.cbvh", "cube.obj", "torus.obj", "--json"]).done().json();
+    let verified = directory.cbvh("verify both.cbvh cube.obj torus.obj --json").done().json();
     assert_eq!((&verified["valid"], &verified["objects"]), (&true.into(), &2.into()));
-    let dump = cbvh_in(directory, &["dump", "both.cbvh", "--json"]).done().json();
+    let dump = directory.cbvh("dump both.cbvh --json").done().json();
     let names: Vec<_> =
         dump["objects"].as_array().unwrap().iter().map(|object| object["name"].clone()).collect();
     assert_eq!(names, ["cube", "torus"]);
@@ -173,7 +171,7 @@ fn objects_without_names_are_named_after_their_files() {
     let bake = |more: &[&str]| {
         let bake = ["bake", "left.obj", "named.obj", "right.v2.obj", "-o", "all.cbvh", "--json", "-q"];
         let skipped = cbvh_in(directory, &[&bake[..], more].concat()).done().json()["skipped"] == true;
-        let dump = cbvh_in(directory, &["dump", "all.cbvh", "--json"]).done().json();
+        let dump = directory.cbvh("dump all.cbvh --json").done().json();
         let objects = dump["objects"].as_array().unwrap().iter();
         (skipped, objects.map(|object| object["name"].as_str().unwrap().to_owned()).collect::<Vec<_>>())
     };
@@ -185,8 +183,8 @@ fn objects_without_names_are_named_after_their_files() {
     assert_eq!(bake(&[]), (false, vec![String::new()]));
     // A file of the same bytes with another name is baked again.
     let is_skipped = |input: &str| {
-        let bake = ["bake", input, "-o", "one.cbvh", "--split-objects", "--json", "-q"];
-        cbvh_in(directory, &bake).done().json()["skipped"] == true
+        directory.cbvh(&format!("bake {input} -o one.cbvh --split-objects --json -q")).done().json()["skipped"]
+            == true
     };
     assert_eq!((is_skipped("left.obj"), is_skipped("left.obj")), (false, true));
     fs::rename(directory.join("left.obj"), directory.join("up.obj")).unwrap();
@@ -223,8 +221,8 @@ fn a_max_error_that_collapses_the_mesh_is_refused_and_a_coarse_one_is_told() {
 fn a_dump_adds_up() {
     let directory = &place();
     directory.write("torus.obj", torus(60, 30));
-    let baked = cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q"]).done().json();
-    let dump = cbvh_in(directory, &["dump", "t.cbvh", "--json"]).done().json();
+    let baked = directory.cbvh("bake torus.obj -o t.cbvh --json -q").done().json();
+    let dump = directory.cbvh("dump t.cbvh --json").done().json();
     assert_eq!(dump["content_xxh3"], baked["content_xxh3"]);
     assert_eq!(dump["provenance"]["input"], "torus.obj");
     let object = &dump["objects"][0];
@@ -236,7 +234,7 @@ fn a_dump_adds_up() {
     let close = |a: &serde_json::Value, b: &serde_json::Value| {
         (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9
     };
-    let verified = cbvh_in(directory, &["verify", "t.cbvh", "torus.obj", "--json"]).done().json();
+    let verified = directory.cbvh("verify t.cbvh torus.obj --json").done().json();
     assert!(close(&verified["width_inflation"], &baked["width_inflation"]), "{verified}");
     assert!(close(&object["mean_children"], &baked["mean_children"]));
     let split = &dump["bytes_per_tri"];
@@ -248,37 +246,35 @@ fn a_dump_adds_up() {
         cbvh_in(directory, &["dump", "t.cbvh", "--json", "--treelet", &(treelets - 1).to_string()]).done();
     assert_eq!(last.json()["treelet"], treelets - 1);
     cbvh_in(directory, &["dump", "t.cbvh", "--treelet", &treelets.to_string()]).failed(1, &["below"]);
-    cbvh_in(directory, &["dump", "t.cbvh", "--page", "100000"]).failed(1, &["below"]);
+    directory.cbvh("dump t.cbvh --page 100000").failed(1, &["below"]);
 }
 
 #[test]
 fn damage_is_told_by_rule() {
     let directory = &place();
     directory.write("torus.obj", torus(60, 30));
-    cbvh_in(directory, &["bake", "torus.obj", "-o", "t.cbvh"]).done();
+    directory.cbvh("bake torus.obj -o t.cbvh").done();
     let whole = fs::read(directory.join("t.cbvh")).unwrap();
     let file = directory.join("bad.cbvh");
     for at in [0, 8, 40, 4200, 9000, whole.len() / 2] {
         let mut bytes = whole.clone();
         bytes[at] ^= 0x10;
         fs::write(&file, &bytes).unwrap();
-        let told =
-            cbvh_in(directory, &["validate", "bad.cbvh", "--json"]).failed(3, &["bad.cbvh: byte ", ": R"]);
+        let told = directory.cbvh("validate bad.cbvh --json").failed(3, &["bad.cbvh: byte ", ": R"]);
         let json = told.json();
         assert_eq!((&json["file"], &json["valid"]), (&"bad.cbvh".into(), &false.into()));
         assert!(json["rule"].is_u64() && json["offset"].is_u64(), "{json}");
         assert!(json["expected"].is_string() && json["found"].is_string(), "{json}");
-        let told =
-            cbvh_in(directory, &["verify", "bad.cbvh", "torus.obj", "--json"]).failed(3, &["bad.cbvh"]);
+        let told = directory.cbvh("verify bad.cbvh torus.obj --json").failed(3, &["bad.cbvh"]);
         assert_eq!(told.json()["valid"], false);
     }
     for length in [0, 7, 100, 4096, whole.len() - 1] {
         fs::write(&file, &whole[..length]).unwrap();
-        cbvh_in(directory, &["validate", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
-        cbvh_in(directory, &["dump", "bad.cbvh"]).failed(3, &["bad.cbvh"]);
+        directory.cbvh("validate bad.cbvh").failed(3, &["bad.cbvh"]);
+        directory.cbvh("dump bad.cbvh").failed(3, &["bad.cbvh"]);
     }
     directory.write("cube.obj", cube());
-    let told = cbvh_in(directory, &["verify", "t.cbvh", "cube.obj", "--json"]);
+    let told = directory.cbvh("verify t.cbvh cube.obj --json");
     let json = told.failed(3, &["t.cbvh: triangles of the input: expected 12, found 3600"]).json();
     assert_eq!((&json["expected"], &json["found"]), (&"12".into(), &"3600".into()));
 }
@@ -293,7 +289,7 @@ fn a_summary_has_the_size_and_a_folder_is_no_output() {
         cbvh_in(directory, &[&["bake", "-o", "out"], inputs].concat())
             .failed(2, &["out: expected a file, found a folder", "cbvh bake DIR -o out"]);
     }
-    let said = cbvh_in(directory, &["bake", "a.obj", "b.obj", "-o", "c.cbvh", "--split-objects"]).done().out;
+    let said = directory.cbvh("bake a.obj b.obj -o c.cbvh --split-objects").done().out;
     assert!(
         said.contains("  size         14 by 6 by 6 mesh units\n") && !said.contains("MiB without ids"),
         "{said}"

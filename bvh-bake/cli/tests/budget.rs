@@ -51,8 +51,7 @@ fn memory_stays_within_the_budget() {
         contents.push(baked["content_xxh3"].clone());
     }
     assert!(contents.iter().all(|content| *content == contents[0]), "{contents:?}");
-    let refused =
-        cbvh_in(directory, &["bake", "sheet.stl", "-o", "out.cbvh", "--force", "--max-memory", "64MiB"]);
+    let refused = directory.cbvh("bake sheet.stl -o out.cbvh --force --max-memory 64MiB");
     refused.failed(4, &["sheet.stl", "67108864 bytes of memory", "2000000 triangles", "at least"]);
 }
 
@@ -78,8 +77,10 @@ fn memory_stays_within_the_budget_where_all_triangles_have_duplicates() {
         assert!(peak <= 132 << 20, "{peak} bytes");
         assert_eq!(baked["content_xxh3"], free["content_xxh3"]);
     }
-    let checked = ["verify", "out.cbvh", "both.stl", "--json", "--max-memory", "48MiB"];
-    assert_eq!(cbvh_in(directory, &checked).done().json()["valid"], true);
+    assert_eq!(
+        directory.cbvh("verify out.cbvh both.stl --json --max-memory 48MiB").done().json()["valid"],
+        true
+    );
     assert_eq!(bake(directory, "sheet.stl", &[])["closed"], 0);
 }
 

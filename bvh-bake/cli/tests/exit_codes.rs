@@ -17,8 +17,8 @@ fn with_cube() -> Place {
 #[test]
 fn help_and_version_are_no_errors() {
     let here = Path::new(".");
-    assert!(cbvh_in(here, &["--version"]).done().out.starts_with("cbvh "));
-    let help = cbvh_in(here, &["--help"]).done().out;
+    assert!(here.cbvh("--version").done().out.starts_with("cbvh "));
+    let help = here.cbvh("--help").done().out;
     for command in ["bake", "dump", "validate", "verify", "query", "motion", "probe", "scene", "report"] {
         assert!(help.contains(command));
         assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
@@ -118,7 +118,7 @@ fn what_the_system_refuses_is_2() {
         io(&[command, "folder"], "folder");
     }
     io(&["verify", "missing.cbvh", "cube.obj"], "missing.cbvh");
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh"]).done();
+    directory.cbvh("bake cube.obj -o cube.cbvh").done();
     io(&["verify", "cube.cbvh", "missing.obj"], "missing.obj");
     io(&["verify", "cube.cbvh", "folder"], "folder: expected a readable file, found a folder");
     io(&["verify", "cube.cbvh", "cube.obj", "--scratch", "missing"], "missing");
@@ -146,12 +146,11 @@ fn invalid_input_is_3() {
     write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
     write("empty.stl", "");
     write("mesh.xyz", "what is this\n");
-    cbvh_in(directory, &["bake", "bad.obj", "-o", "o.cbvh"])
-        .failed(3, &["bad.obj: line 3: expected", "found 3"]);
-    cbvh_in(directory, &["bake", "cube.obj", "bad.obj", "-o", "o.cbvh"]).failed(3, &["bad.obj: line 3"]);
-    cbvh_in(directory, &["bake", "empty.stl", "-o", "o.cbvh"]).failed(3, &["empty.stl"]);
-    cbvh_in(directory, &["bake", "mesh.xyz", "-o", "o.cbvh"]).failed(3, &["mesh.xyz", ".xyz"]);
-    cbvh_in(directory, &["validate", "cube.obj"]).failed(3, &["cube.obj: byte 0: R01"]);
+    directory.cbvh("bake bad.obj -o o.cbvh").failed(3, &["bad.obj: line 3: expected", "found 3"]);
+    directory.cbvh("bake cube.obj bad.obj -o o.cbvh").failed(3, &["bad.obj: line 3"]);
+    directory.cbvh("bake empty.stl -o o.cbvh").failed(3, &["empty.stl"]);
+    directory.cbvh("bake mesh.xyz -o o.cbvh").failed(3, &["mesh.xyz", ".xyz"]);
+    directory.cbvh("validate cube.obj").failed(3, &["cube.obj: byte 0: R01"]);
     cbvh_in(directory, &["query", "bad.obj", "cube.obj", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"])
         .failed(3, &["bad.obj: line 3"]);
     let good = "1 0 0 0 0 1 0 0 0 0 1 0";
@@ -172,8 +171,7 @@ fn invalid_input_is_3() {
     ] {
         write("p.txt", &text);
         let place = format!("p.txt: line {line}: ");
-        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"])
-            .failed(3, &[&place, "expected", word]);
+        directory.cbvh("query cube.obj cube.obj p.txt").failed(3, &[&place, "expected", word]);
         // A wrong pose has the same exit code on the command line.
         let wrong = text.lines().find(|text| !text.contains('#') && !text.is_empty() && *text != good);
         if let Some(pose) = wrong {
@@ -183,7 +181,8 @@ fn invalid_input_is_3() {
     }
     for none in ["", "\n", "# no pose\n\n"] {
         write("p.txt", none);
-        cbvh_in(directory, &["query", "cube.obj", "cube.obj", "p.txt"])
+        directory
+            .cbvh("query cube.obj cube.obj p.txt")
             .failed(3, &["p.txt: expected at least one line of 12 numbers", "found no pose"]);
     }
     assert_eq!(names(directory), ["bad.obj", "cube.obj", "empty.stl", "mesh.xyz", "p.txt"]);
@@ -209,10 +208,10 @@ fn limits_are_4() {
 #[test]
 fn an_old_output_survives_a_failure() {
     let directory = &with_cube();
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).done();
+    directory.cbvh("bake cube.obj -o o.cbvh").done();
     let before = fs::read(directory.join("o.cbvh")).unwrap();
     directory.write("cube.obj", "v 0 0 0\nf 1 1 2\n");
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "o.cbvh"]).failed(3, &["cube.obj: line 2"]);
+    directory.cbvh("bake cube.obj -o o.cbvh").failed(3, &["cube.obj: line 2"]);
     assert_eq!(fs::read(directory.join("o.cbvh")).unwrap(), before);
     assert_eq!(names(directory), ["cube.obj", "o.cbvh"]);
 }

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::Files as _;
 use common::place;
 use common::{cbvh_in, names, shared, skip};
 
@@ -23,9 +24,9 @@ fn hard_files_bake_or_are_refused() {
                 cbvh_in(directory, &[&["bake", input, "-o", "o.cbvh", "--force"][..], options].concat());
             if bake.code == 0 {
                 bake.done();
-                cbvh_in(directory, &["validate", "o.cbvh"]).done();
+                directory.cbvh("validate o.cbvh").done();
                 cbvh_in(directory, &["verify", "o.cbvh", input]).done();
-                cbvh_in(directory, &["dump", "o.cbvh"]).done();
+                directory.cbvh("dump o.cbvh").done();
                 std::fs::remove_file(directory.join("o.cbvh")).unwrap();
                 baked += 1;
             } else {

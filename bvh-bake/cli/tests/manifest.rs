@@ -167,8 +167,7 @@ fn a_folder_is_baked_as_a_tree() {
         directory.write(name, cube());
     }
     directory.write("in/deep/notes.txt", "no mesh");
-    let summary =
-        cbvh_in(directory, &["bake", "in", "-o", "out", "--json", "--out-manifest", "o.jsonl"]).done();
+    let summary = directory.cbvh("bake in -o out --json --out-manifest o.jsonl").done();
     counts(&summary.json(), 3, 3, 0, 0);
     for name in ["out/a.cbvh", "out/deep/b.cbvh", "out/deep/er/c.cbvh"] {
         cbvh_in(directory, &["verify", name, "in/a.obj"]).done();
@@ -177,15 +176,15 @@ fn a_folder_is_baked_as_a_tree() {
     let outputs: Vec<_> =
         lines(&directory.join("o.jsonl")).iter().map(|line| line["output"].clone()).collect();
     assert_eq!(outputs, ["out/a.cbvh", "out/deep/b.cbvh", "out/deep/er/c.cbvh"]);
-    let text = cbvh_in(directory, &["bake", "in", "-o", "out"]).done().out;
+    let text = directory.cbvh("bake in -o out").done().out;
     assert!(text.starts_with("3 assets: 0 baked, 3 up to date, 0 failed\n"), "{text}");
     directory.write("in/a.ply", "");
-    cbvh_in(directory, &["bake", "in", "-o", "out"])
+    directory
+        .cbvh("bake in -o out")
         .failed(3, &["out/a.cbvh", "used by asset 1 (in/a", "and by asset 2 (in/a"]);
-    cbvh_in(directory, &["bake", "in", "-o", "o.jsonl"]).failed(1, &["o.jsonl", "expected a folder"]);
+    directory.cbvh("bake in -o o.jsonl").failed(1, &["o.jsonl", "expected a folder"]);
     fs::create_dir(directory.join("empty")).unwrap();
-    cbvh_in(directory, &["bake", "empty", "-o", "out"])
-        .failed(2, &["empty: expected a mesh or a folder with"]);
+    directory.cbvh("bake empty -o out").failed(2, &["empty: expected a mesh or a folder with"]);
 }
 
 #[test]
@@ -219,7 +218,7 @@ fn shards_are_parts_of_the_whole() {
     for shard in ["0/3", "4/3", "1", "a/b"] {
         bake(directory, "out.jsonl", &["--shard", shard]).failed(1, &["--shard", "I from 1 to N"]);
     }
-    cbvh_in(directory, &["bake", "meshes/1.obj", "-o", "o.cbvh", "--shard", "1/2"]).failed(1, &["--shard"]);
+    directory.cbvh("bake meshes/1.obj -o o.cbvh --shard 1/2").failed(1, &["--shard"]);
 }
 
 /// Runs the second example of `many-assets.md`, which must be in that file exactly as it is run here.
@@ -331,10 +330,9 @@ fn a_wrong_line_is_told_by_its_number() {
     counts(&bake(directory, "out.jsonl", &[]).done().json(), 0, 0, 0, 0);
     fs::remove_file(directory.join("in.jsonl")).unwrap();
     bake(directory, "out.jsonl", &[]).failed(2, &["in.jsonl"]);
-    cbvh_in(directory, &["bake", "--manifest", "in.jsonl"]).failed(1, &["--out-manifest"]);
-    cbvh_in(directory, &["bake", "a.obj", "--manifest", "in.jsonl", "--out-manifest", "o"])
-        .failed(1, &["--manifest"]);
-    cbvh_in(directory, &["bake", "a.obj"]).failed(1, &["--output"]);
+    directory.cbvh("bake --manifest in.jsonl").failed(1, &["--out-manifest"]);
+    directory.cbvh("bake a.obj --manifest in.jsonl --out-manifest o").failed(1, &["--manifest"]);
+    directory.cbvh("bake a.obj").failed(1, &["--output"]);
 }
 
 #[test]

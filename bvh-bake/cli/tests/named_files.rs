@@ -32,14 +32,12 @@ fn no_named_file_makes_the_command_wait() {
             &format!("mesh a cube.obj\nmesh b {pipe}\ninstance a a {POSE}\ninstance b b {POSE}\nmoving a\n"),
         );
         write("frames.txt", &format!("{POSE}\n"));
-        cbvh_in(directory, &["scene", "cell.scene", "frames.txt"]).failed(2, &[pipe, "not a regular file"]);
+        directory.cbvh("scene cell.scene frames.txt").failed(2, &[pipe, "not a regular file"]);
         write("pairs.txt", &format!("one cube.obj {pipe}\n"));
-        let report = ["report", "pairs.txt", "--out", "report"];
-        cbvh_in(directory, &report).failed(2, &[pipe, "not a regular file"]);
+        directory.cbvh("report pairs.txt --out report").failed(2, &[pipe, "not a regular file"]);
     }
     write("pairs.txt", "one cube.obj cube.obj pipe.txt\n");
-    cbvh_in(directory, &["report", "pairs.txt", "--out", "report"])
-        .failed(2, &["pipe.txt", "not a regular file"]);
+    directory.cbvh("report pairs.txt --out report").failed(2, &["pipe.txt", "not a regular file"]);
     for check in
         [&["validate", "pipe.cbvh"][..], &["dump", "pipe.cbvh"], &["verify", "pipe.cbvh", "cube.obj"]]
     {
@@ -58,7 +56,7 @@ fn no_asset_makes_the_command_wait() {
 {"input":"/dev/zero","output":"out/c.cbvh"}
 "#;
     directory.write("in.jsonl", manifest);
-    let ended = cbvh_in(directory, &["bake", "--manifest", "in.jsonl", "--out-manifest", "out.jsonl", "-q"]);
+    let ended = directory.cbvh("bake --manifest in.jsonl --out-manifest out.jsonl -q");
     assert_eq!(ended.code, 2, "{ended:?}");
     assert_eq!(ended.err.matches("not a regular file").count(), 2, "{ended:?}");
     assert!(directory.join("out/b.cbvh").is_file());
@@ -66,7 +64,7 @@ fn no_asset_makes_the_command_wait() {
     fs::rename(directory.join("pipe.obj"), directory.join("meshes/pipe.obj")).unwrap();
     fs::copy(directory.join("cube.obj"), directory.join("meshes/cube.obj")).unwrap();
     symlink("/dev/zero", directory.join("meshes/zero.stl")).unwrap();
-    let ended = cbvh_in(directory, &["bake", "meshes", "-o", "baked", "-q"]);
+    let ended = directory.cbvh("bake meshes -o baked -q");
     assert_eq!(ended.code, 2, "{ended:?}");
     assert_eq!(ended.err.matches("not a regular file").count(), 2, "{ended:?}");
     assert!(directory.join("baked/cube.cbvh").is_file());
@@ -89,7 +87,7 @@ fn arguments_may_be_pipes() {
     piped("p.txt", &["query", "cube.obj", "cube.obj", "/dev/stdin", "--json"]);
     piped("cube.obj", &["query", "/dev/stdin", "cube.obj", "p.txt", "--json"]);
     piped("cube.obj", &["bake", "/dev/stdin", "-o", "out.cbvh", "--max-memory", "200MiB"]);
-    cbvh_in(directory, &["verify", "out.cbvh", "cube.obj"]).done();
+    directory.cbvh("verify out.cbvh cube.obj").done();
 }
 
 /// A pipe has no end that could be known beforehand.

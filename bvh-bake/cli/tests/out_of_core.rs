@@ -66,7 +66,8 @@ fn answers_do_not_depend_on_read_ahead() {
             }
         }
     }
-    cbvh_in(directory, &["query", "sheet.cbvh", "torus.cbvh", "poses.txt", "--read-ahead", "all"])
+    directory
+        .cbvh("query sheet.cbvh torus.cbvh poses.txt --read-ahead all")
         .failed(1, &["usual", "sparse", "whole"]);
 }
 

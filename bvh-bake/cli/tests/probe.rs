@@ -186,7 +186,7 @@ fn several_files_are_read_before_the_first_question() {
 fn an_object_can_be_named() {
     let directory = &world();
     directory.write("both.obj", cube() + "o moved\n" + &cube_at(1, 10));
-    cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
+    directory.cbvh("bake both.obj -o both.cbvh --split-objects -q").done();
     let ask = |mesh: &str, more: &[&str]| {
         cbvh_in(directory, &[&["probe", mesh, "--probe", "6 0 0"], more].concat())
     };
@@ -268,12 +268,13 @@ fn bad_questions_are_named() {
     }
     for none in ["", "\n", "# nothing\n\n"] {
         directory.write("p.txt", none);
-        cbvh_in(directory, &["probe", "cube.obj", "p.txt"])
+        directory
+            .cbvh("probe cube.obj p.txt")
             .failed(3, &["p.txt: expected 3 numbers, a point, in at least one line, found none"]);
     }
     cbvh_in(directory, &["probe", "cube.obj", "--probe", " "]).failed(3, &["--probe: ", "found none"]);
-    cbvh_in(directory, &["probe", "cube.obj", "none.txt"]).failed(2, &["none.txt"]);
-    cbvh_in(directory, &["probe", "none.obj", "side.txt"]).failed(2, &["none.obj"]);
+    directory.cbvh("probe cube.obj none.txt").failed(2, &["none.txt"]);
+    directory.cbvh("probe none.obj side.txt").failed(2, &["none.obj"]);
     assert!(!directory.join("raw.txt").exists());
 }
 
@@ -291,8 +292,10 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
         let probe = ["probe", "open.obj", "--mode", "side", "--probe", point];
         assert_eq!(cbvh_in(directory, &probe).done().out, words);
     }
-    let probe = ["probe", "open.obj", "side.txt", "--mode", "side", "--out", "raw.txt", "--bench"];
-    assert_eq!(cbvh_in(directory, &probe).done().json()["positives"], 0);
+    assert_eq!(
+        directory.cbvh("probe open.obj side.txt --mode side --out raw.txt --bench").done().json()["positives"],
+        0
+    );
     assert_eq!(values(&directory.join("raw.txt")), ["2", "2", "2", "2"]);
     directory.write("tiny.obj", "o tiny\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n");
     let query = ["query", "open.obj", "tiny.obj", "--mode", "relation", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"];
@@ -305,7 +308,7 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
 #[test]
 fn a_file_without_topology_is_named() {
     let directory = &world();
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "bare.cbvh", "--no-topology", "-q"]).done();
+    directory.cbvh("bake cube.obj -o bare.cbvh --no-topology -q").done();
     let refused = |arguments: &[&str]| {
         cbvh_in(directory, arguments)
             .failed(3, &["cbvh: bare.cbvh: this file does not say", "bake it again with topology"]);

@@ -147,10 +147,10 @@ fn stages_are_told_only_where_they_are_asked_for() {
     }
     assert_eq!(cbvh_in(directory, &[&bake[..], &["--json"]].concat()).err.lines().count(), STAGES.len());
     // The bake is skipped, so there are no stages. Nor are there stages if several assets are baked in parallel.
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "c.cbvh", "--json"]).done();
+    directory.cbvh("bake cube.obj -o c.cbvh --json").done();
     fs::create_dir(directory.join("in")).unwrap();
     ["a.obj", "b.obj"].iter().for_each(|name| fs::write(directory.join("in").join(name), cube()).unwrap());
-    cbvh_in(directory, &["bake", "in", "-o", "out", "--json"]).done();
+    directory.cbvh("bake in -o out --json").done();
     // The summary for people tells of scratch files only if there were some.
     assert!(!cbvh_in(directory, &bake).done().out.contains("scratch"));
 }

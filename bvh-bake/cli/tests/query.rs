@@ -115,8 +115,10 @@ fn a_relation_tells_what_is_inside() {
         ("room.obj", "two.obj", ["4", "4", "0", "0", "0", "1", "1"], 5),
         ("cube.obj", "cube.obj", ["0", "1", "1", "1", "1", "1", "1"], 1),
     ] {
-        let query = ["query", a, b, "poses.txt", "--mode", "relation", "--out", "raw_%s.txt", "--bench"];
-        let json = cbvh_in(directory, &query).done().json();
+        let json = directory
+            .cbvh(&format!("query {a} {b} poses.txt --mode relation --out raw_%s.txt --bench"))
+            .done()
+            .json();
         let raw = directory.text("raw_poses.txt");
         let found: Vec<&str> = raw.lines().map(|line| line.split_once(' ').unwrap().0).collect();
         assert_eq!(found, expected, "{a} {b}");
@@ -201,7 +203,7 @@ fn an_object_can_be_named() {
         })
         .collect();
     directory.write("both.obj", cube() + &shifted);
-    cbvh_in(directory, &["bake", "both.obj", "-o", "both.cbvh", "--split-objects", "-q"]).done();
+    directory.cbvh("bake both.obj -o both.cbvh --split-objects -q").done();
     let ask = |a: &str, more: &[&str]| {
         let query = ["query", a, "cube.cbvh", "near.txt", "--mode", "contacts", "--bench"];
         cbvh_in(directory, &[&query[..], more].concat()).done().json()
@@ -261,7 +263,7 @@ fn each_pose_has_a_line_and_a_record() {
             }
         }
     }
-    let one = cbvh_in(directory, &["query", "cube.cbvh", "cube.cbvh", "far.x.txt", "--json", "--limit", "1"]);
+    let one = directory.cbvh("query cube.cbvh cube.cbvh far.x.txt --json --limit 1");
     assert_eq!(one.done().out, "{\"pose\":0,\"collide\":false}\n");
 }
 
@@ -312,7 +314,7 @@ fn one_pose_is_answered_for_a_person() {
     assert_eq!(ask(apart, &[]), "the meshes do not touch\n");
     assert_eq!(ask(touching, &[]), "the meshes touch\n");
     assert_eq!(ask(apart, &["--json"]), "{\"pose\":0,\"collide\":false}\n");
-    let identity = cbvh_in(directory, &["query", "cube.cbvh", "cube.obj", "--mode", "relation"]).done().out;
+    let identity = directory.cbvh("query cube.cbvh cube.obj --mode relation").done().out;
     assert_eq!(identity, "touching\n");
     assert!(ask(touching, &["--mode", "contacts"]).contains("pairs of triangles in contact"));
     assert!(ask(apart, &["--mode", "within", "--within", "3"]).contains("at most 3"));
@@ -348,7 +350,8 @@ fn a_damaged_file_is_named() {
     bytes[page] ^= 1;
     directory.write("bad.cbvh", &bytes);
     for jobs in ["1", "2"] {
-        let query = ["query", "cube.cbvh", "bad.cbvh", "near.txt", "--jobs", jobs];
-        cbvh_in(directory, &query).failed(3, &["bad.cbvh: byte ", "R15"]);
+        directory
+            .cbvh(&format!("query cube.cbvh bad.cbvh near.txt --jobs {jobs}"))
+            .failed(3, &["bad.cbvh: byte ", "R15"]);
     }
 }

@@ -24,7 +24,7 @@ fn report(directory: &Path, arguments: &[&str]) -> std::process::Output {
 fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let directory = &place();
     directory.write("torus.obj", torus(24, 12));
-    cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "--no-ids"]).done();
+    directory.cbvh("bake torus.obj -o torus.cbvh --no-ids").done();
     directory.write("p.txt", poses(8, 0.0, 6.0));
     for mesh in ["fclenv.obj", "fclrob.obj"] {
         fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();

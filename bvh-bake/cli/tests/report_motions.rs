@@ -5,8 +5,8 @@ mod common;
 use common::documents::{
     elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
 };
+use common::torus;
 use common::{Files as _, place};
-use common::{cbvh_in, torus};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -27,8 +27,7 @@ fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
     directory.write("tori.txt", motions.concat());
     let list = "fcl fclenv.obj fclrob.obj\ntori torus.obj torus.obj tori.txt # with motions\n";
     directory.write("pairs.txt", list);
-    let arguments = ["report", "pairs.txt", "--motions", "--out", "out", "--quick"];
-    let said = cbvh_in(directory, &arguments).done().out;
+    let said = directory.cbvh("report pairs.txt --motions --out out --quick").done().out;
     let [csv, html, json, svg] = report_files(directory, "out");
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);

@@ -13,7 +13,7 @@ fn world() -> Place {
     let directory = &place;
     directory.write("cube.obj", cube());
     directory.write("torus.obj", torus(48, 24));
-    cbvh_in(directory, &["bake", "torus.obj", "-o", "torus.cbvh", "-q"]).done();
+    directory.cbvh("bake torus.obj -o torus.cbvh -q").done();
     let scene = "\
 # a comment
 mesh ring torus.cbvh
@@ -153,13 +153,13 @@ fn a_scene_in_which_nothing_moves_is_asked_about_all_pairs() {
     let directory = &world();
     let scene = directory.text("s.scene").replace("moving b c\n", "");
     directory.write("s.scene", scene);
-    let list = cbvh_in(directory, &["scene", "s.scene", "--mode", "distance", "--list"]).done().out;
+    let list = directory.cbvh("scene s.scene --mode distance --list").done().out;
     // The cube of side 2 at the middle of a ring reaches its inner side.
     assert!(
         list.starts_with("frame 1: a b ") && list.contains("\n  a c ") && list.lines().count() == 3,
         "{list}"
     );
-    cbvh_in(directory, &["scene", "s.scene", "f.txt"]).failed(1, &["expected no FRAMES"]);
+    directory.cbvh("scene s.scene f.txt").failed(1, &["expected no FRAMES"]);
 }
 
 /// What is inside what, and instances placed by a position and a quaternion.
@@ -197,9 +197,10 @@ instance far m 20 0 0  0 0 0 1
     .unwrap();
     let json = ask(&["--mode", "distance", "--json"]).json();
     assert!(json["distance"] == 3.5 && json["point_a"][0] == 1.5 && json["point_b"][0] == 5.0, "{json}");
-    cbvh_in(directory, &["scene", "cell.glb"]).failed(2, &["cell.glb"]);
+    directory.cbvh("scene cell.glb").failed(2, &["cell.glb"]);
     directory.write("cell.glb", "glTF");
-    cbvh_in(directory, &["scene", "cell.glb"])
+    directory
+        .cbvh("scene cell.glb")
         .failed(3, &["cell.glb: expected a scene file, found glTF", "cbvh bake cell.glb --scene -o"]);
 }
 
@@ -260,7 +261,7 @@ fn bad_files_are_named_with_line_and_remedy() {
         let ended = ask(directory, arguments);
         assert!(ended.code == 1 && ended.err.contains(words), "{arguments:?}: {}", ended.err);
     }
-    cbvh_in(directory, &["scene", "s.scene"]).failed(1, &["expected FRAMES"]);
+    directory.cbvh("scene s.scene").failed(1, &["expected FRAMES"]);
     assert!(!directory.join("raw.txt").exists());
 }
 
@@ -298,22 +299,17 @@ fn baked_scenes_are_asked_like_text() {
         (&2.into(), &3.into(), &24.into())
     );
     assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], true);
-    cbvh_in(directory, &["verify", "boxes.cbvh", "boxes.gltf"]).done();
-    let dump = cbvh_in(directory, &["dump", "boxes.cbvh", "--json"]).done().json();
+    directory.cbvh("verify boxes.cbvh boxes.gltf").done();
+    let dump = directory.cbvh("dump boxes.cbvh --json").done().json();
     assert_eq!(dump["instances"][1]["name"], "b");
     assert_eq!(dump["instances"][2]["translation"], serde_json::json!([9.0, 0.0, 0.0]));
     assert!(
-        cbvh_in(directory, &["dump", "boxes.cbvh"])
-            .done()
-            .out
-            .contains("\ninstances\n  number 0, name a, object 0,")
+        directory.cbvh("dump boxes.cbvh").done().out.contains("\ninstances\n  number 0, name a, object 0,")
     );
 
-    let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "pairs", "--list"]).done().out;
+    let list = directory.cbvh("scene boxes.cbvh --mode pairs --list").done().out;
     assert_eq!(list, "frame 1: 1 pair touching\n  a b\n");
-    let list = cbvh_in(directory, &["scene", "boxes.cbvh", "--mode", "within", "--within", "9", "--list"])
-        .done()
-        .out;
+    let list = directory.cbvh("scene boxes.cbvh --mode within --within 9 --list").done().out;
     assert_eq!(list, "frame 1: 3 pairs near enough\n  a b\n  a box\n  b box\n");
 
     let large =
@@ -340,8 +336,7 @@ fn baked_scenes_are_asked_like_text() {
     directory.write("f.txt", frames);
     for mode in ["collide", "pairs", "distance"] {
         let ask = |scene: &str, jobs: &str| {
-            let arguments = ["scene", scene, "f.txt", "--mode", mode, "--bench", "--jobs", jobs];
-            cbvh_in(directory, &arguments).done().json()
+            directory.cbvh(&format!("scene {scene} f.txt --mode {mode} --bench --jobs {jobs}")).done().json()
         };
         let (text, baked) = (ask("s.scene", "1"), ask("boxes.cbvh", "2"));
         for field in ["answers_xxh3", "positives", "instances", "moving", "triangles"] {
@@ -350,20 +345,20 @@ fn baked_scenes_are_asked_like_text() {
     }
 
     directory.write("f.txt", identity);
-    cbvh_in(directory, &["scene", "boxes.cbvh", "f.txt"]).failed(3, &["f.txt: line 1: expected 36 numbers"]);
+    directory.cbvh("scene boxes.cbvh f.txt").failed(3, &["f.txt: line 1: expected 36 numbers"]);
     directory.write("p.txt", identity);
     let query = ["query", "boxes.cbvh", "cube.obj", "p.txt"];
     cbvh_in(directory, &query)
         .failed(3, &["boxes.cbvh: expected a mesh, or one object of a scene, found a scene"]);
     cbvh_in(directory, &[&query[..], &["--object", "box"]].concat()).done();
-    cbvh_in(directory, &["bake", "cube.obj", "-o", "cube.cbvh", "-q"]).done();
-    cbvh_in(directory, &["scene", "cube.cbvh"]).failed(3, &["cube.cbvh: expected a scene", "--scene"]);
+    directory.cbvh("bake cube.obj -o cube.cbvh -q").done();
+    directory.cbvh("scene cube.cbvh").failed(3, &["cube.cbvh: expected a scene", "--scene"]);
     let mut bytes = fs::read(directory.join("boxes.cbvh")).unwrap();
     let at = bytes.windows(8).rposition(|window| window == 9f64.to_le_bytes()).unwrap();
     bytes[at] ^= 1;
     directory.write("boxes.cbvh", bytes);
-    cbvh_in(directory, &["scene", "boxes.cbvh"]).failed(3, &["boxes.cbvh: ", "R10"]);
-    cbvh_in(directory, &["validate", "boxes.cbvh"]).failed(3, &["boxes.cbvh", "R10"]);
+    directory.cbvh("scene boxes.cbvh").failed(3, &["boxes.cbvh: ", "R10"]);
+    directory.cbvh("validate boxes.cbvh").failed(3, &["boxes.cbvh", "R10"]);
 }
 
 #[test]
@@ -399,7 +394,7 @@ fn meshes_of_very_different_size_are_pointed_out_once() {
     let lines = ["a small", "b large", "c large"].map(|of| format!("instance {of} 0 0 0 0 0 0 1\n"));
     let scene = format!("mesh small small.obj\nmesh large large.obj\n{}", lines.concat());
     directory.write("s.scene", scene);
-    let ended = cbvh_in(directory, &["scene", "s.scene"]);
+    let ended = directory.cbvh("scene s.scene");
     assert_eq!((ended.code, ended.err.lines().count()), (0, 1), "{ended:?}");
     assert!(ended.err.contains("small.obj is about 2.000") && ended.err.contains("same unit?"), "{ended:?}");
 }

@@ -154,9 +154,9 @@ fn read_error(halt: Halt, path: &Path) -> ReadError {
 fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
     let (progress, checksum) = (&Progress::default(), OnceLock::new());
     let mesh = if input.format() == MeshFormat::Gltf {
-        let mut mesh = gltf::InMemory::default();
-        let read = gltf::read(input, &input.random_access()?, &mut mesh, Allowance::UNLIMITED, progress);
-        read.map(|_| mesh.into_mesh())
+        let mut found = gltf::InMemory::default();
+        let read = gltf::read(input, &input.random_access()?, &mut found, Allowance::UNLIMITED, progress);
+        read.map(|_| found.mesh)
     } else {
         thread::scope(|scope| {
             let opener = Opener { input, progress, checksum: &checksum, scope };

@@ -207,13 +207,20 @@ fn keyword<R: Read>(words: &mut Words<R>, expected: &'static str) -> Result<(), 
 #[derive(Default)]
 struct Joined {
     mesh: Mesh,
-    solid: Option<Solid>,
+    /// The vertices of the last object by the bits of their positions. The map's hashes are random, so that nobody can
+    /// make a file whose vertices all collide.
+    numbers: HashMap<[u64; 3], u32>,
     next_id: u32,
 }
 
 impl Solids for Joined {
     fn begin(&mut self, name: String, expected: usize) -> Result<(), Halt> {
-        self.solid = Some(Solid::new(name, expected));
+        let mut object = Object { name, ..Object::default() };
+        // The file is long enough to hold that many.
+        object.triangles.reserve_exact(expected);
+        self.mesh.objects.push(object);
+        // A closed surface has half as many vertices as triangles.
+        self.numbers = HashMap::with_capacity(expected / 2);
         Ok(())
     }
 
@@ -222,62 +229,40 @@ impl Solids for Joined {
         count: usize,
         corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
     ) -> Result<(), Halt> {
-        let Some(solid) = &mut self.solid else { return Ok(()) };
-        (0..count).try_for_each(|place| Ok(solid.push(corners_of(place))?))
+        let Some(object) = self.mesh.objects.last_mut() else { return Ok(()) };
+        for place in 0..count {
+            let mut triangle = [0; 3];
+            for (corner, position) in triangle.iter_mut().zip(corners_of(place)) {
+                *corner = number(object, &mut self.numbers, position)?;
+            }
+            object.triangles.push(triangle);
+        }
+        Ok(())
     }
 
     fn end(&mut self) -> Result<(), Halt> {
-        if let Some(solid) = self.solid.take() {
-            self.mesh.objects.push(solid.finish(&mut self.next_id)?);
-        }
+        let Some(object) = self.mesh.objects.last_mut() else { return Ok(()) };
+        object.triangle_ids = next_ids(&mut self.next_id, object.triangles.len())?;
         Ok(())
     }
 }
 
-/// An object that grows by triangles and joins equal vertices.
-struct Solid {
-    object: Object,
-    /// The vertices by the bits of their positions. The map's hashes are random, so that nobody can make a file whose
-    /// vertices all collide.
-    numbers: HashMap<[u64; 3], u32>,
-}
-
-impl Solid {
-    /// Makes an empty solid for `expected` triangles. The file is long enough to hold that many.
-    fn new(name: String, expected: usize) -> Self {
-        let mut object = Object { name, ..Object::default() };
-        object.triangles.reserve_exact(expected);
-        // A closed surface has half as many vertices as triangles.
-        Solid { object, numbers: HashMap::with_capacity(expected / 2) }
+/// Returns the number of the vertex with this position, and adds the vertex if there is none.
+fn number(
+    object: &mut Object,
+    numbers: &mut HashMap<[u64; 3], u32>,
+    position: [f64; 3],
+) -> Result<u32, Fault> {
+    // -0.0 and 0.0 are the same position. No coordinate is NaN.
+    let position = position.map(|coordinate| coordinate + 0.0);
+    let next = object.positions.len() as u32;
+    let number = *numbers.entry(position.map(f64::to_bits)).or_insert(next);
+    if number < next {
+        return Ok(number);
     }
-
-    fn push(&mut self, corners: [[f64; 3]; 3]) -> Result<(), Fault> {
-        let mut triangle = [0; 3];
-        for (corner, position) in triangle.iter_mut().zip(corners) {
-            *corner = self.number(position)?;
-        }
-        self.object.triangles.push(triangle);
-        Ok(())
+    if u64::from(number) == MAX_VERTICES {
+        return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" });
     }
-
-    /// Returns the number of the vertex with this position, and adds the vertex if there is none.
-    fn number(&mut self, position: [f64; 3]) -> Result<u32, Fault> {
-        // -0.0 and 0.0 are the same position. No coordinate is NaN.
-        let position = position.map(|coordinate| coordinate + 0.0);
-        let next = self.object.positions.len() as u32;
-        let number = *self.numbers.entry(position.map(f64::to_bits)).or_insert(next);
-        if number < next {
-            return Ok(number);
-        }
-        if u64::from(number) == MAX_VERTICES {
-            return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" });
-        }
-        self.object.positions.push(position);
-        Ok(number)
-    }
-
-    fn finish(mut self, next_id: &mut u32) -> Result<Object, Fault> {
-        self.object.triangle_ids = next_ids(next_id, self.object.triangles.len())?;
-        Ok(self.object)
-    }
+    object.positions.push(position);
+    Ok(number)
 }

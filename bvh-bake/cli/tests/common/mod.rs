@@ -31,8 +31,11 @@ impl AsRef<Path> for Place {
     }
 }
 
-/// Reads and writes files by their names in a folder.
+/// Reads and writes files by their names in a folder, and runs the command there.
 pub(crate) trait Files {
+    /// Runs the command with arguments without blanks.
+    fn cbvh(&self, arguments: &str) -> Ended;
+
     /// Writes a file.
     fn write(&self, name: &str, content: impl AsRef<[u8]>);
 
@@ -41,6 +44,10 @@ pub(crate) trait Files {
 }
 
 impl Files for Path {
+    fn cbvh(&self, arguments: &str) -> Ended {
+        cbvh_in(self, &arguments.split(' ').collect::<Vec<_>>())
+    }
+
     #[track_caller]
     fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         std::fs::write(self.join(name), content).unwrap();

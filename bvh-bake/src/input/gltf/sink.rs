@@ -45,15 +45,9 @@ impl Sink for () {
 /// Collects a mesh in memory. The vertices of each object count from 0.
 #[derive(Default)]
 pub(crate) struct InMemory {
-    mesh: Mesh,
+    /// The mesh, unchecked.
+    pub(crate) mesh: Mesh,
     next_id: u32,
-}
-
-impl InMemory {
-    /// Returns the mesh, unchecked.
-    pub(crate) fn into_mesh(self) -> Mesh {
-        self.mesh
-    }
 }
 
 impl Sink for InMemory {

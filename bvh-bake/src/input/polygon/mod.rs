@@ -53,98 +53,72 @@ impl Cutter {
         if corners.len() == 3 {
             return give([0, 1, 2]);
         }
-        let polygon: Vec<u32> = (0..corners.len() as u32).collect();
-        let mut triangles = Vec::new();
-        self.cut(corners, &polygon, &mut triangles).map_err(|OutOfSteps| Fault::Limit {
+        let triangles = self.cut(corners).map_err(|OutOfSteps| Fault::Limit {
             place: Place::File,
             most: STEPS_PER_CORNER,
             what: "steps per corner to cut a face of more than 1024 corners into triangles (cut it into smaller faces)",
         })?;
-        triangles.into_iter().try_for_each(|triangle| give(triangle.map(|corner| corner as usize)))
+        triangles.into_iter().try_for_each(give)
     }
 
-    fn cut(
-        &mut self,
-        positions: &[[f64; 3]],
-        polygon: &[u32],
-        triangles: &mut Vec<[u32; 3]>,
-    ) -> Result<(), OutOfSteps> {
-        let mut steps = Steps { left: STEPS_PER_CORNER * polygon.len().max(MAX_UNCOUNTED) as u64 };
-        match *polygon {
-            [] | [_] | [_, _] => {}
-            [a, b, c] => triangles.push([a, b, c]),
-            _ if !self.flatten(positions, polygon) => fan(polygon, triangles),
-            [a, b, c, d] => {
-                let [fa, fb, fc, fd] = [self.flat[0], self.flat[1], self.flat[2], self.flat[3]];
-                let along_ac = doubled_area(fa, fb, fc) > 0.0 && doubled_area(fc, fd, fa) > 0.0;
-                let along_bd = doubled_area(fb, fc, fd) > 0.0 && doubled_area(fd, fa, fb) > 0.0;
-                if along_bd && !along_ac {
-                    triangles.extend([[b, c, d], [d, a, b]]);
-                } else {
-                    triangles.extend([[a, b, c], [a, c, d]]);
-                }
-            }
-            _ if polygon.len() > MAX_TANGLED && is_tangled(&self.flat, &mut steps)? => {
-                fan(polygon, triangles);
-            }
-            _ if polygon.len() <= MAX_UNCOUNTED => {
-                self.earcut.earcut_slice::<u32>(&self.flat, &[], &mut self.ears);
-                self.keep_ears(positions, polygon, triangles);
-            }
-            _ => {
-                self.ears.clear();
-                if ears::clip(&self.flat, &mut steps, &mut self.ears)? {
-                    self.keep_ears(positions, polygon, triangles);
-                } else {
-                    fan(polygon, triangles);
-                }
-            }
+    fn cut(&mut self, corners: &[[f64; 3]]) -> Result<Vec<[usize; 3]>, OutOfSteps> {
+        let count = corners.len();
+        if count < 4 || !self.flatten(corners) {
+            return Ok(fan(count));
         }
-        Ok(())
+        if let [a, b, c, d] = self.flat[..] {
+            let along_ac = doubled_area(a, b, c) > 0.0 && doubled_area(c, d, a) > 0.0;
+            let along_bd = doubled_area(b, c, d) > 0.0 && doubled_area(d, a, b) > 0.0;
+            let is_along_bd = along_bd && !along_ac;
+            return Ok(if is_along_bd { vec![[1, 2, 3], [3, 0, 1]] } else { fan(count) });
+        }
+        let mut steps = Steps { left: STEPS_PER_CORNER * count.max(MAX_UNCOUNTED) as u64 };
+        if count > MAX_TANGLED && is_tangled(&self.flat, &mut steps)? {
+            return Ok(fan(count));
+        }
+        self.ears.clear();
+        if count <= MAX_UNCOUNTED {
+            self.earcut.earcut_slice::<u32>(&self.flat, &[], &mut self.ears);
+        } else if !ears::clip(&self.flat, &mut steps, &mut self.ears)? {
+            return Ok(fan(count));
+        }
+        Ok(self.triangles_of_ears(corners))
     }
 
     /// Turns ears into triangles of the polygon, and adds the corners that were left out.
-    fn keep_ears(&mut self, positions: &[[f64; 3]], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
-        let ears = self.ears.as_chunks::<3>().0;
+    fn triangles_of_ears(&mut self, corners: &[[f64; 3]]) -> Vec<[usize; 3]> {
+        let ears = self.ears.as_chunks::<3>().0.iter().map(|ear| ear.map(|corner| corner as usize));
         // Ear clipping has a winding of its own. The polygon's winding is positive here, and the triangles must keep
         // it.
-        let area = |ear: &[u32; 3]| {
-            let [a, b, c] = ear.map(|corner| self.flat[corner as usize]);
+        let area = |ear: [usize; 3]| {
+            let [a, b, c] = ear.map(|corner| self.flat[corner]);
             doubled_area(a, b, c)
         };
-        let flip = ears.iter().map(area).sum::<f64>() < 0.0;
-        triangles.extend(ears.iter().map(|&[a, b, c]| {
-            let [a, b, c] = [a, b, c].map(|corner| polygon[corner as usize]);
-            if flip { [a, c, b] } else { [a, b, c] }
-        }));
+        let flip = ears.clone().map(area).sum::<f64>() < 0.0;
+        let mut triangles: Vec<_> = ears.map(|[a, b, c]| if flip { [a, c, b] } else { [a, b, c] }).collect();
 
         self.kept.clear();
-        self.kept.resize(polygon.len(), false);
-        self.ears.iter().for_each(|&corner| self.kept[corner as usize] = true);
-        let Some(start) = self.kept.iter().position(|&kept| kept) else {
-            return fan(polygon, triangles);
-        };
-        let ring = |step: usize| (start + step) % polygon.len();
-        let mut last = polygon[start];
-        for step in 1..polygon.len() {
-            let (here, next) = (polygon[ring(step)], polygon[ring(step + 1)]);
-            if self.kept[ring(step)] {
+        self.kept.resize(corners.len(), false);
+        triangles.iter().flatten().for_each(|&corner| self.kept[corner] = true);
+        let Some(start) = self.kept.iter().position(|&kept| kept) else { return fan(corners.len()) };
+        let mut last = start;
+        for step in 1..corners.len() {
+            let [here, next] = [step, step + 1].map(|step| (start + step) % corners.len());
+            if self.kept[here] {
                 last = here;
-            } else if has_area([last, here, next].map(|corner| positions[corner as usize])) {
+            } else if has_area([last, here, next].map(|corner| corners[corner])) {
                 triangles.push([last, here, next]);
             }
         }
+        triangles
     }
 
     /// Projects the polygon into `self.flat`, counter-clockwise. Returns false if the polygon has no area.
-    fn flatten(&mut self, positions: &[[f64; 3]], polygon: &[u32]) -> bool {
-        let at = |corner: u32| positions[corner as usize];
-        let origin = at(polygon[0]);
-        let relative =
-            |corner: u32| -> [f64; 3] { std::array::from_fn(|axis| at(corner)[axis] - origin[axis]) };
+    fn flatten(&mut self, corners: &[[f64; 3]]) -> bool {
+        let relative = |corner: &[f64; 3]| [0, 1, 2].map(|axis| corner[axis] - corners[0][axis]);
         let mut normal = [0.0; 3];
-        let mut previous = relative(polygon[polygon.len() - 1]);
-        for &corner in polygon {
+        let mut previous = relative(&corners[corners.len() - 1]);
+        for corner in corners {
             let current = relative(corner);
             for axis in 0..3 {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -166,13 +140,14 @@ impl Cutter {
             (u, v) = (v, u);
         }
         self.flat.clear();
-        self.flat.extend(polygon.iter().map(|&corner| [at(corner)[u], at(corner)[v]]));
+        self.flat.extend(corners.iter().map(|corner| [corner[u], corner[v]]));
         true
     }
 }
 
-fn fan(polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
-    triangles.extend(polygon[1..].windows(2).map(|pair| [polygon[0], pair[0], pair[1]]));
+/// Returns the triangles between the first corner and the edges of a polygon.
+fn fan(corners: usize) -> Vec<[usize; 3]> {
+    (2..corners).map(|last| [0, last - 1, last]).collect()
 }
 
 /// Returns whether a triangle's normal differs from zero as far as f64 can represent it.
@@ -242,28 +217,15 @@ fn doubled_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Cuts polygons that are given as one list of corners and the number of corners of each polygon.
-    fn triangulate(positions: &[[f64; 3]], corners: &[u32], arities: &[usize]) -> Vec<[u32; 3]> {
-        let (mut cutter, mut triangles, mut rest) = (Cutter::default(), Vec::new(), corners);
-        for &arity in arities {
-            let (polygon, after) = rest.split_at(arity.min(rest.len()));
-            cutter.cut(positions, polygon, &mut triangles).unwrap();
-            rest = after;
-        }
-        triangles
-    }
-
-    fn cut(points: &[[f64; 2]], lift: impl Fn([f64; 2]) -> [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-        let positions: Vec<_> = points.iter().map(|&point| lift(point)).collect();
-        let corners: Vec<u32> = (0..points.len() as u32).collect();
-        let triangles = triangulate(&positions, &corners, &[points.len()]);
-        (positions, triangles)
+    fn cut(points: &[[f64; 2]], lift: impl Fn([f64; 2]) -> [f64; 3]) -> Vec<[usize; 3]> {
+        let corners: Vec<_> = points.iter().map(|&point| lift(point)).collect();
+        Cutter::default().cut(&corners).unwrap()
     }
 
     /// Returns the sum of the signed areas and the sum of their magnitudes, in the plane of x and y.
-    fn areas(points: &[[f64; 2]], triangles: &[[u32; 3]]) -> (f64, f64) {
-        let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|corner| points[corner as usize]);
+    fn areas(points: &[[f64; 2]], triangles: &[[usize; 3]]) -> (f64, f64) {
+        let area = |t: &[usize; 3]| {
+            let [a, b, c] = t.map(|corner| points[corner]);
             doubled_area(a, b, c) / 2.0
         };
         (triangles.iter().map(area).sum(), triangles.iter().map(|t| area(t).abs()).sum())
@@ -305,7 +267,7 @@ mod tests {
                 let lifts: [fn([f64; 2]) -> [f64; 3]; 3] =
                     [|[x, y]| [x, y, x + y], |[x, y]| [2.0 * y - x, x, y], |[x, y]| [y, 7.0, x]];
                 for lift in lifts {
-                    let (_, triangles) = cut(&points, lift);
+                    let triangles = cut(&points, lift);
                     let (signed, unsigned) = areas(&points, &triangles);
                     assert_eq!(signed, shoelace(&points), "{points:?}");
                     assert_eq!(unsigned, signed.abs(), "no triangle lies outside, and the winding is kept");
@@ -317,24 +279,23 @@ mod tests {
 
     #[test]
     fn a_convex_quad_is_cut_as_a_fan() {
-        let (_, triangles) = cut(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], |[x, y]| [x, y, 0.0]);
         assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]
     fn a_quad_with_a_corner_on_an_edge_gets_no_triangle_without_area() {
         let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 2.0]];
-        let (_, triangles) = cut(&points, |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&points, |[x, y]| [x, y, 0.0]);
         assert_eq!(areas(&points, &triangles), (2.0, 2.0));
         assert_eq!(triangles, [[1, 2, 3], [3, 0, 1]]);
     }
 
     #[test]
     fn polygons_without_area_become_fans() {
-        let (_, triangles) =
-            cut(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [5.0, 0.0]], |[x, _]| [x; 3]);
+        let triangles = cut(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [5.0, 0.0]], |[x, _]| [x; 3]);
         assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
-        let (_, triangles) = cut(&[[f64::NAN, 0.0]; 5], |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&[[f64::NAN, 0.0]; 5], |[x, y]| [x, y, 0.0]);
         assert_eq!(triangles.len(), 3);
     }
 
@@ -342,21 +303,21 @@ mod tests {
     fn a_corner_on_an_edge_in_projection_only_stays() {
         let positions =
             [[-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0], [-5.0, 0.0, -5.0], [0.0, 5.0, -5.0]];
-        let triangles = triangulate(&positions, &[0, 1, 2, 3, 4], &[5]);
+        let triangles = Cutter::default().cut(&positions).unwrap();
         assert_eq!(triangles.len(), 3);
         assert!(triangles.iter().flatten().any(|&corner| corner == 4), "{triangles:?}");
         // The vertex is on the edge in space as well, so that no triangle is added.
         let positions = positions.map(|[x, _, z]| [x, 0.0, z]);
-        assert_eq!(triangulate(&positions, &[0, 1, 2, 3, 4], &[5]).len(), 2);
+        assert_eq!(Cutter::default().cut(&positions).unwrap().len(), 2);
     }
 
     #[test]
     fn long_polygons_that_cross_themselves_become_fans() {
         let corner = |i: usize| [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]][i % 4];
-        let (_, triangles) = cut(&(0..2000).map(corner).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&(0..2000).map(corner).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
         assert_eq!(triangles.len(), 1998);
         let golden = |i: usize| [(2.4 * i as f64).cos(), (2.4 * i as f64).sin()];
-        let (_, triangles) = cut(&(0..2000).map(golden).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&(0..2000).map(golden).collect::<Vec<_>>(), |[x, y]| [x, y, 0.0]);
         assert_eq!(triangles[1997], [0, 1998, 1999]);
     }
 
@@ -368,7 +329,7 @@ mod tests {
             [(radius + angle) * angle.cos(), (radius + angle) * angle.sin()]
         };
         let points: Vec<_> = (0..1000).map(spiral).collect();
-        let (_, triangles) = cut(&points, |[x, y]| [x, y, 0.0]);
+        let triangles = cut(&points, |[x, y]| [x, y, 0.0]);
         let (signed, unsigned) = areas(&points, &triangles);
         assert!((unsigned - shoelace(&points).abs()).abs() <= 1e-12 * unsigned, "{signed} {unsigned}");
     }
@@ -431,8 +392,8 @@ mod tests {
             assert_eq!(ears::clip(points, &mut steps, &mut ears), Ok(true), "{number}");
             let taken = given - steps.left;
             assert!(taken < given / 4, "polygon {number}: {taken} steps for {} corners", points.len());
-            let triangles = ears.as_chunks::<3>().0;
-            let (signed, unsigned) = areas(points, triangles);
+            let ears: Vec<usize> = ears.into_iter().map(|corner| corner as usize).collect();
+            let (signed, unsigned) = areas(points, ears.as_chunks().0);
             let area = shoelace(points);
             assert!((signed - area).abs() <= 1e-9 * area, "polygon {number}: {signed}, not {area}");
             assert!((unsigned - area).abs() <= 1e-9 * area, "polygon {number}: {unsigned}, not {area}");
@@ -472,7 +433,8 @@ mod tests {
     }
 
     #[test]
-    fn short_runs_and_tiny_polygons_are_no_panic() {
-        assert_eq!(triangulate(&[[0.0; 3]], &[0, 0], &[1, 9]), Vec::<[u32; 3]>::new());
+    fn polygons_of_few_corners_are_no_panic() {
+        (0..3)
+            .for_each(|corners| assert!(Cutter::default().cut(&vec![[0.0; 3]; corners]).unwrap().is_empty()));
     }
 }
