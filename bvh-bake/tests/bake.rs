@@ -4,13 +4,12 @@ use bvh_bake::input;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Effort, Options, prove_bounds, to_bytes, to_bytes_with};
 use bvh_format::checksum::checksum;
-use bvh_format::ids::decode_id;
-use bvh_format::leaf::{TriangleEncoding, decode_packet};
+use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::ObjectRecord;
 use bvh_format::page::{PAGE, Page, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::turning::{DIRECTION_ROW, END_ROW};
-use bvh_format::validate::{packets, validate};
+use bvh_format::validate::validate;
 use bvh_format::{Layout, Rule};
 use cbvh_testkit::ball::ball;
 use cbvh_testkit::loosen::{Node, move_sphere, remote_roots, rewritten, widen};
@@ -34,27 +33,10 @@ fn soup(count: usize, seed: u64) -> Vec<Triangle> {
     (0..count).map(|_| triangle()).collect()
 }
 
-/// The file's triangles with their ids (without ids, in the order of the leaves), by the reference decoder.
+/// Returns the file's triangles with their ids, in ascending order.
 fn stored(bytes: &[u8]) -> Vec<(u32, Triangle)> {
-    let layout = Layout::read(bytes).unwrap();
-    let mut triangles = Vec::new();
-    for object in &layout.objects {
-        let origin = object.origin();
-        let first = object.record().first_page.get();
-        for page in first..first + object.record().pages.get() {
-            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile());
-            let (block, ids) =
-                (layout.leaf_block(bytes, page.header()), layout.id_block(bytes, page.header()));
-            for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-                for lane in 0..count {
-                    let corner = |v: [f32; 3]| [0, 1, 2].map(|k| origin[k] + f64::from(v[k]));
-                    let id = decode_id(ids, usize::from(packet), lane);
-                    triangles.push((id, values.triangle(lane).map(corner)));
-                }
-            }
-        }
-    }
+    let all = cbvh_testkit::stored::stored(bytes);
+    let mut triangles: Vec<_> = all.iter().map(|stored| (stored.id, stored.corners)).collect();
     triangles.sort_by_key(|&(id, _)| id);
     triangles
 }

@@ -4,13 +4,11 @@
 use bvh_bake::mesh::{Mesh, Object};
 use bvh_bake::{Options, StoredFile, to_bytes};
 use bvh_format::Layout;
-use bvh_format::ids::decode_id;
 use bvh_format::leaf::TriangleEncoding;
-use bvh_format::leaf::decode_packet;
-use bvh_format::page::Page;
-use bvh_format::validate::{packets, validate};
+use bvh_format::validate::validate;
 use cbvh_testkit::ball::ball;
 use cbvh_testkit::seal::{put_together, take_apart};
+use cbvh_testkit::stored::stored;
 use cbvh_testkit::{Random, Triangle};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -46,22 +44,9 @@ struct Stated {
 
 fn stated(bytes: &[u8], number: usize) -> Stated {
     let layout = validate(bytes).unwrap();
-    let object = &layout.objects[number];
-    let mut triangles = BTreeMap::new();
-    for page in object.pages() {
-        let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile());
-        let header = page.header();
-        let (block, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
-        for (packet, count) in packets(&page) {
-            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-            for lane in 0..count {
-                let place = 4 * (header.first_packet.get() + u32::from(packet)) + lane as u32;
-                let id = decode_id(ids, usize::from(packet), lane);
-                let corners = values.triangle(lane).map(|corner| corner.map(f32::to_bits));
-                triangles.insert(place, (id, corners));
-            }
-        }
-    }
+    let stored = stored(bytes).into_iter().filter(|triangle| triangle.object as usize == number);
+    let bits = |values: [[f32; 3]; 3]| values.map(|corner| corner.map(f32::to_bits));
+    let triangles = stored.map(|triangle| (triangle.place, (triangle.id, bits(triangle.values)))).collect();
     let topology = &layout.check_topology(bytes).unwrap()[number];
     Stated {
         closed: topology.closed,

@@ -15,6 +15,7 @@ pub mod hard_cases;
 pub mod loosen;
 pub mod random;
 pub mod seal;
+pub mod stored;
 
 pub use random::Random;
 

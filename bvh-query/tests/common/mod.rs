@@ -10,11 +10,8 @@ pub(crate) mod truth;
 
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes};
-use bvh_format::ids::decode_id;
-use bvh_format::leaf::{TriangleEncoding, decode_packet};
-use bvh_format::page::Page;
+use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_format::validate::packets;
 use bvh_query::{Backend, Bvh, Pose, Querier};
 pub(crate) use cbvh_testkit::{Random, Triangle};
 use std::path::PathBuf;
@@ -69,30 +66,11 @@ pub(crate) struct Stored {
 
 /// Returns the triangles of a file by the reference decoder, including the duplicates that were left out.
 pub(crate) fn stored(bvh: &Bvh) -> Vec<Stored> {
-    let (layout, bytes) = (bvh.layout(), bvh.bytes());
     let mut triangles = Vec::new();
-    for (number, object) in bvh.objects().iter().enumerate() {
-        let origin = object.origin();
-        let first = object.record().first_page.get();
-        for page in first..first + object.record().pages.get() {
-            let page = Page::new(layout.page_bytes(bytes, page).unwrap(), object.profile());
-            let block = layout.leaf_block(bytes, page.header());
-            let ids = layout.id_block(bytes, page.header());
-            for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-                for lane in 0..count {
-                    let corner = |v: [f32; 3]| [0, 1, 2].map(|a| origin[a] + f64::from(v[a]));
-                    let corners = values.triangle(lane).map(corner);
-                    let place = 4 * (page.header().first_packet.get() + u32::from(packet)) + lane as u32;
-                    let has_ids = layout.has_ids();
-                    let id = if has_ids { decode_id(ids, usize::from(packet), lane) } else { place };
-                    let object = number as u32;
-                    triangles.push(Stored { object, id, corners });
-                    let duplicates = bvh.duplicates_of(id).unwrap();
-                    triangles.extend(duplicates.map(|id| Stored { object, id, corners }));
-                }
-            }
-        }
+    for cbvh_testkit::stored::Stored { object, id, corners, .. } in cbvh_testkit::stored::stored(bvh.bytes())
+    {
+        triangles.push(Stored { object, id, corners });
+        triangles.extend(bvh.duplicates_of(id).unwrap().map(|id| Stored { object, id, corners }));
     }
     triangles.sort_by_key(|stored| (stored.object, stored.id));
     triangles

@@ -5,12 +5,11 @@
 
 use super::kinds::turn;
 use crate::common::{Random, bake, mesh, options};
-use bvh_format::leaf::{TriangleEncoding, decode_packet};
-use bvh_format::page::Page;
+use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_format::validate::packets;
 use bvh_query::Pose;
 use cbvh_testkit::exact::{Dyadic, Number};
+use cbvh_testkit::stored::stored;
 
 /// Returns whether `x` is an exact number, rounded to nearest, ties to even: no farther away than half way to a neighbour,
 /// and half way only with an even mantissa.
@@ -94,18 +93,11 @@ fn stored_corners_are_sums_without_rounding() {
         let encodings = [TriangleEncoding::F32, TriangleEncoding::Packed, TriangleEncoding::Quantized];
         let profile = Profile::ALL[round % Profile::ALL.len()];
         let file = bake(&mesh(&triangles), &options(profile, encodings[round % 3]));
-        let (object, layout) = (&file.objects()[0], file.layout());
-        let origin = object.origin();
-        let page = object.record().first_page.get();
-        let page = Page::new(layout.page_bytes(file.bytes(), page).unwrap(), object.profile());
-        let block = layout.leaf_block(file.bytes(), page.header());
-        for (packet, count) in packets(&page) {
-            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-            for corner in (0..count).flat_map(|lane| values.triangle(lane)) {
-                for k in 0..3 {
-                    let (v, sum) = (f64::from(corner[k]), origin[k] + f64::from(corner[k]));
-                    assert_eq!(Dyadic::of(origin[k]).plus(&Dyadic::of(v)), Dyadic::of(sum));
-                }
+        let origin = file.objects()[0].origin();
+        for corner in stored(file.bytes()).iter().flat_map(|triangle| triangle.values) {
+            for k in 0..3 {
+                let (v, sum) = (f64::from(corner[k]), origin[k] + f64::from(corner[k]));
+                assert_eq!(Dyadic::of(origin[k]).plus(&Dyadic::of(v)), Dyadic::of(sum));
             }
         }
     }
