@@ -21,7 +21,7 @@ fn an_edge_over_a_triangle_and_a_segment() {
     ];
     let translation = [1.1299171079459656, 1.5419387627434098, -6.428096199248133e-16];
     let pose = Pose::new(turn, translation).unwrap();
-    let [a, b] = [&[a][..], &[triangle, segment][..]].map(|t| baked(t));
+    let [a, b] = [&[a][..], &[triangle, segment][..]].map(baked);
     let surfaces = [&a, &b].map(|file| Surface::new(stored(file)));
     let truth = Truth::new(&surfaces[0], &surfaces[1], &pose);
     let (mut tally, mut queriers) = (Tally::default(), queriers());
