@@ -1,6 +1,6 @@
 //! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh from which it was baked.
 
-use crate::console::{self, Failure, Record, hex, length, names, plural, record};
+use crate::console::{self, Failure, Record, counted, hex, length, names, record};
 use crate::options::size;
 use crate::process;
 use bvh_bake::{FileError, StoredFile, VerifyError, VerifyOptions, validate_in_parallel, verify_files};
@@ -70,7 +70,6 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
             peak_rss_bytes: process::peak_bytes(),
         });
     }
-    let counted = |count: u64, word: &str| format!("{count} {}", plural(count, word));
     console::text(&format!(
         "{file}: valid, format {version}, {}, {}, {}, content {content}\n",
         counted(objects, "object"),
@@ -173,13 +172,12 @@ pub(crate) fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
     }
     let duplicates = match report.duplicates {
         0 => String::new(),
-        count => format!(" and {count} exact {}", plural(count, "duplicate")),
+        count => format!(" and {}", counted(count, "exact duplicate")),
     };
     let how = if report.by_id { "compared by id" } else { "compared in any order" };
     console::text(&format!(
-        "{file}: has the {} {}{duplicates} of {mesh}, {how}, moved by at most {}; every bound contains its triangles\n",
-        report.triangles,
-        plural(report.triangles, "triangle"),
+        "{file}: has the {}{duplicates} of {mesh}, {how}, moved by at most {}; every bound contains its triangles\n",
+        counted(report.triangles, "triangle"),
         length(report.max_move)
     ))
 }

@@ -39,16 +39,16 @@ impl Failure {
 
     /// Describes a file that the system does not let the command read.
     pub(crate) fn from_input(path: &Path, error: &io::Error) -> Self {
-        Self::System(format!("{}: expected a readable file, found {}", path.display(), unreadable(error)))
+        Self::system(path, format_args!("expected a readable file, found {}", unreadable(error)))
     }
 
     /// Describes a folder that the system does not let the command read.
     pub(crate) fn from_folder(path: &Path, error: &io::Error) -> Self {
-        Self::System(format!("{}: expected a readable folder, found {}", path.display(), unreadable(error)))
+        Self::system(path, format_args!("expected a readable folder, found {}", unreadable(error)))
     }
 
     /// Classifies an error of baking these inputs.
-    pub(crate) fn from_bake(inputs: &str, error: &BakeError) -> Self {
+    pub(crate) fn from_bake(inputs: impl Display, error: &BakeError) -> Self {
         let named = format!("{inputs}: {error}");
         match error {
             BakeError::Read(ReadError::Io { path, source }) => Self::from_input(path, source),
@@ -80,7 +80,22 @@ impl Failure {
             }
             _ => error.to_string(),
         };
-        Self::System(format!("{}: cannot {action}: {why}", path.display()))
+        Self::system(path, format_args!("cannot {action}: {why}"))
+    }
+
+    /// Describes a command line that cannot be obeyed, and points to the help.
+    pub(crate) fn usage(text: impl Display) -> Self {
+        Self::Usage(format!("{text} (see --help)"))
+    }
+
+    /// Describes what the system does not allow with a file or a folder.
+    pub(crate) fn system(path: &Path, error: impl Display) -> Self {
+        Self::System(format!("{}: {error}", path.display()))
+    }
+
+    /// Describes threads that the system does not start.
+    pub(crate) fn from_threads(jobs: u16, error: impl Display) -> Self {
+        Self::System(format!("--jobs {jobs}: cannot start threads: {error}"))
     }
 
     /// Describes an invalid file.
@@ -298,13 +313,13 @@ pub(crate) fn significant(value: f64) -> String {
 }
 
 /// Removes trailing zeros of a fraction.
-fn trimmed(text: &str) -> &str {
+pub(crate) fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// Returns `word` with an s, unless the count is one.
-pub(crate) fn plural(count: u64, word: &str) -> String {
-    if count == 1 { word.to_owned() } else { format!("{word}s") }
+/// Returns a count and its word, with an s unless the count is one.
+pub(crate) fn counted(count: u64, word: &str) -> String {
+    format!("{count} {word}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Returns a length in mesh units as an exponent, and zero as a plain 0.

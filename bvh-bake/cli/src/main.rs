@@ -108,7 +108,7 @@ fn failure(error: &clap::Error) -> Failure {
     let said = said.strip_prefix("error: ").unwrap_or(said);
     let paragraphs: Vec<String> =
         said.split("\n\n").map(|text| text.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
-    Failure::Usage(format!("{} (see --help)", paragraphs.join("; ")))
+    Failure::usage(paragraphs.join("; "))
 }
 
 #[cfg(test)]

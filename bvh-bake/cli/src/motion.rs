@@ -6,7 +6,7 @@ use crate::asking::{self, Answer, AskingArguments, Session};
 use crate::console::{Failure, Record, record, significant};
 use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
-use bvh_query::{Motion, MotionAnswer, MotionOptions, Querier, RigidPath as _, Shape};
+use bvh_query::{Distance, Motion, MotionAnswer, MotionOptions, Querier, RigidPath as _, Shape};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.asking.run.isa)?;
     // Clap cannot check this: where files exclude --motion, it also waives what requires --motion.
     if arguments.witness.is_some() && arguments.motion.is_none() {
-        return Err(Failure::Usage("--witness requires --motion (see --help)".into()));
+        return Err(Failure::usage("--witness requires --motion"));
     }
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
     let what = (backend, ["motion", "motions"], "motion".to_owned(), true);
@@ -79,19 +79,14 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let motion = files::one_motion(motion)?;
     let session = session()?;
     let answer = session.ask(|querier| ask(querier, session.shapes(), &motion))?;
-    let (mut text, end) = match &answer {
-        MotionAnswer::Free => ("free\n".to_owned(), None),
-        MotionAnswer::Hit { free_until, touching_at, nearest } => {
-            (format!("free until {free_until:?}, hit at {touching_at:?}\n"), Some((*touching_at, nearest)))
-        }
-        MotionAnswer::Near { free_until, at, nearest } => {
-            let apart = nearest.distance;
-            let text =
-                format!("free until {free_until:?}, {apart:?} mesh units apart at {at:?}, undecided\n");
-            (text, Some((*at, nearest)))
-        }
-    };
-    if let Some((at, distance)) = end {
+    let mut text = "free\n".to_owned();
+    if let Some((kind, [free_until, at], distance)) = end(&answer) {
+        text = match (kind, distance.distance) {
+            (HIT, _) => format!("free until {free_until:?}, hit at {at:?}\n"),
+            (_, apart) => {
+                format!("free until {free_until:?}, {apart:?} mesh units apart at {at:?}, undecided\n")
+            }
+        };
         text.push_str(&mesh::describe(session.meshes(), distance));
         if let Some(path) = &arguments.witness {
             write_file(path, &mesh::obj(session.meshes(), &motion.pose(at), distance)?)?;
@@ -100,6 +95,22 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
         text.push_str("no witness, because the motion is free\n");
     }
     session.tell_one(&answer, &text)
+}
+
+/// The names of answers that are not free.
+const HIT: &str = "hit";
+const NEAR: &str = "near";
+
+/// Returns what an answer has unless the motion is free: its name, the time until which the motion is free and the time at
+/// which it is not, and the distance at that time.
+fn end(answer: &MotionAnswer) -> Option<(&'static str, [f64; 2], &Distance)> {
+    match answer {
+        MotionAnswer::Free => None,
+        MotionAnswer::Hit { free_until, touching_at, nearest } => {
+            Some((HIT, [*free_until, *touching_at], nearest))
+        }
+        MotionAnswer::Near { free_until, at, nearest } => Some((NEAR, [*free_until, *at], nearest)),
+    }
 }
 
 impl Answer for MotionAnswer {
@@ -113,48 +124,28 @@ impl Answer for MotionAnswer {
     }
 
     fn line(&self) -> String {
-        match self {
-            Self::Free => "free".to_owned(),
-            Self::Hit { free_until, touching_at, .. } => {
-                format!("hit {} {}", significant(*free_until), significant(*touching_at))
-            }
-            Self::Near { free_until, at, .. } => {
-                format!("near {} {}", significant(*free_until), significant(*at))
-            }
-        }
+        end(self).map_or("free".to_owned(), |(kind, [free_until, at], _)| {
+            format!("{kind} {} {}", significant(free_until), significant(at))
+        })
     }
 
     fn json(&self) -> Record {
-        match self {
-            Self::Free => record! { answer: "free" },
-            Self::Hit { free_until, touching_at, nearest } => {
-                record! { answer: "hit", free_until: free_until, touching_at: touching_at }
-                    .with(asking::distance_json(nearest))
-            }
-            Self::Near { free_until, at, nearest } => {
-                record! { answer: "near", free_until: free_until, at: at }
-                    .with(asking::distance_json(nearest))
-            }
-        }
+        let Some((kind, [free_until, at], nearest)) = end(self) else { return record! { answer: "free" } };
+        record! { answer: kind, free_until: free_until }
+            .with(Record::of(if kind == HIT { "touching_at" } else { "at" }, &at))
+            .with(asking::distance_json(nearest))
     }
 
     /// Hashes a byte for the kind, and the bits of both times.
     fn hash(&self, hasher: &mut Hasher) {
-        let (kind, times) = match self {
-            Self::Free => (0, [0.0; 2]),
-            Self::Hit { free_until, touching_at, .. } => (1, [*free_until, *touching_at]),
-            Self::Near { free_until, at, .. } => (2, [*free_until, *at]),
-        };
-        hasher.update(&[kind]);
+        let (kind, times) = end(self).map_or(("", [0.0; 2]), |(kind, times, _)| (kind, times));
+        hasher.update(&[u8::from(kind == HIT) + 2 * u8::from(kind == NEAR)]);
         times.iter().for_each(|time| hasher.update(&time.to_bits().to_le_bytes()));
     }
 
     fn counts<'a>(answers: impl Iterator<Item = &'a Self>) -> Option<Record> {
-        let (mut hits, mut near) = (0, 0);
-        for answer in answers {
-            hits += u64::from(matches!(answer, Self::Hit { .. }));
-            near += u64::from(matches!(answer, Self::Near { .. }));
-        }
-        Some(record! { hits: hits, near: near })
+        let kinds: Vec<&str> = answers.filter_map(end).map(|(kind, ..)| kind).collect();
+        let count = |of: &str| kinds.iter().filter(|kind| **kind == of).count();
+        Some(record! { hits: count(HIT), near: count(NEAR) })
     }
 }

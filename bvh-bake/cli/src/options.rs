@@ -19,18 +19,18 @@ pub(crate) struct LayoutArguments {
 impl LayoutArguments {
     /// Returns the default options with this layout.
     pub(crate) fn to_options(&self) -> Options {
-        Options::default().profile(self.profile.0).triangles(self.triangles.0)
+        Options::default().profile(self.profile).triangles(self.triangles)
     }
 
     /// Returns whether vertices may move, so that `--max-error` has a meaning.
     pub(crate) fn is_quantized(&self) -> bool {
-        self.triangles.0 == Some(TriangleEncoding::Quantized)
+        self.triangles == Some(TriangleEncoding::Quantized)
     }
 }
 
-/// A choice by name; `None` leaves it to the baker.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Choice<T>(pub(crate) Option<T>);
+/// A choice by name; `None` leaves it to the baker. Under the name `Option`, clap would take it for an argument that may be
+/// missing.
+type Choice<T> = Option<T>;
 
 /// Parses the name of a profile.
 pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
@@ -45,11 +45,11 @@ pub(crate) fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> 
 /// Finds the choice of this name.
 fn choice<T: Copy>(name: &str, all: &[T], name_of: fn(T) -> &'static str) -> Result<Choice<T>, String> {
     if name == "auto" {
-        return Ok(Choice(None));
+        return Ok(None);
     }
     let names = || all.iter().map(|&one| name_of(one)).collect::<Vec<_>>().join(", ");
     let found = all.iter().find(|&&one| name_of(one) == name);
-    found.map(|&one| Choice(Some(one))).ok_or_else(|| format!("expected auto, {}", names()))
+    found.map(|&one| Some(one)).ok_or_else(|| format!("expected auto, {}", names()))
 }
 
 /// The most threads that `--jobs` may ask for.

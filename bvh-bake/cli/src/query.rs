@@ -3,7 +3,7 @@
 use crate::asking::files::{self, read_all, read_poses, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
-use crate::console::{Failure, Record, plural, record};
+use crate::console::{Failure, Record, counted, record};
 use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation, Shape};
@@ -140,24 +140,19 @@ impl Question {
     /// Takes the question from the command line, and refuses options that do not belong to its mode.
     fn new(arguments: &QueryArguments) -> Result<Self, Failure> {
         let mode = arguments.mode;
-        let wrong = |text: &str| Err(Failure::Usage(format!("{text} (see --help)")));
-        if mode == Mode::Within && arguments.within.is_none() {
-            return wrong("--mode within requires --within D");
-        }
-        if mode != Mode::Within && arguments.within.is_some() {
-            return wrong("--within requires --mode within");
-        }
+        let within = asking::within(mode == Mode::Within, arguments.within)?;
         if (arguments.rel_err.is_some() || arguments.abs_err.is_some()) && mode != Mode::Distance {
-            return wrong("--rel-err and --abs-err require --mode distance");
+            return Err(Failure::usage("--rel-err and --abs-err require --mode distance"));
         }
         if arguments.witness.is_some() && (arguments.poses.is_some() || mode != Mode::Distance) {
-            return wrong("--witness requires --mode distance and one pose, --pose instead of files");
+            let what = "--witness requires --mode distance and one pose, --pose instead of files";
+            return Err(Failure::usage(what));
         }
         let errors = DistanceOptions::new()
             .rel_err(arguments.rel_err.unwrap_or(0.0))
             .abs_err(arguments.abs_err.unwrap_or(0.0));
         let list = arguments.asking.run.json || arguments.poses.is_none();
-        Ok(Self { mode, within: arguments.within.unwrap_or(0.0), errors, list })
+        Ok(Self { mode, within, errors, list })
     }
 
     /// Returns whether the answer is the same on every backend and with every number of threads.
@@ -194,7 +189,7 @@ impl Question {
                 format!("the meshes are {how} {:?} apart\n", self.within)
             }
             Answer::Contacts(count, contacts) => {
-                let mut text = format!("{count} {} of triangles in contact\n", plural(*count, "pair"));
+                let mut text = format!("{} of triangles in contact\n", counted(*count, "pair"));
                 for contact in contacts.iter().take(MAX_LISTED) {
                     let a = mesh::name(mesh_a, contact.object_a, contact.triangle_a);
                     let b = mesh::name(mesh_b, contact.object_b, contact.triangle_b);

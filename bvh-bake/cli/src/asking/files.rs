@@ -17,12 +17,11 @@ pub(crate) fn read_all<T>(
     let names = list.unwrap_or_default().split(',').filter(|name| !name.is_empty());
     let files: Vec<PathBuf> = names.map(PathBuf::from).collect();
     if files.is_empty() {
-        return Err(Failure::Usage(format!("expected {what}, found none (see --help)")));
+        return Err(Failure::usage(format_args!("expected {what}, found none")));
     }
     if files.len() > 1 && arguments.out.as_ref().is_some_and(|out| !out.contains("%s")) {
-        return Err(Failure::Usage(format!(
-            "--out: expected %s in the name, because there are several {what} (see --help)"
-        )));
+        let what = format_args!("--out: expected %s in the name, because there are several {what}");
+        return Err(Failure::usage(what));
     }
     let read = |file: PathBuf| {
         let mut questions = read(&file)?;
@@ -102,7 +101,7 @@ pub(crate) fn stem(path: &Path) -> String {
 /// Writes a text file whole or not at all.
 pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     let written = bvh_bake::write_atomically(path, text.as_bytes());
-    written.map_err(|error| Failure::from_bake(&path.display().to_string(), &error))
+    written.map_err(|error| Failure::from_bake(path.display(), &error))
 }
 
 /// The number of numbers of a pose: the entries of a 3 by 4 matrix.

@@ -3,7 +3,8 @@
 use crate::console::{Failure, tell_line};
 use crate::map::map;
 use crate::options::LayoutArguments;
-use bvh_bake::{BakeError, Options, input, to_bytes};
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{BakeError, BakeReport, Options, input, to_bytes};
 use bvh_format::header::MAGIC;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
@@ -180,18 +181,31 @@ pub(crate) fn is_baked(path: &Path) -> Result<bool, Failure> {
 }
 
 fn bake(path: &Path, options: &Options, object: Option<&str>) -> Result<(Bvh, f64), Failure> {
-    let failed = |error: &BakeError| Failure::from_bake(&path.display().to_string(), error);
-    let mut mesh = input::read(path).map_err(|error| failed(&error.into()))?;
+    let mut mesh = read_mesh(path)?;
     // One tree is faster to query than several, unless the object is to be queried alone.
     let has = object.is_some_and(|name| mesh.objects.iter().any(|object| object.name == name));
     if !has {
         mesh = mesh.merged();
     }
     let start = Instant::now();
-    let options = options.clone().split_objects(has);
-    let (bytes, _) = to_bytes(&mesh, &options).map_err(|error| failed(&error))?;
-    let bvh = Bvh::from_bytes(bytes).map_err(|error| failed(&BakeError::Unproved(error)))?;
+    let (bvh, _) = bake_in_memory(path, &mesh, &options.clone().split_objects(has))?;
     Ok((bvh, start.elapsed().as_secs_f64()))
+}
+
+/// Reads a mesh file.
+pub(crate) fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
+    input::read(path).map_err(|error| Failure::from_bake(path.display(), &error.into()))
+}
+
+/// Bakes the mesh of a file in memory.
+pub(crate) fn bake_in_memory(
+    path: &Path,
+    mesh: &Mesh,
+    options: &Options,
+) -> Result<(Bvh, BakeReport), Failure> {
+    let failed = |error: BakeError| Failure::from_bake(path.display(), &error);
+    let (bytes, report) = to_bytes(mesh, options).map_err(failed)?;
+    Ok((Bvh::from_bytes(bytes).map_err(|error| failed(BakeError::Unproved(error)))?, report))
 }
 
 /// Returns a distance, its bounds and the closest points with their triangles.
@@ -248,9 +262,9 @@ fn corners(mesh: &LoadedMesh, object: u32, triangle: u32) -> Result<[[f64; 3]; 3
     let object = mesh.bvh.objects().get(object as usize);
     // Searches all pages of the object, which is fast enough for one answer.
     let found = object.and_then(|object| triangles(&mesh.bvh, object).find(|&(id, _)| id == triangle));
-    found.map(|(_, corners)| corners).ok_or_else(|| {
-        Failure::Invalid(format!("{}: expected triangle {triangle}, found none", mesh.path.display()))
-    })
+    found
+        .map(|(_, corners)| corners)
+        .ok_or_else(|| Failure::invalid(&mesh.path, format_args!("expected triangle {triangle}, found none")))
 }
 
 /// Returns the triangles of an object with their numbers, in the order of the file and in its frame. Without ids, they are

@@ -53,6 +53,15 @@ pub(crate) fn mode_name(mode: &impl ValueEnum) -> String {
     mode.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
+/// Returns the distance of `--within`, which only the mode of this name takes and requires.
+pub(crate) fn within(is_mode: bool, within: Option<f64>) -> Result<f64, Failure> {
+    match within {
+        None if is_mode => Err(Failure::usage("--mode within requires --within D")),
+        Some(_) if !is_mode => Err(Failure::usage("--within requires --mode within")),
+        within => Ok(within.unwrap_or(0.0)),
+    }
+}
+
 /// One mesh or two, and how to ask about them.
 pub(crate) struct Session<'a> {
     arguments: &'a AskingArguments,
@@ -226,7 +235,7 @@ impl AskingArguments {
     /// Refuses what only files of questions need.
     pub(crate) fn require_no_files(&self) -> Result<(), Failure> {
         if self.bench || self.out.is_some() {
-            return Err(Failure::Usage("--bench and --out require a file of questions (see --help)".into()));
+            return Err(Failure::usage("--bench and --out require a file of questions"));
         }
         Ok(())
     }

@@ -5,9 +5,8 @@
 //! appends to it, and removes it when the output manifest is written. It is locked, so that two processes never share
 //! it.
 
-use super::shown;
 use crate::bake::{Report, Shard};
-use crate::console::{Failure, plural};
+use crate::console::{Failure, counted};
 use crate::process;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,17 +29,15 @@ impl Journal {
         let mut part = OsString::from(path);
         part.push(".part");
         let part = PathBuf::from(part);
-        let failed = |error: io::Error| Failure::System(format!("{}: cannot create: {error}", shown(&part)));
+        let failed = |error: io::Error| Failure::system(&part, format_args!("cannot create: {error}"));
         if path.is_dir() {
-            return Err(Failure::System(format!(
-                "{}: cannot replace: expected a file or nothing, found a folder",
-                shown(path)
-            )));
+            let what = "cannot replace: expected a file or nothing, found a folder";
+            return Err(Failure::system(path, what));
         }
         let mut file = File::options().read(true).append(true).create(true).open(&part).map_err(failed)?;
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let what = "expected a file that no other process uses, found it in use; wait for the other bake or name another output manifest";
-            return Err(Failure::System(format!("{}: {what}", shown(&part))));
+            return Err(Failure::system(&part, what));
         }
         if ends_within_a_line(&mut file).map_err(failed)? {
             file.write_all(b"\n").map_err(failed)?;
@@ -48,11 +45,10 @@ impl Journal {
         Ok(Self { path: path.to_owned(), part, file, lines: Vec::new() })
     }
 
-    /// Appends the line of an asset that has ended.
-    pub(super) fn add(&mut self, number: usize, mut line: String) -> Result<(), Failure> {
-        line.push('\n');
+    /// Appends the line of an asset that has ended, with its line feed.
+    pub(super) fn add(&mut self, number: usize, line: String) -> Result<(), Failure> {
         let written = self.file.write_all(line.as_bytes());
-        written.map_err(|error| Failure::System(format!("{}: cannot write: {error}", shown(&self.part))))?;
+        written.map_err(|error| Failure::system(&self.part, format_args!("cannot write: {error}")))?;
         self.lines.push((number, line));
         Ok(())
     }
@@ -62,7 +58,7 @@ impl Journal {
         self.lines.sort_by_key(|(number, _)| *number);
         let whole: String = self.lines.into_iter().map(|(_, line)| line).collect();
         bvh_bake::write_atomically(&self.path, whole.as_bytes())
-            .map_err(|error| Failure::from_bake(&shown(&self.path), &error))?;
+            .map_err(|error| Failure::from_bake(self.path.display(), &error))?;
         // A part file that stays does no harm.
         let _ = fs::remove_file(&self.part);
         Ok(())
@@ -138,17 +134,16 @@ impl Summary {
     /// Returns the counts so far for the progress line.
     pub(super) fn progress(&self) -> String {
         let ended = self.done + self.skipped + self.failed;
-        format!("{ended} of {} {}, {} failed", self.assets, plural(self.assets, "asset"), self.failed)
+        format!("{ended} of {}, {} failed", counted(self.assets, "asset"), self.failed)
     }
 
     /// Returns the summary for people.
     pub(super) fn to_text(&self) -> String {
         let memory = process::memory_in_words();
         format!(
-            "{} {}: {} baked, {} up to date, {} failed\n  triangles    {}\n  bytes        {}\n  \
+            "{}: {} baked, {} up to date, {} failed\n  triangles    {}\n  bytes        {}\n  \
              took         {:.2} s{memory}\n",
-            self.assets,
-            plural(self.assets, "asset"),
+            counted(self.assets, "asset"),
             self.done,
             self.skipped,
             self.failed,
@@ -161,9 +156,8 @@ impl Summary {
     /// Returns the failure to end with, if any asset has failed. `results` is the file that has the details.
     pub(super) fn failure(&self, results: Option<&Path>) -> Option<Failure> {
         let code = CODES_BY_PRECEDENCE.into_iter().find(|code| self.exit_codes.contains_key(code))?;
-        let told = results.map(|path| format!(", see {}", shown(path))).unwrap_or_default();
-        let text =
-            format!("{} of {} {} failed{told}", self.failed, self.assets, plural(self.assets, "asset"));
+        let told = results.map(|path| format!(", see {}", path.display())).unwrap_or_default();
+        let text = format!("{} of {} failed{told}", self.failed, counted(self.assets, "asset"));
         Some(match code {
             1 => Failure::Usage(text),
             3 => Failure::Invalid(text),

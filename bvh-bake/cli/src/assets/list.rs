@@ -1,7 +1,6 @@
 //! Lists of assets: manifests, with one JSON object per line, and folders of meshes. Each asset is a mesh file with an output
 //! that no other asset has.
 
-use super::shown;
 use crate::console::Failure;
 use crate::{bake, options};
 use bvh_bake::Options;
@@ -46,7 +45,7 @@ pub(super) fn require_memory(list: &Path, known: u64, max_memory: Option<u64>) -
         Some(budget) if known > budget => Err(Failure::Limit(format!(
             "{}: expected a list of assets that fits into {budget} bytes of memory, found a longer one; raise --max-memory or \
              split the list",
-            shown(list)
+            list.display()
         ))),
         _ => Ok(()),
     }
@@ -65,13 +64,13 @@ pub(super) fn refuse_shared_outputs(
     for (path, what) in [(manifest, "the manifest"), (results, "the output manifest")] {
         let Some(path) = path else { continue };
         if taken.insert(place(path), Err(what)).is_some() {
+            let path = path.display();
             return Err(Failure::Usage(format!(
-                "{}: expected an output manifest other than the manifest",
-                shown(path)
+                "{path}: expected an output manifest other than the manifest"
             )));
         }
     }
-    let label = |asset: &Asset| format!("asset {} ({})", asset.line, shown(&asset.input));
+    let label = |asset: &Asset| format!("asset {} ({})", asset.line, asset.input.display());
     for asset in assets {
         if let Some(other) = taken.insert(place(&asset.output), Ok(asset)) {
             let other = other.map_or_else(str::to_owned, label);
@@ -79,7 +78,7 @@ pub(super) fn refuse_shared_outputs(
                 "expected an output of one asset only, found it used by {other} and by {}",
                 label(asset)
             );
-            return Err(Failure::Invalid(format!("{}: {what}", shown(&asset.output))));
+            return Err(Failure::invalid(&asset.output, what));
         }
     }
     for asset in assets {
@@ -87,10 +86,12 @@ pub(super) fn refuse_shared_outputs(
         if let Some(Ok(other)) =
             taken.get(&place(&asset.input)).filter(|of| of.is_ok_and(|of| of.line != asset.line))
         {
-            let what =
-                format!("expected an input that no asset writes, found the output of {}", label(other));
-            let input = shown(&asset.input);
-            return Err(Failure::Invalid(format!("{input}: {what}, as the input of asset {}", asset.line)));
+            let what = format!(
+                "expected an input that no asset writes, found the output of {}, as the input of asset {}",
+                label(other),
+                asset.line
+            );
+            return Err(Failure::invalid(&asset.input, what));
         }
     }
     Ok(())
@@ -154,14 +155,15 @@ pub(super) fn read_manifest(
         }
         bytes.pop_if(|last| *last == b'\n');
         if bytes.len() as u64 > MAX_LINE_BYTES {
-            let what =
-                format!("line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more");
-            return Err(Failure::Limit(format!("{}: {what}", shown(manifest))));
+            return Err(Failure::Limit(format!(
+                "{}: line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more",
+                manifest.display()
+            )));
         }
         if bytes.trim_ascii().is_empty() {
             continue;
         }
-        let wrong = |what: String| Failure::Invalid(format!("{}: line {number}: {what}", shown(manifest)));
+        let wrong = |what: String| Failure::invalid(manifest, format_args!("line {number}: {what}"));
         let line = parse(&bytes).map_err(wrong)?;
         let options = line.options(options).map_err(wrong)?;
         let place = |name: &str| match name {
@@ -187,20 +189,22 @@ fn parse(bytes: &[u8]) -> Result<Line, String> {
     })
 }
 
+/// Parses the choice that a field names.
+fn choice<T>(field: &str, name: &str, parse: fn(&str) -> Result<T, String>) -> Result<T, String> {
+    parse(name).map_err(|expected| format!("{field}: {expected}, found {name:?}"))
+}
+
 impl Line {
     fn options(&self, defaults: &Options) -> Result<Options, String> {
         let mut options = defaults.clone();
-        let wrong =
-            |field: &str, found: &str, expected: String| format!("{field}: {expected}, found {found:?}");
         if let Some(name) = &self.profile {
-            options.profile = options::profile(name).map_err(|expected| wrong("profile", name, expected))?.0;
+            options.profile = choice("profile", name, options::profile)?;
         }
         if let Some(name) = &self.triangles {
-            options.triangles =
-                options::triangles(name).map_err(|expected| wrong("triangles", name, expected))?.0;
+            options.triangles = choice("triangles", name, options::triangles)?;
         }
         if let Some(name) = &self.effort {
-            options.effort = bake::effort(name).map_err(|expected| wrong("effort", name, expected))?;
+            options.effort = choice("effort", name, bake::effort)?;
         }
         let is_quantized = options.triangles == Some(TriangleEncoding::Quantized);
         match self.max_error {
@@ -233,10 +237,8 @@ pub(super) fn read_folder(
     max_memory: Option<u64>,
 ) -> Result<Vec<Asset>, Failure> {
     if output.exists() && !output.is_dir() {
-        return Err(Failure::Usage(format!(
-            "{}: expected a folder, existing or new, found a file",
-            shown(output)
-        )));
+        let output = output.display();
+        return Err(Failure::Usage(format!("{output}: expected a folder, existing or new, found a file")));
     }
     let mut inputs = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -255,13 +257,13 @@ pub(super) fn read_folder(
     if inputs.is_empty() {
         // Most likely the name is wrong, so that this counts as a missing file.
         let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf or .glb, found none";
-        return Err(Failure::System(format!("{}: {what}", shown(folder))));
+        return Err(Failure::system(folder, what));
     }
     inputs.sort();
     let asset = |(line, input): (u64, PathBuf)| {
         let below = input.strip_prefix(folder).unwrap_or(&input);
         let output = output.join(below).with_extension("cbvh");
-        let (named_input, named_output) = (shown(&input), shown(&output));
+        let [named_input, named_output] = [&input, &output].map(|path| path.display().to_string());
         Asset { line, input, output, named_input, named_output, options: options.clone() }
     };
     let mut known = 0;

@@ -16,7 +16,6 @@ use indicatif::ProgressBar;
 use journal::{Journal, Summary};
 use list::Asset;
 use shares::Shares;
-use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -27,7 +26,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let mut assets = match (&arguments.manifest, &arguments.inputs[..], &arguments.output) {
         (Some(manifest), ..) => list::read_manifest(manifest, &options, arguments.max_memory)?,
         (None, [folder], Some(output)) => list::read_folder(folder, output, &options, arguments.max_memory)?,
-        _ => return Err(Failure::Usage("expected a manifest or one folder (see --help)".into())),
+        _ => return Err(Failure::usage("expected a manifest or one folder")),
     };
     let results = arguments.out_manifest.as_deref();
     list::refuse_shared_outputs(&assets, arguments.manifest.as_deref(), results)?;
@@ -145,7 +144,7 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
                 Ok(report)
             }
             Err(error) => {
-                let failure = Failure::from_bake(&asset.input.display().to_string(), &error);
+                let failure = Failure::from_bake(asset.input.display(), &error);
                 Err(failure.line().unwrap_or_else(|| (2, error.to_string())))
             }
         };
@@ -156,8 +155,6 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
                 record! { line: line, exit_code: exit_code, input: named.0, output: named.1, error: error }
             }
         };
-        let text = serde_json::to_string(&record);
-        let text = text.map_err(|error| Failure::System(format!("JSON: {error}")))?;
         let mut done = lock(&self.done);
         match &baked {
             Ok(report) => {
@@ -173,7 +170,7 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
         }
         self.spinner.set_message(done.summary.progress());
         match &mut done.journal {
-            Some(journal) => journal.add(number, text),
+            Some(journal) => journal.add(number, format!("{record}\n")),
             None => Ok(()),
         }
     }
@@ -182,9 +179,4 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
 /// Locks a mutex. Poison is ignored: a thread that panics leaves nothing half-changed behind the lock.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Returns a path as messages show it.
-fn shown(path: &Path) -> String {
-    path.display().to_string()
 }

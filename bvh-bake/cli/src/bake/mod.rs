@@ -23,12 +23,10 @@ pub(crate) fn are_many(arguments: &BakeArguments) -> bool {
 pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let options = prepare(arguments)?;
     let Some(output) = &arguments.output else {
-        return Err(Failure::Usage("expected --output <OUT.cbvh>, found none (see --help)".into()));
+        return Err(Failure::usage("expected --output <OUT.cbvh>, found none"));
     };
     if arguments.shard.is_some() || arguments.out_manifest.is_some() {
-        return Err(Failure::Usage(
-            "--shard and --out-manifest require --manifest or one folder (see --help)".into(),
-        ));
+        return Err(Failure::usage("--shard and --out-manifest require --manifest or one folder"));
     }
     let progress = Progress::default();
     let screen = Screen::new(&progress, arguments.quiet);
@@ -43,7 +41,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
             }
         });
     screen.spinner.finish_and_clear();
-    let report = baked.map_err(|error| Failure::from_bake(&names(&arguments.inputs), &error))?;
+    let report = baked.map_err(|error| Failure::from_bake(names(&arguments.inputs), &error))?;
     match &report.warning {
         Some(warning) if tells_stages => console::tell_json(&serde_json::json!({ "warning": warning })),
         Some(warning) if !arguments.json => console::tell_line(&format!("warning: {warning}")),
@@ -61,7 +59,7 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
 /// Turns the arguments into options, and applies those that concern the whole process: threads and memory.
 pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     if arguments.max_error.is_some() && !arguments.layout.is_quantized() {
-        return Err(Failure::Usage("--max-error requires --triangles quantized (see --help)".into()));
+        return Err(Failure::usage("--max-error requires --triangles quantized"));
     }
     if arguments.output.as_deref().is_some_and(|output| output == Path::new("-")) {
         return Err(Failure::Usage(
@@ -82,7 +80,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     }
     if let Some(jobs) = arguments.jobs {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
-        pool.map_err(|error| Failure::System(format!("--jobs {jobs}: cannot start threads: {error}")))?;
+        pool.map_err(|error| Failure::from_threads(jobs, error))?;
     }
     if arguments.max_memory.is_some() {
         process::give_back();

@@ -1,6 +1,6 @@
 //! What a bake prints when it has ended: a summary for people, or one JSON object.
 
-use crate::console::{Record, hex, length, names, plural, record};
+use crate::console::{Record, counted, hex, length, names, record};
 use crate::process;
 use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, StoredFile, Traffic};
 use bvh_format::Layout;
@@ -117,11 +117,10 @@ impl Report {
         let mut line = |label: &str, value: String| text.push_str(&format!("  {label:<12} {value}\n"));
         let left_out = match file.duplicates {
             0 => String::new(),
-            count => format!(" ({count} exact {} left out)", plural(count, "duplicate")),
+            count => format!(" ({} left out)", counted(count, "exact duplicate")),
         };
         line("triangles", format!("{}{left_out}, {} of zero area", file.triangles, file.degenerate));
-        let objects = plural(file.objects, "object");
-        line("vertices", format!("{} in {} {objects}", baked.vertices, file.objects));
+        line("vertices", format!("{} in {}", baked.vertices, counted(file.objects, "object")));
         if file.instances > 0 {
             line("instances", file.instances.to_string());
         } else if let Some([x, y, z]) = sides(Path::new(&self.output)) {

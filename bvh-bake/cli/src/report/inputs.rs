@@ -2,10 +2,10 @@
 
 use super::{Kind, ReportArguments};
 use crate::asking::files::require_regular;
-use crate::asking::mesh::{is_baked, refuse_scene, triangles};
+use crate::asking::mesh::{self, bake_in_memory, is_baked, refuse_scene, triangles};
 use crate::console::Failure;
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{BakeError, BakeReport, Options, input, to_bytes};
+use bvh_bake::{BakeReport, Options};
 use bvh_format::validate::validate;
 use bvh_query::Bvh;
 use std::path::{Path, PathBuf};
@@ -89,8 +89,7 @@ fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
     if is_baked(path)? {
         return unbaked(path);
     }
-    let read = input::read(path).map_err(|error| failed(path, &error.into()))?;
-    Ok(read.merged())
+    Ok(mesh::read_mesh(path)?.merged())
 }
 
 /// Returns the triangles of a `.cbvh` file in the order of their ids, or in the order of the file if it has no ids. The
@@ -120,12 +119,7 @@ pub(super) fn bake_both(pair: &Pair, [a, b]: &[Mesh; 2], options: &Options) -> R
 
 /// Bakes the mesh of a file, and checks all pages, so that no timed query pays for the first touch of one.
 fn bake(path: &Path, mesh: &Mesh, options: &Options) -> Result<Baked, Failure> {
-    let (bytes, report) = to_bytes(mesh, options).map_err(|error| failed(path, &error))?;
-    let bvh = Bvh::from_bytes(bytes).map_err(|error| failed(path, &BakeError::Unproved(error)))?;
-    bvh.validate().map_err(|error| Failure::invalid(path, error))?;
-    Ok((bvh, report))
-}
-
-fn failed(path: &Path, error: &BakeError) -> Failure {
-    Failure::from_bake(&path.display().to_string(), error)
+    let baked = bake_in_memory(path, mesh, options)?;
+    baked.0.validate().map_err(|error| Failure::invalid(path, error))?;
+    Ok(baked)
 }

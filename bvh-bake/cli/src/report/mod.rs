@@ -13,7 +13,7 @@ mod timing;
 mod ways;
 
 use crate::asking::{self, files};
-use crate::console::{self, Failure, Record, plural, spinner};
+use crate::console::{self, Failure, Record, spinner};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Options};
 use bvh_query::{Backend, Bvh, Querier, QueryError};
@@ -166,9 +166,8 @@ fn run_kind<T: Clone>(
     // All inputs are read before the first pair is measured, so that an error in the last one shows at once.
     let inputs = inputs::read(arguments, &kind, files)?;
     let out = &arguments.out;
-    std::fs::create_dir_all(out).map_err(|error| {
-        Failure::System(format!("{}: expected a folder to write to, found {error}", out.display()))
-    })?;
+    let failed = |error| Failure::system(out, format_args!("expected a folder to write to, found {error}"));
+    std::fs::create_dir_all(out).map_err(failed)?;
     let quick = arguments.quick;
     let (rounds, limit) = if quick { QUICK } else { (usize::from(arguments.rounds), arguments.limit) };
     let mut report = Report {
@@ -263,7 +262,7 @@ impl Report {
         ] {
             files::write_file(&out.join(name), &text)?;
         }
-        let counted = |count: usize, word| format!("{count} {}", plural(count as u64, word));
+        let counted = |count: usize, word| console::counted(count as u64, word);
         let mut text = format!(
             "{}: {}, {}, {}\n",
             out.join("report.html").display(),

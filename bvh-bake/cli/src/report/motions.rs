@@ -10,7 +10,7 @@ use super::timing::{order, take_turn, times};
 use super::ways::{Method, SAMPLES, Said, is_hit, judge};
 use super::{Kind, Measured, Subject, made};
 use crate::asking::files::read_motions;
-use crate::console::{Failure, Record, plural, record};
+use crate::console::{Failure, Record, counted, record};
 use bvh_query::{Backend, Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError};
 
 pub(super) const KIND: Kind<Motion> = Kind {
@@ -150,9 +150,9 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
     let count = |name| motion.number(name).unwrap_or_default() as u64;
     let (motions, hits) = (count("motions"), count("hits"));
     let mut sentences = vec![format!(
-        "{motions} {}: {hits} certified hits, {free} free, {undecided} undecided. The median time is {} \u{b5}s for the certified \
+        "{}: {hits} certified hits, {free} free, {undecided} undecided. The median time is {} \u{b5}s for the certified \
          first contact and {} \u{b5}s for the certified yes or no.",
-        plural(motions, "motion"),
+        counted(motions, "motion"),
         micro(time(motion)),
         micro(time(is_free))
     )];

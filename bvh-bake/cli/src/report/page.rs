@@ -4,7 +4,7 @@
 
 use super::plot::{self, escape};
 use super::{Measured, Report};
-use crate::console::Record;
+use crate::console::{Record, trimmed};
 
 const STYLE: &str = "\
 :root { color-scheme: light; } \
@@ -155,12 +155,7 @@ pub(super) fn figure(value: f64) -> String {
         0.0 => "0".to_owned(),
         size @ 1e-4..1e9 => {
             let decimals = (2.0 - size.log10().floor()).max(0.0) as usize;
-            let text = format!("{value:.decimals$}");
-            if text.contains('.') {
-                text.trim_end_matches('0').trim_end_matches('.').to_owned()
-            } else {
-                text
-            }
+            trimmed(&format!("{value:.decimals$}")).to_owned()
         }
         _ => format!("{value:.1e}"),
     }

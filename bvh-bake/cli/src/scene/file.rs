@@ -261,14 +261,10 @@ pub(super) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<
         (Some(path), false) => path,
         (None, true) => return Ok(as_it_stands()),
         (None, false) => {
-            return Err(Failure::Usage(
-                "expected FRAMES, because instances of the scene move (see --help)".into(),
-            ));
+            return Err(Failure::usage("expected FRAMES, because instances of the scene move"));
         }
         (Some(_), true) => {
-            return Err(Failure::Usage(
-                "expected no FRAMES, because nothing moves in the scene (see --help)".into(),
-            ));
+            return Err(Failure::usage("expected no FRAMES, because nothing moves in the scene"));
         }
     };
     let count = POSE_NUMBERS * moving.len();

@@ -97,7 +97,9 @@ enum Mode {
 /// Answers the question about each frame.
 pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let backend = asking::backend(&arguments.run.isa)?;
-    let question = Question::new(arguments, backend)?;
+    let mode = arguments.mode;
+    let within = asking::within(mode == Mode::Within, arguments.within)?;
+    let question = Question { mode, within, all_distances: arguments.list.then_some(backend) };
     let extension = arguments.scene.extension().unwrap_or_default().to_ascii_lowercase();
     let is_baked = is_baked(&arguments.scene)?;
     if !is_baked && (extension == "glb" || extension == "gltf") {
@@ -125,15 +127,13 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     }
     let run = if arguments.run.jobs > 1 {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(arguments.run.jobs)).build();
-        let pool = pool.map_err(|error| {
-            Failure::System(format!("--jobs {}: cannot start threads: {error}", arguments.run.jobs))
-        })?;
+        let pool = pool.map_err(|error| Failure::from_threads(arguments.run.jobs, error))?;
         scene.scene.set_parallel(true);
         pool.install(|| ask(&mut scene, &frames, &question, arguments))
     } else {
         ask(&mut scene, &frames, &question, arguments)
     }?;
-    let run = run.map(|answer| Told { scene: &scene, mode: question.mode, answer });
+    let run = run.map(|answer| Told { scene: &scene, mode, answer });
     if let Some(out) = &arguments.out {
         run.write_raw(out)?;
     }
@@ -192,22 +192,6 @@ impl Answer {
 }
 
 impl Question {
-    /// Takes the question from the command line.
-    fn new(arguments: &SceneArguments, backend: Backend) -> Result<Self, Failure> {
-        match (arguments.mode, arguments.within) {
-            (Mode::Within, None) => {
-                Err(Failure::Usage("--mode within requires --within D (see --help)".into()))
-            }
-            (mode, Some(_)) if mode != Mode::Within => {
-                Err(Failure::Usage("--within requires --mode within (see --help)".into()))
-            }
-            (mode, within) => {
-                let all_distances = arguments.list.then_some(backend);
-                Ok(Self { mode, within: within.unwrap_or(0.0), all_distances })
-            }
-        }
-    }
-
     fn ask(&self, loaded: &mut LoadedScene, frame: &[Pose]) -> Result<Answer, SceneError> {
         let LoadedScene { scene, moving, .. } = loaded;
         scene.set_poses(moving.iter().copied().zip(frame.iter().copied()))?;

@@ -5,7 +5,7 @@ use super::{Answer, Mode, SceneArguments};
 use crate::asking::files::stem;
 use crate::asking::runner::Run;
 use crate::asking::{self, distance_json, mode_name};
-use crate::console::{Record, plural, record, significant};
+use crate::console::{Record, counted, record, significant};
 use bvh_format::checksum::Hasher;
 use bvh_query::{Backend, InstanceId, Relation, ScenePair};
 
@@ -134,8 +134,8 @@ impl Told<'_> {
                     };
                     format!("\n  {words}")
                 };
-                let (count, lines) = (pairs.len() as u64, pairs.iter().map(line).collect::<String>());
-                format!("{count} {} {what}{lines}", plural(count, "pair"))
+                let lines: String = pairs.iter().map(line).collect();
+                format!("{} {what}{lines}", counted(pairs.len() as u64, "pair"))
             }
             Answer::Nearest(None, _) => "no pairs".to_owned(),
             Answer::Nearest(Some(of), others) => {
