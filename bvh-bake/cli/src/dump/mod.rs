@@ -10,8 +10,9 @@ use crate::options::{size, whole};
 use bvh_bake::{FileError, StoredFile};
 use bvh_format::Layout;
 use bvh_format::object::Object;
-use bvh_format::page::check_page;
+use bvh_format::page::{Page, check_page};
 use bvh_format::source::PageBytes;
+use bvh_format::treelet::Child;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -61,6 +62,12 @@ impl Contents {
         check_page(bytes.page(object).bytes(), number, object, self.layout.page_offset(number))?;
         Ok(bytes)
     }
+}
+
+/// Returns the children of a slot of a checked page, each with its place. There are no gaps between them.
+fn children(page: &Page, slot: u8) -> impl Iterator<Item = (usize, Child)> {
+    let links = page.links(slot);
+    (0..links.children()).map(move |place| (place, links.child(place)))
 }
 
 const HELP: &str = "\

@@ -1,6 +1,6 @@
 //! One decoded page, with its anchors, links and treelets; and one decoded treelet, with its links and slabs.
 
-use super::Contents;
+use super::{Contents, children};
 use crate::console::{Record, hex, record};
 use bvh_bake::FileError;
 use bvh_format::decode::decode_child;
@@ -11,13 +11,6 @@ use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::Child;
 use bvh_format::turning::decode_turning;
 use bvh_format::{FormatError, Rule};
-
-/// Returns the children of a treelet, without empty places.
-fn children(page: &Page, slot: u8) -> Vec<Child> {
-    let links = page.links(slot);
-    let children = (0..links.children()).map(|child| links.child(child));
-    children.filter(|child| !matches!(child, Child::Empty)).collect()
-}
 
 /// Returns what a link leads to: `treelet`, `remote` or `leaf`.
 fn child_json(page: &Page, child: Child) -> Record {
@@ -59,7 +52,7 @@ pub(super) fn page(contents: &Contents, number: u32) -> Result<Record, FileError
         record! { link: link, page: to.page(), root: to.root() }
     });
     let treelets = (0..header.treelets).map(|slot| {
-        let children = children(&page, slot).into_iter().map(|child| child_json(&page, child));
+        let children = children(&page, slot).map(|(_, child)| child_json(&page, child));
         record! { slot: slot, children: children.collect::<Vec<_>>() }
     });
     Ok(record! {
@@ -101,7 +94,7 @@ pub(super) fn treelet(contents: &Contents, number: u64) -> Result<Option<Record>
                 let slabs = profile.directions().slabs();
                 // Decoded from its anchor down.
                 let own = decoded_slots(object, &page)[usize::from(slot)];
-                let children = children(&page, slot).into_iter().enumerate().map(|(place, child)| {
+                let children = children(&page, slot).map(|(place, child)| {
                     let node = decode_child(profile, object.f16_scale(), page.treelet(slot), place, &own);
                     let turning = decode_turning(profile, page.treelet(slot), place, &node);
                     let turning = turning.map(|slab| {
@@ -137,13 +130,11 @@ fn decoded_slots(object: &Object, page: &Page) -> Vec<NodeSlabs> {
         decoded[usize::from(root)] = page.anchor_slabs(root);
     }
     for slot in 0..header.treelets {
-        let treelet = page.treelet(slot);
-        let links = page.links(slot);
-        for child in 0..links.children() {
-            if let Child::Treelet(inner) = links.child(child) {
-                let parent = decoded[usize::from(slot)];
+        let (treelet, parent) = (page.treelet(slot), decoded[usize::from(slot)]);
+        for (place, child) in children(page, slot) {
+            if let Child::Treelet(inner) = child {
                 decoded[usize::from(inner)] =
-                    decode_child(object.profile(), object.f16_scale(), treelet, child, &parent);
+                    decode_child(object.profile(), object.f16_scale(), treelet, place, &parent);
             }
         }
     }

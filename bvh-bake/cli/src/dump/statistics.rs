@@ -3,11 +3,11 @@
 //! Links lead only to later pages, so one pass is enough. Memory holds one page with its leaf block, and the levels of
 //! roots in pages that have not been reached.
 
-use super::Contents;
+use super::{Contents, children};
 use bvh_bake::FileError;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef};
-use bvh_format::treelet::{Child, Links};
+use bvh_format::treelet::Child;
 use bvh_format::{FormatError, Rule};
 use std::collections::BTreeMap;
 
@@ -71,10 +71,14 @@ impl Statistics {
             let levels = slot_levels(&page, &roots);
             for slot in 0..header.treelets {
                 let level = levels[usize::from(slot)];
-                let links = page.links(slot);
-                statistics.count(level, &links);
-                for child in 0..links.children() {
-                    if let Child::Remote(link) = links.child(child) {
+                let counted = statistics.level(level);
+                counted.treelets += 1;
+                for (_, child) in children(&page, slot) {
+                    counted.children += 1;
+                    if let Child::Leaf { triangles, .. } = child {
+                        counted.packets += 1;
+                        counted.triangles += u64::from(triangles);
+                    } else if let Child::Remote(link) = child {
                         ahead.insert(page.remote(link), level + 1);
                     }
                 }
@@ -88,33 +92,22 @@ impl Statistics {
         Ok(statistics)
     }
 
-    fn count(&mut self, level: usize, links: &Links) {
+    fn level(&mut self, level: usize) -> &mut Level {
         if self.levels.len() <= level {
             self.levels.resize(level + 1, Level::default());
         }
-        let level = &mut self.levels[level];
-        level.treelets += 1;
-        for child in 0..links.children() {
-            level.children += 1;
-            if let Child::Leaf { triangles, .. } = links.child(child) {
-                level.packets += 1;
-                level.triangles += u64::from(triangles);
-            }
-        }
+        &mut self.levels[level]
     }
 }
 
 /// Returns the level of each slot of a page, given the levels of its roots.
 fn slot_levels(page: &Page, roots: &[usize]) -> Vec<usize> {
     let header = page.header();
-    let mut levels = vec![0; usize::from(header.treelets)];
-    for root in 0..usize::from(header.roots) {
-        levels[root] = roots.get(root).copied().unwrap_or(0);
-    }
+    let mut levels = roots.to_vec();
+    levels.resize(usize::from(header.treelets), 0);
     for slot in 0..header.treelets {
-        let links = page.links(slot);
-        for child in 0..links.children() {
-            if let Child::Treelet(inner) = links.child(child) {
+        for (_, child) in children(page, slot) {
+            if let Child::Treelet(inner) = child {
                 levels[usize::from(inner)] = levels[usize::from(slot)] + 1;
             }
         }
