@@ -3,7 +3,7 @@
 //! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
 //! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `report`. They import these modules, which do not import them:
 //! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
-//! (memory and signals), `map` (mapped files) and `console` (output and exit codes). `cbvh --help` and the help of each
+//! (memory, mapped files and signals) and `console` (output and exit codes). `cbvh --help` and the help of each
 //! command state what scripts may rely on.
 
 mod asking;
@@ -12,7 +12,6 @@ mod bake;
 mod check;
 mod console;
 mod dump;
-mod map;
 mod motion;
 mod options;
 mod probe;

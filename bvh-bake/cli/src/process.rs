@@ -1,8 +1,11 @@
-//! This process and the system: its resident memory, how to keep it small, and signals.
+//! This process and the system: its resident memory, how to keep it small, mapped files, locks, and signals.
 
 use crate::console::{Failure, tell_line};
+use bvh_query::{Bvh, OpenError, ReadAhead};
 use indicatif::ProgressBar;
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The largest size returned so far. The system counts roughly, and its peak may shrink again by a few pages.
 static PEAK: AtomicU64 = AtomicU64::new(0);
@@ -27,9 +30,22 @@ fn status_bytes(label: &str) -> Option<u64> {
     Some(kibibytes * 1024)
 }
 
+/// Locks a mutex. Poison is ignored: a thread that panics leaves nothing half-changed behind the locks of the command.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Returns the largest resident size so far as the end of a sentence; nothing if it is unknown.
 pub(crate) fn memory_in_words() -> String {
     peak_bytes().map_or(String::new(), |bytes| format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0))
+}
+
+/// Maps a file that a person names. The README says that a mapped file must not change while it is open. Only here, the
+/// command promises that nobody changes it.
+#[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
+pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> Result<Bvh, OpenError> {
+    // SAFETY: the command never writes to a file that it maps, and those who run it are told that nobody else may.
+    unsafe { Bvh::map_with(path, read_ahead) }
 }
 
 /// Makes the allocator return large freed blocks to the system at once. The GNU C library would otherwise keep more and

@@ -1,8 +1,8 @@
 //! The meshes of a question. Each is an opened file, or a mesh baked in memory.
 
 use crate::console::{Failure, tell_line};
-use crate::map::map;
 use crate::options::LayoutArguments;
+use crate::process::map;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, BakeReport, Options, input, to_bytes};
 use bvh_format::header::MAGIC;

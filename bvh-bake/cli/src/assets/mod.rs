@@ -10,13 +10,13 @@ mod shares;
 use crate::asking::files::regular_file;
 use crate::bake::{self, BakeArguments, Report};
 use crate::console::{self, Failure, record, spinner};
-use crate::process;
-use bvh_bake::{BakeError, Progress, ReadError};
+use crate::process::{self, lock};
+use bvh_bake::{BakeError, ReadError};
 use indicatif::ProgressBar;
 use journal::{Journal, Summary};
 use list::Asset;
 use shares::Shares;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Bakes all assets of a manifest or a folder.
@@ -131,42 +131,31 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
         // The user has not seen these names, so that none of them may make the command wait.
         regular_file(&asset.input).map_err(|source| ReadError::Io { path: asset.input.clone(), source })?;
         let inputs = std::slice::from_ref(&asset.input);
-        let progress = Progress::default();
-        bake::bake(inputs, &asset.output, &asset.options, self.arguments, max_memory, &progress, &mut |_| ())
+        bake::bake(inputs, &asset.output, &asset.options, self.arguments, max_memory, None)
     }
 
     /// Counts an asset, writes its line of results, and tells what is wrong with it.
     fn note(&self, number: usize, asset: &Asset, baked: Result<Report, BakeError>) -> Result<(), Failure> {
-        let (input, output) = (asset.named_input.clone(), asset.named_output.clone());
-        let baked = match baked {
+        let Asset { line, named_input: input, named_output: output, .. } = asset;
+        let mut done = lock(&self.done);
+        let (record, told) = match baked {
             Ok(mut report) => {
-                (report.input, report.output) = (input, output);
-                Ok(report)
+                (report.input, report.output) = (input.clone(), output.clone());
+                done.summary.add(&report);
+                let record = record! { line: line, exit_code: 0 }.with(report.json());
+                (record, report.warning.map(|warning| format!("warning: {warning}")))
             }
             Err(error) => {
                 let failure = Failure::from_bake(asset.input.display(), &error);
-                Err(failure.line().unwrap_or_else(|| (2, error.to_string())))
+                let (code, error) = failure.line().unwrap_or_else(|| (2, error.to_string()));
+                done.summary.add_failed(code);
+                let what =
+                    record! { line: line, exit_code: code, input: input, output: output, error: error };
+                (what, Some(error))
             }
         };
-        let (line, named) = (asset.line, (&asset.named_input, &asset.named_output));
-        let record = match &baked {
-            Ok(report) => record! { line: line, exit_code: 0 }.with(report.json()),
-            Err((exit_code, error)) => {
-                record! { line: line, exit_code: exit_code, input: named.0, output: named.1, error: error }
-            }
-        };
-        let mut done = lock(&self.done);
-        match &baked {
-            Ok(report) => {
-                done.summary.add(report);
-                if let Some(warning) = &report.warning {
-                    self.spinner.suspend(|| console::tell_line(&format!("warning: {warning}")));
-                }
-            }
-            Err((code, error)) => {
-                done.summary.add_failed(*code);
-                self.spinner.suspend(|| console::tell_line(error));
-            }
+        if let Some(line) = told {
+            self.spinner.suspend(|| console::tell_line(&line));
         }
         self.spinner.set_message(done.summary.progress());
         match &mut done.journal {
@@ -174,9 +163,4 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
             None => Ok(()),
         }
     }
-}
-
-/// Locks a mutex. Poison is ignored: a thread that panics leaves nothing half-changed behind the lock.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -4,6 +4,7 @@
 //! memory for the largest mesh that the file can hold, or an equal part of the budget if that is more. Small assets
 //! therefore run in parallel, and an asset that needs the whole budget runs alone.
 
+use crate::process::lock;
 use bvh_bake::input::MeshFormat;
 use bvh_bake::least_memory;
 use std::path::Path;
@@ -49,9 +50,8 @@ impl Shares {
     /// Waits until this many bytes are free, or the whole budget if it is smaller, and takes them.
     pub(super) fn take(&self, bytes: u64) -> Share<'_> {
         let bytes = bytes.min(self.budget);
-        let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut free =
-            self.returned.wait_while(free, |free| *free < bytes).unwrap_or_else(PoisonError::into_inner);
+        let waited = self.returned.wait_while(lock(&self.free), |free| *free < bytes);
+        let mut free = waited.unwrap_or_else(PoisonError::into_inner);
         *free -= bytes;
         Share { bytes, shares: self }
     }
@@ -59,7 +59,7 @@ impl Shares {
 
 impl Drop for Share<'_> {
     fn drop(&mut self) {
-        *self.shares.free.lock().unwrap_or_else(PoisonError::into_inner) += self.bytes;
+        *lock(&self.shares.free) += self.bytes;
         self.shares.returned.notify_all();
     }
 }

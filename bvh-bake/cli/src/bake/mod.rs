@@ -6,10 +6,10 @@ mod screen;
 use crate::console::{self, Failure, names};
 use crate::options::{LayoutArguments, positive, size, threads};
 use crate::process;
-use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome, Progress, Step};
+use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome};
 use clap::Args;
 pub(crate) use report::Report;
-use report::{StageLine, Stages};
+use report::Stages;
 use screen::Screen;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -28,22 +28,16 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     if arguments.shard.is_some() || arguments.out_manifest.is_some() {
         return Err(Failure::usage("--shard and --out-manifest require --manifest or one folder"));
     }
-    let progress = Progress::default();
-    let screen = Screen::new(&progress, arguments.quiet);
-    let tells_stages = arguments.json && !arguments.quiet;
+    let screen = Screen::new(arguments.json, arguments.quiet);
     process::remove_unfinished_files(&screen.spinner)?;
-    let baked =
-        bake(&arguments.inputs, output, &options, arguments, arguments.max_memory, &progress, &mut |event| {
-            match event {
-                Event::Begins(step) => screen.begin(step, &progress),
-                Event::Ended(line) if tells_stages => screen.spinner.suspend(|| console::tell_json(line)),
-                Event::Ended(_) => {}
-            }
-        });
+    let (inputs, max_memory) = (&arguments.inputs, arguments.max_memory);
+    let baked = bake(inputs, output, &options, arguments, max_memory, Some(&screen));
     screen.spinner.finish_and_clear();
     let report = baked.map_err(|error| Failure::from_bake(names(&arguments.inputs), &error))?;
     match &report.warning {
-        Some(warning) if tells_stages => console::tell_json(&serde_json::json!({ "warning": warning })),
+        Some(warning) if screen.tells_stages => {
+            console::tell_json(&serde_json::json!({ "warning": warning }))
+        }
         Some(warning) if !arguments.json => console::tell_line(&format!("warning: {warning}")),
         _ => {}
     }
@@ -79,7 +73,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         std::fs::read_dir(folder).map_err(|error| Failure::from_folder(folder, &error))?;
     }
     if let Some(jobs) = arguments.jobs {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build_global();
         pool.map_err(|error| Failure::from_threads(jobs, error))?;
     }
     if arguments.max_memory.is_some() {
@@ -97,36 +91,25 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     Ok(options)
 }
 
-/// What can be observed of a bake while it runs.
-pub(crate) enum Event<'a> {
-    /// A step begins.
-    Begins(Step),
-    /// A stage has ended for all objects.
-    Ended(&'a StageLine),
-}
-
-/// Bakes meshes into one file within a budget of memory, and reports on it. The arguments say how files are handled.
+/// Bakes meshes into one file within a budget of memory, and reports on it. The arguments say how files are handled, and the
+/// screen shows the progress.
 pub(crate) fn bake(
     inputs: &[PathBuf],
     output: &Path,
     options: &Options,
     arguments: &BakeArguments,
     max_memory: Option<u64>,
-    progress: &Progress,
-    watch: &mut dyn FnMut(Event),
+    screen: Option<&Screen>,
 ) -> Result<Report, BakeError> {
     let start = Instant::now();
-    let mut stages = Stages::new(progress);
+    let progress = screen.map(|screen| screen.progress.clone()).unwrap_or_default();
+    let mut stages = Stages::new(&progress, screen);
     let BakeArguments { force, scratch, allow_outside, .. } = arguments;
     let bake = FileBake::new(inputs, output).options(options.clone()).force(*force).max_memory(max_memory);
-    let bake =
-        bake.allow_outside(*allow_outside).scratch(scratch.clone()).progress(progress).on_step(|step| {
-            watch(Event::Begins(step));
-            stages.begin(step, &mut |line| watch(Event::Ended(line)));
-        });
-    let outcome = bake.run()?;
+    let bake = bake.allow_outside(*allow_outside).scratch(scratch.clone()).progress(&progress);
+    let outcome = bake.on_step(|step| stages.begin(step)).run()?;
     let stages = match outcome {
-        Outcome::Baked(_) => stages.finish(&mut |line| watch(Event::Ended(line))),
+        Outcome::Baked(_) => stages.finish(),
         Outcome::UpToDate(_) => Vec::new(),
     };
     let seconds = start.elapsed().as_secs_f64();

@@ -1,6 +1,7 @@
 //! What a bake prints when it has ended: a summary for people, or one JSON object.
 
-use crate::console::{Record, counted, hex, length, names, record};
+use super::screen::Screen;
+use crate::console::{Record, counted, hex, length, names, record, tell_json};
 use crate::process;
 use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, StoredFile, Traffic};
 use bvh_format::Layout;
@@ -8,7 +9,7 @@ use bvh_format::header::version_name;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// What a bake has done.
 pub(crate) struct Report {
@@ -108,8 +109,7 @@ impl Report {
 
     /// Returns the summary for people.
     pub(super) fn to_text(&self) -> String {
-        let file = self.file();
-        let content = hex(file.content_xxh3);
+        let (file, content) = (self.file(), hex(self.file().content_xxh3));
         let Some(baked) = self.baked() else {
             return format!("{}: up to date, content {content}\n", self.output);
         };
@@ -163,10 +163,9 @@ impl Report {
             let [most, written] = [traffic.scratch_most, traffic.scratch_written].map(mebibytes);
             line("scratch", format!("{most:.1} MiB at most, {written:.1} MiB written"));
         }
-        let memory = process::memory_in_words();
-        let stages: Vec<String> =
-            self.stages.iter().map(|line| format!("{} {:.2}", line.stage, line.seconds)).collect();
-        line("took", format!("{:.2} s{memory}: {}", self.seconds, stages.join(", ")));
+        let stage = |line: &StageLine| format!("{} {:.2}", line.stage, line.seconds);
+        let stages = self.stages.iter().map(stage).collect::<Vec<_>>().join(", ");
+        line("took", format!("{:.2} s{}: {stages}", self.seconds, process::memory_in_words()));
         text
     }
 }
@@ -198,19 +197,25 @@ fn warning(input: &str, options: &Options, report: &BakeReport) -> Option<String
 }
 
 /// One stage as `--json` prints it. Seconds and bytes add up over the stages of a bake.
-#[derive(Serialize)]
+#[derive(Default, Clone, Serialize)]
 pub(crate) struct StageLine {
     stage: &'static str,
     seconds: f64,
     /// Triangles of the input up to `prepare`, and stored triangles from `build` on.
     triangles: u64,
     triangles_per_second: f64,
-    #[serde(flatten)]
-    taken: Taken,
+    /// Bytes read from all files, and written to them.
+    bytes_read: u64,
+    bytes_written: u64,
+    /// The part of `bytes_written` that went to scratch files.
+    spilled_bytes: u64,
+    /// Resident memory when the stage ended, and the largest since the process began.
+    resident_bytes: Option<u64>,
+    peak_rss_bytes: Option<u64>,
 }
 
 /// Returns the name of a stage, which scripts rely on.
-pub(crate) fn key(step: Step) -> &'static str {
+fn key(step: Step) -> &'static str {
     match step {
         Step::Read => "read",
         Step::Bake(Stage::Prepare) => "prepare",
@@ -222,78 +227,62 @@ pub(crate) fn key(step: Step) -> &'static str {
 }
 
 /// Measures the stages of a bake. The figures of several objects add up.
-pub(crate) struct Stages {
-    progress: Progress,
-    /// Indexed by the number of the step.
-    taken: [Taken; Step::ALL.len()],
+pub(crate) struct Stages<'a> {
+    progress: &'a Progress,
+    /// Where steps that begin and stages that have ended are shown.
+    screen: Option<&'a Screen>,
+    lines: BTreeMap<Step, StageLine>,
     open: Option<(Step, Instant, Traffic)>,
     /// The number of stages that have been reported.
     told: usize,
 }
 
-/// What a stage takes of time, files and memory.
-#[derive(Default, Clone, Serialize)]
-struct Taken {
-    #[serde(skip)]
-    time: Duration,
-    /// Bytes read from all files, and written to them.
-    bytes_read: u64,
-    bytes_written: u64,
-    /// The part of `bytes_written` that went to scratch files.
-    spilled_bytes: u64,
-    /// Resident memory when the stage ended, and the largest since the process began.
-    resident_bytes: Option<u64>,
-    peak_rss_bytes: Option<u64>,
-}
-
-impl Stages {
-    pub(crate) fn new(progress: &Progress) -> Self {
-        Self { progress: progress.clone(), taken: Default::default(), open: None, told: 0 }
+impl<'a> Stages<'a> {
+    pub(crate) fn new(progress: &'a Progress, screen: Option<&'a Screen>) -> Self {
+        Self { progress, screen, lines: BTreeMap::new(), open: None, told: 0 }
     }
 
     /// Notes that a step begins. Tells the stages that have ended for all objects.
-    pub(crate) fn begin(&mut self, step: Step, tell: &mut dyn FnMut(&StageLine)) {
+    pub(crate) fn begin(&mut self, step: Step) {
+        self.screen.iter().for_each(|screen| screen.begin(step));
         self.close();
         self.open = Some((step, Instant::now(), self.progress.traffic()));
         let has_ended = |before: Step| before < step && self.progress.share(before) == Some(1.0);
         while let Some(&before) = Step::ALL.get(self.told).filter(|&&before| has_ended(before)) {
-            tell(&self.line(before));
+            self.tell(&self.line(before));
             self.told += 1;
         }
     }
 
     /// Notes that all steps have ended. Tells the remaining stages and returns all of them.
-    pub(crate) fn finish(mut self, tell: &mut dyn FnMut(&StageLine)) -> Vec<StageLine> {
+    pub(crate) fn finish(mut self) -> Vec<StageLine> {
         self.close();
         let lines: Vec<StageLine> = Step::ALL.iter().map(|&step| self.line(step)).collect();
-        lines[self.told..].iter().for_each(tell);
+        lines[self.told..].iter().for_each(|line| self.tell(line));
         lines
+    }
+
+    fn tell(&self, line: &StageLine) {
+        if let Some(screen) = self.screen.filter(|screen| screen.tells_stages) {
+            screen.spinner.suspend(|| tell_json(line));
+        }
     }
 
     fn close(&mut self) {
         let Some((step, since, before)) = self.open.take() else { return };
         let traffic = self.progress.traffic();
-        let taken = &mut self.taken[number(step)];
-        taken.time += since.elapsed();
-        taken.bytes_read += traffic.read() - before.read();
-        taken.bytes_written += traffic.written() - before.written();
-        taken.spilled_bytes += traffic.scratch_written - before.scratch_written;
-        (taken.resident_bytes, taken.peak_rss_bytes) = (process::current_bytes(), process::peak_bytes());
+        let line = self.lines.entry(step).or_default();
+        line.seconds += since.elapsed().as_secs_f64();
+        line.bytes_read += traffic.read() - before.read();
+        line.bytes_written += traffic.written() - before.written();
+        line.spilled_bytes += traffic.scratch_written - before.scratch_written;
+        (line.resident_bytes, line.peak_rss_bytes) = (process::current_bytes(), process::peak_bytes());
     }
 
     fn line(&self, step: Step) -> StageLine {
-        let taken = &self.taken[number(step)];
-        let (seconds, triangles) = (taken.time.as_secs_f64(), self.progress.triangles(step));
-        StageLine {
-            stage: key(step),
-            seconds,
-            triangles,
-            triangles_per_second: if seconds > 0.0 { triangles as f64 / seconds } else { 0.0 },
-            taken: taken.clone(),
-        }
+        let line = self.lines.get(&step).cloned().unwrap_or_default();
+        let triangles = self.progress.triangles(step);
+        let triangles_per_second = if line.seconds > 0.0 { triangles as f64 / line.seconds } else { 0.0 };
+        StageLine { stage: key(step), triangles, triangles_per_second, ..line }
     }
-}
-
-fn number(step: Step) -> usize {
-    Step::ALL.iter().position(|&other| other == step).unwrap_or(0)
 }

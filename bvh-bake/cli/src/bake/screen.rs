@@ -1,15 +1,19 @@
 //! The progress line of a bake, on standard error if that is a terminal.
 
 use crate::console::spinner;
+use crate::process::lock;
 use bvh_bake::{Progress, Step};
 use indicatif::{FormattedDuration, HumanBytes, HumanCount, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::{self, Display, Write};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// The line on the terminal.
 pub(crate) struct Screen {
     pub(crate) spinner: ProgressBar,
+    pub(crate) progress: Progress,
+    /// Whether stages that have ended are told as JSON.
+    pub(crate) tells_stages: bool,
     step: Arc<Mutex<Option<Begun>>>,
 }
 
@@ -24,8 +28,8 @@ struct Begun {
 
 impl Screen {
     /// Shows the progress of a bake.
-    pub(crate) fn new(progress: &Progress, quiet: bool) -> Self {
-        let spinner = spinner(quiet);
+    pub(crate) fn new(json: bool, quiet: bool) -> Self {
+        let (spinner, progress) = (spinner(quiet), Progress::default());
         let step: Arc<Mutex<Option<Begun>>> = Arc::default();
         if !spinner.is_hidden() {
             let (progress, step, start) = (progress.clone(), step.clone(), Instant::now());
@@ -39,22 +43,18 @@ impl Screen {
                 spinner.set_style(style.with_key("bake", draw));
             }
         }
-        Self { spinner, step }
+        Self { spinner, progress, tells_stages: json && !quiet, step }
     }
 
     /// Notes that a step begins.
-    pub(crate) fn begin(&self, step: Step, progress: &Progress) {
+    pub(crate) fn begin(&self, step: Step) {
         if !self.spinner.is_hidden() {
-            *lock(&self.step) =
-                Some(Begun { step, since: Instant::now(), triangles: progress.triangles(step) });
+            let triangles = self.progress.triangles(step);
+            *lock(&self.step) = Some(Begun { step, since: Instant::now(), triangles });
             // Draws at once, so that even a step shorter than the spinner's interval is shown.
             self.spinner.force_draw();
         }
     }
-}
-
-fn lock(step: &Mutex<Option<Begun>>) -> MutexGuard<'_, Option<Begun>> {
-    step.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What the line says.

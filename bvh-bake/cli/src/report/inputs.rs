@@ -95,7 +95,7 @@ fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
 /// Returns the triangles of a `.cbvh` file in the order of their ids, or in the order of the file if it has no ids. The
 /// file stores only one of several exact duplicates, so the others are missing.
 fn unbaked(path: &Path) -> Result<Mesh, Failure> {
-    let bvh = crate::map::map(path, bvh_query::ReadAhead::Usual)?;
+    let bvh = crate::process::map(path, bvh_query::ReadAhead::Usual)?;
     refuse_scene(path, &bvh)?;
     validate(bvh.bytes()).map_err(|error| Failure::invalid(path, error))?;
     let mut triangles: Vec<_> = bvh.objects().iter().flat_map(|object| triangles(&bvh, object)).collect();

@@ -3,8 +3,8 @@
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
 use crate::console::Failure;
-use crate::map::map;
 use crate::options::LayoutArguments;
+use crate::process::map;
 use bvh_query::{Backend, Groups, InstanceId, Pose, ReadAhead, Scene, SceneFileError};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,15 @@ const STILL: u32 = 2;
 /// A scene file, each item with the number of its line.
 #[derive(Default)]
 pub(super) struct SceneText {
-    meshes: Vec<(usize, String, PathBuf)>,
+    meshes: Vec<PathBuf>,
     instances: Vec<(usize, String, usize, Pose)>,
     pub(super) moving: Vec<String>,
     /// Places in `instances`.
     moving_instances: Vec<usize>,
     allowed: Vec<(usize, usize)>,
+    /// The places of meshes and of instances by their names.
+    mesh_of: HashMap<String, usize>,
+    instance_of: HashMap<String, usize>,
 }
 
 /// A scene that is ready to be asked.
@@ -42,19 +45,17 @@ pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let text = String::from_utf8_lossy(&bytes);
     let mut scene = SceneText::default();
-    let (mut meshes, mut instances) = (HashMap::new(), HashMap::new());
+    let folder = path.parent().unwrap_or_else(|| Path::new(""));
     for (number, line) in (1..).zip(text.lines()) {
         let added = words(line).and_then(|words| {
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            scene.add(number, &words, path, &mut meshes, &mut instances)
+            scene.add(number, &words, folder)
         });
         added.map_err(|text| Failure::invalid(path, format_args!("line {number}: {text}")))?;
     }
     if scene.instances.is_empty() {
-        return Err(Failure::invalid(
-            path,
-            "expected at least one line: instance NAME MESH POSE, found none",
-        ));
+        let what = "expected at least one line: instance NAME MESH POSE, found none";
+        return Err(Failure::invalid(path, what));
     }
     Ok(scene)
 }
@@ -91,34 +92,25 @@ fn words(line: &str) -> Result<Vec<String>, String> {
 }
 
 impl SceneText {
-    fn add(
-        &mut self,
-        number: usize,
-        words: &[&str],
-        path: &Path,
-        meshes: &mut HashMap<String, usize>,
-        instances: &mut HashMap<String, usize>,
-    ) -> Result<(), String> {
+    /// Adds what a line says. Files are in `folder`.
+    fn add(&mut self, number: usize, words: &[&str], folder: &Path) -> Result<(), String> {
         let find = |names: &HashMap<String, usize>, what: &str, name: &str| {
-            names
-                .get(name)
-                .copied()
-                .ok_or_else(|| format!("expected {what} of an earlier line, found {name:?}"))
+            let found = names.get(name).copied();
+            found.ok_or_else(|| format!("expected {what} of an earlier line, found {name:?}"))
         };
         match *words {
             [] => {}
             ["mesh", name, file] => {
-                if meshes.insert(name.to_owned(), self.meshes.len()).is_some() {
+                if self.mesh_of.insert(name.to_owned(), self.meshes.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second mesh {name:?}"));
                 }
-                let folder = path.parent().unwrap_or_else(|| Path::new(""));
-                self.meshes.push((number, name.to_owned(), folder.join(file)));
+                self.meshes.push(folder.join(file));
             }
             ["instance", name, mesh, ..] => {
-                let mesh = find(meshes, "a mesh", mesh)?;
+                let mesh = find(&self.mesh_of, "a mesh", mesh)?;
                 let pose = files::parse_placed(&words[3..].join(" "))?;
                 let pose = pose.ok_or("expected 12 numbers, or 7, after the mesh, found none")?;
-                if instances.insert(name.to_owned(), self.instances.len()).is_some() {
+                if self.instance_of.insert(name.to_owned(), self.instances.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second instance {name:?}"));
                 }
                 self.instances.push((number, name.to_owned(), mesh, pose));
@@ -126,7 +118,7 @@ impl SceneText {
             ["moving"] => return Err("expected the names of instances after moving, found none".into()),
             ["moving", ref names @ ..] => {
                 for name in names {
-                    let instance = find(instances, "an instance", name)?;
+                    let instance = find(&self.instance_of, "an instance", name)?;
                     if self.moving_instances.contains(&instance) {
                         return Err(format!("expected each instance once, found {name:?} again"));
                     }
@@ -135,7 +127,8 @@ impl SceneText {
                 }
             }
             ["allow", a, b] => {
-                let pair = (find(instances, "an instance", a)?, find(instances, "an instance", b)?);
+                let find = |name| find(&self.instance_of, "an instance", name);
+                let pair = (find(a)?, find(b)?);
                 if a == b {
                     return Err(format!("expected two instances, found {a:?} twice"));
                 }
@@ -208,7 +201,7 @@ pub(super) fn load(
     let mut shapes = Vec::new();
     // The smallest and the largest mesh.
     let mut ends: Option<[(f64, &Path); 2]> = None;
-    for (_, _, file) in &text.meshes {
+    for file in &text.meshes {
         require_regular(file)?;
         let mesh = LoadedMesh::load(file, &how)?;
         mesh.check()?;
@@ -250,16 +243,11 @@ pub(super) struct Frame {
     pub(super) poses: Vec<Pose>,
 }
 
-/// The only frame of a scene in which nothing moves.
-pub(super) fn as_it_stands() -> Vec<Frame> {
-    vec![Frame { number: 1, line: 0, poses: Vec::new() }]
-}
-
 /// Reads the frames of a scene, each with the poses of the moving instances. A scene in which nothing moves has one frame.
 pub(super) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<Frame>, Failure> {
     let path = match (path, moving.is_empty()) {
         (Some(path), false) => path,
-        (None, true) => return Ok(as_it_stands()),
+        (None, true) => return Ok(vec![Frame { number: 1, line: 0, poses: Vec::new() }]),
         (None, false) => {
             return Err(Failure::usage("expected FRAMES, because instances of the scene move"));
         }
@@ -281,9 +269,8 @@ pub(super) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<
             ));
         }
         let poses = moving.iter().zip(words.chunks(POSE_NUMBERS)).map(|(name, words)| {
-            let pose =
-                files::parse_pose(&words.join(" ")).map_err(|text| format!("instance {name}: {text}"))?;
-            Ok(pose.unwrap_or(Pose::IDENTITY))
+            let pose = files::parse_pose(&words.join(" "));
+            Ok(pose.map_err(|text| format!("instance {name}: {text}"))?.unwrap_or(Pose::IDENTITY))
         });
         poses.collect::<Result<Vec<Pose>, String>>().map(Some)
     })?;

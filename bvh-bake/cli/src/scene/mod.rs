@@ -110,12 +110,10 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     }
     let (mut scene, mut frames) = if is_baked {
         let mut scene = file::open(&arguments.scene, backend)?;
-        let frames = if let Some(path) = &arguments.frames {
-            file::read_frames(Some(path), &scene.names_of_moving())?
-        } else {
+        if arguments.frames.is_none() {
             scene.moving.clear();
-            file::as_it_stands()
-        };
+        }
+        let frames = file::read_frames(arguments.frames.as_deref(), &scene.names_of_moving())?;
         (scene, frames)
     } else {
         let text = file::read(&arguments.scene)?;
