@@ -32,7 +32,7 @@ const MIN_SINE: f64 = 0.1;
 
 /// Returns `count` poses with the gaps in turn.
 pub(super) fn poses(querier: &mut Querier, a: &Bvh, b: &Bvh, count: usize) -> Result<Vec<Pose>, QueryError> {
-    let mut random = Random::default();
+    let mut random = Random::SEED;
     let gaps = POSE_GAPS.into_iter().cycle().take(count);
     gaps.map(|gap| Ok(Start::new(querier, a, b, &mut random, gap)?.pose)).collect()
 }
@@ -44,7 +44,7 @@ pub(super) fn motions(
     b: &Bvh,
     count: usize,
 ) -> Result<Vec<Motion>, QueryError> {
-    let (mut random, shift) = (Random::default(), SHIFT * diagonal(a));
+    let (mut random, shift) = (Random::SEED, SHIFT * diagonal(a));
     let mut motions = Vec::new();
     for number in 0..count {
         let kind = number % MOTION_GAPS.len();
@@ -129,14 +129,10 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// A linear congruential generator: what matters here is that the numbers can be reproduced, not their quality.
 struct Random(u64);
 
-impl Default for Random {
-    /// A generator with a constant seed.
-    fn default() -> Self {
-        Self(0x9e37_79b9_7f4a_7c15)
-    }
-}
-
 impl Random {
+    /// The seed, the same for all pairs.
+    const SEED: Self = Self(0x9e37_79b9_7f4a_7c15);
+
     /// Returns a number from -1 to 1.
     fn signed(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

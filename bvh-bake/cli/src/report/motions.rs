@@ -165,16 +165,11 @@ fn sentences(methods: &[Method], rows: &[Record], [free, undecided]: [usize; 2])
     let enough = SAMPLES.into_iter().rev().take_while(misses_none).last();
     for samples in [USUAL_SAMPLES, enough.unwrap_or(SAMPLES[SAMPLES.len() - 1])] {
         let Some(row) = row(Method::Ordered(samples)) else { continue };
-        let late = match (row.number("late_median"), row.number("late_max")) {
-            (Some(median), Some(max)) => {
-                format!(
-                    ", find the others late by {} of the motion in the median and {} at worst",
-                    percent(median),
-                    percent(max)
-                )
-            }
-            _ => String::new(),
-        };
+        let late = row.number("late_median").zip(row.number("late_max")).map(|(median, max)| {
+            let [median, max] = [median, max].map(percent);
+            format!(", find the others late by {median} of the motion in the median and {max} at worst")
+        });
+        let late = late.unwrap_or_default();
         sentences.push(format!(
             "{samples} samples miss {} of {hits} contacts{late}, and take {} \u{b5}s, {} times as long as the certified first \
              contact and {} times as long as the certified yes or no.",
@@ -200,12 +195,8 @@ fn panels(pair: &str, methods: &[Method], rows: &[Record]) -> Vec<Panel> {
             Series { name, is_joined: true, points: points.collect() }
         };
         let series = Method::KINDS.into_iter().enumerate().map(series).collect();
-        Panel {
-            title: format!("{pair}: time against {title}"),
-            x,
-            y: "median time per motion, \u{b5}s",
-            series,
-        }
+        let title = format!("{pair}: time against {title}");
+        Panel { title, x, y: "median time per motion, \u{b5}s", series }
     };
     vec![
         panel("contacts missed", "contacts missed, % of the certified ones", "missed_share"),

@@ -88,13 +88,9 @@ fn opening(report: &Report, words: &Words) -> String {
             list(wrong.into_iter().take(20))
         );
     }
-    for (holds, warning) in [
-        (
-            report.settings["quick"] == true,
-            "This was a quick run that asked little in two rounds. Do not quote its figures.",
-        ),
-        (origin.unoptimised, "The program was built without optimisation, so its times mean nothing."),
-    ] {
+    let quick = "This was a quick run that asked little in two rounds. Do not quote its figures.";
+    let unoptimised = "The program was built without optimisation, so its times mean nothing.";
+    for (holds, warning) in [(report.settings["quick"] == true, quick), (origin.unoptimised, unoptimised)] {
         if holds {
             text += &format!("<p class=\"wrong\">{warning}</p>\n");
         }

@@ -63,16 +63,17 @@ impl Method {
 
     /// The name for people.
     pub(super) fn in_words(self) -> String {
-        let count = self.samples().map_or(String::new(), |samples| format!("{samples} "));
-        count + Self::KINDS[self.kind()][1]
+        self.samples_in_words() + Self::KINDS[self.kind()][1]
+    }
+
+    /// The number of samples and a space.
+    fn samples_in_words(self) -> String {
+        self.samples().map_or(String::new(), |samples| format!("{samples} "))
     }
 
     /// Returns the number of samples.
     pub(super) fn samples(self) -> Option<u32> {
-        match self {
-            Self::Ordered(samples) => Some(samples),
-            Self::Motion | Self::IsFree => None,
-        }
+        if let Self::Ordered(samples) = self { Some(samples) } else { None }
     }
 
     /// Returns the times of its samples, in order.
@@ -147,7 +148,7 @@ pub(super) fn judge(
         late_median: median(late),
         undecided: method.samples().is_none().then(|| undecided.count() as u64),
     };
-    let samples = method.samples().map_or(String::new(), |samples| format!("{samples} "));
+    let samples = method.samples_in_words();
     let wrong = (1..).zip(both()).filter_map(|(number, (certified, &said))| {
         let text = contradiction(method, certified, said)?;
         Some(format!("{pair}, {samples}{}, motion {number}: {text}", method.name()))
