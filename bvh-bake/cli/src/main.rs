@@ -26,7 +26,8 @@ use console::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let result = Arguments::of_process().and_then(|arguments| match arguments.command {
+    let arguments = Arguments::try_parse().map_err(|error| failure(&error));
+    let result = arguments.and_then(|arguments| match arguments.command {
         Command::Bake(arguments) if bake::are_many(&arguments) => assets::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Dump(arguments) => dump::run(&arguments),
@@ -79,21 +80,11 @@ enum Command {
     Report(report::ReportArguments),
 }
 
-impl Arguments {
-    /// Parses the command line of this process.
-    fn of_process() -> Result<Self, Failure> {
-        Self::try_parse().map_err(|error| failure(&error))
-    }
-}
-
 /// Prints help and the version; turns everything else into one line.
 fn failure(error: &clap::Error) -> Failure {
     let text = error.render().to_string();
     if !error.use_stderr() {
-        return match console::text(&text) {
-            Ok(()) => Failure::Nothing,
-            Err(failure) => failure,
-        };
+        return console::text(&text).err().unwrap_or(Failure::Nothing);
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(

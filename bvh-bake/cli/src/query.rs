@@ -148,9 +148,8 @@ impl Question {
             let what = "--witness requires --mode distance and one pose, --pose instead of files";
             return Err(Failure::usage(what));
         }
-        let errors = DistanceOptions::new()
-            .rel_err(arguments.rel_err.unwrap_or(0.0))
-            .abs_err(arguments.abs_err.unwrap_or(0.0));
+        let [rel_err, abs_err] = [arguments.rel_err, arguments.abs_err].map(Option::unwrap_or_default);
+        let errors = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
         let list = arguments.asking.run.json || arguments.poses.is_none();
         Ok(Self { mode, within, errors, list })
     }

@@ -112,9 +112,8 @@ const A_MOTION: &str = "expected 24 numbers, two poses of 12 numbers each";
 
 /// Reads a file of poses. Each line has the 12 numbers of a 3 by 4 matrix, row by row.
 pub(crate) fn read_poses(path: &Path) -> Result<Vec<Pose>, Failure> {
-    let none =
-        "expected at least one line of 12 numbers, the rows of the 3 by 4 matrix [R | t], found no pose";
-    read_lines(path, none, parse_pose).map(unnumbered)
+    let form = "expected at least one line of 12 numbers, the rows of the 3 by 4 matrix [R | t]";
+    read_lines(path, &format!("{form}, found no pose"), parse_pose).map(unnumbered)
 }
 
 /// Reads a file of motions. Each line has the 24 numbers of two poses.
@@ -135,23 +134,21 @@ pub(crate) fn one_motion(text: &str) -> Result<Motion, Failure> {
 /// Parses a pose. Returns `None` if the text is blank.
 pub(crate) fn parse_pose(text: &str) -> Result<Option<Pose>, String> {
     let numbers = numbers(text)?;
-    match <&[f64; POSE_NUMBERS]>::try_from(&numbers[..]) {
-        Ok(rows) => Pose::from_rows(rows).map(Some).map_err(|error| error.to_string()),
-        Err(_) if numbers.is_empty() => Ok(None),
-        // Guesses what the numbers mean, and says what to write instead.
-        Err(_) => {
-            let guess = match numbers.len() {
-                7 => {
-                    "; a quaternion and a translation? write the quaternion as a 3 by 3 matrix, and each number of the \
-                     translation after a row of it"
-                }
-                9 => "; a rotation alone? write a 0 after each row of it",
-                16 => "; a 4 by 4 matrix? write its first three rows only, row by row",
-                _ => "",
-            };
-            Err(format!("{A_POSE}, found {}{guess}", numbers.len()))
-        }
+    if let Ok(rows) = <&[f64; POSE_NUMBERS]>::try_from(&numbers[..]) {
+        return Pose::from_rows(rows).map(Some).map_err(|error| error.to_string());
     }
+    // Guesses what the numbers mean, and says what to write instead.
+    let guess = match numbers.len() {
+        0 => return Ok(None),
+        7 => {
+            "; a quaternion and a translation? write the quaternion as a 3 by 3 matrix, and each number of the \
+             translation after a row of it"
+        }
+        9 => "; a rotation alone? write a 0 after each row of it",
+        16 => "; a 4 by 4 matrix? write its first three rows only, row by row",
+        _ => "",
+    };
+    Err(format!("{A_POSE}, found {}{guess}", numbers.len()))
 }
 
 /// Parses the pose of an instance, which may also be 7 numbers: x, y and z of the position, and x, y, z and w of a unit

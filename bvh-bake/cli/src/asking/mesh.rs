@@ -121,11 +121,10 @@ pub(crate) fn refuse_unknown_object(
     b: Option<&LoadedMesh>,
     how: &How,
 ) -> Result<(), Failure> {
-    let meshes = || std::iter::once(a).chain(b);
-    let Some(name) = how.object.filter(|_| meshes().all(|mesh| mesh.object.is_none())) else {
-        return Ok(());
-    };
-    let paths: Vec<String> = meshes().map(|mesh| mesh.path.display().to_string()).collect();
+    let meshes: Vec<&LoadedMesh> = std::iter::once(a).chain(b).collect();
+    let is_unknown = meshes.iter().all(|mesh| mesh.object.is_none());
+    let Some(name) = how.object.filter(|_| is_unknown) else { return Ok(()) };
+    let paths: Vec<String> = meshes.iter().map(|mesh| mesh.path.display().to_string()).collect();
     Err(Failure::Usage(format!(
         "--object: expected an object of this name in {}, found none named {name:?}; cbvh dump lists the objects of a file",
         paths.join(" or ")

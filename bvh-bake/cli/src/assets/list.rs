@@ -83,14 +83,11 @@ pub(super) fn refuse_shared_outputs(
     }
     for asset in assets {
         // The bake refuses an asset that is its own output, and the others go on.
-        if let Some(Ok(other)) =
-            taken.get(&place(&asset.input)).filter(|of| of.is_ok_and(|of| of.line != asset.line))
-        {
-            let what = format!(
-                "expected an input that no asset writes, found the output of {}, as the input of asset {}",
-                label(other),
-                asset.line
-            );
+        let writer = taken.get(&place(&asset.input)).and_then(|of| of.ok());
+        if let Some(other) = writer.filter(|other| other.line != asset.line) {
+            let (other, line) = (label(other), asset.line);
+            let what = format!("found the output of {other}, as the input of asset {line}");
+            let what = format!("expected an input that no asset writes, {what}");
             return Err(Failure::invalid(&asset.input, what));
         }
     }

@@ -55,19 +55,16 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     if arguments.max_error.is_some() && !arguments.layout.is_quantized() {
         return Err(Failure::usage("--max-error requires --triangles quantized"));
     }
-    if arguments.output.as_deref().is_some_and(|output| output == Path::new("-")) {
-        return Err(Failure::Usage(
-            "-o: expected a file, found -; an output appears whole or not at all, so it cannot be standard output (write \
-             ./- for a file of this name)"
-                .into(),
-        ));
+    let output = arguments.output.as_deref();
+    if output == Some(Path::new("-")) {
+        let what = "-o: expected a file, found -; an output appears whole or not at all, so it cannot be standard output (write \
+                    ./- for a file of this name)";
+        return Err(Failure::Usage(what.into()));
     }
-    if let Some(folder) = arguments.output.as_deref().filter(|output| output.is_dir() && !are_many(arguments))
-    {
-        return Err(Failure::System(format!(
-            "{0}: expected a file, found a folder; name a file in it, or bake a folder of meshes into it: cbvh bake DIR -o {0}",
-            folder.display()
-        )));
+    if let Some(folder) = output.filter(|output| output.is_dir() && !are_many(arguments)) {
+        let bake = format!("cbvh bake DIR -o {}", folder.display());
+        let remedy = format!("name a file in it, or bake a folder of meshes into it: {bake}");
+        return Err(Failure::system(folder, format_args!("expected a file, found a folder; {remedy}")));
     }
     if let Some(folder) = &arguments.scratch {
         std::fs::read_dir(folder).map_err(|error| Failure::from_folder(folder, &error))?;

@@ -134,28 +134,17 @@ impl Report {
             }
         }
         let because = if baked.reason.is_empty() { String::new() } else { format!(": {}", baked.reason) };
-        line(
-            "layout",
-            format!("{}, triangles {}{because}", file.profile.name(), file.triangle_encoding.name()),
-        );
-        let per_triangle = |bytes: u64| bytes as f64 / file.triangles as f64;
-        line(
-            "bytes",
-            format!(
-                "{}, {:.2} per triangle: nodes {:.2}, triangles {:.2}, ids {:.2}",
-                file.file_bytes,
-                file.bytes_per_tri(),
-                per_triangle(file.node_bytes),
-                per_triangle(file.triangle_bytes),
-                per_triangle(file.id_bytes)
-            ),
-        );
-        line("rounding", format!("vertices moved by at most {}", length(file.max_vertex_rounding)));
+        let [nodes, triangles] = [file.profile.name(), file.triangle_encoding.name()];
+        line("layout", format!("{nodes}, triangles {triangles}{because}"));
+        let (bytes, all) = (file.file_bytes, file.bytes_per_tri());
+        let [nodes, triangles, ids] = [file.node_bytes, file.triangle_bytes, file.id_bytes]
+            .map(|bytes| format!("{:.2}", bytes as f64 / file.triangles as f64));
+        let split = format!("nodes {nodes}, triangles {triangles}, ids {ids}");
+        line("bytes", format!("{bytes}, {all:.2} per triangle: {split}"));
+        let moved = |by: f64| format!("vertices moved by at most {}", length(by));
+        line("rounding", moved(file.max_vertex_rounding));
         if file.max_quantization_error > 0.0 {
-            line(
-                "quantisation",
-                format!("vertices moved by at most {}", length(file.max_quantization_error)),
-            );
+            line("quantisation", moved(file.max_quantization_error));
         }
         line("content", content);
         let (traffic, mebibytes) = (&baked.traffic, |bytes: u64| bytes as f64 / 1048576.0);

@@ -96,10 +96,8 @@ pub(super) fn treelet(contents: &Contents, number: u64) -> Result<Option<Record>
                 let own = decoded_slots(object, &page)[usize::from(slot)];
                 let children = children(&page, slot).map(|(place, child)| {
                     let node = decode_child(profile, object.f16_scale(), page.treelet(slot), place, &own);
-                    let turning = decode_turning(profile, page.treelet(slot), place, &node);
-                    let turning = turning.map(|slab| {
-                        let turning =
-                            record! { direction: slab.direction.vector(), slab: [slab.lo, slab.hi] };
+                    let turning = decode_turning(profile, page.treelet(slot), place, &node).map(|of| {
+                        let turning = record! { direction: of.direction.vector(), slab: [of.lo, of.hi] };
                         record! { turning: turning }
                     });
                     let slabs = slabs_of(&node.to_kdop(slabs), slabs);

@@ -73,9 +73,8 @@ fn add_object(text: &mut String, object: &str, indent: &str) {
         add_fields(text, object, indent);
         text.push('\n');
     } else {
-        let fields: Vec<String> =
-            fields.iter().map(|(name, value)| format!("{name} {}", plain(value.get()))).collect();
-        *text += &format!("{indent}{}\n", fields.join(", "));
+        let fields = fields.iter().map(|(name, value)| format!("{name} {}", plain(value.get())));
+        *text += &format!("{indent}{}\n", fields.collect::<Vec<_>>().join(", "));
     }
 }
 

@@ -341,11 +341,8 @@ fn sentences(rows: &[Record], [a, b]: &[String; 2]) -> Vec<String> {
     let of = |(collide, distance): (&Record, &Record)| {
         let [contact, far] = [collide, distance].map(|row| number(row, "ns_median"));
         let (layout, bytes) = (collide.text("layout"), number(collide, "file_bytes_per_tri"));
-        let shown = format!(
-            "{layout}: {} \u{b5}s for contact, {} \u{b5}s for distance, {bytes:.1} bytes per triangle",
-            micro(contact),
-            micro(far)
-        );
+        let [a, b] = [contact, far].map(|time| format!("{} \u{b5}s", micro(time)));
+        let shown = format!("{layout}: {a} for contact, {b} for distance, {bytes:.1} bytes per triangle");
         (layout, (contact * far).sqrt(), bytes, shown)
     };
     let all: Vec<_> = asked("collide").zip(asked("distance")).map(of).collect();
@@ -372,14 +369,11 @@ fn panels(pair: &str, rows: &[Record]) -> Vec<Panel> {
         let at = |row: &Record| Some((row.number(field)?, row.number("ns_median")? / 1000.0));
         let shown = || rows.iter().filter(|row| is_in(row)).filter_map(|row| Some((at(row)?, row)));
         let names = ["f32 triangles", "packed: the same values", "quantised: vertices moved"];
-        let mut series: Vec<Series> = TriangleEncoding::ALL
-            .into_iter()
-            .zip(names)
-            .map(|(triangles, name)| {
-                let of = shown().filter(|(_, row)| row.text("triangles") == triangles.name());
-                Series { name, is_joined: false, points: of.map(|(at, _)| (at, None)).collect() }
-            })
-            .collect();
+        let of = |(triangles, name): (TriangleEncoding, &'static str)| {
+            let of = shown().filter(|(_, row)| row.text("triangles") == triangles.name());
+            Series { name, is_joined: false, points: of.map(|(at, _)| (at, None)).collect() }
+        };
+        let mut series: Vec<Series> = TriangleEncoding::ALL.into_iter().zip(names).map(of).collect();
         let label = |row: &Record| match row.number("rel_err") {
             Some(rel_err) if rel_err > 0.0 => format!("{}, {} %", row.text("layout"), 100.0 * rel_err),
             _ => row.text("layout"),

@@ -263,26 +263,16 @@ impl Report {
             files::write_file(&out.join(name), &text)?;
         }
         let counted = |count: usize, word| console::counted(count as u64, word);
-        let mut text = format!(
-            "{}: {}, {}, {}\n",
-            out.join("report.html").display(),
-            counted(sections.len(), "pair"),
-            counted(json.rows.len(), "row"),
-            counted(json.wrong.len(), "wrong answer")
-        );
+        let (pairs, rows) = (counted(sections.len(), "pair"), counted(json.rows.len(), "row"));
+        let wrong = counted(json.wrong.len(), "wrong answer");
+        let mut text = format!("{}: {pairs}, {rows}, {wrong}\n", out.join("report.html").display());
         for section in sections {
-            for line in &section.sentences {
-                text += &format!("  {}: {line}\n", section.name);
-            }
+            section.sentences.iter().for_each(|line| text += &format!("  {}: {line}\n", section.name));
         }
         console::text(&text)?;
-        match json.wrong.first() {
-            None => Ok(()),
-            Some(first) => Err(Failure::invalid(
-                &out.join("report.json"),
-                format!("expected right answers, found {} wrong; the first: {first}", json.wrong.len()),
-            )),
-        }
+        let Some(first) = json.wrong.first() else { return Ok(()) };
+        let what = format!("expected right answers, found {} wrong; the first: {first}", json.wrong.len());
+        Err(Failure::invalid(&out.join("report.json"), what))
     }
 }
 

@@ -145,13 +145,9 @@ fn path(points: &[[f64; 2]], style: &str) -> String {
 
 /// Draws a mark of a series around a point.
 fn mark(kind: usize, [x, y]: [f64; 2]) -> String {
-    let corners: Vec<[f64; 2]> =
-        SHAPES[kind % SHAPES.len()].iter().map(|[dx, dy]| [x + dx, y + dy]).collect();
-    let colour = COLOURS[kind % COLOURS.len()];
-    format!(
-        "<polygon points=\"{}\" fill=\"{colour}\" fill-opacity=\"0.6\" stroke=\"{colour}\"/>\n",
-        pixels(&corners)
-    )
+    let (shape, colour) = (SHAPES[kind % SHAPES.len()], COLOURS[kind % COLOURS.len()]);
+    let corners = pixels(&shape.iter().map(|[dx, dy]| [x + dx, y + dy]).collect::<Vec<_>>());
+    format!("<polygon points=\"{corners}\" fill=\"{colour}\" fill-opacity=\"0.6\" stroke=\"{colour}\"/>\n")
 }
 
 fn pixels(points: &[[f64; 2]]) -> String {

@@ -71,9 +71,7 @@ impl asking::Answer for Told<'_> {
             Answer::Nearest(None, _) => record! { distance: None::<f64> },
             Answer::Nearest(Some(of), others) => {
                 let others = others.as_ref().map(|others| {
-                    let other = |(pair, distance): &(ScenePair, f64)| {
-                        names(pair).with(record! { distance: distance })
-                    };
+                    let other = |(pair, by): &(ScenePair, f64)| names(pair).with(record! { distance: by });
                     record! { others: others.iter().map(other).collect::<Vec<_>>() }
                 });
                 names(&of.pair).with(distance_json(&of.nearest)).with(others)
@@ -139,10 +137,8 @@ impl Told<'_> {
             }
             Answer::Nearest(None, _) => "no pairs".to_owned(),
             Answer::Nearest(Some(of), others) => {
-                let line =
-                    |pair, distance| format!("{} {} mesh units apart", names(pair), significant(distance));
-                let others =
-                    others.iter().flatten().map(|(pair, distance)| format!("\n  {}", line(pair, *distance)));
+                let line = |pair, by| format!("{} {} mesh units apart", names(pair), significant(by));
+                let others = others.iter().flatten().map(|(pair, by)| format!("\n  {}", line(pair, *by)));
                 line(&of.pair, of.nearest.distance) + &others.collect::<String>()
             }
         };
