@@ -255,7 +255,8 @@ enum {
     CBVH_BACKEND_BEST = 0,
     CBVH_BACKEND_SCALAR = 1,
     CBVH_BACKEND_AVX2 = 2,
-    CBVH_BACKEND_AVX512 = 3
+    CBVH_BACKEND_AVX512 = 3,
+    CBVH_BACKEND_NEON = 4
 };
 
 /* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. Until it is freed, it keeps the memory of

@@ -117,7 +117,7 @@ macro_rules! numbers {
     ($($name:ident = $number:expr),*) => { $(pub const $name: i32 = $number;)* };
 }
 numbers!(MAP = 0, MAP_SPARSE = 1, MAP_WHOLE = 2, READ = 3);
-numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3);
+numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3, BACKEND_NEON = 4);
 numbers!(TOUCHING = 0, APART = 1, A_IN_B = 2, B_IN_A = 3, MIXED = 4, RELATION_UNDEFINED = 5);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
 numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 3);
@@ -129,7 +129,8 @@ pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
         BACKEND_SCALAR => Backend::Scalar,
         BACKEND_AVX2 => Backend::Avx2,
         BACKEND_AVX512 => Backend::Avx512,
-        _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 3", number)),
+        BACKEND_NEON => Backend::Neon,
+        _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 4", number)),
     };
     Ok(Backend::from_name(backend.name())?)
 }

@@ -87,6 +87,7 @@ impl Files {
 ///
 /// # Safety
 /// Nobody changes the file while it is mapped.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "other systems take no hint"))]
 unsafe fn map(path: &Path, read_ahead: ReadAhead) -> io::Result<Mmap> {
     // Opening a named pipe would wait for its other end, and another file may take the name before it is opened.
     require_mappable(&std::fs::metadata(path)?)?;

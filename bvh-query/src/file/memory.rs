@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 
 /// Asks the system to read a part of a map, all of which is about to be needed.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "other systems take no hint"))]
 pub(crate) fn will_need(map: &Mmap, part: Range<usize>) {
     // What is wrong with the hint shows when the bytes are read.
     #[cfg(unix)]

@@ -11,18 +11,18 @@
 //! with derived error bounds.
 
 /// Calls intrinsics whose features the token of a backend stands for.
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! with_features {
     ($body:expr) => {
-        // SAFETY: a value of the backend's types exists only if `detect` has found the CPU to have all features that these
-        // intrinsics need. Loads and stores go through references to arrays of exactly their size, or to parts of such
+        // SAFETY: a value of the backend's types exists only if the target has all features that these intrinsics need, or
+        // if `detect` has found that the CPU has them. Loads and stores go through references to arrays of exactly their size, or to parts of such
         // arrays, and need no alignment.
         unsafe { $body }
     };
 }
 
 /// Defines methods of `Lanes` by an intrinsic each, for lanes in one register, `(0)`, or in two, `(0, 1)`.
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! by_intrinsics {
     ($registers:tt $($name:ident($($other:ident),*) $intrinsic:ident;)+) => {
         $(by_intrinsics!(@ $registers $name($($other),*) $intrinsic);)+
@@ -49,7 +49,15 @@ pub(crate) mod avx2;
 pub(crate) mod avx512;
 #[allow(unsafe_code, reason = "registers of the CPU; each block says why it is sound")]
 pub mod floats;
+#[cfg(target_arch = "aarch64")]
+#[allow(unsafe_code, reason = "loads, stores and two instructions; each says why it is sound")]
+mod neon;
+#[cfg(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128")))]
+mod quads;
 pub(crate) mod scalar;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+#[allow(unsafe_code, reason = "loads and stores; each says why it is sound")]
+mod simd128;
 
 use bvh_format::slabs::Group;
 use std::fmt;
@@ -102,6 +110,10 @@ pub(crate) struct FourRows<'a> {
     /// Rows of a group; upper ends start at row 16.
     pub(crate) rows: &'a [u32; 4],
     /// Element `4 * i + j` is four times the place of row i in its part, plus j.
+    #[cfg_attr(
+        not(target_arch = "x86_64"),
+        allow(dead_code, reason = "only AVX-512 picks lanes of registers")
+    )]
     pub(crate) lanes: &'a [u32; 16],
 }
 
@@ -219,11 +231,15 @@ pub enum Backend {
     Avx2,
     /// AVX-512 F, VL, DQ and BW.
     Avx512,
+    /// NEON, which every CPU of AArch64 has.
+    Neon,
+    /// SIMD128 of WebAssembly, if the library was compiled with it.
+    Simd128,
 }
 
 impl Backend {
-    /// All backends, the slowest first.
-    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
+    /// All backends: of those that a CPU may have, the slowest first.
+    pub const ALL: [Self; 5] = [Self::Scalar, Self::Avx2, Self::Avx512, Self::Neon, Self::Simd128];
 
     /// Returns the fastest backend of this CPU, or the one that the environment variable `CBVH_ISA` names. This is decided
     /// once per process.
@@ -239,7 +255,7 @@ impl Backend {
         CHOICE.get_or_init(choose).clone()
     }
 
-    /// Returns the backend called `scalar`, `avx2` or `avx512`, if the CPU has it.
+    /// Returns the backend called `scalar`, `avx2`, `avx512`, `neon` or `simd128`, if the CPU has it.
     ///
     /// # Errors
     /// [`BackendError`] if there is no backend of this name, or if the CPU lacks its features.
@@ -255,6 +271,8 @@ impl Backend {
             Self::Scalar => "scalar",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+            Self::Simd128 => "simd128",
         }
     }
 
@@ -266,26 +284,34 @@ impl Backend {
             Self::Avx2 => avx2::Avx2::detect().is_some(),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => avx512::Avx512::detect().is_some(),
+            // What the target has, no CPU lacks.
+            Self::Neon => cfg!(target_arch = "aarch64"),
+            Self::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             #[cfg(not(target_arch = "x86_64"))]
-            _ => false,
+            Self::Avx2 | Self::Avx512 => false,
         }
     }
 
     /// Runs a task on this backend, or on the scalar one if the CPU lacks the features.
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
-        #[cfg(target_arch = "x86_64")]
         match self {
+            #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 if let Some(isa) = avx512::Avx512::detect() {
                     return isa.run(task);
                 }
             }
+            #[cfg(target_arch = "x86_64")]
             Self::Avx2 => {
                 if let Some(isa) = avx2::Avx2::detect() {
                     return isa.run(task);
                 }
             }
-            Self::Scalar => {}
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => return quads::Quads::<neon::Neon>::NEW.run(task),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => return quads::Quads::<simd128::Simd128>::NEW.run(task),
+            _ => {}
         }
         scalar::Scalar.run(task)
     }
@@ -302,7 +328,7 @@ impl fmt::Display for Backend {
 #[non_exhaustive]
 pub enum BackendError {
     /// No backend has this name.
-    #[error("expected a backend scalar, avx2 or avx512, found {0:?}")]
+    #[error("expected a backend scalar, avx2, avx512, neon or simd128, found {0:?}")]
     Unknown(String),
     /// The CPU lacks its features.
     #[error(

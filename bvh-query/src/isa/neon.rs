@@ -1,0 +1,184 @@
+//! The NEON backend: registers of four lanes, which every CPU of AArch64 has.
+//!
+//! All `unsafe` here rests on one fact: the target of AArch64 has NEON, so that no CPU which runs this lacks it.
+
+use super::Lanes;
+use super::quads::{Four, Quad};
+use bvh_format::treelet::SHORT_CODES;
+use std::arch::aarch64::*;
+use std::arch::asm;
+
+/// Four lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Neon(float32x4_t);
+
+impl Lanes for Neon {
+    type Mask = uint32x4_t;
+
+    by_intrinsics! {
+        (0)
+        add(other) vaddq_f32;
+        sub(other) vsubq_f32;
+        mul(other) vmulq_f32;
+        div(other) vdivq_f32;
+        sqrt() vsqrtq_f32;
+        abs() vabsq_f32;
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(vfmaq_f32(term.0, self.0, factor.0)))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        Self(with_features!(vfmsq_f32(term.0, self.0, factor.0)))
+    }
+    // The minimum and the maximum of the CPU are NaN if either operand is.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::select(self.lt(other), self, other)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::select(other.lt(self), self, other)
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> uint32x4_t {
+        with_features!(vcleq_f32(self.0, other.0))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> uint32x4_t {
+        with_features!(vcltq_f32(self.0, other.0))
+    }
+    #[inline(always)]
+    fn select(mask: uint32x4_t, yes: Self, no: Self) -> Self {
+        Self(with_features!(vbslq_f32(mask, yes.0, no.0)))
+    }
+    #[inline(always)]
+    fn bits(mask: uint32x4_t) -> u16 {
+        with_features!(vaddvq_u32(vandq_u32(mask, lane_bits())) as u16)
+    }
+}
+
+impl Quad for Neon {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(with_features!(vdupq_n_f32(value)))
+    }
+    #[inline(always)]
+    fn load(from: &[f32; 4]) -> Self {
+        Self(with_features!(vld1q_f32(from.as_ptr())))
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f32; 4]) {
+        with_features!(vst1q_f32(to.as_mut_ptr(), self.0))
+    }
+    #[inline(always)]
+    fn splat_lane(self, lane: usize) -> Self {
+        Self(with_features!(match lane % 4 {
+            0 => vdupq_laneq_f32::<0>(self.0),
+            1 => vdupq_laneq_f32::<1>(self.0),
+            2 => vdupq_laneq_f32::<2>(self.0),
+            _ => vdupq_laneq_f32::<3>(self.0),
+        }))
+    }
+    #[inline(always)]
+    fn round_step_up(self) -> Self {
+        with_features!({
+            let bits = vaddq_u32(vreinterpretq_u32_f32(self.0), vdupq_n_u32(0xff));
+            Self(vreinterpretq_f32_u32(vandq_u32(bits, vdupq_n_u32(!0xff))))
+        })
+    }
+    #[inline(always)]
+    fn codes_u8(from: &[u8; 16]) -> Four<Self> {
+        with_features!({
+            let bytes = bytes(from);
+            let (low, high) = (vmovl_u8(vget_low_u8(bytes)), vmovl_high_u8(bytes));
+            Four(
+                Self(vcvtq_f32_u32(vmovl_u16(vget_low_u16(low)))),
+                Self(vcvtq_f32_u32(vmovl_high_u16(low))),
+                Self(vcvtq_f32_u32(vmovl_u16(vget_low_u16(high)))),
+                Self(vcvtq_f32_u32(vmovl_high_u16(high))),
+            )
+        })
+    }
+    #[inline(always)]
+    fn codes_f16(from: &[u8; 8]) -> Self {
+        let codes = with_features!(vld1_u8(from.as_ptr()));
+        let converted: float32x4_t;
+        // SAFETY: the instruction is part of NEON. It reads a register and writes another one.
+        unsafe {
+            asm!("fcvtl {0:v}.4s, {1:v}.4h", out(vreg) converted, in(vreg) codes, options(pure, nomem, nostack));
+        }
+        Self(converted)
+    }
+    #[inline(always)]
+    fn codes_f32(from: &[u8; 16]) -> Self {
+        Self(with_features!(vreinterpretq_f32_u8(bytes(from))))
+    }
+    #[inline(always)]
+    fn short_codes(from: &[u8; 16]) -> [u8; 16] {
+        let mut codes = [0; 16];
+        with_features!({
+            let places = vandq_u8(bytes(from), vdupq_n_u8(15));
+            vst1q_u8(codes.as_mut_ptr(), vqtbl1q_u8(bytes(&SHORT_CODES), places));
+        });
+        codes
+    }
+    #[inline(always)]
+    fn ordered(from: &[i32; 4]) -> Self {
+        with_features!({
+            let integers = integers(from);
+            let inverted = vshrq_n_u32::<1>(vreinterpretq_u32_s32(vshrq_n_s32::<31>(integers)));
+            Self(vreinterpretq_f32_u32(veorq_u32(vreinterpretq_u32_s32(integers), inverted)))
+        })
+    }
+    #[inline(always)]
+    fn times_unit(from: &[i32; 4], unit: f64) -> Self {
+        with_features!({
+            let integers = integers(from);
+            let low = vcvtq_f64_s64(vmovl_s32(vget_low_s32(integers)));
+            let high = vcvtq_f64_s64(vmovl_high_s32(integers));
+            let low = vcvt_f32_f64(vmulq_n_f64(low, unit));
+            Self(vcvt_high_f32_f64(low, vmulq_n_f64(high, unit)))
+        })
+    }
+    #[inline(always)]
+    fn mask(bits: u16) -> uint32x4_t {
+        with_features!(vtstq_u32(vdupq_n_u32(u32::from(bits)), lane_bits()))
+    }
+    #[inline(always)]
+    fn bits_of_four([a, b, c, d]: [uint32x4_t; 4]) -> u16 {
+        with_features!({
+            let narrow = |a, b| vmovn_high_u32(vmovn_u32(a), b);
+            let lanes = vmovn_high_u16(vmovn_u16(narrow(a, b)), narrow(c, d));
+            let bits = vandq_u8(lanes, bytes(&[1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128]));
+            u16::from(vaddv_u8(vget_low_u8(bits))) | u16::from(vaddv_u8(vget_high_u8(bits))) << 8
+        })
+    }
+    #[inline(always)]
+    fn prefetch_line(byte: &u8) {
+        // SAFETY: a hint that changes nothing, wherever it points.
+        unsafe {
+            asm!("prfm pldl1keep, [{0}]", in(reg) std::ptr::from_ref(byte), options(readonly, nostack, preserves_flags));
+        }
+    }
+}
+
+#[inline(always)]
+fn bytes(from: &[u8; 16]) -> uint8x16_t {
+    // SAFETY: see above.
+    with_features!(vld1q_u8(from.as_ptr()))
+}
+
+#[inline(always)]
+fn integers(from: &[i32; 4]) -> int32x4_t {
+    // SAFETY: see above.
+    with_features!(vld1q_s32(from.as_ptr()))
+}
+
+/// A bit for each lane.
+#[inline(always)]
+fn lane_bits() -> uint32x4_t {
+    // SAFETY: see above.
+    with_features!(vld1q_u32([1, 2, 4, 8].as_ptr()))
+}

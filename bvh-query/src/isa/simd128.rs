@@ -1,0 +1,171 @@
+//! The SIMD128 backend: registers of four lanes, in WebAssembly that is compiled for an engine which has them.
+//!
+//! Loads and stores are `unsafe`, because they take pointers. Here these come from references to arrays of exactly the size
+//! that is read or written, and need no alignment.
+
+use super::Lanes;
+use super::quads::{Four, Quad};
+use bvh_format::treelet::SHORT_CODES;
+use half::f16;
+use std::arch::wasm32::*;
+
+/// Four lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Simd128(v128);
+
+impl Lanes for Simd128 {
+    type Mask = v128;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(f32x4_add(self.0, other.0))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(f32x4_sub(self.0, other.0))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(f32x4_mul(self.0, other.0))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(f32x4_div(self.0, other.0))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self.mul(factor).add(term)
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        term.sub(self.mul(factor))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(f32x4_sqrt(self.0))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(f32x4_abs(self.0))
+    }
+    // These return their first operand for NaN.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(f32x4_pmin(other.0, self.0))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(f32x4_pmax(other.0, self.0))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> v128 {
+        f32x4_le(self.0, other.0)
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> v128 {
+        f32x4_lt(self.0, other.0)
+    }
+    #[inline(always)]
+    fn select(mask: v128, yes: Self, no: Self) -> Self {
+        Self(v128_bitselect(yes.0, no.0, mask))
+    }
+    #[inline(always)]
+    fn bits(mask: v128) -> u16 {
+        u16::from(i32x4_bitmask(mask))
+    }
+}
+
+impl Quad for Simd128 {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(f32x4_splat(value))
+    }
+    #[inline(always)]
+    fn load(from: &[f32; 4]) -> Self {
+        // SAFETY: see above.
+        Self(unsafe { v128_load(from.as_ptr().cast()) })
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f32; 4]) {
+        // SAFETY: see above.
+        unsafe { v128_store(to.as_mut_ptr().cast(), self.0) }
+    }
+    #[inline(always)]
+    fn splat_lane(self, lane: usize) -> Self {
+        Self(match lane % 4 {
+            0 => i32x4_shuffle::<0, 0, 0, 0>(self.0, self.0),
+            1 => i32x4_shuffle::<1, 1, 1, 1>(self.0, self.0),
+            2 => i32x4_shuffle::<2, 2, 2, 2>(self.0, self.0),
+            _ => i32x4_shuffle::<3, 3, 3, 3>(self.0, self.0),
+        })
+    }
+    #[inline(always)]
+    fn round_step_up(self) -> Self {
+        Self(v128_and(i32x4_add(self.0, i32x4_splat(0xff)), i32x4_splat(!0xff)))
+    }
+    #[inline(always)]
+    fn codes_u8(from: &[u8; 16]) -> Four<Self> {
+        let bytes = bytes(from);
+        let (low, high) = (u16x8_extend_low_u8x16(bytes), u16x8_extend_high_u8x16(bytes));
+        Four(
+            Self(f32x4_convert_u32x4(u32x4_extend_low_u16x8(low))),
+            Self(f32x4_convert_u32x4(u32x4_extend_high_u16x8(low))),
+            Self(f32x4_convert_u32x4(u32x4_extend_low_u16x8(high))),
+            Self(f32x4_convert_u32x4(u32x4_extend_high_u16x8(high))),
+        )
+    }
+    #[inline(always)]
+    fn codes_f16(from: &[u8; 8]) -> Self {
+        let code = |i: usize| f16::from_le_bytes([from[2 * i], from[2 * i + 1]]).to_f32();
+        Self(f32x4(code(0), code(1), code(2), code(3)))
+    }
+    #[inline(always)]
+    fn codes_f32(from: &[u8; 16]) -> Self {
+        Self(bytes(from))
+    }
+    #[inline(always)]
+    fn short_codes(from: &[u8; 16]) -> [u8; 16] {
+        let codes = u8x16_swizzle(bytes(&SHORT_CODES), v128_and(bytes(from), u8x16_splat(15)));
+        let mut to = [0; 16];
+        // SAFETY: see above.
+        unsafe { v128_store(to.as_mut_ptr().cast(), codes) };
+        to
+    }
+    #[inline(always)]
+    fn ordered(from: &[i32; 4]) -> Self {
+        let integers = integers(from);
+        Self(v128_xor(integers, u32x4_shr(i32x4_shr(integers, 31), 1)))
+    }
+    #[inline(always)]
+    fn times_unit(from: &[i32; 4], unit: f64) -> Self {
+        let (integers, unit) = (integers(from), f64x2_splat(unit));
+        let low = f64x2_convert_low_i32x4(integers);
+        let high = f64x2_convert_low_i32x4(i64x2_shuffle::<1, 1>(integers, integers));
+        let rounded = |doubles| f32x4_demote_f64x2_zero(f64x2_mul(doubles, unit));
+        Self(i64x2_shuffle::<0, 2>(rounded(low), rounded(high)))
+    }
+    #[inline(always)]
+    fn mask(bits: u16) -> v128 {
+        i32x4_ne(v128_and(i32x4_splat(i32::from(bits)), i32x4(1, 2, 4, 8)), i32x4_splat(0))
+    }
+    #[inline(always)]
+    fn bits_of_four([a, b, c, d]: [v128; 4]) -> u16 {
+        i8x16_bitmask(i8x16_narrow_i16x8(i16x8_narrow_i32x4(a, b), i16x8_narrow_i32x4(c, d)))
+    }
+    #[inline(always)]
+    fn prefetch_line(_byte: &u8) {
+        // WebAssembly has no prefetch instruction.
+    }
+}
+
+#[inline(always)]
+fn bytes(from: &[u8; 16]) -> v128 {
+    // SAFETY: see above.
+    unsafe { v128_load(from.as_ptr().cast()) }
+}
+
+#[inline(always)]
+fn integers(from: &[i32; 4]) -> v128 {
+    // SAFETY: see above.
+    unsafe { v128_load(from.as_ptr().cast()) }
+}
