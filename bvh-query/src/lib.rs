@@ -23,9 +23,9 @@
 //! rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the
 //! world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
-//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2, NEON,
-//! SIMD128 or portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have the same bits on
-//! every backend and in every order of queries.
+//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2,
+//! NEON, SIMD128 or portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have
+//! the same bits on every backend and in every order of queries.
 //!
 //! # Debug builds
 //! Without optimisation, queries are about a hundred times slower: a program that takes 0.18 seconds with these lines in the
