@@ -189,7 +189,7 @@ static void numbers(void) {
     FAILS(cbvh_mesh_open("x", 4, &opened), CBVH_INVALID_ARGUMENT,
           "mode: expected a number of cbvh_open_mode, 0 to 3, found 4");
     FAILS(cbvh_querier_new(-1, &(cbvh_querier){0}), CBVH_INVALID_ARGUMENT,
-          "backend: expected a number of cbvh_backend, 0 to 3, found -1");
+          "backend: expected a number of cbvh_backend, 0 to 4, found -1");
     FAILS(cbvh_querier_set_parallel(querier, 2), CBVH_INVALID_ARGUMENT, "parallel: expected 0 or 1, found 2");
     FAILS(cbvh_scene_set_tracking(scene, -1), CBVH_INVALID_ARGUMENT, "tracking: expected 0 or 1, found -1");
     FAILS(cbvh_scene_set_allowed(scene, instance, instance, 3), CBVH_INVALID_ARGUMENT, "allowed: expected 0 or 1, found 3");
