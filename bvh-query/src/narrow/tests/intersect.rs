@@ -1,8 +1,8 @@
-//! Compares `triangles_intersect` with the oracle: in every touching, coplanar and degenerate position, by name and
+//! Compares `triangles_intersect` and `segment_intersects` with the oracle: in every touching, coplanar and degenerate position, by name and
 //! at random on small grids, and in positions that rounding cannot tell from touching.
 
 use super::generate::{KINDS, float, grid_triangle, pair, shuffled};
-use crate::narrow::{Triangle, triangles_intersect};
+use crate::narrow::{Triangle, segment_intersects, triangles_intersect};
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::exact::{Length, meet};
@@ -21,6 +21,10 @@ fn expect(a: &Triangle, b: &Triangle, expected: bool) {
     }
 }
 
+fn scaled(triangle: &Triangle, scale: f64) -> Triangle {
+    triangle.map(|corner| corner.map(|x| x * scale))
+}
+
 #[test]
 fn grid_pairs_agree_with_the_oracle() {
     for (n, everyday) in [(2, 3000), (3, 4000), (5, 4000)] {
@@ -31,6 +35,10 @@ fn grid_pairs_agree_with_the_oracle() {
             let (c, d) = (shuffled(&mut random, &a), shuffled(&mut random, &b));
             assert_eq!(triangles_intersect(&float(&a), &float(&b)), expected, "{a:?} {b:?}");
             assert_eq!(triangles_intersect(&float(&d), &float(&c)), expected, "{d:?} {c:?}");
+            let [p, q, _] = d;
+            let expected = meet(&c, &[p, q, q]).unwrap();
+            let [from, to, _] = float(&d);
+            assert_eq!(segment_intersects(&float(&c), from, to), expected, "{c:?} {p:?} {q:?}");
         }
     }
 }
@@ -41,9 +49,20 @@ fn pairs_within_rounding_of_touching_agree_with_the_oracle() {
     for round in 0..KINDS * 60 {
         let (name, a, b) = pair(round % KINDS, &mut random);
         let (a, b) = (shuffled(&mut random, &a), shuffled(&mut random, &b));
-        let expected = Length::between(&a, &b).compare(0.0).is_eq();
-        assert_eq!(triangles_intersect(&a, &b), expected, "{name}: {a:?} {b:?}");
-        assert_eq!(triangles_intersect(&b, &a), expected, "{name}, swapped: {a:?} {b:?}");
+        let touches = |b: &Triangle| Length::between(&a, b).compare(0.0).is_eq();
+        let (expected, [p, q, _]) = (touches(&b), b);
+        let expected_of_segment = touches(&[p, q, q]);
+        // Bounds of errors have the unit of what they bound: scales show a product in the place of a sum.
+        for scale in [1.0, 2_f64.powi(-60), 2_f64.powi(60)] {
+            let (a, b) = (scaled(&a, scale), scaled(&b, scale));
+            assert_eq!(triangles_intersect(&a, &b), expected, "{name}: {a:?} {b:?}");
+            assert_eq!(triangles_intersect(&b, &a), expected, "{name}, swapped: {a:?} {b:?}");
+            assert_eq!(
+                segment_intersects(&a, b[0], b[1]),
+                expected_of_segment,
+                "{name}, an edge: {a:?} {b:?}"
+            );
+        }
     }
 }
 
