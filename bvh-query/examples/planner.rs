@@ -1,4 +1,4 @@
-//! Plans a way for a robot through an environment with RRT-Connect (Kuffner and LaValle, ICRA 2000), each edge of which is
+//! Plans a path for a robot through an environment with RRT-Connect (Kuffner and LaValle, ICRA 2000), each edge of which is
 //! certified: free at every moment, not at samples.
 //!
 //! ```text
@@ -33,7 +33,7 @@ impl State {
         moved.sqrt() + size * cosine.abs().min(1.0).acos()
     }
 
-    /// The state on the way to another one, at a fraction of it.
+    /// The state on the path to another one, at a fraction of it.
     fn towards(&self, other: &Self, fraction: f64) -> Self {
         let mix = |from: f64, to: f64| from + fraction * (to - from);
         let cosine: f64 = (0..4).map(|k| self.rotation[k] * other.rotation[k]).sum();
@@ -59,8 +59,8 @@ struct World {
 impl World {
     fn is_free(&mut self, from: &State, to: &State) -> Result<bool, Box<dyn Error>> {
         self.edges += 1;
-        let way = Motion::between(&from.pose()?, &to.pose()?)?;
-        Ok(self.querier.is_free(&self.environment, &self.robot, &way, &self.options)?)
+        let path = Motion::between(&from.pose()?, &to.pose()?)?;
+        Ok(self.querier.is_free(&self.environment, &self.robot, &path, &self.options)?)
     }
 }
 
@@ -88,15 +88,15 @@ impl Tree {
         Ok(Some((self.0.len() - 1, distance <= step)))
     }
 
-    /// Returns the way from the first state to this one.
-    fn way(&self, mut number: usize) -> Vec<State> {
-        let mut way = vec![self.0[number].0];
+    /// Returns the path from the first state to this one.
+    fn path(&self, mut number: usize) -> Vec<State> {
+        let mut path = vec![self.0[number].0];
         while number > 0 {
             number = self.0[number].1;
-            way.push(self.0[number].0);
+            path.push(self.0[number].0);
         }
-        way.reverse();
-        way
+        path.reverse();
+        path
     }
 }
 
@@ -141,48 +141,48 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let (start, step) = (Instant::now(), 4.0 * size);
     let mut trees = [Tree(vec![(ends[0], 0)]), Tree(vec![(ends[1], 0)])];
-    let way = 'planned: loop {
+    let path = 'planned: loop {
         for (grown, other) in [(0, 1), (1, 0)] {
             let Some((number, _)) = trees[grown].extend(&sample(), step, size, &mut world)? else { continue };
             let target = trees[grown].0[number].0;
             while let Some((met, is_there)) = trees[other].extend(&target, step, size, &mut world)? {
                 if is_there {
-                    let (mut way, mut back) = (trees[grown].way(number), trees[other].way(met));
+                    let (mut path, mut back) = (trees[grown].path(number), trees[other].path(met));
                     back.pop();
                     back.reverse();
-                    way.extend(back);
+                    path.extend(back);
                     if grown == 1 {
-                        way.reverse();
+                        path.reverse();
                     }
-                    break 'planned way;
+                    break 'planned path;
                 }
             }
         }
     };
     let seconds = start.elapsed().as_secs_f64();
-    println!("{} states, {} edges asked about in {:.1} ms", way.len(), world.edges, 1e3 * seconds);
+    println!("{} states, {} edges asked about in {:.1} ms", path.len(), world.edges, 1e3 * seconds);
 
-    // The way as a whole, certified once more.
+    // The path as a whole, certified once more.
     let mut free = 0;
-    for pair in way.windows(2) {
+    for pair in path.windows(2) {
         let edge = Motion::between(&pair[0].pose()?, &pair[1].pose()?)?;
         let answer = world.querier.motion(&world.environment, &world.robot, &edge, &world.options)?;
         free += usize::from(answer == MotionAnswer::Free);
     }
     println!(
         "{free} of {} edges are free at every moment, {} mesh units from anything",
-        way.len() - 1,
+        path.len() - 1,
         world.options.clearance
     );
     // Planners without such an answer go straight, and look at a pose here and there.
     let straight = Motion::between(&ends[0].pose()?, &ends[1].pose()?)?;
     match world.querier.motion(&world.environment, &world.robot, &straight, &world.options)? {
-        MotionAnswer::Free => println!("the straight way would have been free, too"),
+        MotionAnswer::Free => println!("the straight path would have been free, too"),
         MotionAnswer::Hit { free_until, touching_at, .. } => {
-            println!("the straight way is free until {free_until} and ends at {touching_at}");
+            println!("the straight path is free until {free_until} and ends at {touching_at}");
         }
         MotionAnswer::Near { free_until, at, .. } => {
-            println!("the straight way is free until {free_until}, near at {at}")
+            println!("the straight path is free until {free_until}, near at {at}")
         }
     }
     Ok(())

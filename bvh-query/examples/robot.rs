@@ -1,4 +1,4 @@
-//! Moves a robot among obstacles, and tells what touches, how much room is left, and whether the ways between are free.
+//! Moves a robot among obstacles, and tells what touches, how much room is left, and whether the motions between are free.
 //!
 //! ```text
 //! cargo run --release --example robot -- [URDF]
@@ -66,7 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (a, b) = (scene.name(pair.a)?, scene.name(pair.b)?);
             let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
             println!(
-                "      the way to the next step is free for {free_until:.4} of it, until {a} and {b} touch"
+                "      the motion to the next step is free for {free_until:.4} of it, until {a} and {b} touch"
             );
         }
     }

@@ -1,4 +1,4 @@
-// What a planner asks: is the way between two poses free, at every moment? A wall with a door, and a box that goes
+// What a planner asks: is the motion between two poses free, at every moment? A wall with a door, and a box that goes
 // through.
 #include <cbvh.hpp>
 

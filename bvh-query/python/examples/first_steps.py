@@ -28,9 +28,9 @@ with tempfile.TemporaryDirectory() as folder:
     print(f"it touches the walls in {touch.sum()} of {len(poses)} poses")
     print(f"in the first one it is {apart.distance[0]} away, certainly {apart.lower[0]:.12g} to {apart.upper[0]:.12g}")
 
-    # The whole way, at every moment.
-    way = walls.motion(robot, cbvh.Motion.between(poses[0], poses[-1]))
-    print(f"the way is a {way.kind.name}, surely free until {way.free_until:.9f}")
+    # The motion from the first pose to the last, at every moment.
+    answer = walls.motion(robot, cbvh.Motion.between(poses[0], poses[-1]))
+    print(f"the motion gives {answer.kind.name} and is certainly free until {answer.free_until:.9f}")
 
     # Points, rays, and many placed meshes at once.
     print(f"a wall below the origin is {walls.first_hits([0, 0, 0], [0, 0, -1]).t} away")

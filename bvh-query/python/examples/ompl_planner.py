@@ -1,4 +1,4 @@
-"""OMPL plans ways for a rigid body, and each edge of a way is certified: free at every moment, not at samples.
+"""OMPL plans paths for a rigid body, and each edge of a path is certified: free at every moment, not at samples.
 
     pip install ompl
     python examples/ompl_planner.py
@@ -21,7 +21,7 @@ import cbvh
 TESTDATA = pathlib.Path(__file__).resolve().parents[3] / "testdata"
 # The box of the robot's positions, how far its corners are from its origin, and how near it may come, in mesh units.
 LOW, HIGH, SIZE, CLEARANCE = [-3000, -3000, 0], [3000, 3000, 3000], 890, 9
-WAYS = 3
+PATHS = 3
 
 
 def pose_of(state):
@@ -40,10 +40,10 @@ class Certified(base.MotionValidator):
 
     def checkMotion(self, start, end):
         try:
-            # The origin moves on a line, and the rotation is a slerp the shorter way: just what OMPL interpolates.
+            # The origin moves on a line, and the rotation is a slerp over the shorter arc: just what OMPL interpolates.
             motion = cbvh.Motion.between(pose_of(start), pose_of(end))
         except ValueError:
-            return False  # Half a turn apart: neither way is shorter.
+            return False  # Half a turn apart: neither arc is shorter.
         return self.walls.is_free(self.robot, motion, clearance=CLEARANCE)
 
 
@@ -59,11 +59,11 @@ def valid_ends(information):
 
 
 def plan(setup, walls, robot):
-    """Plans a way. Returns how many edges it has, how many of them are free at every moment, and how long it took."""
+    """Plans a path. Returns how many edges it has, how many of them are free at every moment, and how long it took."""
     setup.clear()
     start = time.perf_counter()
     setup.solve(60.0)
-    assert setup.haveExactSolutionPath(), "expected a way, found none within a minute"
+    assert setup.haveExactSolutionPath(), "expected a path, found none within a minute"
     setup.simplifySolution()
     seconds = time.perf_counter() - start
     path = setup.getSolutionPath()
@@ -103,8 +103,8 @@ def main(folder):
     setup.setStartAndGoalStates(*valid_ends(information))
     for name, validator in (("certified", certified), ("at intervals", sampled)):
         information.setMotionValidator(validator)
-        edges, free, seconds = np.sum([plan(setup, walls, robot) for _ in range(WAYS)], axis=0)
-        print(f"{name}: {WAYS} ways in {seconds:.1f} s; {free:.0f} of {edges:.0f} edges are free at every moment")
+        edges, free, seconds = np.sum([plan(setup, walls, robot) for _ in range(PATHS)], axis=0)
+        print(f"{name}: {PATHS} paths in {seconds:.1f} s; {free:.0f} of {edges:.0f} edges are free at every moment")
         assert validator is sampled or free == edges > 0
 
 

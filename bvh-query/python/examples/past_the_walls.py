@@ -35,7 +35,7 @@ environment, robot_arrays = read_obj(TESTDATA / "fclenv.obj"), read_obj(TESTDATA
 walls, robot = cbvh.bake(*environment), cbvh.bake(*robot_arrays)
 
 # %%
-# A way past the walls, and the distance along it. It turns by a third of a circle.
+# A motion past the walls, and the distance along it. It turns by a third of a circle.
 HEIGHT = 1000.0
 
 
@@ -46,18 +46,18 @@ def placed(x, y, angle):
     return pose
 
 
-way = cbvh.Motion.between(placed(250, -2250, 0.2), placed(-1300, 2000, 2.3))
+motion = cbvh.Motion.between(placed(250, -2250, 0.2), placed(-1300, 2000, 2.3))
 times = np.linspace(0, 1, 1001)
-poses = way.pose(times)
+poses = motion.pose(times)
 found = walls.distance(robot, poses)
 touching = walls.collide(robot, poses)
 
 # %%
-# Whether the way is free is a question of its own: its answer holds at every moment, not at samples.
-answer = walls.motion(robot, way)
-clear = walls.motion(robot, way, clearance=100.0)
-print(f"contact: {answer.kind.name}, surely free until {answer.free_until:.6f}")
-print(f"100 from the walls: {clear.kind.name}, surely farther until {clear.free_until:.6f}")
+# Whether the motion is free is a question of its own: its answer holds at every moment, not at samples.
+answer = walls.motion(robot, motion)
+clear = walls.motion(robot, motion, clearance=100.0)
+print(f"contact: {answer.kind.name}, certainly free until {answer.free_until:.6f}")
+print(f"100 from the walls: {clear.kind.name}, certainly farther until {clear.free_until:.6f}")
 
 # %%
 # All pairs of triangles in contact, while it touches, and the distance of a slice of the world from the walls.
@@ -95,17 +95,17 @@ for number in range(0, len(times), 200):
         color = "crimson" if touching[number] else "darkorange"
         place.fill(*(rotation @ triangle[:, :2].T + shift[:, None]), color=color, linewidth=0, alpha=0.8)
 place.plot(*poses[:, :2, 3].T, color="black", linewidth=0.8, linestyle=":")
-place.set(aspect="equal", xlabel="x", ylabel="y", title="The robot on its way, and a slice of the walls")
+place.set(aspect="equal", xlabel="x", ylabel="y", title="The robot during its motion, and a slice of the walls")
 course.plot(times, found.distance, color="navy", label="distance")
 shade = {"color": "crimson", "alpha": 0.2, "label": "contact"}
 course.fill_between(times, 0, found.distance.max(), where=touching, step="mid", **shade)
-course.axvline(answer.free_until, color="black", linewidth=0.9, linestyle="--", label="surely free until")
+course.axvline(answer.free_until, color="black", linewidth=0.9, linestyle="--", label="certainly free until")
 course.set(xlabel="time", ylabel="mesh units", xlim=(0, 1), ylim=(0, 1.4 * found.distance.max()))
 pairs = course.twinx()
 pairs.plot(times, contacts, color="crimson", linewidth=0.8)
 pairs.set_ylabel("pairs of triangles in contact", color="crimson")
 pairs.set_ylim(0, None)
 course.legend(loc="upper left")
-course.set_title("How far apart they are along the way")
+course.set_title("How far apart they are during the motion")
 figure.savefig(PICTURE, dpi=72)
 print(f"{PICTURE.name}: {PICTURE.stat().st_size} bytes")

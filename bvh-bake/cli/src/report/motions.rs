@@ -28,7 +28,7 @@ pub(super) const KIND: Kind<Motion> = Kind {
 };
 
 const ABOUT: &str = "\
-Programs often test a motion by samples: they check poses along the way until one touches. Samples miss contacts between \
+Programs often test a motion by samples: they check poses along the motion until one touches. Samples miss contacts between \
 them, and find others late. cbvh certifies its answers for every moment between start and end. This page tells for each pair \
 of meshes what samples miss, how late they are, and how long they take compared with the certified answers.";
 
@@ -42,7 +42,7 @@ const METHODS: &str = "\
 millionth of the larger mesh's diagonal without touching.</li>
 <li>A certified contact is missed if all samples are free. A contact is late by the time between the end of the part that is \
 certified free and the contact found, as a fraction of the motion; only contacts that are not missed count.</li>
-<li>Times are those of single motions on one thread, with the poses of samples made on the way. All ways to ask take turns \
+<li>Times are those of single motions on one thread, with the poses of samples made as they are needed. All ways to ask take turns \
 in rounds, as many as fit into 10 seconds per pair, but at least one; <code>report.csv</code> has their number. A median is \
 taken over the motions of a round and then over the rounds.</li>
 <li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";
@@ -200,7 +200,7 @@ fn panels(pair: &str, methods: &[Method], rows: &[Record]) -> Vec<Panel> {
     };
     vec![
         panel("contacts missed", "contacts missed, % of the certified ones", "missed_share"),
-        panel("how late contacts are found", "late in the median, % of the way", "late_median"),
+        panel("how late contacts are found", "late in the median, % of the motion", "late_median"),
     ]
 }
 
