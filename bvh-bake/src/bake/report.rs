@@ -28,7 +28,7 @@ pub struct BakeReport {
     /// The bytes read from files and written to files.
     pub traffic: Traffic,
     /// The seconds from the parsed mesh (with a memory budget, from the start of reading) to the finished bytes, or to
-    /// the closed file if one is written.
+    /// the closed file if one is written. 0 on `wasm32-unknown-unknown`, which has no clock.
     pub seconds: f64,
 }
 

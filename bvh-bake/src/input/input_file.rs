@@ -3,6 +3,7 @@
 
 use super::MeshFormat;
 use super::byte_reader::ByteReader;
+#[cfg(not(target_family = "wasm"))]
 use super::read_ahead::ReadAhead;
 use crate::error::{Halt, ReadError};
 use crate::progress::{Progress, Step, Tally};
@@ -191,22 +192,25 @@ impl RandomAccess<'_> {
     }
 }
 
-/// Opens an input at its beginning, any number of times. A thread of its own reads ahead.
+/// Opens an input at its beginning, any number of times. Where there are threads, one of its own reads ahead.
 pub(crate) struct Opener<'scope, 'env> {
     pub(crate) input: &'env InputFile<'env>,
     pub(crate) progress: &'env Progress,
     /// The checksum of all bytes, once a reader has come to the end.
     pub(crate) checksum: &'env OnceLock<u64>,
+    #[cfg_attr(target_family = "wasm", expect(dead_code, reason = "WebAssembly has no threads"))]
     pub(crate) scope: &'scope Scope<'scope, 'env>,
 }
 
-impl Opener<'_, '_> {
+impl<'scope, 'env> Opener<'scope, 'env> {
     /// Opens the input. Reading it is a pass of the given weight.
-    pub(crate) fn open(&self, weight: u64) -> Result<ByteReader<ReadAhead>, Halt> {
+    pub(crate) fn open(&self, weight: u64) -> Result<ByteReader<impl Read + use<'scope, 'env>>, Halt> {
         let mut reader = self.input.reader(self.progress, weight).map_err(Halt::Io)?;
         reader.checksum = Some((Hasher::default(), self.checksum));
         let length = reader.length;
-        Ok(ByteReader::new(ReadAhead::start(self.scope, reader), length))
+        #[cfg(not(target_family = "wasm"))]
+        let reader = ReadAhead::start(self.scope, reader);
+        Ok(ByteReader::new(reader, length))
     }
 }
 

@@ -21,6 +21,7 @@ mod names;
 mod obj;
 mod ply;
 pub(crate) mod polygon;
+#[cfg(not(target_family = "wasm"))]
 mod read_ahead;
 mod stl;
 mod text;

@@ -97,12 +97,14 @@ impl Temporary {
     /// Creates an empty file in a directory, hidden and named after `name`.
     pub(crate) fn named(directory: &Path, name: &OsStr) -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
+        // WebAssembly knows no processes. A name that is in use is never taken, and without locks no file counts as stale.
+        let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
         remove_stale_of(directory, name);
         loop {
             let number = COUNT.fetch_add(1, Ordering::Relaxed);
             let mut hidden = OsString::from(".");
             hidden.push(name);
-            hidden.push(format!(".{}-{number}.tmp", std::process::id()));
+            hidden.push(format!(".{process}-{number}.tmp"));
             let path = directory.join(hidden);
             let mut live = live();
             match File::options().read(true).write(true).create_new(true).open(&path) {

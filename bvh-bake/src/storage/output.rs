@@ -51,7 +51,7 @@ impl Output {
         let mut output = Self::beside(path, progress)?;
         if let Self::File(file) = &mut output {
             file.kept = Some(Pieces::default());
-            file.writer = Some(file.start_writer()?);
+            file.writer = file.start_writer()?;
         }
         Ok(output)
     }
@@ -98,10 +98,10 @@ impl Output {
                 }
                 file.write(0, bytes)?;
                 let writer = match file.writer.take() {
-                    Some(writer) => writer,
                     None => file.start_writer()?,
+                    writer => writer,
                 };
-                file.writer = Some(writer.closed());
+                file.writer = writer.map(Writer::closed);
             }
         }
         Ok(())
@@ -133,8 +133,12 @@ impl Output {
 }
 
 impl OutputFile {
-    fn start_writer(&self) -> Result<Writer, BakeError> {
-        Writer::start(self.file.file()).map_err(failed(&self.path, "create"))
+    /// Starts the thread that writes. Returns `None` where there are no threads; bytes are then written as they come.
+    fn start_writer(&self) -> Result<Option<Writer>, BakeError> {
+        match Writer::start(self.file.file()) {
+            Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(None),
+            started => started.map(Some).map_err(failed(&self.path, "create")),
+        }
     }
 
     /// Writes bytes at an offset, or passes them to the writer thread.

@@ -85,8 +85,8 @@ pub(crate) struct Resources {
 }
 
 /// Returns the bytes that `bricks` bricks take while they are built.
-fn bytes_of_bricks(bricks: u64) -> usize {
-    (bricks * MAX_BRICK_TRIANGLES as u64 * BRICK_BYTES_PER_TRIANGLE) as usize
+fn bytes_of_bricks(bricks: u64) -> u64 {
+    bricks * MAX_BRICK_TRIANGLES as u64 * BRICK_BYTES_PER_TRIANGLE
 }
 
 impl Resources {
@@ -97,7 +97,7 @@ impl Resources {
             scratch: Scratch::in_memory(progress),
             progress: progress.clone(),
             bricks,
-            brick_bytes: bytes_of_bricks(bricks as u64),
+            brick_bytes: bytes_of_bricks(bricks as u64) as usize,
             buffers: None,
             document: Allowance::UNLIMITED,
             keeping: Allowance::UNLIMITED,
@@ -120,7 +120,7 @@ impl Resources {
             progress: progress.clone(),
             bricks: bricks as usize,
             // A budget for a small mesh is less than a brick takes.
-            brick_bytes: bytes_of_bricks(bricks).min(budget.saturating_sub(MIN_BYTES) as usize),
+            brick_bytes: bytes_of_bricks(bricks).min(budget.saturating_sub(MIN_BYTES)) as usize,
             buffers: Some(BUFFER_BYTES),
             ..Self::keeping_within(whole, budget.saturating_sub(MIN_BYTES + left / 2))
         }
@@ -192,7 +192,7 @@ impl Resources {
     /// Returns how many of `records` records are sorted at once.
     pub(crate) fn sorted_at_once<T>(&self, records: u64) -> usize {
         let most = self.buffers.map_or(u64::MAX, |bytes| bytes / size_of::<T>() as u64);
-        records.min(most) as usize
+        usize::try_from(records.min(most)).unwrap_or(usize::MAX)
     }
 
     /// Makes one empty stream for each expected number of records.

@@ -19,8 +19,8 @@ use std::sync::{Arc, Mutex};
 
 /// The memory and the scratch files that a bake may use.
 pub(crate) struct Scratch {
-    /// The directory of scratch files; `None` if everything stays in memory.
-    directory: Option<PathBuf>,
+    /// The directory of scratch files.
+    directory: PathBuf,
     /// The most bytes of pieces that may be in memory.
     allowance: u64,
     kept: AtomicU64,
@@ -31,16 +31,13 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Keeps everything in memory.
     pub(crate) fn in_memory(progress: &Progress) -> Arc<Self> {
-        Self::new(None, u64::MAX, progress)
+        Self::in_directory(Path::new(""), u64::MAX, progress)
     }
 
     /// Keeps `allowance` bytes in memory and the rest in files of a directory.
     pub(crate) fn in_directory(directory: &Path, allowance: u64, progress: &Progress) -> Arc<Self> {
-        Self::new(Some(directory.to_owned()), allowance, progress)
-    }
-
-    fn new(directory: Option<PathBuf>, allowance: u64, progress: &Progress) -> Arc<Self> {
-        Arc::new(Self { directory, allowance, kept: AtomicU64::new(0), progress: progress.clone() })
+        let (directory, progress) = (directory.to_owned(), progress.clone());
+        Arc::new(Self { directory, allowance, kept: AtomicU64::new(0), progress })
     }
 
     /// Makes a place for the pieces of one stage.
@@ -101,8 +98,7 @@ impl Spill {
         if let Some(file) = &*file {
             return Ok(file.clone());
         }
-        let directory = self.scratch.directory.clone().unwrap_or_else(std::env::temp_dir);
-        let made = Arc::new(ScratchFile::create(&directory, &self.scratch.progress)?);
+        let made = Arc::new(ScratchFile::create(&self.scratch.directory, &self.scratch.progress)?);
         *file = Some(made.clone());
         Ok(made)
     }

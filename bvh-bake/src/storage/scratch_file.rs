@@ -5,6 +5,8 @@ use crate::progress::Progress;
 use crate::storage::atomic::{Temporary, remove_stale_of};
 use std::fs::File;
 use std::io;
+#[cfg(target_family = "wasm")]
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -96,4 +98,18 @@ pub(crate) fn read_exact_at(file: &File, mut bytes: &mut [u8], mut offset: u64) 
         }
     }
     Ok(())
+}
+
+/// Writes at an offset of a file. No other thread moves the cursor meanwhile, because there is none.
+#[cfg(target_family = "wasm")]
+pub(crate) fn write_all_at(mut file: &File, bytes: &[u8], offset: u64) -> io::Result<()> {
+    file.seek(SeekFrom::Start(offset))?;
+    file.write_all(bytes)
+}
+
+/// Reads at an offset of a file. No other thread moves the cursor meanwhile, because there is none.
+#[cfg(target_family = "wasm")]
+pub(crate) fn read_exact_at(mut file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
+    file.seek(SeekFrom::Start(offset))?;
+    file.read_exact(bytes)
 }

@@ -181,7 +181,9 @@ pub fn verify_files(
     }
     let file = StoredFile::open(path, options.max_memory)?;
     let layout = Layout::read_from(&file)?;
-    let scratch = options.scratch.clone().unwrap_or_else(std::env::temp_dir);
+    // WASI has no directory for temporary files, and asking for it would panic.
+    let usual = || if cfg!(target_family = "wasm") { PathBuf::from(".") } else { std::env::temp_dir() };
+    let scratch = options.scratch.clone().unwrap_or_else(usual);
     let resources = Resources::of_check(budget, &scratch);
     let mut gatherer = Gatherer::in_input_order(&resources);
     let (mut inputs, mut taken) = (Vec::new(), 0);
