@@ -82,6 +82,11 @@ pub(crate) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     /// Returns the larger operand of each lane; the second operand if either is NaN.
     fn max(self, other: Self) -> Self;
+    /// Returns the larger operand of each lane; either operand if either is NaN. For backends where `max` takes longer.
+    #[inline(always)]
+    fn max_of_numbers(self, other: Self) -> Self {
+        self.max(other)
+    }
     /// `self <= other`, false for NaN.
     fn le(self, other: Self) -> Self::Mask;
     /// `self < other`, false for NaN.

@@ -23,6 +23,7 @@ impl Lanes for Neon {
         div(other) vdivq_f32;
         sqrt() vsqrtq_f32;
         abs() vabsq_f32;
+        max_of_numbers(other) vmaxnmq_f32;
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
@@ -74,12 +75,12 @@ impl Quad for Neon {
     }
     #[inline(always)]
     fn splat_lane(self, lane: usize) -> Self {
-        Self(with_features!(match lane % 4 {
-            0 => vdupq_laneq_f32::<0>(self.0),
-            1 => vdupq_laneq_f32::<1>(self.0),
-            2 => vdupq_laneq_f32::<2>(self.0),
-            _ => vdupq_laneq_f32::<3>(self.0),
-        }))
+        // A lookup takes any lane. Where the lane is a constant, this becomes a duplication of that lane.
+        with_features!({
+            let places = vdupq_n_u32(0x0302_0100 + 0x0404_0404 * (lane % 4) as u32);
+            let bytes = vqtbl1q_u8(vreinterpretq_u8_f32(self.0), vreinterpretq_u8_u32(places));
+            Self(vreinterpretq_f32_u8(bytes))
+        })
     }
     #[inline(always)]
     fn round_step_up(self) -> Self {
@@ -149,10 +150,33 @@ impl Quad for Neon {
     #[inline(always)]
     fn bits_of_four([a, b, c, d]: [uint32x4_t; 4]) -> u16 {
         with_features!({
-            let narrow = |a, b| vmovn_high_u32(vmovn_u32(a), b);
-            let lanes = vmovn_high_u16(vmovn_u16(narrow(a, b)), narrow(c, d));
-            let bits = vandq_u8(lanes, bytes(&[1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128]));
-            u16::from(vaddv_u8(vget_low_u8(bits))) | u16::from(vaddv_u8(vget_high_u8(bits))) << 8
+            // Lane i has the bits of lane i of each register: a at the bottom, then four bits to the left for each.
+            let all = vsliq_n_u32::<12>(vsliq_n_u32::<8>(vsliq_n_u32::<4>(a, b), c), d);
+            vaddvq_u32(vandq_u32(all, vld1q_u32([0x1111, 0x2222, 0x4444, 0x8888].as_ptr()))) as u16
+        })
+    }
+    #[inline(always)]
+    fn permute(value: Four<Self>, places: &[u8; 16]) -> Four<Self> {
+        with_features!({
+            let all = uint8x16x4_t(
+                vreinterpretq_u8_f32(value.0.0),
+                vreinterpretq_u8_f32(value.1.0),
+                vreinterpretq_u8_f32(value.2.0),
+                vreinterpretq_u8_f32(value.3.0),
+            );
+            // A lookup of bytes needs the places of the four bytes of each lane: 4 * place, and 1, 2 and 3 more.
+            let first = vshlq_n_u8::<2>(vandq_u8(bytes(places), vdupq_n_u8(15)));
+            let (low, high) = (vzip1q_u8(first, first), vzip2q_u8(first, first));
+            let lanes = |twice| {
+                let places = vorrq_u8(twice, vreinterpretq_u8_u32(vdupq_n_u32(0x0302_0100)));
+                Self(vreinterpretq_f32_u8(vqtbl4q_u8(all, places)))
+            };
+            Four(
+                lanes(vzip1q_u8(low, low)),
+                lanes(vzip2q_u8(low, low)),
+                lanes(vzip1q_u8(high, high)),
+                lanes(vzip2q_u8(high, high)),
+            )
         })
     }
     #[inline(always)]

@@ -34,6 +34,14 @@ pub(crate) trait Quad: Lanes {
         let [a, b, c, d] = masks;
         Self::bits(a) | Self::bits(b) << 4 | Self::bits(c) << 8 | Self::bits(d) << 12
     }
+    /// Lane i is lane `places[i]`, modulo 16, of `value`.
+    #[inline(always)]
+    fn permute(value: Four<Self>, places: &[u8; 16]) -> Four<Self> {
+        let isa = Quads::<Self>::NEW;
+        let mut lanes = [0.0; 16];
+        isa.store(value, &mut lanes);
+        isa.load(&places.map(|place| lanes[usize::from(place & 15)]))
+    }
     /// Prefetches the cache line of a byte that will soon be read.
     fn prefetch_line(byte: &u8);
 }
@@ -71,6 +79,7 @@ impl<Q: Quad> Lanes for Four<Q> {
         abs();
         min(other);
         max(other);
+        max_of_numbers(other);
     }
     #[inline(always)]
     fn le(self, other: Self) -> [Q::Mask; 4] {
@@ -218,9 +227,7 @@ impl<Q: Quad> Isa for Quads<Q> {
     }
     #[inline(always)]
     fn permute(self, value: Four<Q>, places: &[u8; 16]) -> Four<Q> {
-        let mut lanes = [0.0; 16];
-        self.store(value, &mut lanes);
-        self.load(&places.map(|place| lanes[usize::from(place & 15)]))
+        Q::permute(value, places)
     }
     #[inline(always)]
     fn splat4(self, value: f32) -> Q {

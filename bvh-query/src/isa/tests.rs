@@ -1,7 +1,7 @@
-//! Tests that backends agree: they decode every profile and packed packets to the bits of the reference, and find the
-//! same least lane.
+//! Tests that backends agree: they decode every profile and packed packets to the bits of the reference, compare in the same
+//! way, and find the same least lane.
 
-use super::{Backend, Isa, Task};
+use super::{Backend, Isa, Lanes, Task};
 use crate::file::unpack::unpack;
 use crate::traverse::decode::decode_group;
 use bvh_format::decode::decode_child;
@@ -175,6 +175,58 @@ fn every_backend_finds_the_first_of_the_least_lanes() {
                 expected,
                 "{backend}, round {round}: {lanes:?}"
             );
+        }
+    }
+}
+
+struct Compare<'a>(&'a [f32; 16], &'a [f32; 16], usize);
+
+/// The masks of `le` and `lt`; then the lanes of the minimum, of the maximum, of the maximum of numbers, of one operand where it is
+/// less, and of a column.
+impl Task for Compare<'_> {
+    type Output = ([u16; 2], [[f32; 16]; 5]);
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        let (a, b) = (isa.load(self.0), isa.load(self.1));
+        let (le, lt) = (a.le(b), a.lt(b));
+        let values =
+            [a.min(b), a.max(b), a.max_of_numbers(b), I::V::select(lt, a, b), isa.quad_splat(a, self.2)];
+        let mut lanes = [[0.0; 16]; 5];
+        for (value, lanes) in values.into_iter().zip(&mut lanes) {
+            isa.store(value, lanes);
+        }
+        ([I::V::bits(le), I::V::bits(lt)], lanes)
+    }
+}
+
+#[test]
+fn every_backend_compares_as_the_portable_one_does() {
+    let mut random = Random::new(11);
+    let mut random = || (random.bits() >> 40) as u32;
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        for round in 0..2000 {
+            let values = [f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1.5, 1e-40, f32::MAX, f32::NAN];
+            let mut lanes =
+                || -> [f32; 16] { std::array::from_fn(|_| values[random() as usize % values.len()]) };
+            let (a, b) = (lanes(), lanes());
+            let task = || Compare(&a, &b, round % 4);
+            let (expected, found) = (Backend::Scalar.run(task()), backend.run(task()));
+            assert_eq!(found.0, expected.0, "{backend}: {a:?}, {b:?}");
+            for (at, (found, expected)) in found.1.iter().zip(expected.1).enumerate() {
+                for lane in 0..16 {
+                    // Of a number and NaN, the maximum of numbers may be either, and of two zeros, too.
+                    let is_free = at == 2 && (a[lane].is_nan() || b[lane].is_nan() || a[lane] == b[lane]);
+                    let is_same = found[lane].to_bits() == expected[lane].to_bits()
+                        || found[lane].is_nan() && expected[lane].is_nan();
+                    let is_either =
+                        [a[lane], b[lane]].iter().any(|operand| operand.to_bits() == found[lane].to_bits());
+                    assert!(
+                        is_same || is_free && is_either,
+                        "{backend}, value {at}, lane {lane}: {a:?}, {b:?}, {found:?}"
+                    );
+                }
+            }
         }
     }
 }

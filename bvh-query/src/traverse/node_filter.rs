@@ -256,7 +256,7 @@ fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::
     let (rows_a, rows_b) = (group_a.rows(), group_b.rows());
     let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
     let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
-    lo_a.sub(hi_b).max(lo_b.sub(hi_a))
+    lo_a.sub(hi_b).max_of_numbers(lo_b.sub(hi_a))
 }
 
 /// Returns the gap of each of 16 pairs, four nodes of A and four of B, along the directions of a set, which the groups of both
@@ -285,12 +285,12 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Gr
         for slab in 3..SLABS {
             let gap = gap(isa, ends, slab);
             match slab % 3 {
-                0 => x = x.max(gap),
-                1 => y = y.max(gap),
-                _ => z = z.max(gap),
+                0 => x = x.max_of_numbers(gap),
+                1 => y = y.max_of_numbers(gap),
+                _ => z = z.max_of_numbers(gap),
             }
         }
-        return x.max(y).max(z);
+        return x.max_of_numbers(y).max_of_numbers(z);
     }
     // Along the three axes gaps add up like the sides of a box.
     let zero = isa.splat(0.0);
@@ -299,12 +299,12 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Gr
     for slab in 3..SLABS {
         let gap = gap(isa, ends, slab).mul(isa.splat(INVERSE_LENGTHS[slab]));
         match slab % 3 {
-            0 => x = x.max(gap),
-            1 => y = y.max(gap),
-            _ => z = z.max(gap),
+            0 => x = x.max_of_numbers(gap),
+            1 => y = y.max_of_numbers(gap),
+            _ => z = z.max_of_numbers(gap),
         }
     }
-    let largest = x.max(y).max(z);
+    let largest = x.max_of_numbers(y).max_of_numbers(z);
     // Up to four roundings of the sum and one of the root, each 2^-24 relative, and three squares that
     // underflow by 2^-150 each: of a sum from 2^-126 on, no more than that again.
     //
