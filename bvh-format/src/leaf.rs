@@ -138,14 +138,7 @@ fn encode_f32(packets: &[Packet]) -> Vec<u8> {
 fn decode_f32(block: &[u8], index: usize) -> Packet {
     let start = index * F32_PACKET_BYTES;
     let Some(bytes) = block.get(start..start + F32_PACKET_BYTES) else { return Packet::default() };
-    // Memory and disk differ in the order of bytes at most.
-    let mut packet: Packet = bytemuck::pod_read_unaligned(bytes);
-    if cfg!(target_endian = "big") {
-        for value in packet.corners.iter_mut().flatten().flatten() {
-            *value = f32::from_bits(value.to_bits().swap_bytes());
-        }
-    }
-    packet
+    bytemuck::pod_read_unaligned(bytes)
 }
 
 /// Reads packet `index` of a block. Bytes beyond the block read as zero.

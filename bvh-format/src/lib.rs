@@ -51,6 +51,11 @@
 //! ```
 #![forbid(unsafe_code)]
 
+#[cfg(target_endian = "big")]
+compile_error!(
+    "cbvh supports little-endian targets only: queries use triangles of a file where they are, in its byte order"
+);
+
 mod bits;
 pub mod bounds;
 pub mod checksum;

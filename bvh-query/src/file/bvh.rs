@@ -391,7 +391,7 @@ impl std::fmt::Debug for OpenFile {
 /// Returns a packet of plain `f32` in place, if its alignment allows that.
 #[inline(always)]
 fn plain_packet<'a>(object: &Object, block: &'a [u8], packet: u16) -> Option<&'a Packet> {
-    if cfg!(target_endian = "big") || object.triangle_encoding() != TriangleEncoding::F32 {
+    if object.triangle_encoding() != TriangleEncoding::F32 {
         return None;
     }
     let bytes: &[u8; F32_PACKET_BYTES] =
