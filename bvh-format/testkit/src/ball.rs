@@ -3,6 +3,7 @@
 //! Its triangles form a grid of rows and columns and become smaller towards the poles. The bumps are the same at every
 //! size: more triangles follow the same surface more closely.
 
+use libm::{cos, sin};
 use std::f64::consts::{PI, TAU};
 
 /// The least and the largest distance of a vertex from the centre, widened by more than rounding adds.
@@ -17,8 +18,9 @@ pub fn ball(triangles: u64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let point = |row: u32, column: u32| {
         let polar = PI * f64::from(row) / f64::from(rows);
         let around = TAU * f64::from(column) / f64::from(columns);
-        let bump = 1.0 + 0.1 * (5.0 * polar).sin() * (7.0 * around).cos();
-        let unit = [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()];
+        // The functions of the standard library are those of the system, and differ between systems.
+        let bump = 1.0 + 0.1 * sin(5.0 * polar) * cos(7.0 * around);
+        let unit = [sin(polar) * cos(around), sin(polar) * sin(around), cos(polar)];
         // Coordinates are `f32` numbers, so that storing moves nothing.
         unit.map(|c| f64::from((bump * c) as f32))
     };
