@@ -53,6 +53,20 @@ pub(crate) fn require_regular(path: &Path) -> Result<(), Failure> {
     regular_file(path).map_err(|error| Failure::from_input(path, &error))
 }
 
+/// The mark that some editors, most of them on Windows, write at the beginning of UTF-8.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Reads a text file, without a byte order mark.
+pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>, Failure> {
+    // On Windows, a device such as the console has no metadata, and must not make the command wait.
+    let read = std::fs::metadata(path).and_then(|_| std::fs::read(path));
+    let mut bytes = read.map_err(|error| Failure::from_input(path, &error))?;
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    Ok(bytes)
+}
+
 /// Reads a file of one question per line, and returns the questions with the numbers of their lines. `#` starts a comment, and
 /// blank lines are skipped. `none` is the message for a file without questions.
 pub(crate) fn read_lines<T>(
@@ -60,7 +74,7 @@ pub(crate) fn read_lines<T>(
     none: &str,
     parse: impl Fn(&str) -> Result<Option<T>, String>,
 ) -> Result<Vec<(usize, T)>, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
+    let bytes = read_text(path)?;
     let mut questions = Vec::new();
     for (number, line) in (1..).zip(bytes.split(|&byte| byte == b'\n')) {
         let text = String::from_utf8_lossy(line);

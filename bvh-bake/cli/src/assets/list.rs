@@ -1,6 +1,7 @@
 //! Lists of assets: manifests, with one JSON object per line, and folders of meshes. Each asset is a mesh file with an output
 //! that no other asset has.
 
+use crate::asking::files::BYTE_ORDER_MARK;
 use crate::console::Failure;
 use crate::{bake, options};
 use bvh_bake::Options;
@@ -151,6 +152,9 @@ pub(super) fn read_manifest(
             break;
         }
         bytes.pop_if(|last| *last == b'\n');
+        if number == 1 && bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
         if bytes.len() as u64 > MAX_LINE_BYTES {
             return Err(Failure::Limit(format!(
                 "{}: line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more",

@@ -1,7 +1,7 @@
 //! The inputs of a report: a list of pairs, one per line, their meshes, and their files of poses or motions.
 
 use super::{Kind, ReportArguments};
-use crate::asking::files::require_regular;
+use crate::asking::files::{read_text, require_regular};
 use crate::asking::mesh::{self, bake_in_memory, is_baked, refuse_scene, triangles};
 use crate::console::Failure;
 use bvh_bake::mesh::Mesh;
@@ -31,7 +31,7 @@ pub(super) fn read<T>(
     files: Option<&str>,
 ) -> Result<Vec<Input<T>>, Failure> {
     let list: &Path = &arguments.pairs;
-    let bytes = std::fs::read(list).map_err(|error| Failure::from_input(list, &error))?;
+    let bytes = read_text(list)?;
     let pairs = parse(&bytes, list, arguments.meshes.as_deref(), files)
         .map_err(|error| Failure::invalid(list, error))?;
     let items = |pair: &Pair| -> Result<Vec<T>, Failure> {

@@ -42,7 +42,7 @@ pub(super) struct LoadedScene {
 
 /// Reads a scene file without opening its meshes.
 pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
+    let bytes = files::read_text(path)?;
     let text = String::from_utf8_lossy(&bytes);
     let mut scene = SceneText::default();
     let folder = path.parent().unwrap_or_else(|| Path::new(""));
