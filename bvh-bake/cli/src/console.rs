@@ -39,12 +39,12 @@ impl Failure {
 
     /// Describes a file that the system does not let the command read.
     pub(crate) fn from_input(path: &Path, error: &io::Error) -> Self {
-        Self::system(path, format_args!("expected a readable file, found {}", unreadable(error)))
+        Self::system(path, format_args!("expected a readable file, found {}", unreadable(path, error)))
     }
 
     /// Describes a folder that the system does not let the command read.
     pub(crate) fn from_folder(path: &Path, error: &io::Error) -> Self {
-        Self::system(path, format_args!("expected a readable folder, found {}", unreadable(error)))
+        Self::system(path, format_args!("expected a readable folder, found {}", unreadable(path, error)))
     }
 
     /// Classifies an error of baking these inputs.
@@ -160,9 +160,12 @@ impl From<BackendError> for Failure {
 }
 
 /// Says why a file cannot be read.
-fn unreadable(error: &io::Error) -> String {
+fn unreadable(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "nothing of this name".to_owned(),
+        // Windows denies to open a folder as a file, and tells nothing about what is no file.
+        io::ErrorKind::PermissionDenied if path.is_dir() => "a folder".to_owned(),
+        _ if cfg!(windows) && std::fs::metadata(path).is_err() => "a device or a pipe".to_owned(),
         io::ErrorKind::PermissionDenied => "one that this user may not read".to_owned(),
         io::ErrorKind::IsADirectory => "a folder".to_owned(),
         _ => error.to_string(),

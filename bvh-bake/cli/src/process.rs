@@ -24,6 +24,10 @@ pub(crate) fn current_bytes() -> Option<u64> {
 }
 
 fn status_bytes(label: &str) -> Option<u64> {
+    if cfg!(windows) {
+        // Wine has this file, but of another process.
+        return None;
+    }
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(label))?;
     let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
@@ -85,8 +89,26 @@ pub(crate) fn remove_unfinished_files(spinner: &ProgressBar) -> Result<(), Failu
     Ok(())
 }
 
+/// Starts a thread that waits until the console asks the process to end: by Ctrl-C, by Ctrl-Break, or because its window is
+/// closed. The thread removes unfinished files, prints one line, and ends the process with the code that it would
+/// otherwise have.
+#[cfg(windows)]
+pub(crate) fn remove_unfinished_files(spinner: &ProgressBar) -> Result<(), Failure> {
+    /// `STATUS_CONTROL_C_EXIT`.
+    const STOPPED: i32 = 0xC000_013A_u32 as i32;
+    let spinner = spinner.clone();
+    #[expect(clippy::exit, reason = "the console has asked for it, and nobody else may end the process")]
+    let stop = move || {
+        bvh_bake::discard_unfinished();
+        spinner.finish_and_clear();
+        tell_line("stopped by the console; no unfinished file was left behind");
+        std::process::exit(STOPPED)
+    };
+    ctrlc::set_handler(stop).map_err(|error| Failure::System(format!("cannot wait for Ctrl-C: {error}")))
+}
+
 /// Does nothing on other systems: the next bake of the same output removes what is left.
-#[cfg(not(unix))]
+#[cfg(not(any(unix, windows)))]
 pub(crate) fn remove_unfinished_files(_: &ProgressBar) -> Result<(), Failure> {
     Ok(())
 }

@@ -216,7 +216,6 @@ fn an_old_output_survives_a_failure() {
     assert_eq!(names(directory), ["cube.obj", "o.cbvh"]);
 }
 
-#[cfg(unix)]
 #[test]
 fn a_closed_pipe_is_no_panic() {
     let folder = with_cube();

@@ -5,11 +5,10 @@ mod common;
 
 use common::sheet::write_sheet;
 use common::{Files as _, place};
-use common::{cbvh_in, cube, names, skip};
+use common::{cbvh_in, cube, names};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 const STAGES: [&str; 6] = ["read", "prepare", "build", "assemble", "prove", "write"];
 
@@ -101,7 +100,7 @@ fn the_system_counts_the_same_bytes() {
     let directory = &place();
     write_sheet(&directory.join("sheet.ply"), 400);
     if fs::read_to_string("/proc/self/io").is_err() {
-        return skip("this system does not count bytes");
+        return common::skip("this system does not count bytes");
     }
     for more in ["", "--max-memory 140MiB", "--max-memory 1GiB --jobs 1"] {
         // The numbers of a shell include those of its children that have ended.
@@ -109,7 +108,8 @@ fn the_system_counts_the_same_bytes() {
             "{} bake sheet.ply -o out.cbvh --force --json -q {more} > summary && cat /proc/$$/io",
             env!("CARGO_BIN_EXE_cbvh")
         );
-        let ended = Command::new("sh").args(["-ec", &script]).current_dir(directory).output().unwrap();
+        let ended =
+            std::process::Command::new("sh").args(["-ec", &script]).current_dir(directory).output().unwrap();
         let counted = String::from_utf8(ended.stdout).unwrap();
         let system = |label: &str| {
             let line = counted.lines().find_map(|line| line.strip_prefix(label));
@@ -167,11 +167,11 @@ fn a_terminal_shows_how_far_it_is() {
             env!("CARGO_BIN_EXE_cbvh")
         );
         let script = ["-qec", &command, "/dev/null"];
-        let ended = Command::new("script").args(script).current_dir(directory).output().ok()?;
+        let ended = std::process::Command::new("script").args(script).current_dir(directory).output().ok()?;
         assert!(ended.status.success(), "{ended:?}");
         Some(String::from_utf8(ended.stdout).unwrap())
     };
-    let Some(shown) = on_a_terminal("") else { return skip("the command `script` is missing") };
+    let Some(shown) = on_a_terminal("") else { return common::skip("the command `script` is missing") };
     for words in ["reading", "preparing", "building bricks", " %", " triangles/s", " MiB spilled", "left"] {
         assert!(shown.contains(words), "{words}: {shown}");
     }

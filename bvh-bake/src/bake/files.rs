@@ -250,10 +250,11 @@ fn file_lengths(inputs: &[PathBuf]) -> u64 {
 
 /// Refuses outputs that a rename would destroy: an input, a directory or a device.
 fn refuse_output(inputs: &[PathBuf], output: &Path) -> Result<(), BakeError> {
-    let Ok(existing) = std::fs::canonicalize(output) else { return Ok(()) };
-    for input in inputs {
-        if std::fs::canonicalize(input).is_ok_and(|input| input == existing) {
-            return Err(BakeError::OutputIsInput { path: output.to_owned() });
+    if let Ok(existing) = std::fs::canonicalize(output) {
+        for input in inputs {
+            if std::fs::canonicalize(input).is_ok_and(|input| input == existing) {
+                return Err(BakeError::OutputIsInput { path: output.to_owned() });
+            }
         }
     }
     atomic::refuse_special(output)

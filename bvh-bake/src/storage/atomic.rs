@@ -33,16 +33,65 @@ pub fn discard_unfinished() {
     std::mem::forget(live);
 }
 
-/// Refuses a device or a directory, because a rename would replace it or fail late.
+/// Refuses what a rename would replace or at which it would fail late: a device, a directory, or a file in use.
 pub(crate) fn refuse_special(path: &Path) -> Result<(), BakeError> {
-    match fs::metadata(path) {
-        Ok(metadata) if !metadata.is_file() => {
-            let found = if metadata.is_dir() { "a directory" } else { "a special file" };
-            let source = io::Error::other(format!("expected a regular file or none, found {found}"));
-            Err(BakeError::Write { path: path.to_owned(), action: "replace", source })
-        }
+    let found = match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => "a directory",
+        Ok(metadata) if !metadata.is_file() => "a special file",
+        _ if cfg!(windows) && names_device(path) => "the name of a device",
+        _ => return refuse_in_use(path),
+    };
+    let source = io::Error::other(format!("expected a regular file or none, found {found}"));
+    Err(BakeError::Write { path: path.to_owned(), action: "replace", source })
+}
+
+/// Refuses a file that another process has opened without allowing others to replace it, as most programs do on
+/// Windows. Whether a file is mapped shows only when it is replaced.
+#[cfg(windows)]
+fn refuse_in_use(path: &Path) -> Result<(), BakeError> {
+    use std::os::windows::fs::OpenOptionsExt;
+    /// The access right `DELETE`, which a file must grant in order to be replaced.
+    const DELETE: u32 = 0x0001_0000;
+    match File::options().access_mode(DELETE).open(path) {
+        Err(error) if error.raw_os_error() == Some(SHARING_VIOLATION) => Err(kept(path)(error)),
         _ => Ok(()),
     }
+}
+
+/// Other systems replace a file whoever uses it.
+#[cfg(not(windows))]
+fn refuse_in_use(_: &Path) -> Result<(), BakeError> {
+    Ok(())
+}
+
+/// Windows' error for a file that another process has opened, and does not share.
+#[cfg(windows)]
+const SHARING_VIOLATION: i32 = 32;
+
+/// Returns the error of an output that the system does not let the bake replace. On Windows, the reason is most likely that
+/// somebody uses the file, which its own message does not always say.
+fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
+    move |source| {
+        if !cfg!(windows) || !path.exists() {
+            return failed(path, "create")(source);
+        }
+        let remedy = "close the program that has the file open or mapped, or name another output";
+        failed(path, "replace")(io::Error::new(source.kind(), format!("{source}; {remedy}")))
+    }
+}
+
+/// Returns whether Windows takes a part of a path for a device, in whatever folder it stands.
+pub(crate) fn names_device(path: &Path) -> bool {
+    path.iter().any(|part| is_device(&part.to_string_lossy()))
+}
+
+fn is_device(part: &str) -> bool {
+    let stem = part.split(['.', ':']).next().unwrap_or_default().trim_end().to_ascii_uppercase();
+    let is_port = |kind: &str| {
+        let number = stem.strip_prefix(kind).map(|rest| rest.chars().collect::<Vec<_>>());
+        matches!(number.as_deref(), Some(['0'..='9' | '¹' | '²' | '³']))
+    };
+    matches!(&*stem, "CON" | "PRN" | "AUX" | "NUL" | "CONIN$" | "CONOUT$") || is_port("COM") || is_port("LPT")
 }
 
 /// Removes the temporary files for `name` that killed processes left in a directory.
@@ -144,8 +193,12 @@ impl Temporary {
     pub(crate) fn rename(mut self, path: &Path) -> Result<(), BakeError> {
         // Without this, a crash soon after the rename could leave an empty file under the name.
         self.file.sync_all().map_err(failed(path, "write"))?;
+        if cfg!(windows) {
+            // A lock there keeps others from reading, and a program may wait for the name to appear.
+            let _ = self.file.unlock();
+        }
         let mut live = live();
-        fs::rename(&self.path, path).map_err(failed(path, "create"))?;
+        fs::rename(&self.path, path).map_err(kept(path))?;
         live.retain(|path| *path != self.path);
         self.named = false;
         drop(live);
@@ -190,6 +243,17 @@ pub(crate) fn directory_of(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn devices_are_known_by_their_names() {
+        for part in ["NUL", "nul.bin", "con", "COM1", "lpt9.txt", "COM¹", "aux ", "nul:stream"] {
+            assert!(is_device(part), "{part}");
+        }
+        for part in ["null.bin", "COM", "COM10", "a.con", "console", ""] {
+            assert!(!is_device(part), "{part}");
+        }
+        assert!(names_device(Path::new("out/nul.cbvh")) && !names_device(Path::new("out/null.cbvh")));
+    }
 
     #[test]
     fn what_a_killed_process_left_is_removed_and_what_is_in_use_is_not() {

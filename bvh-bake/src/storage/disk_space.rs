@@ -30,7 +30,13 @@ fn free_bytes(directory: &Path) -> Option<u64> {
     Some(found.f_bavail.saturating_mul(found.f_frsize))
 }
 
-#[cfg(not(unix))]
+/// Returns the bytes that may still be written in a directory, or `None` if the system does not say.
+#[cfg(windows)]
+fn free_bytes(directory: &Path) -> Option<u64> {
+    fs4::available_space(directory).ok()
+}
+
+#[cfg(not(any(unix, windows)))]
 fn free_bytes(_: &Path) -> Option<u64> {
     None
 }
@@ -41,7 +47,34 @@ fn same_system(a: &Path, b: &Path) -> bool {
     device(a) == device(b)
 }
 
-#[cfg(not(unix))]
+/// Compares the drives, or the servers and their shares.
+#[cfg(windows)]
+fn same_system(a: &Path, b: &Path) -> bool {
+    let resolved = [a, b].map(|path| std::fs::canonicalize(path).unwrap_or_default());
+    let [a, b] = resolved.each_ref().map(|path| path.components().next());
+    a == b
+}
+
+#[cfg(not(any(unix, windows)))]
 fn same_system(_: &Path, _: &Path) -> bool {
     false
+}
+
+#[cfg(all(test, any(unix, windows)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn room_is_counted_once_per_disk() {
+        let directory = tempfile::tempdir().unwrap();
+        let (path, inner) = (directory.path(), directory.path().join("inner"));
+        std::fs::create_dir(&inner).unwrap();
+        let free = free_bytes(path).unwrap();
+        assert!(free > 0);
+        check(&[(path, 1), (&inner, 1)]).unwrap();
+        for needs in [&[(path, u64::MAX)][..], &[(path, u64::MAX / 2), (&inner, u64::MAX / 2)]] {
+            let refused = check(needs).unwrap_err();
+            assert!(matches!(refused, BakeError::Room { needed: 0xffff_ffff_ffff_fffe.., .. }), "{refused}");
+        }
+    }
 }

@@ -172,10 +172,13 @@ mod tests {
             assert!(piece.all().unwrap().iter().copied().eq(i * 1000..i * 1000 + 500));
             assert_eq!(*piece.range(7..9).unwrap(), [i * 1000 + 7, i * 1000 + 8]);
         }
-        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
+        let files = || std::fs::read_dir(directory.path()).unwrap().count();
+        // On Windows, some file systems keep the names of removed files until they are closed.
+        assert!(files() == 0 || cfg!(windows));
         drop(pieces);
         assert!(in_memory(&spill.put(vec![0u32; 1000]).unwrap()), "room is given back");
         drop(spill);
+        assert_eq!(files(), 0);
         let traffic = progress.traffic();
         assert_eq!((traffic.scratch_most, traffic.scratch_read), (4000, 2 * (2000 + 8)));
         assert_eq!(progress.scratch_held(), 0);

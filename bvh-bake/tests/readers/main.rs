@@ -2,6 +2,9 @@
 
 mod any_bytes;
 mod gltf;
+/// Windows lets few users make links, and has no pipes in folders.
+#[cfg(unix)]
+mod named_files;
 
 use bvh_bake::input::{MeshFormat, Place, ReadError, read, read_bytes};
 use bvh_bake::mesh::{Mesh, Object};

@@ -37,9 +37,9 @@ impl Bvh {
     /// Neither this process nor another one may change the bytes of the file while it is open. In detail:
     ///
     /// - *Replaced* by renaming another file over it, or *removed*: allowed. The old content stays, and so do the answers.
-    ///   `cbvh bake` replaces its output in this way.
+    ///   `cbvh bake` replaces its output in this way. Windows may refuse both while the file is mapped.
     /// - *Truncated*, by whatever process: on Unix the first access beyond the new end sends SIGBUS, which ends this process.
-    ///   There is no error to catch.
+    ///   There is no error to catch. Windows refuses to truncate a mapped file.
     /// - *Written into*: the behaviour is undefined, since Rust assumes that bytes behind a shared reference do not
     ///   change. Queries are written so that they do not depend on that assumption. They read file bytes only as
     ///   numbers for which every value is valid. They check each index that they compute from them. Counts that were

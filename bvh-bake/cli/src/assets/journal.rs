@@ -11,7 +11,7 @@ use crate::process;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -34,11 +34,10 @@ impl Journal {
             let what = "cannot replace: expected a file or nothing, found a folder";
             return Err(Failure::system(path, what));
         }
-        let mut file = File::options().read(true).append(true).create(true).open(&part).map_err(failed)?;
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+        let Some(mut file) = open_alone(&part).map_err(failed)? else {
             let what = "expected a file that no other process uses, found it in use; wait for the other bake or name another output manifest";
             return Err(Failure::system(&part, what));
-        }
+        };
         if ends_within_a_line(&mut file).map_err(failed)? {
             file.write_all(b"\n").map_err(failed)?;
         }
@@ -62,6 +61,27 @@ impl Journal {
         // A part file that stays does no harm.
         let _ = fs::remove_file(&self.part);
         Ok(())
+    }
+}
+
+/// Opens a file to append to it and locks it. Returns `None` if another process has done so. Others may read it.
+#[cfg(not(windows))]
+fn open_alone(path: &Path) -> io::Result<Option<File>> {
+    let file = File::options().read(true).append(true).create(true).open(path)?;
+    Ok(if let Err(fs::TryLockError::WouldBlock) = file.try_lock() { None } else { Some(file) })
+}
+
+/// Opens a file to append to it, and lets nobody else write to it. Returns `None` if another process has done so. Others may
+/// read it, which a lock would prevent on Windows.
+#[cfg(windows)]
+fn open_alone(path: &Path) -> io::Result<Option<File>> {
+    use std::os::windows::fs::OpenOptionsExt;
+    const SHARE_READ_AND_DELETE: u32 = 1 | 4;
+    const SHARING_VIOLATION: i32 = 32;
+    let mut options = File::options();
+    match options.read(true).append(true).create(true).share_mode(SHARE_READ_AND_DELETE).open(path) {
+        Err(error) if error.raw_os_error() == Some(SHARING_VIOLATION) => Ok(None),
+        opened => opened.map(Some),
     }
 }
 

@@ -98,10 +98,12 @@ pub(super) fn refuse_shared_outputs(
 /// Returns the same path for a file however it is named, except through links to the file itself.
 fn place(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    match (path.parent(), path.file_name()) {
+    let place = match (path.parent(), path.file_name()) {
         (Some(folder), Some(name)) => resolve(folder).join(name),
         _ => path,
-    }
+    };
+    // Windows does not distinguish capital letters in names.
+    if cfg!(windows) { place.to_string_lossy().to_lowercase().into() } else { place }
 }
 
 /// Returns a folder without links, `.` and `..`, whether it exists or not.

@@ -67,8 +67,9 @@ pub(crate) struct Ended {
     pub(crate) err: String,
 }
 
-/// The longest time that a command may take on these files, even on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(100);
+/// The longest time that a command may take on these files, even on a busy machine. Wine takes long to open and to flush
+/// files.
+const PATIENCE: Duration = Duration::from_secs(if cfg!(windows) { 1000 } else { 100 });
 
 /// Runs the command in a directory.
 pub(crate) fn cbvh_in(directory: &Path, arguments: &[&str]) -> Ended {
