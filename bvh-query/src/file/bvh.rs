@@ -94,9 +94,14 @@ impl Bvh {
     /// break a rule of the format.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        let bytes = memory::read(path).map_err(|source| OpenError::Io { path: path.to_owned(), source })?;
-        Self::new(Bytes::from_owner(bytes), None)
-            .map_err(|source| OpenError::Format { path: path.to_owned(), source })
+        // WebAssembly has no memory of its own for maps.
+        let bytes = if cfg!(target_family = "wasm") {
+            std::fs::read(path).map(Bytes::from)
+        } else {
+            memory::read(path).map(Bytes::from_owner)
+        };
+        let bytes = bytes.map_err(|source| OpenError::Io { path: path.to_owned(), source })?;
+        Self::new(bytes, None).map_err(|source| OpenError::Format { path: path.to_owned(), source })
     }
 
     /// Opens the bytes of a file in memory, such as those that `bvh_bake::to_bytes` returns.
