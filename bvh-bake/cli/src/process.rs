@@ -48,6 +48,10 @@ pub(crate) fn memory_in_words() -> String {
 /// command promises that nobody changes it.
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> Result<Bvh, OpenError> {
+    // WebAssembly has no maps.
+    if cfg!(target_family = "wasm") {
+        return Bvh::read(path);
+    }
     // SAFETY: the command never writes to a file that it maps, and those who run it are told that nobody else may.
     unsafe { Bvh::map_with(path, read_ahead) }
 }
