@@ -264,6 +264,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
     fn passes_add_up_to_the_whole() {
         let progress = Progress::default();
         let step = Step::Bake(Stage::Build);

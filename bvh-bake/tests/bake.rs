@@ -116,7 +116,7 @@ fn the_bytes_depend_on_mesh_and_options_alone() {
             let options = options(profile, encoding).effort(effort);
             let mesh = mesh(&soup(20_000, 6));
             let bake = |threads: usize| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let pool = cbvh_testkit::pool(threads);
                 pool.install(|| to_bytes(&mesh, &options).unwrap().0)
             };
             let first = bake(1);
@@ -143,7 +143,7 @@ fn several_bricks_are_baked_to_the_same_bytes_by_any_number_of_threads() {
         .collect();
     let mesh = mesh(&triangles);
     let bake = |effort: Effort, threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = cbvh_testkit::pool(threads);
         let options = options(Profile::Dop14U8, TriangleEncoding::Packed).effort(effort);
         pool.install(|| to_bytes(&mesh, &options).unwrap().0)
     };

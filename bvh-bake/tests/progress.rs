@@ -13,8 +13,9 @@ fn strip(count: u32) -> String {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn shares_grow_to_the_whole() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let (input, output) = (directory.path().join("in.obj"), directory.path().join("out.cbvh"));
     let count = 300_000;
     fs::write(&input, strip(count)).unwrap();
@@ -61,7 +62,7 @@ fn shares_grow_to_the_whole() {
 
 #[test]
 fn what_is_up_to_date_is_read_and_not_written() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let (input, output) = (directory.path().join("in.obj"), directory.path().join("out.cbvh"));
     fs::write(&input, strip(1000)).unwrap();
     let bake = || {

@@ -42,8 +42,8 @@ fn glb(nodes: &str) -> Vec<u8> {
 }
 
 /// Writes a scene file, and returns its folder and path.
-fn file(nodes: &str) -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
+fn file(nodes: &str) -> (cbvh_testkit::TempDir, PathBuf) {
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("scene.glb");
     fs::write(&path, glb(nodes)).unwrap();
     (folder, path)

@@ -12,11 +12,11 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-struct Folder(tempfile::TempDir);
+struct Folder(cbvh_testkit::TempDir);
 
 impl Folder {
     fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        Self(cbvh_testkit::folder())
     }
 
     /// Validates bytes in every way; returns what all of them say.

@@ -19,11 +19,11 @@ fn bake(inputs: &[PathBuf], output: &Path, options: &Options, max_memory: Option
     }
 }
 
-struct Folder(tempfile::TempDir);
+struct Folder(cbvh_testkit::TempDir);
 
 impl Folder {
     fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        Self(cbvh_testkit::folder())
     }
 
     /// Bakes a file both ways, apart and as one, and compares.

@@ -318,7 +318,7 @@ fn threads_do_not_matter() {
     let shells = [ball_of(300_000, ORIGIN, 1.0), turned(&ball_of(2000, ORIGIN, 0.5))].concat();
     let mesh = mesh(&[shells.clone(), shells[..500].to_vec()].concat());
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = cbvh_testkit::pool(threads);
         pool.install(|| bake(&mesh, &Options::default()))
     };
     assert!(with(1) == with(3));
@@ -357,7 +357,7 @@ fn stored_files_are_checked_as_files_in_memory_are() {
     let sphere = ball_of(3000, ORIGIN, 1.0);
     let doubled: Vec<Triangle> = [sphere.clone(), sphere].concat();
     let bytes = bake(&mesh(&doubled), &Options::default());
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let path = directory.path().join("sphere.cbvh");
     std::fs::write(&path, &bytes).unwrap();
     let file = StoredFile::open(&path, None).unwrap();

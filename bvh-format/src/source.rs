@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_block_too_long_for_any_is_known_by_length_and_checksum() {
-        let bytes: Vec<u8> = (0..3 * MAX_BLOCK_BYTES).map(|i| ((i * i) >> 7) as u8).collect();
+        let bytes: Vec<u8> = (0..3 * MAX_BLOCK_BYTES).map(|i| (i.wrapping_mul(i) >> 7) as u8).collect();
         for length in [0, 100, MAX_BLOCK_BYTES, MAX_BLOCK_BYTES + 1, bytes.len() - 9] {
             let whole = &bytes[9..9 + length];
             let block = Block::read(&bytes[..], Some(9..9 + length)).unwrap();

@@ -10,10 +10,9 @@ use bvh_format::profile::Profile;
 use bvh_query::{Backend, Batch, Bvh, Pose, Querier, QueryError, Tracker};
 use common::shapes::{cube, dirty, moved, soup, sphere, torus};
 use common::{Random, backends, bake, baked, mesh, options, random_pose, translation};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
-fn pools() -> Vec<ThreadPool> {
-    [1, 2, 3, 8].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().unwrap()).into()
+fn pools() -> Vec<cbvh_testkit::Pool> {
+    [1, 2, 3, 8].map(|threads| cbvh_testkit::pool(threads)).into()
 }
 
 /// Makes poses, first along a line through the mesh, then anywhere.

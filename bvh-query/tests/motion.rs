@@ -318,7 +318,7 @@ fn batches_of_motions_have_the_same_answers() {
     let free: Vec<bool> = expected.iter().map(|answer| *answer == MotionAnswer::Free).collect();
     assert!(free.contains(&true) && free.contains(&false));
     for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = cbvh_testkit::pool(threads);
         let batch = bvh_query::Batch::new(&a, &b).unwrap();
         assert_eq!(pool.install(|| batch.motions(&motions, &options)), Ok(expected.clone()));
         assert_eq!(pool.install(|| batch.are_free(&motions, &options)), Ok(free.clone()));

@@ -14,8 +14,8 @@ fn file(seed: u64) -> Vec<u8> {
 }
 
 /// Writes a file into a folder that is removed with the guard.
-fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
+fn written(bytes: &[u8]) -> (cbvh_testkit::TempDir, PathBuf) {
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("victim.cbvh");
     std::fs::write(&path, bytes).unwrap();
     (folder, path)

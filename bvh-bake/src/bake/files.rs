@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn what_is_up_to_date_is_left_alone() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let input = directory.path().join("in.obj");
         let output = directory.path().join("out.cbvh");
         fs::write(&input, TRIANGLE).unwrap();
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn ids_run_on_over_files() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let inputs = ["a.obj", "b.obj"].map(|name| directory.path().join(name));
         inputs.iter().for_each(|input| fs::write(input, TRIANGLE).unwrap());
         let mesh = crate::read_meshes(&inputs).unwrap();
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn an_input_is_never_the_output() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let input = directory.path().join("in.obj");
         fs::write(&input, TRIANGLE).unwrap();
         let output = directory.path().join(".").join("in.obj");
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_small_budget_is_refused_before_the_work() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let input = directory.path().join("in.obj");
         fs::write(&input, TRIANGLE).unwrap();
         let output = directory.path().join("out.cbvh");

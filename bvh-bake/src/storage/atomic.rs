@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn what_a_killed_process_left_is_removed_and_what_is_in_use_is_not() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let output = directory.path().join("out.cbvh");
         let write = |name: &str| fs::write(directory.path().join(name), "x").unwrap();
         let stale = ".out.cbvh.123-4.tmp";
@@ -278,7 +278,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn what_cannot_be_synchronised_gets_no_name() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let output = directory.path().join("out.cbvh");
         fs::write(&output, "old").unwrap();
         let mut unfinished = Temporary::beside(&output).unwrap();

@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn room_is_counted_once_per_disk() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let (path, inner) = (directory.path(), directory.path().join("inner"));
         std::fs::create_dir(&inner).unwrap();
         let free = free_bytes(path).unwrap();

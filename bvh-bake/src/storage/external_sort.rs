@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn runs_are_merged() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let scratch = Scratch::in_directory(directory.path(), 1000, &Default::default());
         let records: Vec<[u32; 2]> = (0..50_000u32).map(|i| [i.wrapping_mul(0x9e37_79b9) >> 20, i]).collect();
         let mut expected = records.clone();

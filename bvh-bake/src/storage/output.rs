@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_what_is_written() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let path = directory.path().join("out");
         let mut expected: Vec<u8> = (0..20_000u32).map(|i| ((i * i) >> 5) as u8).collect();
         for keep in [false, true] {

@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn pieces_go_to_files_when_memory_is_full_and_leave_nothing() {
-        let directory = tempfile::tempdir().unwrap();
+        let directory = cbvh_testkit::folder();
         let progress = Progress::default();
         let scratch = Scratch::in_directory(directory.path(), 4000, &progress);
         let spill = scratch.spill();

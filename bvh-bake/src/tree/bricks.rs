@@ -356,7 +356,7 @@ mod tests {
         assert_eq!(top.leaves(), found.len());
         assert!(found.into_iter().eq(0..bricks.len() as u32));
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = cbvh_testkit::pool(threads);
             assert_eq!(pool.install(|| divided(triangles, &BUILDER)).0, bricks, "{threads} threads");
         }
         bricks.len()

@@ -5,8 +5,9 @@ use bvh_bake::input::{MeshFormat, read};
 use std::fs;
 
 /// Returns a document with one buffer: three u8 indices, a zero, three f32 positions, one sparse index, three zeros
-/// and one position.
+/// and one position. Another buffer claims as many bytes as memory can have at most.
 pub(crate) fn gltf(nodes: &str, primitive: &str, uri: &str) -> String {
+    let most = isize::MAX;
     format!(
         r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"meshes":[{{"name":"m","primitives":[{primitive}]}}],
         "accessors":[
@@ -22,7 +23,7 @@ pub(crate) fn gltf(nodes: &str, primitive: &str, uri: &str) -> String {
         "bufferViews":[{{"buffer":0,"byteLength":3}},{{"buffer":0,"byteOffset":4,"byteLength":36}},
             {{"buffer":0,"byteOffset":40,"byteLength":1}},{{"buffer":0,"byteOffset":44,"byteLength":12}},
             {{"buffer":1,"byteLength":12}}],
-        "buffers":[{{"byteLength":56{uri}}},{{"byteLength":9000000000000000000,"uri":"data:;base64,"}}]}}"#
+        "buffers":[{{"byteLength":56{uri}}},{{"byteLength":{most},"uri":"data:;base64,"}}]}}"#
     )
 }
 
@@ -68,7 +69,7 @@ fn gltf_nodes_are_placed_in_f64() {
 
 #[test]
 fn gltf_buffers_are_found_wherever_they_are() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     fs::write(directory.path().join("my buffer.bin"), gltf_buffer()).unwrap();
     let path = directory.path().join("a.gltf");
     fs::write(&path, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"my%20buffer.bin""#)).unwrap();

@@ -251,7 +251,7 @@ fn ply_counts_are_checked_before_anything_is_read() {
 
 #[test]
 fn the_format_is_told_by_name_or_content() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let at = |name: &str, bytes: &[u8]| {
         let path = directory.path().join(name);
         fs::write(&path, bytes).unwrap();

@@ -18,7 +18,7 @@ fn read_in_time(path: &Path) -> Result<Mesh, ReadError> {
 
 #[test]
 fn gltf_names_lead_to_files_below_its_folder_only() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let (outside, inside) = (directory.path().join("secret.bin"), directory.path().join("models"));
     fs::create_dir_all(inside.join("sub")).unwrap();
     fs::write(&outside, gltf_buffer()).unwrap();
@@ -63,7 +63,7 @@ fn gltf_names_lead_to_files_below_its_folder_only() {
 /// Textures, and the materials of OBJ files, are none of a reader's business.
 #[test]
 fn what_no_triangle_needs_is_not_opened() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let pipe = directory.path().join("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let path = directory.path().join("a.obj");

@@ -12,12 +12,15 @@ pub mod depth;
 pub mod exact;
 pub mod forge;
 pub mod hard_cases;
+pub mod here;
 pub mod loosen;
 pub mod random;
 pub mod seal;
 pub mod stored;
 
+pub use here::{Pool, folder, pool};
 pub use random::Random;
+pub use tempfile::TempDir;
 
 /// The three corners of a triangle, in mesh units.
 pub type Triangle = [[f64; 3]; 3];

@@ -15,7 +15,8 @@ fn u32_at(bytes: &[u8], at: usize) -> u32 {
 }
 
 fn u64_at(bytes: &[u8], at: usize) -> usize {
-    u32_at(bytes, at) as usize | (u32_at(bytes, at + 4) as usize) << 32
+    let [low, high] = [at, at + 4].map(|at| u64::from(u32_at(bytes, at)));
+    usize::try_from(low | high << 32).unwrap_or(usize::MAX)
 }
 
 /// Replaces the bytes from `at` on by `value`.
@@ -123,7 +124,7 @@ pub fn seal_blocks(bytes: &mut [u8]) {
     for at in section(bytes, 2).step_by(PAGE) {
         for (whole, place, count, sum, unit) in [(&leaves, 24, 48, 8, 64), (&ids, 32, 52, 16, 8)] {
             let start = whole.start.saturating_add(u64_at(bytes, at + place).saturating_mul(unit));
-            let end = start.saturating_add(u32_at(bytes, at + count) as usize * unit);
+            let end = start.saturating_add((u32_at(bytes, at + count) as usize).saturating_mul(unit));
             let block = if end <= whole.end { &bytes[start..end] } else { &[] };
             // Without an id block, the field is 0.
             let value = if sum == 16 && block.is_empty() { 0 } else { checksum(block) };

@@ -45,8 +45,9 @@ impl Spent for SceneError {
     }
 }
 
-/// Lets batches and parallel scenes work on this thread alone, whose bytes are counted.
+/// Lets batches and parallel scenes work on this thread alone, whose bytes are counted. WebAssembly has no other.
 fn use_this_thread() {
+    #[cfg(not(target_family = "wasm"))]
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap();
 }
 

@@ -177,7 +177,7 @@ fn pairs_in_pieces_are_all_pairs() {
         contacts.len()
     );
     for (threads, tracking) in [(1, false), (3, true)] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = cbvh_testkit::pool(threads);
         scene.set_parallel(threads > 1);
         scene.set_tracking(tracking);
         // The second time, the scene knows which pair is likely.
@@ -247,7 +247,7 @@ fn motions_in_pieces_are_those_of_all_pairs() {
     assert_eq!(pair.b, last);
     assert_eq!(scene.is_free(&[moving], options), Ok(false));
     for threads in [1, 3] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = cbvh_testkit::pool(threads);
         scene.set_parallel(threads > 1);
         pool.install(|| {
             assert_eq!(scene.motion(&paths, options).unwrap(), alone);
@@ -287,7 +287,7 @@ fn the_pairs_of_a_scene_are_not_all_kept() {
 /// A file that is opened for each question takes as much as opening it, and no more stay open than may.
 #[test]
 fn files_that_are_opened_for_a_question_are_closed_again() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = cbvh_testkit::folder();
     let bytes = to_bytes(&mesh(&dust(10)), &Options::default()).unwrap().0;
     let files = Files::new(2);
     let mut scene = Scene::new().unwrap();

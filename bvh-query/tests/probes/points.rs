@@ -193,7 +193,7 @@ fn batches_of_points_have_the_same_answers() {
                 points.iter().map(|point| querier.closest_point(&bvh, *point, within).unwrap()).collect();
             assert!(expected.iter().any(Option::is_some) && (within > 1.0 || expected.contains(&None)));
             for threads in [1, 2] {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let pool = cbvh_testkit::pool(threads);
                 assert_eq!(pool.install(|| batch.closest_points(&points, within)), Ok(expected.clone()));
             }
         }

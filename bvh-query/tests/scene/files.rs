@@ -8,8 +8,8 @@ use bvh_query::{
 use std::path::{Path, PathBuf};
 
 /// Writes a file of its own for each shape, and returns the folder and the paths.
-fn files_of(shapes: &[OwnedShape]) -> (tempfile::TempDir, Vec<PathBuf>) {
-    let folder = tempfile::tempdir().unwrap();
+fn files_of(shapes: &[OwnedShape]) -> (cbvh_testkit::TempDir, Vec<PathBuf>) {
+    let folder = cbvh_testkit::folder();
     let path = |number: usize| folder.path().join(format!("{number}.cbvh"));
     let paths: Vec<_> = (0..shapes.len()).map(path).collect();
     paths.iter().zip(shapes).for_each(|(path, shape)| std::fs::write(path, shape.bvh().bytes()).unwrap());

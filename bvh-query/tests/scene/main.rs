@@ -157,7 +157,7 @@ fn scenes() -> Vec<Scene> {
 
 #[test]
 fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let pool = cbvh_testkit::pool(2);
     let random = &mut Random::new(7);
     let shapes = shapes();
     let mut querier = Querier::new().unwrap();

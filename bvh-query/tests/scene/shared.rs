@@ -60,7 +60,7 @@ impl SharedScene {
 
 #[test]
 fn open_scenes_have_the_answers_of_brute_force_in_every_frame() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let pool = cbvh_testkit::pool(2);
     // Least distances of all pairs take brute force long: one frame in so many.
     for (name, frames, every) in
         [("clutter60", 200, 20), ("clutter300", 200, 50), ("arm", 500, 50), ("many5k", 500, 250)]

@@ -139,7 +139,7 @@ fn write_obj(mesh: &Mesh, path: &Path) {
 
 #[test]
 fn files_are_told_as_meshes_in_memory() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let [file, obj] = ["f.cbvh", "m.obj"].map(|name| folder.path().join(name));
     let scratch = Some(folder.path().to_owned());
     let (mut fine, mut wrong) = (0, std::collections::BTreeSet::new());
@@ -211,7 +211,7 @@ fn the_first_difference_is_told() {
 
 #[test]
 fn a_small_budget_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let file = folder.path().join("f.cbvh");
     let (bytes, _) = to_bytes(&sheet(5, 0.0), &Options::default()).unwrap();
     std::fs::write(&file, bytes).unwrap();
