@@ -286,7 +286,7 @@ impl Bvh {
 
     /// Returns the id block of a checked page, after checking the block if this is its first touch. It is empty in a file
     /// without ids.
-    fn id_block(&self, page: &Page) -> Result<&[u8], QueryError> {
+    pub(super) fn id_block(&self, page: &Page) -> Result<&[u8], QueryError> {
         let number = page.header().page_number.get();
         let flags = self.0.checked.get(number as usize).ok_or_else(|| self.no_page(number))?;
         if flags.load(Ordering::Acquire) & IDS_CHECKED == 0 {

@@ -9,4 +9,5 @@ pub(crate) mod owned_shape;
 pub(crate) mod place;
 pub(crate) mod shape;
 pub(crate) mod topology;
+mod triangles;
 pub(crate) mod unpack;
