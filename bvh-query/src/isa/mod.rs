@@ -230,7 +230,8 @@ pub(crate) trait Task {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Backend {
-    /// Portable code.
+    /// Portable code. On `wasm32-unknown-unknown` with SIMD128, it stands for SIMD128: nobody chooses there, and a page would
+    /// have to load both.
     Scalar,
     /// AVX2, FMA and F16C.
     Avx2,
@@ -315,7 +316,9 @@ impl Backend {
             #[cfg(target_arch = "aarch64")]
             Self::Neon => return quads::Quads::<neon::Neon>::NEW.run(task),
             #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-            Self::Simd128 => return quads::Quads::<simd128::Simd128>::NEW.run(task),
+            _ if self == Self::Simd128 || cfg!(target_os = "unknown") => {
+                return quads::Quads::<simd128::Simd128>::NEW.run(task);
+            }
             _ => {}
         }
         scalar::Scalar.run(task)
