@@ -1,0 +1,102 @@
+//! Bakes meshes in memory: of arrays, and of the bytes of mesh files.
+
+use crate::arguments::{Answer, bytes, refused, room, rows, wrong};
+use crate::mesh::Mesh;
+use bvh_bake::mesh::Mesh as Triangles;
+use bvh_bake::{Effort, MeshFormat, Options, Profile, TriangleEncoding, input, to_bytes_with};
+use bvh_query::Bvh;
+use js_sys::{Float64Array, Function, Reflect, Uint8Array, Uint32Array};
+use std::path::Path;
+use wasm_bindgen::prelude::*;
+
+/// Finds a name among those that are known.
+fn named<T>(name: &str, found: Option<String>, known: &[T], name_of: fn(&T) -> &str) -> Answer<Option<T>>
+where
+    T: Copy,
+{
+    let Some(found) = found else { return Ok(None) };
+    let names = || known.iter().map(name_of).collect::<Vec<_>>().join(", ");
+    let of_name = known.iter().find(|one| name_of(one) == found).copied();
+    of_name.map(Some).ok_or_else(|| wrong(name, format_args!("expected one of {}, found {found:?}", names())))
+}
+
+/// Reads the options of the command line that have the same names there.
+fn options(given: &JsValue) -> Answer<Options> {
+    let get = |name: &str| Reflect::get(given, &name.into()).unwrap_or(JsValue::UNDEFINED);
+    let text = |name: &str| get(name).as_string();
+    let profile = named("profile", text("profile"), &Profile::ALL, |profile| profile.name())?;
+    let known = &TriangleEncoding::ALL;
+    let triangles = named("triangles", text("triangles"), known, |encoding| encoding.name())?;
+    let effort = named("effort", text("effort"), &Effort::ALL, |effort| effort.name())?;
+    let max_error = get("maxError").as_f64();
+    if let Some(found) = max_error {
+        if triangles != Some(TriangleEncoding::Quantized) {
+            return Err(wrong(
+                "maxError",
+                "expected triangles \"quantized\" beside it, found other triangles",
+            ));
+        }
+        if !(found.is_finite() && found > 0.0) {
+            return Err(wrong("maxError", format_args!("expected a finite length above 0, found {found}")));
+        }
+    }
+    let flag = |name: &str| get(name).as_bool().unwrap_or(true);
+    Ok(Options::default()
+        .profile(profile)
+        .triangles(triangles)
+        .effort(effort.unwrap_or_default())
+        .max_error(max_error)
+        .ids(flag("ids"))
+        .topology(flag("topology")))
+}
+
+/// Bakes a mesh, and calls `onStage` with the name of each stage. What it throws is thrown when the bake has ended.
+fn bake_mesh(mesh: &Triangles, given: &JsValue) -> Result<Mesh, JsValue> {
+    let options = options(given)?;
+    let told = Reflect::get(given, &"onStage".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
+    let mut thrown = Ok(());
+    let baked = to_bytes_with(mesh, &options, "", &mut |stage| {
+        if let (Some(told), Ok(())) = (&told, &thrown) {
+            thrown = told.call1(&JsValue::UNDEFINED, &stage.name().into()).map(|_| ());
+        }
+    });
+    thrown?;
+    let (bytes, _) = baked.map_err(refused)?;
+    Ok(Bvh::from_bytes(bytes).map(Mesh::from).map_err(refused)?)
+}
+
+/// Bakes triangles of numbers of vertices or, without `faces`, of three vertices in turn each.
+#[wasm_bindgen]
+pub fn bake(vertices: &Float64Array, faces: Option<Uint32Array>, options: &JsValue) -> Result<Mesh, JsValue> {
+    let vertices = rows::<3>(vertices, "vertices")?;
+    let corners = faces.as_ref().map_or(vertices.len(), |faces| faces.length() as usize);
+    if !corners.is_multiple_of(3) {
+        let found = format_args!("expected three corners for each triangle, found {corners} corners");
+        return Err(wrong(if faces.is_some() { "faces" } else { "vertices" }, found).into());
+    }
+    let mut triangles = room("faces", [0; 3], corners / 3)?;
+    match &faces {
+        Some(faces) => faces.copy_to(triangles.as_flattened_mut()),
+        None => {
+            triangles.as_flattened_mut().iter_mut().zip(0..).for_each(|(corner, number)| *corner = number)
+        }
+    }
+    bake_mesh(&Triangles::from_triangles(vertices, triangles), options)
+}
+
+/// Bakes the bytes of a file, whose name tells the format and stands in errors.
+#[wasm_bindgen(js_name = bakeFile)]
+pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mesh, JsValue> {
+    let (path, bytes) = (Path::new(name), bytes(file, name)?);
+    let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
+    let format = format.ok_or_else(|| {
+        wrong(
+            name,
+            "expected a mesh in a file named .obj, .stl, .ply or .glb, found content of no known format",
+        )
+    })?;
+    let mesh = input::read_bytes(&bytes, format, path).map_err(refused)?;
+    // It is not needed while the mesh is baked.
+    drop(bytes);
+    bake_mesh(&mesh, options)
+}

@@ -1,0 +1,19 @@
+//! The WebAssembly module behind the npm package: typed arrays in, typed arrays out.
+//!
+//! The TypeScript in `ts/` gives it the form that users see: it converts arguments to the arrays that these functions
+//! take, and names the parts of answers. What counts as a valid number is decided here, by the libraries.
+//! All functions run on one thread, which is that of the page or worker that has loaded the module. An answer of N questions is
+//! a list of arrays, one per field.
+#![forbid(unsafe_code)]
+
+mod answers;
+mod arguments;
+mod bake;
+mod mesh;
+mod motions;
+mod pairs;
+mod paths;
+mod poses;
+mod probes;
+mod scene;
+mod scene_questions;

@@ -1,0 +1,90 @@
+//! A mesh in the bytes of a `.cbvh` file: all objects of the file, or one.
+
+use crate::answers::floats;
+use crate::arguments::{Answer, bytes, refused, room, wrong};
+use bvh_format::validate::validate;
+use bvh_query::{Bvh, OwnedShape};
+use js_sys::{Float64Array, Uint8Array};
+use wasm_bindgen::prelude::*;
+
+/// A handle of a mesh. Several handles may share the bytes of a file.
+#[wasm_bindgen]
+pub struct Mesh {
+    pub(crate) shape: OwnedShape,
+}
+
+impl From<Bvh> for Mesh {
+    fn from(bvh: Bvh) -> Self {
+        Self { shape: bvh.into() }
+    }
+}
+
+#[wasm_bindgen]
+impl Mesh {
+    /// Opens the bytes of a file, which are copied.
+    pub fn open(file: &Uint8Array) -> Answer<Mesh> {
+        Bvh::from_bytes(bytes(file, "bytes")?).map(Self::from).map_err(refused)
+    }
+
+    /// Copies the bytes of the file.
+    pub fn bytes(&self) -> Uint8Array {
+        Uint8Array::from(self.shape.bvh().bytes())
+    }
+
+    /// The number of bytes of the file.
+    pub fn size(&self) -> usize {
+        self.shape.bvh().bytes().len()
+    }
+
+    /// One object of the file, which shares its bytes.
+    pub fn object(&self, number: f64) -> Answer<Mesh> {
+        let bvh = self.shape.bvh().clone();
+        let objects = bvh.objects().len();
+        let whole =
+            Some(number).filter(|number| number.fract() == 0.0 && (0.0..2f64.powi(32)).contains(number));
+        let shape = whole.and_then(|number| OwnedShape::object(bvh, number as usize));
+        let shape = shape.ok_or_else(|| {
+            wrong("object", format_args!("expected a number below {objects}, found {number}"))
+        })?;
+        Ok(Self { shape })
+    }
+
+    /// The names of all objects of the file.
+    pub fn names(&self) -> Vec<String> {
+        self.shape.bvh().objects().iter().map(|object| object.name().to_owned()).collect()
+    }
+
+    /// The number of triangles stored.
+    pub fn count(&self) -> f64 {
+        self.shape.shape().triangles() as f64
+    }
+
+    /// The lower and the upper corner of the box of all objects.
+    pub fn bounds(&self) -> JsValue {
+        let boxes = self.shape.shape().objects().iter().map(|object| object.bounding_box());
+        let joined = boxes.reduce(|[lo_a, hi_a], [lo_b, hi_b]| {
+            [[0, 1, 2].map(|k| lo_a[k].min(lo_b[k])), [0, 1, 2].map(|k| hi_a[k].max(hi_b[k]))]
+        });
+        floats(joined.iter().flatten().flatten().copied())
+    }
+
+    /// The nine coordinates of each triangle by its number, NaN where there is none.
+    pub fn triangles(&self) -> Answer<Float64Array> {
+        let shape = self.shape.shape();
+        let objects = shape.objects().len();
+        if objects > 1 && !shape.bvh().layout().has_ids() {
+            let found = format_args!("expected one object in a file without ids, found {objects}");
+            return Err(wrong("triangles", found));
+        }
+        let mut end = 0;
+        shape.visit_triangles(|id, _| end = end.max(id as usize + 1)).map_err(refused)?;
+        let mut corners = room("triangles", [[f64::NAN; 3]; 3], end)?;
+        shape.visit_triangles(|id, triangle| corners[id as usize] = triangle).map_err(refused)?;
+        Ok(Float64Array::from(corners.as_flattened().as_flattened()))
+    }
+
+    /// Checks the whole file.
+    pub fn validate(&self) -> Answer<()> {
+        validate(self.shape.bvh().bytes()).map(|_| ()).map_err(refused)
+    }
+}

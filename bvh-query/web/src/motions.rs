@@ -1,0 +1,67 @@
+//! Questions about motions of one mesh past another.
+
+use crate::answers::{distances, floats, small};
+use crate::arguments::{Answer, refused, with_querier};
+use crate::mesh::Mesh;
+use crate::paths::read;
+use bvh_query::{MotionAnswer, MotionOptions};
+use js_sys::{Array, Float64Array, Uint8Array};
+use wasm_bindgen::prelude::*;
+
+/// The numbers of `MotionKind`.
+pub(crate) const FREE: u8 = 0;
+pub(crate) const HIT: u8 = 1;
+pub(crate) const NEAR: u8 = 2;
+
+/// What counts as a hit, and how exactly time is searched.
+pub(crate) fn options(clearance: f64, tolerance: Option<f64>) -> MotionOptions {
+    MotionOptions::new().clearance(clearance).tolerance(tolerance)
+}
+
+/// Kind, time until which the path is free, time of the contact or of the first undecided pose, and the distance there.
+#[wasm_bindgen]
+pub fn motion(
+    a: &Mesh,
+    b: &Mesh,
+    kind: u8,
+    numbers: &Float64Array,
+    clearance: f64,
+    tolerance: Option<f64>,
+) -> Answer<Array> {
+    let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
+    let ask = |querier: &mut bvh_query::Querier| {
+        let of = |path: &Box<dyn bvh_query::RigidPath + Sync>| {
+            querier.motion(&a.shape, &b.shape, path.as_ref(), &options).map_err(refused)
+        };
+        paths.iter().map(of).collect::<Answer<Vec<MotionAnswer>>>()
+    };
+    let row = |answer: MotionAnswer| match answer {
+        MotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
+        MotionAnswer::Hit { free_until, touching_at, nearest } => {
+            (HIT, free_until, touching_at, Some(nearest))
+        }
+        MotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, Some(nearest)),
+    };
+    let rows: Vec<_> = with_querier(ask)?.into_iter().map(row).collect();
+    let nearest: Vec<_> = rows.iter().map(|row| row.3).collect();
+    let times = [floats(rows.iter().map(|row| row.1)), floats(rows.iter().map(|row| row.2))];
+    let kinds = JsValue::from(small(rows.iter().map(|row| row.0)));
+    Ok(std::iter::once(kinds).chain(times).chain([distances(&nearest).into()]).collect())
+}
+
+#[wasm_bindgen(js_name = isFree)]
+pub fn is_free(
+    a: &Mesh,
+    b: &Mesh,
+    kind: u8,
+    numbers: &Float64Array,
+    clearance: f64,
+    tolerance: Option<f64>,
+) -> Answer<Uint8Array> {
+    let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
+    let found = with_querier(|querier| {
+        let mut of = |path: &dyn bvh_query::RigidPath| querier.is_free(&a.shape, &b.shape, path, &options);
+        paths.iter().map(|path| of(path.as_ref()).map_err(refused)).collect::<Answer<Vec<bool>>>()
+    })?;
+    Ok(small(found.into_iter().map(u8::from)))
+}

@@ -1,0 +1,209 @@
+//! Scenes: placed meshes under numbers of their own, which are given once and never again.
+
+use crate::answers;
+use crate::arguments::{Answer, bytes, integers, pose_or_identity, poses, refused, same_count, wrong};
+use crate::mesh::Mesh;
+use bvh_query::{
+    Bvh, Groups, InstanceError, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair,
+};
+use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
+use std::collections::HashMap;
+use wasm_bindgen::prelude::*;
+
+/// Many placed meshes.
+#[wasm_bindgen]
+pub struct Scene {
+    pub(crate) scene: bvh_query::Scene,
+    ids: HashMap<u32, InstanceId>,
+    numbers: HashMap<InstanceId, u32>,
+    next: u32,
+}
+
+impl Scene {
+    fn of(scene: bvh_query::Scene) -> Self {
+        let mut made = Self { scene, ids: HashMap::new(), numbers: HashMap::new(), next: 0 };
+        for id in made.scene.instances().collect::<Vec<_>>() {
+            made.enter(id);
+        }
+        made
+    }
+
+    fn enter(&mut self, id: InstanceId) -> u32 {
+        let number = self.next;
+        self.ids.insert(number, id);
+        self.numbers.insert(id, number);
+        self.next += 1;
+        number
+    }
+
+    pub(crate) fn id(&self, number: u32, name: &str) -> Answer<InstanceId> {
+        let found = format_args!("expected an instance of the scene, found {number}; was it removed?");
+        self.ids.get(&number).copied().ok_or_else(|| wrong(name, found))
+    }
+
+    /// Returns the number of an instance of the scene.
+    pub(crate) fn number(&self, id: InstanceId) -> u32 {
+        self.numbers.get(&id).copied().unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn pair(&self, pair: ScenePair) -> [u32; 2] {
+        [self.number(pair.a), self.number(pair.b)]
+    }
+
+    /// Names an instance that an error names: by its name or, without one, by its number.
+    fn called(&self, instance: &InstanceLabel) -> String {
+        let number = || self.number(instance.id).to_string();
+        instance.name.as_ref().map_or_else(number, |name| format!("{name:?}"))
+    }
+
+    /// The `Error` of what the scene refuses, which names instances as callers know them.
+    pub(crate) fn refused(&self, error: impl Into<SceneError>) -> JsError {
+        match error.into() {
+            SceneError::Pair { a, b, source } => {
+                wrong(&format!("instances {} and {}", self.called(&a), self.called(&b)), source)
+            }
+            SceneError::Instance { instance, source } => {
+                wrong(&format!("instance {}", self.called(&instance)), source)
+            }
+            SceneError::Refused(InstanceError::Pose { instance, source }) => {
+                wrong(&format!("instance {}", self.called(&instance)), source)
+            }
+            error => refused(error),
+        }
+    }
+
+    /// The places of instances.
+    pub(crate) fn ids(&self, numbers: &Uint32Array, name: &str) -> Answer<Vec<InstanceId>> {
+        integers(numbers, name)?.into_iter().map(|number| self.id(number, name)).collect()
+    }
+
+    /// The pose of an instance, and its mesh.
+    pub(crate) fn placed(&self, number: u32, name: &str) -> Answer<(Pose, OwnedShape)> {
+        let id = self.id(number, name)?;
+        let pose = self.scene.pose(id).map_err(|error| self.refused(error))?;
+        let shape = self.scene.shape(id).map_err(|error| self.refused(error))?;
+        Ok((*pose, shape.opened().map_err(refused)?))
+    }
+}
+
+#[wasm_bindgen]
+impl Scene {
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> Answer<Scene> {
+        Ok(Self::of(bvh_query::Scene::new().map_err(refused)?))
+    }
+
+    /// The instances of the bytes of a scene file, which are copied.
+    pub fn open(file: &Uint8Array) -> Answer<Scene> {
+        let bvh = Bvh::from_bytes(bytes(file, "bytes")?).map_err(refused)?;
+        bvh_query::Scene::of_file(bvh).map(Self::of).map_err(refused)
+    }
+
+    /// Adds a mesh, in the identity where no pose is given, and returns its number.
+    pub fn add(
+        &mut self,
+        mesh: &Mesh,
+        pose: Option<Float64Array>,
+        name: Option<String>,
+        member: u32,
+        meets: u32,
+    ) -> Answer<u32> {
+        let (pose, shape) = (pose_or_identity(pose.as_ref())?, mesh.shape.clone());
+        if self.next == u32::MAX {
+            return Err(wrong(
+                "scene",
+                "expected fewer than 2^32 - 1 instances in all, found no number left",
+            ));
+        }
+        let added = match name {
+            Some(name) => self.scene.add_named(name, shape, pose),
+            None => self.scene.add(shape, pose),
+        };
+        let id = added.map_err(|error| match error {
+            // It has no number yet.
+            InstanceError::Pose { source, .. } => wrong("pose", source),
+            error => refused(error),
+        })?;
+        // The instance is there.
+        self.scene.set_groups(id, Groups { member, meets }).map_err(refused)?;
+        Ok(self.enter(id))
+    }
+
+    pub fn remove(&mut self, number: u32) -> Answer<()> {
+        let id = self.id(number, "id")?;
+        self.scene.remove(id).map_err(|error| self.refused(error))?;
+        self.numbers.remove(&id);
+        self.ids.remove(&number);
+        Ok(())
+    }
+
+    /// Moves as many instances as there are poses, or none.
+    #[wasm_bindgen(js_name = setPoses)]
+    pub fn set_poses(&mut self, numbers: &Uint32Array, array: &Float64Array) -> Answer<()> {
+        let (ids, poses) = (self.ids(numbers, "ids")?, poses(array, "poses")?);
+        same_count("poses", poses.len(), "ids", ids.len())?;
+        self.scene.set_poses(ids.into_iter().zip(poses)).map_err(|error| self.refused(error))
+    }
+
+    /// The poses of instances.
+    pub fn poses(&self, numbers: &Uint32Array) -> Answer<Float64Array> {
+        let of = |id| self.scene.pose(id).copied().map_err(|error| self.refused(error));
+        let found = self.ids(numbers, "ids")?.into_iter().map(of).collect::<Answer<Vec<Pose>>>()?;
+        Ok(answers::poses(&found))
+    }
+
+    /// The groups that an instance is in, and those that it meets.
+    pub fn groups(&self, number: u32) -> Answer<JsValue> {
+        let groups = self.scene.groups(self.id(number, "id")?).map_err(|error| self.refused(error))?;
+        Ok(answers::ids([groups.member, groups.meets].into_iter()))
+    }
+
+    #[wasm_bindgen(js_name = setGroups)]
+    pub fn set_groups(&mut self, number: u32, member: u32, meets: u32) -> Answer<()> {
+        let id = self.id(number, "id")?;
+        self.scene.set_groups(id, Groups { member, meets }).map_err(|error| self.refused(error))
+    }
+
+    #[wasm_bindgen(js_name = setAllowed)]
+    pub fn set_allowed(&mut self, a: u32, b: u32, allowed: bool) -> Answer<()> {
+        let (first, second) = (self.id(a, "a")?, self.id(b, "b")?);
+        self.scene.set_allowed(first, second, allowed).map_err(|error| self.refused(error))
+    }
+
+    /// The pairs that may touch, lower numbers first.
+    pub fn allowed(&self) -> JsValue {
+        let mut allowed: Vec<[u32; 2]> = self.scene.allowed().map(|pair| self.pair(pair)).collect();
+        allowed.iter_mut().for_each(|pair| pair.sort_unstable());
+        allowed.sort_unstable();
+        answers::ids(allowed.into_iter().flatten())
+    }
+
+    pub fn find(&self, name: &str) -> Option<u32> {
+        self.scene.find(name).map(|id| self.number(id))
+    }
+
+    pub fn name(&self, number: u32) -> Answer<Option<String>> {
+        let found = self.scene.name(self.id(number, "id")?).map_err(|error| self.refused(error))?;
+        Ok(found.map(str::to_owned))
+    }
+
+    /// The mesh of an instance, under a handle of its own.
+    pub fn mesh(&self, number: u32) -> Answer<Mesh> {
+        Ok(Mesh { shape: self.placed(number, "id")?.1 })
+    }
+
+    /// The numbers of all instances, in their order.
+    pub fn instances(&self) -> JsValue {
+        answers::ids(self.scene.instances().map(|id| self.number(id)))
+    }
+
+    #[wasm_bindgen(js_name = setTracking)]
+    pub fn set_tracking(&mut self, tracking: bool) {
+        self.scene.set_tracking(tracking);
+    }
+}
+
+/// Numbers of pairs, and what is found of each.
+pub(crate) fn beside(pairs: impl Iterator<Item = [u32; 2]>, found: JsValue) -> Array {
+    [answers::ids(pairs.flatten()), found].into_iter().collect()
+}

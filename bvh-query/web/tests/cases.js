@@ -1,0 +1,541 @@
+/** Tests of the package that run in Node, in a page and in a worker. Each gets the package, and a function that reads files. */
+
+import { equal, ok, random, refused } from "./expect.js";
+import { writers } from "./formats.js";
+
+const CUBE = Float64Array.from({ length: 24 }, (_, k) =>
+    (k % 3 === 0 ? k / 3 : k % 3 === 1 ? k / 6 : k / 12) & 1 ? 1 : -1,
+);
+const CUBE_FACES = [
+    0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5,
+];
+
+const at = (x, y, z) => [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z];
+const cubeOf = (cbvh) => cbvh.Mesh.bake(CUBE, CUBE_FACES);
+
+/** A random rotation, of a quaternion, and a translation. */
+function somewhere(cbvh, source, reach, count = 1) {
+    const quaternions = source.numbers(4 * count, -1, 1);
+    for (let k = 0; k < quaternions.length; k += 4) {
+        const length = Math.hypot(...quaternions.subarray(k, k + 4));
+        quaternions.subarray(k, k + 4).forEach((number, axis) => (quaternions[k + axis] = number / length));
+    }
+    return cbvh.pose(source.numbers(3 * count, -reach, reach), quaternions);
+}
+
+/** Asks everything about two meshes: whatever they hold, and whatever the numbers, with an answer or an error. */
+function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
+    const { Motion, Scene } = cbvh;
+    const scene = (work) => {
+        const made = new Scene();
+        try {
+            made.add(a, null, { name: "a" });
+            made.add(b, pose, { name: "b" });
+            return work(made);
+        } finally {
+            made.free();
+        }
+    };
+    const screw = () => Motion.screw(at(0, 0, 0), [x, y, z], [u, v, w], x, y);
+    return [
+        () => a.collide(b, pose),
+        () => a.within(b, pose, x),
+        () => a.distance(b, pose),
+        () => a.distance(b, pose, { relErr: x, absErr: y }),
+        () => a.relation(b, pose),
+        () => a.contacts(b, pose),
+        () => a.motion(b, Motion.between(at(x, y, z), pose), { clearance: w, tolerance: v }),
+        () => a.isFree(b, screw()),
+        () => a.motion(b, Motion.through([...pose, ...at(u, v, w)])),
+        () => a.closestPoints([x, y, z], { within: w, pose }),
+        () => a.sides([x, y, z]),
+        () => a.signedDistances([x, y, z, u, v, w]),
+        () => a.firstHits([x, y, z], [u, v, w], { until: x }),
+        () => a.anyHits([x, y, z], [u, v, w]),
+        () => a.allHits([x, y, z], [u, v, w], { pose }),
+        () => a.segmentHits([x, y, z], [u, v, w]),
+        () => a.triangles(),
+        () => a.validate(),
+        () => cbvh.nearestPose(pose),
+        () => scene((made) => [made.collide(), made.pairsInContact(), made.pairsWithin(x), made.within(y)]),
+        () => scene((made) => [made.distance(), made.relations(), made.contacts(), made.distances(["a", "b"])]),
+        () => scene((made) => made.motion(new Map([["b", screw()]]), { clearance: x })),
+        () => scene((made) => [made.closestPoints([x, y, z]), made.sides([x, y, z]), made.allHits([x, y, z], [u, v, w])]),
+    ];
+}
+
+/** Asks, and returns how many questions were refused; a trap would end the module. */
+function refusals(work) {
+    let count = 0;
+    for (const question of work) {
+        try {
+            question();
+        } catch (error) {
+            refused(() => {
+                throw error;
+            });
+            count++;
+        }
+    }
+    return count;
+}
+
+export const cases = {
+    "a baked cube answers every question about pairs": (cbvh) => {
+        const { Relation } = cbvh;
+        const cube = cubeOf(cbvh);
+        equal(cube.triangleCount, 12);
+        equal(cube.bounds, [-1, -1, -1, 1, 1, 1]);
+        equal([cube.collide(cube, at(2, 0, 0)), cube.collide(cube, at(2.5, 0, 0))], [true, false]);
+        equal(cube.collideEach(cube, [...at(2, 0, 0), ...at(3, 0, 0)]), [1, 0]);
+        equal(cube.collideEach(cube, []), []);
+        equal([cube.within(cube, at(2.5, 0, 0), 0.5), cube.within(cube, at(2.5, 0, 0), 0.49)], [true, false]);
+        const answer = cube.distance(cube, at(2.5, 0, 0));
+        equal([answer.distance, answer.pointA[0], answer.pointB[0]], [0.5, 1, 1.5]);
+        ok(answer.lower <= 0.5 && 0.5 <= answer.upper, "bounds around the distance");
+        const both = cube.distanceEach(cube, [...at(2.5, 0, 0), ...at(0, 0, 4)]);
+        equal([both.distance, both.pointA.length], [[0.5, 2], 6]);
+        const loose = cube.distance(cube, at(2.5, 0, 0), { relErr: 0.5 });
+        ok(loose.distance >= 0.5 && loose.distance <= 0.75, "a distance within the allowed error");
+        equal(Relation[cube.relation(cube, at(9, 0, 0))], "APART");
+        equal(Relation[cube.relation(cube, at(1, 0, 0))], "TOUCHING");
+        const small = cbvh.Mesh.bake(
+            CUBE.map((x) => x / 4),
+            CUBE_FACES,
+        );
+        equal(cube.relation(small, cbvh.IDENTITY), Relation.B_IN_A);
+        const contacts = cube.contacts(cube, at(2, 2, 2));
+        ok(contacts.length > 0 && contacts.length % 4 === 0, "rows of four");
+        equal(cube.contactsEach(cube, [...at(2, 2, 2), ...at(9, 0, 0)]), [contacts, []]);
+    },
+
+    "a baked cube answers every question about motions": (cbvh) => {
+        const { Motion, MotionKind } = cbvh;
+        const cube = cubeOf(cbvh);
+        const through = Motion.between(at(5, 0, 0), at(-5, 0, 0));
+        const hit = cube.motion(cube, through);
+        equal(MotionKind[hit.kind], "HIT");
+        ok(hit.freeUntil <= 0.3 && hit.at >= 0.3 - 1e-9 && hit.at < 0.3001, `a hit at 0.3, found ${hit.at}`);
+        equal(hit.nearest.distance, 0);
+        const past = Motion.between(at(5, 3, 0), at(-5, 3, 0));
+        equal(cube.motion(cube, past), { kind: MotionKind.FREE, freeUntil: 1, at: NaN, nearest: undefined });
+        equal([cube.isFree(cube, past), cube.isFree(cube, past, { clearance: 1 })], [true, false]);
+        const many = Motion.between([...at(5, 0, 0), ...at(5, 3, 0)], [...at(-5, 0, 0), ...at(-5, 3, 0)]);
+        equal([many.count, cube.isFreeEach(cube, many)], [2, [0, 1]]);
+        const answers = cube.motionEach(cube, many);
+        equal([answers.kind, answers.at[0], answers.nearest.distance], [[1, 0], hit.at, [0, NaN]]);
+        equal(past.poses([0, 0.5, 1]), [...at(5, 3, 0), ...at(0, 3, 0), ...at(-5, 3, 0)]);
+        equal(cube.isFree(cube, Motion.screw(at(5, 0, 0), [0, 0, 0], [0, 0, 1], 2 * Math.PI)), true);
+        const round = Motion.through([...at(5, 0, 0), ...at(5, 5, 0), ...at(-5, 5, 0), ...at(-5, 0, 0)]);
+        equal([cube.isFree(cube, round), round.poses([1])], [true, at(-5, 0, 0)]);
+    },
+
+    "a baked cube answers every question about points, rays and segments": (cbvh) => {
+        const cube = cubeOf(cbvh);
+        const closest = cube.closestPoints([3, 0, 0, 0, 0, 9], { within: 4 });
+        equal(
+            [closest.found, closest.distance, closest.point.subarray(0, 3)],
+            [
+                [1, 0],
+                [2, NaN],
+                [1, 0, 0],
+            ],
+        );
+        equal(cube.sides([0, 0, 0, 1, 0, 0, 3, 0, 0]), [1, 0, -1]);
+        equal(cube.sides([0, 0, 0], { pose: at(5, 0, 0) }), [-1]);
+        equal(cube.signedDistances([0, 0, 0.5, 3, 0, 0]), [-0.5, 2]);
+        const hits = cube.firstHits([-5, 0.1, 0.2, -5, 7, 0], [2, 0, 0, 2, 0, 0]);
+        equal(
+            [hits.found, hits.t],
+            [
+                [1, 0],
+                [2, NaN],
+            ],
+        );
+        equal(cube.anyHits([-5, 0.1, 0.2, -5, 7, 0], [2, 0, 0, 2, 0, 0]), [1, 0]);
+        equal(cube.anyHits([-5, 0.1, 0.2, -5, 0, 0.1], [2, 0, 0, 2, 0, 0], { until: [1.9, 2] }), [0, 1]);
+        const all = cube.allHits([-5, 0.1, 0.2], [2, 0, 0]);
+        equal([all.length, all[0].t], [1, [2, 3]]);
+        equal(cube.segmentHits([-5, 0.1, 0.2, 0, 0, 0], [0, 0.1, 0.2, 0.5, 0.5, 0.5]), [1, 0]);
+        const open = cbvh.Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+        equal([open.sides([0, 0, 1]), open.signedDistances([0, 0, 1])], [[2], [NaN]]);
+    },
+
+    "scenes hold instances and answer every question": (cbvh) => {
+        const { Motion, MotionKind, Scene } = cbvh;
+        const [cube, scene] = [cubeOf(cbvh), new Scene()];
+        equal(scene.distance(), undefined);
+        const [a, b] = [scene.add(cube, null, { name: "a" }), scene.add(cube, at(2.5, 0, 0))];
+        cube.free();
+        equal([a, b, scene.find("a"), scene.find("c"), scene.name(b)], [0, 1, 0, undefined, undefined]);
+        equal([scene.collide(), scene.within(0.5), scene.pairsWithin(0.5)], [false, true, [0, 1]]);
+        const nearest = scene.distance();
+        equal([nearest.a, nearest.b, nearest.nearest.distance], [0, 1, 0.5]);
+        scene.setPose(b, at(0, 0, 3));
+        equal([scene.distance().nearest.distance, scene.poses(["a", 1])], [1, [...at(0, 0, 0), ...at(0, 0, 3)]]);
+        scene.setPoses(["a", b], [...at(0, 0, 1), ...at(0, 0, 2)]);
+        equal(
+            [scene.pairsInContact(), scene.contacts().pairs.subarray(0, 2)],
+            [
+                [0, 1],
+                [0, 1],
+            ],
+        );
+        equal(scene.relations(), { pairs: [0, 1], relations: [0] });
+        scene.setTracking(true);
+        scene.setAllowed("a", b);
+        equal([scene.collide(), scene.allowed()], [false, [0, 1]]);
+        scene.setAllowed(b, "a", false);
+        scene.setGroups(b, { meets: 2 });
+        equal([scene.collide(), scene.groups(b)], [true, { member: 0xffff_ffff, meets: 2 }]);
+        scene.setGroups("a", { member: 1 });
+        equal(scene.collide(), false);
+        scene.setGroups("a", { member: 2 });
+        // A number is never given again.
+        scene.remove(b);
+        const [mesh, c] = [scene.mesh("a"), scene.add(scene.mesh("a"), at(4, 0, 1))];
+        equal([c, scene.instances(), mesh.triangleCount], [2, [0, 2], 12]);
+        equal(
+            refused(() => scene.name(1)),
+            "id: expected an instance of the scene, found 1; was it removed?",
+        );
+        equal(scene.distances([c, "a"]).distance, [2]);
+        const free = scene.motion(new Map([[c, Motion.between(at(4, 0, 1), at(4, 9, 1))]]));
+        equal(free, { kind: MotionKind.FREE, freeUntil: 1, at: NaN, pair: undefined });
+        const ways = new Map([
+            [c, Motion.between(at(4, 0, 1), at(0, 0, 1))],
+            ["a", Motion.between(at(0, 0, 1), at(4, 0, 1))],
+        ]);
+        const hit = scene.motion(ways);
+        equal([hit.kind, hit.pair.a, hit.pair.b, scene.isFree(ways)], [MotionKind.HIT, 0, 2, false]);
+        ok(Math.abs(hit.at - 0.25) < 1e-4, `a hit at 0.25, found ${hit.at}`);
+        const closest = scene.closestPoints([8, 0, 1, 90, 0, 0], { within: 5 });
+        equal(
+            [closest.instance, closest.closest.distance],
+            [
+                [2, -1],
+                [3, NaN],
+            ],
+        );
+        equal([scene.sides([4, 0, 1, 2, 0, 1]), scene.signedDistances([4, 0, 1.5])], [[1, -1], [-0.5]]);
+        const rays = [
+            [-9, 0.1, 1],
+            [1, 0, 0],
+        ];
+        equal([scene.firstHits(...rays).instance, scene.firstHits(...rays).hit.t, scene.anyHits(...rays)], [[0], [8], [1]]);
+        equal(
+            scene.allHits(...rays).map((hits) => [hits.instance, hits.hit.t]),
+            [
+                [
+                    [0, 0, 2, 2],
+                    [8, 10, 12, 14],
+                ],
+            ],
+        );
+        equal(scene.segmentHits([2, 0, 1], [2, 0, 9]), [0]);
+    },
+
+    "poses come of quaternions, rounded matrices and pairs of poses": (cbvh) => {
+        equal(cbvh.pose([1, 2, 3, 4, 5, 6]), [...at(1, 2, 3), ...at(4, 5, 6)]);
+        equal(cbvh.pose([1, 2, 3], [0, 0, 1, 0]), [-1, 0, 0, 1, 0, -1, 0, 2, 0, 0, 1, 3]);
+        equal(cbvh.relative(at(1, 0, 0), at(3, 0, 0)), at(2, 0, 0));
+        const source = random(5);
+        const rounded = Float64Array.from(somewhere(cbvh, source, 1), Math.fround);
+        const cube = cubeOf(cbvh);
+        cube.collide(cube, cbvh.nearestPose(rounded.map((x) => x * (1 + 1e-5))));
+    },
+
+    "files of four formats are the same mesh": async (cbvh, read) => {
+        const robot = cbvh.Mesh.bakeFile("fclrob.obj", await read("testdata/fclrob.obj"));
+        const triangles = robot.triangles();
+        equal([robot.triangleCount, triangles.length, robot.names], [216, 9 * 216, [""]]);
+        const stages = [];
+        for (const [ending, write] of Object.entries(writers)) {
+            const stl = write(triangles);
+            const other = cbvh.Mesh.bakeFile(`Robot.${ending.toUpperCase()}`, stl, {
+                onStage: (stage) => stages.push(stage),
+            });
+            equal(other.triangles(), triangles, ending);
+            equal(cbvh.Mesh.bakeFile("dropped", stl.buffer.slice(0)).triangleCount, 216, ending);
+            equal(robot.collide(other, cbvh.IDENTITY), true);
+        }
+        equal([stages.length, stages[0], stages.at(-1)], [16, "preparing", "proving bounds"]);
+        ok(
+            /^robot\.obj: line 2: /.test(
+                refused(() => cbvh.Mesh.bakeFile("robot.obj", new TextEncoder().encode("v 1 2 3\nv 1 2 x\n"))),
+            ),
+            "the line",
+        );
+        ok(/^robot\.stl: /.test(refused(() => cbvh.Mesh.bakeFile("robot.stl", new Uint8Array(90)))), "the file");
+        ok(
+            /found content of no known format/.test(refused(() => cbvh.Mesh.bakeFile("robot.xyz", new Uint8Array(9)))),
+            "the format",
+        );
+        const outside = { asset: { version: "2.0" }, buffers: [{ byteLength: 36, uri: "beside.bin" }] };
+        Object.assign(outside, {
+            bufferViews: [{ buffer: 0, byteLength: 36 }],
+            meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
+        });
+        Object.assign(outside, {
+            accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: "VEC3" }],
+            nodes: [{ mesh: 0 }],
+        });
+        refused(() => cbvh.Mesh.bakeFile("outside.gltf", new TextEncoder().encode(JSON.stringify(outside))));
+    },
+
+    "what a bake is told": (cbvh) => {
+        const bake = (options) => cbvh.Mesh.bake(CUBE, CUBE_FACES, options);
+        const sizes = ["f32", "packed", "quantized"].map((triangles) => bake({ triangles }).byteLength);
+        ok(sizes[0] >= sizes[1] && sizes[1] >= sizes[2], `smaller files, found ${sizes}`);
+        bake({ profile: "dop14-u8", effort: "fast", ids: false, topology: false, triangles: "quantized", maxError: 0.01 });
+        const open = bake({ topology: false });
+        ok(/bake it again with topology/.test(refused(() => open.sides([0, 0, 0]))), "what is missing");
+        equal(cbvh.Mesh.bake(Float32Array.from(CUBE), Uint16Array.from(CUBE_FACES)).bytes(), bake({}).bytes());
+        ok(/dop14-u8/.test(refused(() => bake({ profile: "best" }))), "the profiles that there are");
+        ok(/fast, default/.test(refused(() => bake({ effort: "slow" }))), "the efforts that there are");
+        ok(/^maxError: .*quantized/.test(refused(() => bake({ maxError: 1 }))), "what it needs");
+        ok(/^ids: expected a boolean/.test(refused(() => bake({ ids: 1 }))), "the type");
+        const told = new Error("no more");
+        equal(
+            refused(() =>
+                bake({
+                    onStage: () => {
+                        throw told;
+                    },
+                }),
+            ),
+            "no more",
+        );
+        const mesh = cbvh.Mesh.bake(
+            CUBE.map((x) => 0.1 + x / 3),
+            CUBE_FACES,
+        );
+        equal(cbvh.Mesh.open(mesh.bytes()).triangles(), mesh.triangles());
+    },
+
+    "golden files open, and damaged ones say what is wrong": async (cbvh, read, list) => {
+        for (const name of await list("testdata", "ok-")) {
+            const mesh = cbvh.Mesh.open(await read(`testdata/${name}`));
+            mesh.validate();
+            if (name !== "ok-profiles.cbvh") {
+                ok(mesh.triangles().length > 0, "triangles");
+            }
+            mesh.distance(mesh, at(9, 0, 0));
+        }
+        const topology = cbvh.Mesh.open(await read("testdata/ok-topology.cbvh"));
+        equal(topology.object(0).triangleCount, 12);
+        ok(/^object: expected a number below 4/.test(refused(() => topology.object(4))), "how many there are");
+        [-1, 0.5, NaN, 1e300].forEach((number) => refused(() => topology.object(number)));
+        const scene = cbvh.Scene.open(await read("testdata/ok-scene.cbvh"));
+        equal(scene.instances(), [0, 1, 2]);
+        scene.distance();
+        ok(/expected a scene/.test(refused(() => cbvh.Scene.open(topology.bytes()))), "no instances");
+        const bad = await list("testdata", "bad-");
+        ok(bad.length > 40, "damaged files");
+        for (const name of bad) {
+            const file = await read(`testdata/${name}`);
+            const found = refused(() => cbvh.Mesh.open(file).validate());
+            ok(found.includes(name.slice(4, 7)), `${name}: the rule, found ${found}`);
+        }
+    },
+
+    "no bytes trap": async (cbvh, read) => {
+        const source = random(11);
+        const known = cbvh.Mesh.bakeFile("fclrob.obj", await read("testdata/fclrob.obj"));
+        const files = [await read("testdata/ok-everything.cbvh"), await read("testdata/ok-scene.cbvh"), known.bytes()];
+        files.push(await read("testdata/ok-topology.cbvh"), await read("testdata/ok-turning.cbvh"));
+        let [opened, refusedOnes] = [0, 0];
+        for (let round = 0; round < 600; round++) {
+            let bytes = files[round % files.length].slice();
+            for (let change = source.below(4); change >= 0; change--) {
+                bytes[source.below(bytes.length)] = source.below(3) === 0 ? 255 : source.below(256);
+            }
+            if (round % 7 === 0) {
+                bytes = bytes.subarray(0, source.below(bytes.length));
+            }
+            refusedOnes += refusals([() => cbvh.Scene.open(bytes).free()]);
+            let mesh;
+            refusedOnes += refusals([() => (mesh = cbvh.Mesh.open(bytes))]);
+            if (mesh !== undefined) {
+                opened++;
+                const pose = somewhere(cbvh, source, 100);
+                refusedOnes += refusals(questions(cbvh, mesh, known, pose, source.numbers(6, -50, 50)));
+                refusedOnes += refusals(questions(cbvh, known, mesh, pose, source.numbers(6, 0, 50)));
+                mesh.free();
+            }
+        }
+        ok(opened > 100 && refusedOnes > 1000, `files of both kinds, found ${opened} and ${refusedOnes}`);
+        for (const [ending, write] of Object.entries(writers)) {
+            const whole = write(known.triangles().subarray(0, 90));
+            for (let round = 0; round < 100; round++) {
+                const bytes = whole.slice(0, round % 3 === 0 ? source.below(whole.length) : whole.length);
+                bytes[source.below(bytes.length)] = source.below(256);
+                refusals([() => cbvh.Mesh.bakeFile(`x.${ending}`, bytes).free()]);
+            }
+        }
+        known.free();
+    },
+
+    "no numbers trap": (cbvh) => {
+        const source = random(3);
+        const cube = cubeOf(cbvh);
+        const strange = [
+            0,
+            -0,
+            1,
+            -1,
+            1e-320,
+            5e-324,
+            1e300,
+            -1e300,
+            Infinity,
+            -Infinity,
+            NaN,
+            2 ** 53,
+            2 ** -500,
+            2 ** 120,
+        ];
+        const number = () => (source.below(2) === 0 ? strange[source.below(strange.length)] : source.from(-3, 3));
+        let found = 0;
+        for (let round = 0; round < 400; round++) {
+            const pose = source.below(2) === 0 ? somewhere(cbvh, source, 3) : Float64Array.from({ length: 12 }, number);
+            const numbers = Array.from({ length: 6 }, number);
+            found += refusals(questions(cbvh, cube, cube, pose, numbers));
+            found += refusals([
+                () => cbvh.pose([number(), number(), number()], [number(), number(), number(), number()]),
+                () => cbvh.Mesh.bake(Array.from({ length: 9 }, number)).free(),
+                () => cbvh.Mesh.bake(CUBE, [0, 1, source.below(2 ** 32)]).free(),
+                () => cbvh.Mesh.bake(CUBE, CUBE_FACES, { triangles: "quantized", maxError: number() }).free(),
+            ]);
+        }
+        ok(found > 1000, `errors, found ${found}`);
+        equal(cube.collide(cube, cbvh.IDENTITY), true);
+    },
+
+    "wrong arguments are named": (cbvh) => {
+        const { Mesh, Motion, Scene } = cbvh;
+        const [cube, scene, gone, moved] = [cubeOf(cbvh), new Scene(), cubeOf(cbvh), new Float64Array(12)];
+        gone.free();
+        gone.free();
+        scene.add(cube, null, { name: "a" });
+        structuredClone(moved.buffer, { transfer: [moved.buffer] });
+        const wrong = [
+            [() => cube.collide(cube, [1, 2, 3]), "pose: expected 12 numbers, found 3"],
+            [
+                () => cube.collideEach(cube, new Float64Array(13)),
+                "poses: expected 12 numbers for each, found 13 numbers in all",
+            ],
+            [
+                () => cube.collideEach(cube, [...at(0, 0, 0), ...at(NaN, 0, 0)]),
+                "poses[1]: row 1, column 4: expected a finite number, found NaN",
+            ],
+            [
+                () => cube.collide(cube, moved),
+                "pose: expected an array with its memory, found one that was transferred elsewhere",
+            ],
+            [() => cube.collide(cube), "pose: expected an array of numbers, found undefined"],
+            [() => cube.collide(cube, "123456789012"), "pose: expected an array of numbers, found a string"],
+            [() => cube.collide(cube, { length: 12 }), "pose: expected an array of numbers, found Object"],
+            [() => cube.collide(cube, new BigInt64Array(12)), "pose: expected an array of numbers, found BigInt64Array"],
+            [() => cube.collide(cube, Array(12)), "pose[0]: expected a number, found undefined"],
+            [() => cube.collide({}, at(0, 0, 0)), "other: expected a Mesh, found Object"],
+            [() => cube.collide(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
+            [() => gone.bytes(), "mesh: expected a Mesh in use, found one that was freed"],
+            [() => cube.within(cube, at(0, 0, 0), -1), "d: expected a finite distance of at least 0, found -1"],
+            [() => cube.within(cube, at(0, 0, 0), "1"), "d: expected a number, found a string"],
+            [() => cube.motion(cube, {}), "motion: expected a Motion, found Object"],
+            [
+                () => cube.motion(cube, Motion.between(at(0, 0, 0).concat(at(1, 0, 0)), at(0, 0, 0).concat(at(1, 0, 0)))),
+                "motion: expected one path, found 2",
+            ],
+            [() => Motion.between(at(0, 0, 0), [1]), "end: expected as many numbers as start, 12, found 1"],
+            [() => Motion.through(at(0, 0, 0)), /^poses: /],
+            [() => cube.closestPoints([1, 2]), "points: expected 3 numbers for each, found 2 numbers in all"],
+            [() => cube.closestPoints([1, 2, 1e300]), /^point: expected finite coordinates of at most 2\^120/],
+            [() => cube.firstHits([1, 2, 3], []), "directions: expected as many as origins, 1, found 0"],
+            [
+                () => cube.firstHits([1, 2, 3], [1, 1, 1], { until: [1, 2] }),
+                "until: expected as many as origins, 1, found 2",
+            ],
+            [() => cube.firstHits([1, 2, 3], [0, 0, 0]), /^direction: /],
+            [() => cube.object("body"), 'object: expected one object of this name, found 0 named "body"'],
+            [() => Mesh.open("file"), "bytes: expected a Uint8Array or an ArrayBuffer, found a string"],
+            [() => Mesh.open(new Uint8Array(0)), /R0/],
+            [() => Mesh.bake(CUBE, [0, 1, 8]), /8/],
+            [() => Mesh.bake(CUBE, [0, 1, -1]), "faces[2]: expected a whole number from 0 to 2^32 - 1, found -1"],
+            [() => Mesh.bake(CUBE, [0, 1]), /^faces: expected three corners for each triangle/],
+            [() => Mesh.bake([1, 2, 3]), "vertices: expected three corners for each triangle, found 1 corners"],
+            [() => Mesh.bake([1, 2]), "vertices: expected 3 numbers for each, found 2 numbers in all"],
+            [() => Mesh.bake([]), /triangle/],
+            [() => scene.add(cube, null, { name: "a" }), /"a": expected a name of its own/],
+            [() => scene.add(cube, at(2 ** 119, 0, 0)), /^pose: expected a translation of at most 2\^118/],
+            [() => scene.setPose("b", at(0, 0, 0)), 'ids: expected an instance of the scene, found "b"'],
+            [() => scene.setPose(7, at(0, 0, 0)), "ids: expected an instance of the scene, found 7; was it removed?"],
+            [() => scene.setPose("a", at(2 ** 119, 0, 0)), /^instance "a": /],
+            [() => scene.setPoses(["a"], []), "poses: expected as many as ids, 1, found 0"],
+            [() => scene.setGroups("a", { member: -1 }), "member: expected a whole number from 0 to 2^32 - 1, found -1"],
+            [() => scene.isFree({ a: 1 }), "paths: expected a Map of instances to paths, found Object"],
+            [
+                () =>
+                    scene.isFree(
+                        new Map([
+                            ["a", Motion.between(at(0, 0, 0), at(1, 0, 0))],
+                            [0, Motion.through([...at(0, 0, 0), ...at(0, 0, 0)])],
+                        ]),
+                    ),
+                "paths: expected one path for each instance, found two for one",
+            ],
+            [() => scene.distances([0]), /^pairs: /],
+            [() => cbvh.pose([0, 0, 0], [1, 1, 1, 1]), /^quaternions\[0\]: /],
+            [() => cbvh.relative(at(0, 0, 0), []), "b: expected as many as a, 1, found 0"],
+        ];
+        for (const [work, expected] of wrong) {
+            const found = refused(work);
+            ok(expected instanceof RegExp ? expected.test(found) : found === expected, `${expected}, found: ${found}`);
+        }
+    },
+
+    "memory that is freed is used again": async (cbvh) => {
+        const source = random(2);
+        const vertices = source.numbers(9 * 2000, -1, 1);
+        const round = () => {
+            const mesh = cbvh.Mesh.bake(vertices);
+            const scene = new cbvh.Scene();
+            scene.add(mesh);
+            scene.add(mesh, at(0.5, 0, 0));
+            scene.collide();
+            mesh.contacts(mesh, at(1.9, 0, 0));
+            scene.free();
+            const copy = cbvh.Mesh.open(mesh.bytes());
+            copy.free();
+            mesh.free();
+            refused(() => cbvh.Mesh.open(new Uint8Array(100000)));
+        };
+        for (let warm = 0; warm < 3; warm++) {
+            round();
+        }
+        const before = cbvh.memoryBytes();
+        for (let again = 0; again < 40; again++) {
+            round();
+        }
+        equal(cbvh.memoryBytes() - before, 0, "growth in bytes");
+        if (Symbol.dispose !== undefined) {
+            const mesh = cubeOf(cbvh);
+            mesh[Symbol.dispose]();
+            refused(() => mesh.triangleCount);
+        }
+        // What nobody frees, the engine does, when it collects.
+        if (globalThis.gc !== undefined) {
+            const bytes = cbvh.Mesh.bake(vertices).bytes();
+            for (let again = 0; again < 600; again++) {
+                cbvh.Mesh.open(bytes);
+                if (again % 50 === 0) {
+                    globalThis.gc();
+                    await new Promise((resolve) => setTimeout(resolve, 20));
+                }
+            }
+            const grown = cbvh.memoryBytes() - before;
+            ok(grown < 200 * bytes.length, `room for some of ${600 * bytes.length} bytes, found ${grown} more`);
+        }
+    },
+};

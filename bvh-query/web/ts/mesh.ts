@@ -1,0 +1,381 @@
+/** Meshes, and all questions about one mesh or a pair. */
+
+import * as answers from "./answers.js";
+import type { ClosestPoints, Distance, Distances, MotionAnswer, MotionAnswers, RayHits, Relation } from "./answers.js";
+import {
+    bytes,
+    described,
+    float,
+    floats,
+    instance,
+    integers,
+    text,
+    type Bytes,
+    type Integers,
+    type Numbers,
+} from "./arguments.js";
+import { call, Handle, raw } from "./module.js";
+import { Motion, onePath } from "./motion.js";
+
+/** How a mesh is baked. The choices of the command `cbvh bake` have the same names; left out, the baker chooses. */
+export interface BakeOptions {
+    /** The layout of the tree. */
+    profile?: string;
+    /** How triangles are stored: "f32", "packed" or "quantized". */
+    triangles?: string;
+    /** With triangles "quantized", how far a vertex may move, in mesh units. */
+    maxError?: number;
+    /** The time spent on a better tree: "fast" or "default". */
+    effort?: string;
+    /** Whether triangles keep their numbers of the input; else the baker numbers them in its own order. True by default. */
+    ids?: boolean;
+    /** Whether the file says what is inside. True by default. */
+    topology?: boolean;
+    /** Is called with the name of each stage when it begins. */
+    onStage?: (stage: string) => void;
+}
+
+/** Lets a distance exceed the least one, which saves time; `lower` is then the certified bound. */
+export interface DistanceOptions {
+    /** By this fraction of it. 0 by default. */
+    relErr?: number;
+    /** By this length. 0 by default. */
+    absErr?: number;
+}
+
+/** What counts as a hit, and how exactly time is searched. */
+export interface MotionOptions {
+    /** Meshes that are at most this far apart, in mesh units, count as a hit. 0, contact, by default. */
+    clearance?: number;
+    /** The width of the undecided range beyond the clearance, in mesh units; by default a millionth of the diagonal of the
+     * larger object's box. */
+    tolerance?: number;
+}
+
+/** Where the mesh is, and where rays end. */
+export interface RayOptions {
+    /** The greatest parameter, one for all rays or N numbers. Infinite by default. */
+    until?: number | Numbers;
+    /** The pose of the mesh in the frame of the rays; by default, the rays are in the frame of the mesh. */
+    pose?: Numbers;
+}
+
+/** The options of a bake, as the module takes them. */
+function checked(options: BakeOptions): BakeOptions {
+    const types: [keyof BakeOptions, string][] = [
+        ["profile", "string"],
+        ["triangles", "string"],
+        ["maxError", "number"],
+        ["effort", "string"],
+        ["ids", "boolean"],
+        ["topology", "boolean"],
+        ["onStage", "function"],
+    ];
+    for (const [name, type] of types) {
+        if (options[name] !== undefined && typeof options[name] !== type) {
+            throw new TypeError(`${name}: expected a ${type}, found ${described(options[name])}`);
+        }
+    }
+    return options;
+}
+
+/** The clearance and the tolerance. */
+export function limits(options: MotionOptions): [number, number | undefined] {
+    const { clearance = 0, tolerance } = options;
+    return [float(clearance, "clearance"), tolerance === undefined ? undefined : float(tolerance, "tolerance")];
+}
+
+/** The greatest parameters of rays. */
+export function untils(until: number | Numbers = Number.POSITIVE_INFINITY): Float64Array {
+    return typeof until === "number" ? Float64Array.of(until) : floats(until, "until");
+}
+
+/** One pose. */
+export function onePose(value: Numbers, name = "pose"): Float64Array {
+    const numbers = floats(value, name);
+    if (numbers.length !== 12) {
+        throw new TypeError(`${name}: expected 12 numbers, found ${numbers.length}`);
+    }
+    return numbers;
+}
+
+const placed = (value: Numbers | undefined) => (value === undefined ? undefined : onePose(value));
+
+/**
+ * A mesh in the bytes of a `.cbvh` file: all objects of the file, or one. It never changes.
+ *
+ * Questions whose names end in `Each` are about N poses or paths, and answer with arrays; so do those about points and rays.
+ * Poses are those of the other mesh in the frame of this one: see `pose`.
+ */
+export class Mesh extends Handle<raw.Mesh> {
+    private constructor(made: raw.Mesh) {
+        super(made, "Mesh");
+    }
+
+    /** @internal */
+    static _of(made: raw.Mesh): Mesh {
+        return new Mesh(made);
+    }
+
+    /** Opens the bytes of a `.cbvh` file, which are copied. Only the head of the file is read, whatever its size. */
+    static open(file: Bytes): Mesh {
+        const array = bytes(file, "bytes");
+        return new Mesh(call(() => raw.Mesh.open(array)));
+    }
+
+    /**
+     * Bakes a mesh.
+     *
+     * Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
+     * does not move. Others move by at most 2^-23 of the diagonal of the object's box. Answers are exact for the stored mesh.
+     *
+     * @param vertices 3 V numbers, in any unit of length.
+     * @param faces 3 F numbers of vertices; by default, every three vertices are a triangle.
+     */
+    static bake(vertices: Numbers, faces?: Integers | null, options: BakeOptions = {}): Mesh {
+        const points = floats(vertices, "vertices");
+        const corners = faces === undefined || faces === null ? undefined : integers(faces, "faces");
+        const chosen = checked(options);
+        return new Mesh(call(() => raw.bake(points, corners, chosen)));
+    }
+
+    /**
+     * Bakes the bytes of a mesh file. All its objects become one.
+     *
+     * @param name The name of the file, whose ending tells the format: .obj, .stl, .ply, .glb, or .gltf with all its buffers
+     * inside. Another ending leaves it to the content.
+     */
+    static bakeFile(name: string, file: Bytes, options: BakeOptions = {}): Mesh {
+        const [title, array, chosen] = [text(name, "name"), bytes(file, "bytes"), checked(options)];
+        return new Mesh(call(() => raw.bakeFile(title, array, chosen)));
+    }
+
+    /** A copy of the bytes of the file, to be saved. */
+    bytes(): Uint8Array {
+        return this.#call((mesh) => mesh.bytes());
+    }
+
+    /** The size of the file in bytes, which is about all the memory that the mesh takes. */
+    get byteLength(): number {
+        return this.#call((mesh) => mesh.size());
+    }
+
+    /** The number of triangles, without exact duplicates. */
+    get triangleCount(): number {
+        return this.#call((mesh) => mesh.count());
+    }
+
+    /** The lower and the upper corner of the axis-aligned box of all vertices: 6 numbers. */
+    get bounds(): Float64Array {
+        return this.#call((mesh) => mesh.bounds());
+    }
+
+    /** The names of all objects of the file. */
+    get names(): string[] {
+        return this.#call((mesh) => mesh.names());
+    }
+
+    /** One object of the file, by number or name. It shares the bytes, and is freed by itself. */
+    object(object: number | string): Mesh {
+        return new Mesh(
+            this.#call((mesh) => {
+                if (typeof object !== "string") {
+                    return mesh.object(float(object, "object"));
+                }
+                const numbers = mesh.names().flatMap((name, number) => (name === object ? [number] : []));
+                if (numbers.length !== 1) {
+                    const found = `found ${numbers.length} named ${JSON.stringify(object)}`;
+                    throw new Error(`object: expected one object of this name, ${found}`);
+                }
+                return mesh.object(numbers[0] as number);
+            }),
+        );
+    }
+
+    /**
+     * The corners of all triangles as they are stored: 9 T numbers. Those of triangle `id` begin at `9 * id`. If this mesh
+     * does not have an id, they are NaN. Each call reads and checks the whole file.
+     */
+    triangles(): Float64Array {
+        return this.#call((mesh) => mesh.triangles());
+    }
+
+    /** Checks all rules of the whole file. Questions check only the parts that they touch. */
+    validate(): void {
+        this.#call((mesh) => mesh.validate());
+    }
+
+    #call<T>(work: (mesh: raw.Mesh) => T): T {
+        const mesh = this._raw("mesh");
+        return call(() => work(mesh));
+    }
+
+    /** Asks about another mesh in N poses. */
+    #pair<T>(other: Mesh, poses: Numbers, ask: (a: raw.Mesh, b: raw.Mesh, poses: Float64Array) => T): T {
+        const [a, b] = [this._raw("mesh"), instance(other, Mesh, "Mesh", "other")._raw("other")];
+        const array = floats(poses, "poses");
+        return call(() => ask(a, b, array));
+    }
+
+    /** Do the surfaces touch? Exact. */
+    collide(other: Mesh, pose: Numbers): boolean {
+        return this.collideEach(other, onePose(pose))[0] === 1;
+    }
+
+    /** `collide` for N poses: 1 or 0 for each. */
+    collideEach(other: Mesh, poses: Numbers): Uint8Array {
+        return this.#pair(other, poses, raw.collide);
+    }
+
+    /** Are they at most `d` mesh units apart? Exact. */
+    within(other: Mesh, pose: Numbers, d: number): boolean {
+        return this.withinEach(other, onePose(pose), d)[0] === 1;
+    }
+
+    /** `within` for N poses: 1 or 0 for each. */
+    withinEach(other: Mesh, poses: Numbers, d: number): Uint8Array {
+        const limit = float(d, "d");
+        return this.#pair(other, poses, (a, b, array) => raw.within(a, b, array, limit));
+    }
+
+    /** How far apart are they? The least distance, a pair of closest points, and their triangles. */
+    distance(other: Mesh, pose: Numbers, options: DistanceOptions = {}): Distance {
+        return answers.onlyDistance(this.distanceEach(other, onePose(pose), options));
+    }
+
+    /** `distance` for N poses. */
+    distanceEach(other: Mesh, poses: Numbers, options: DistanceOptions = {}): Distances {
+        const { relErr = 0, absErr = 0 } = options;
+        const [relative, absolute] = [float(relErr, "relErr"), float(absErr, "absErr")];
+        return answers.distances(this.#pair(other, poses, (a, b, array) => raw.distance(a, b, array, relative, absolute)));
+    }
+
+    /** Do they touch and, if not, is one inside the other? */
+    relation(other: Mesh, pose: Numbers): Relation {
+        return this.relationEach(other, onePose(pose))[0] as Relation;
+    }
+
+    /** `relation` for N poses: numbers of `Relation`. */
+    relationEach(other: Mesh, poses: Numbers): Uint8Array {
+        return this.#pair(other, poses, raw.relation);
+    }
+
+    /**
+     * All pairs of triangles that touch, exactly, in ascending order: 4 K numbers, which are object and triangle of this mesh,
+     * and object and triangle of `other`. Triangles are numbered as in the input.
+     */
+    contacts(other: Mesh, pose: Numbers): Uint32Array {
+        return this.contactsEach(other, onePose(pose))[0] as Uint32Array;
+    }
+
+    /** `contacts` for N poses: an array for each. */
+    contactsEach(other: Mesh, poses: Numbers): Uint32Array[] {
+        return this.#pair(other, poses, raw.contacts);
+    }
+
+    /**
+     * Is the motion of `other` in the frame of this mesh free, and where does it end if it is not? The answer is certain at
+     * every moment, not only at samples.
+     */
+    motion(other: Mesh, motion: Motion, options: MotionOptions = {}): MotionAnswer {
+        const { kind, freeUntil, at, nearest } = this.motionEach(
+            other,
+            onePath(instance(motion, Motion, "Motion", "motion"), "motion"),
+            options,
+        );
+        const end = kind[0] === answers.MotionKind.FREE ? undefined : answers.onlyDistance(nearest);
+        return { kind: kind[0] as number, freeUntil: freeUntil[0] as number, at: at[0] as number, nearest: end };
+    }
+
+    /** `motion` for N paths. */
+    motionEach(other: Mesh, motion: Motion, options: MotionOptions = {}): MotionAnswers {
+        const { _kind: kind, _numbers: numbers } = instance(motion, Motion, "Motion", "motion");
+        const limit = limits(options);
+        return answers.motions(this.#pair(other, numbers, (a, b) => raw.motion(a, b, kind, numbers, ...limit)));
+    }
+
+    /** Whether `motion` answers FREE. It takes less time than `motion`: use it in planners. */
+    isFree(other: Mesh, motion: Motion, options: MotionOptions = {}): boolean {
+        return this.isFreeEach(other, onePath(instance(motion, Motion, "Motion", "motion"), "motion"), options)[0] === 1;
+    }
+
+    /** `isFree` for N paths: 1 or 0 for each. */
+    isFreeEach(other: Mesh, motion: Motion, options: MotionOptions = {}): Uint8Array {
+        const { _kind: kind, _numbers: numbers } = instance(motion, Motion, "Motion", "motion");
+        const limit = limits(options);
+        return this.#pair(other, numbers, (a, b) => raw.isFree(a, b, kind, numbers, ...limit));
+    }
+
+    /**
+     * The points of the surface that are closest to N points.
+     *
+     * @param points 3 N numbers.
+     * @param options `within`: the greatest distance to search, in mesh units, infinite by default. `pose`: of this mesh in
+     * the frame of the points; by default, the points are in the frame of the mesh.
+     */
+    closestPoints(points: Numbers, options: { within?: number; pose?: Numbers } = {}): ClosestPoints {
+        const { within = Number.POSITIVE_INFINITY } = options;
+        const [array, limit, pose] = [floats(points, "points"), float(within, "within"), placed(options.pose)];
+        return answers.closest(this.#call((mesh) => raw.closestPoints(mesh, pose, array, limit)));
+    }
+
+    /** Which side of the surface each of N points is on, exactly: numbers of `Side`. */
+    sides(points: Numbers, options: { pose?: Numbers } = {}): Int8Array {
+        const [array, pose] = [floats(points, "points"), placed(options.pose)];
+        return this.#call((mesh) => raw.sides(mesh, pose, array));
+    }
+
+    /**
+     * Distances of N points from the surface, negative inside; NaN if the mesh has no inside, because it is not closed, or if
+     * the surface is farther away than `within`. Options are those of `closestPoints`.
+     */
+    signedDistances(points: Numbers, options: { within?: number; pose?: Numbers } = {}): Float64Array {
+        const { within = Number.POSITIVE_INFINITY } = options;
+        const [array, limit, pose] = [floats(points, "points"), float(within, "within"), placed(options.pose)];
+        return this.#call((mesh) => raw.signedDistances(mesh, pose, array, limit));
+    }
+
+    /** Asks about N rays. */
+    #rays<T>(
+        origins: Numbers,
+        directions: Numbers,
+        options: RayOptions,
+        ask: (
+            mesh: raw.Mesh,
+            pose: Float64Array | undefined,
+            origins: Float64Array,
+            directions: Float64Array,
+            until: Float64Array,
+        ) => T,
+    ): T {
+        const [pose, until] = [placed(options.pose), untils(options.until)];
+        const [from, along] = [floats(origins, "origins"), floats(directions, "directions")];
+        return this.#call((mesh) => ask(mesh, pose, from, along, until));
+    }
+
+    /**
+     * Where N rays first hit the surface.
+     *
+     * @param origins 3 N numbers.
+     * @param directions 3 N numbers. Directions may have any length, which is the unit of `t`.
+     */
+    firstHits(origins: Numbers, directions: Numbers, options: RayOptions = {}): RayHits {
+        return answers.hits(this.#rays(origins, directions, options, raw.firstHits));
+    }
+
+    /** Whether N rays hit the surface, exactly: 1 or 0 for each. */
+    anyHits(origins: Numbers, directions: Numbers, options: RayOptions = {}): Uint8Array {
+        return this.#rays(origins, directions, options, raw.anyHits);
+    }
+
+    /** All triangles that N rays hit, in the exact order along each: an answer for each ray, with an element for each hit. */
+    allHits(origins: Numbers, directions: Numbers, options: RayOptions = {}): RayHits[] {
+        return this.#rays(origins, directions, options, raw.allHits).map(answers.hits);
+    }
+
+    /** Whether N closed segments meet the surface, exactly: 1 or 0 for each. Starts and ends are 3 N numbers each. */
+    segmentHits(starts: Numbers, ends: Numbers, options: { pose?: Numbers } = {}): Uint8Array {
+        const [from, to, pose] = [floats(starts, "starts"), floats(ends, "ends"), placed(options.pose)];
+        return this.#call((mesh) => raw.segmentHits(mesh, pose, from, to));
+    }
+}

@@ -1,0 +1,130 @@
+/** Loads the WebAssembly module, and guards every call of it. */
+
+import start, * as raw from "./raw/cbvh.js";
+
+export { raw };
+
+/** Where the module comes from: its address, a response with it, its bytes, or the compiled module. */
+export type ModuleSource = string | URL | Response | BufferSource | WebAssembly.Module;
+
+/** A function that returns a vector: browsers before 2021 to 2023 refuse it. */
+const SIMD_PROBE = new Uint8Array([
+    0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11,
+]);
+
+let loading: Promise<void> | undefined;
+let memory: WebAssembly.Memory | undefined;
+let broken: Error | undefined;
+
+function checkSupport(): void {
+    if (typeof WebAssembly !== "object") {
+        throw new Error("cbvh: expected WebAssembly, found none; is it switched off in this browser?");
+    }
+    if (!WebAssembly.validate(SIMD_PROBE)) {
+        const since = "Chrome 91, Firefox 89, Safari 16.4 and Node 16.4 have it";
+        throw new Error(`cbvh: expected WebAssembly with SIMD, found it without; ${since}`);
+    }
+}
+
+async function load(source: ModuleSource): Promise<void> {
+    checkSupport();
+    if (typeof source === "string" || source instanceof URL) {
+        const response = await fetch(source);
+        if (!response.ok) {
+            throw new Error(`cbvh: expected the module at ${response.url}, found status ${response.status}`);
+        }
+        source = response;
+    }
+    ({ memory } = await start({ module_or_path: source }));
+}
+
+/**
+ * Loads the module. Everything else needs it: `await init()` first. Each page and each worker loads a module of its own.
+ * Later calls do nothing.
+ *
+ * @param source The module; by default the file beside this package's code. A worker may be sent the compiled module, and a
+ * page in one file may have the bytes in it.
+ * @throws If there is no WebAssembly with SIMD, or no module at the address. It may then be called again.
+ */
+export function init(source: ModuleSource = new URL("./raw/cbvh_bg.wasm", import.meta.url)): Promise<void> {
+    loading ??= load(source).catch((error: unknown) => {
+        loading = undefined;
+        throw error;
+    });
+    return loading;
+}
+
+/** Loads the module from its bytes or from the compiled module, and blocks meanwhile. Browsers refuse it outside workers. */
+export function initSync(source: BufferSource | WebAssembly.Module): void {
+    checkSupport();
+    if (memory === undefined) {
+        ({ memory } = raw.initSync({ module: source }));
+        loading = Promise.resolve();
+    }
+}
+
+/** Calls the module. If memory runs out, what it has in memory is no longer certain, and every later call is refused. */
+export function call<T>(work: () => T): T {
+    if (memory === undefined) {
+        throw new Error("cbvh: expected a loaded module, found none; await init() first");
+    }
+    if (broken !== undefined) {
+        throw broken;
+    }
+    try {
+        return work();
+    } catch (error) {
+        if (error instanceof WebAssembly.RuntimeError) {
+            const found = "found no more of it, or a defect of the library";
+            broken = new Error(`cbvh: expected memory for the answer, ${found}; start again in a new worker or page`, {
+                cause: error,
+            });
+            throw broken;
+        }
+        throw error;
+    }
+}
+
+/** The number of bytes that the module's memory has at present, 0 before it is loaded. It grows, and never shrinks. */
+export function memoryBytes(): number {
+    return memory?.buffer.byteLength ?? 0;
+}
+
+/** The base of classes whose objects stand for something in the module's memory. */
+export abstract class Handle<Raw extends { free(): void }> {
+    #raw: Raw | undefined;
+    readonly #kind: string;
+
+    protected constructor(raw: Raw, kind: string) {
+        this.#raw = raw;
+        this.#kind = kind;
+    }
+
+    /** @internal */
+    _raw(name: string): Raw {
+        if (this.#raw === undefined) {
+            throw new Error(`${name}: expected a ${this.#kind} in use, found one that was freed`);
+        }
+        return this.#raw;
+    }
+
+    /**
+     * Frees the memory now. Objects that are not freed are freed some time after nobody refers to them: when the engine
+     * collects them, which it need not do soon. Freeing twice does nothing.
+     */
+    free(): void {
+        const held = this.#raw;
+        this.#raw = undefined;
+        if (held !== undefined && broken === undefined) {
+            call(() => held.free());
+        }
+    }
+
+    /** Frees the memory at the end of a block: `using mesh = Mesh.open(bytes)`. */
+    declare [Symbol.dispose]: () => void;
+}
+
+// Not all browsers have the symbol.
+if (Symbol.dispose !== undefined) {
+    Handle.prototype[Symbol.dispose] = Handle.prototype.free;
+}

@@ -1,0 +1,338 @@
+/** Scenes: many placed meshes, and questions over all pairs of them that may meet. */
+
+import * as answers from "./answers.js";
+import type {
+    Distances,
+    SceneClosestPoints,
+    SceneContacts,
+    SceneDistance,
+    SceneMotionAnswer,
+    SceneRayHits,
+    SceneRelations,
+} from "./answers.js";
+import {
+    bytes,
+    described,
+    float,
+    floats,
+    instance,
+    integer,
+    integers,
+    text,
+    type Bytes,
+    type Integers,
+    type Numbers,
+} from "./arguments.js";
+import { limits, Mesh, onePose, untils, type MotionOptions } from "./mesh.js";
+import { call, Handle, raw } from "./module.js";
+import { Motion, onePath } from "./motion.js";
+
+/** An instance of a scene: its number or its name. */
+export type Instance = number | string;
+
+/** What an instance is called, and which pairs it takes part in. */
+export interface InstanceOptions {
+    /** A name that no other instance has. */
+    name?: string;
+    /** The groups that the instance is in, one bit for each of 32. All by default. */
+    member?: number;
+    /** The groups that it meets. Questions are about two instances if each is in a group that the other meets. */
+    meets?: number;
+}
+
+const ALL_GROUPS = 0xffff_ffff;
+
+/**
+ * Many placed meshes, and questions over all pairs that may meet.
+ *
+ * An instance is a mesh with its pose in the world. `add` returns its number, which is never given again. Arguments may name
+ * an instance by its name instead, if it has one; answers have numbers. The first instance of a pair is A. A question is about
+ * all pairs of instances whose groups meet and whose contact is not allowed. Answers are in the order of the pairs, and each is
+ * that of `Mesh` for the pose of B in A's frame, to the bit.
+ */
+export class Scene extends Handle<raw.Scene> {
+    /** An empty scene. */
+    constructor();
+    /** @internal */
+    constructor(opened?: raw.Scene);
+    constructor(opened?: raw.Scene) {
+        super(opened ?? call(() => new raw.Scene()), "Scene");
+    }
+
+    /** Opens the bytes of a file of `cbvh bake --scene`: its instances, in their order. */
+    static open(file: Bytes): Scene {
+        const array = bytes(file, "bytes");
+        return new Scene(call(() => raw.Scene.open(array)));
+    }
+
+    #call<T>(work: (scene: raw.Scene) => T): T {
+        const scene = this._raw("scene");
+        return call(() => work(scene));
+    }
+
+    /** The number of an instance. */
+    #number(value: Instance, name: string): number {
+        if (typeof value !== "string") {
+            return integer(value, name);
+        }
+        const found = this.#call((scene) => scene.find(value));
+        if (found === undefined) {
+            throw new Error(`${name}: expected an instance of the scene, found ${JSON.stringify(value)}`);
+        }
+        return found;
+    }
+
+    /** The numbers of instances. */
+    #numbers(values: readonly Instance[] | Integers, name: string): Uint32Array {
+        if (Array.isArray(values)) {
+            return Uint32Array.from(values as Instance[], (value) => this.#number(value, name));
+        }
+        return integers(values as Integers, name);
+    }
+
+    /**
+     * Adds an instance, and returns its number. The scene keeps the mesh, which may be freed.
+     *
+     * @param pose Twelve numbers, the identity by default. It must be rigid to within 2^-23.
+     */
+    add(mesh: Mesh, pose?: Numbers | null, options: InstanceOptions = {}): number {
+        const { name, member = ALL_GROUPS, meets = ALL_GROUPS } = options;
+        const added = instance(mesh, Mesh, "Mesh", "mesh")._raw("mesh");
+        const at = pose === undefined || pose === null ? undefined : onePose(pose);
+        const called = name === undefined ? undefined : text(name, "name");
+        const groups: [number, number] = [integer(member, "member"), integer(meets, "meets")];
+        return this.#call((scene) => scene.add(added, at, called, ...groups));
+    }
+
+    /** Removes an instance, and its permissions to touch others. */
+    remove(id: Instance): void {
+        const number = this.#number(id, "id");
+        this.#call((scene) => scene.remove(number));
+    }
+
+    /** Moves an instance. */
+    setPose(id: Instance, pose: Numbers): void {
+        this.setPoses([id], onePose(pose));
+    }
+
+    /** Moves N instances. If an instance is given twice, the last pose counts. If an argument is wrong, none moves. */
+    setPoses(ids: readonly Instance[] | Integers, poses: Numbers): void {
+        const [numbers, array] = [this.#numbers(ids, "ids"), floats(poses, "poses")];
+        this.#call((scene) => scene.setPoses(numbers, array));
+    }
+
+    /** The poses of instances in the world, those of all in their order by default: 12 numbers for each. */
+    poses(ids?: readonly Instance[] | Integers): Float64Array {
+        const numbers = ids === undefined ? this.instances() : this.#numbers(ids, "ids");
+        return this.#call((scene) => scene.poses(numbers));
+    }
+
+    /** Puts an instance into groups: see {@link InstanceOptions}. What is left out stays. */
+    setGroups(id: Instance, groups: { member?: number; meets?: number }): void {
+        const number = this.#number(id, "id");
+        const known = this.groups(number);
+        const member = integer(groups.member ?? known.member, "member");
+        const meets = integer(groups.meets ?? known.meets, "meets");
+        this.#call((scene) => scene.setGroups(number, member, meets));
+    }
+
+    /** The groups that an instance is in, and those that it meets. */
+    groups(id: Instance): { member: number; meets: number } {
+        const number = this.#number(id, "id");
+        const [member, meets] = this.#call((scene) => scene.groups(number)) as Uint32Array;
+        return { member: member as number, meets: meets as number };
+    }
+
+    /** Allows two instances to touch, or forbids it again. No question is about an allowed pair. */
+    setAllowed(a: Instance, b: Instance, allowed = true): void {
+        const [first, second] = [this.#number(a, "a"), this.#number(b, "b")];
+        this.#call((scene) => scene.setAllowed(first, second, allowed));
+    }
+
+    /** The pairs that may touch: 2 K numbers. */
+    allowed(): Uint32Array {
+        return this.#call((scene) => scene.allowed());
+    }
+
+    /** The number of the instance with a name. */
+    find(name: string): number | undefined {
+        const called = text(name, "name");
+        return this.#call((scene) => scene.find(called));
+    }
+
+    /** The name of an instance, if it has one. */
+    name(id: Instance): string | undefined {
+        const number = this.#number(id, "id");
+        return this.#call((scene) => scene.name(number));
+    }
+
+    /** The mesh of an instance: an object of its own, to be freed by itself, which shares the bytes. */
+    mesh(id: Instance): Mesh {
+        const number = this.#number(id, "id");
+        return Mesh._of(this.#call((scene) => scene.mesh(number)));
+    }
+
+    /** The numbers of all instances, in their order. */
+    instances(): Uint32Array {
+        return this.#call((scene) => scene.instances());
+    }
+
+    /** Whether the scene reuses earlier results about each pair. This affects no answer, and saves time if instances move
+     * little from question to question. Off at first. */
+    setTracking(tracking: boolean): void {
+        this.#call((scene) => scene.setTracking(tracking));
+    }
+
+    /** Whether any pair touches, exactly. */
+    collide(): boolean {
+        return this.#call((scene) => scene.collide());
+    }
+
+    /** Whether any pair is at most `d` mesh units apart, exactly. */
+    within(d: number): boolean {
+        const limit = float(d, "d");
+        return this.#call((scene) => scene.within(limit));
+    }
+
+    /** All pairs that touch, exactly: 2 K numbers of instances. */
+    pairsInContact(): Uint32Array {
+        return this.#call((scene) => scene.pairsInContact());
+    }
+
+    /** All pairs that are at most `d` mesh units apart, exactly: 2 K numbers of instances. */
+    pairsWithin(d: number): Uint32Array {
+        const limit = float(d, "d");
+        return this.#call((scene) => scene.pairsWithin(limit));
+    }
+
+    /** All pairs that touch, or of which one is inside the other, wholly or in part, with their relations. */
+    relations(): SceneRelations {
+        const [pairs, relations] = this.#call((scene) => scene.relations());
+        return { pairs, relations } as SceneRelations;
+    }
+
+    /** All pairs of triangles that touch, exactly. */
+    contacts(): SceneContacts {
+        const [pairs, triangles] = this.#call((scene) => scene.contacts());
+        return { pairs, triangles } as SceneContacts;
+    }
+
+    /** The nearest pair and its distance, or `undefined` if there are no pairs. */
+    distance(): SceneDistance | undefined {
+        const [pair, nearest] = this.#call((scene) => scene.distance());
+        return pairOf(pair as Uint32Array, nearest as unknown[]);
+    }
+
+    /**
+     * How far apart pairs of instances are, pair by pair.
+     *
+     * @param pairs 2 K numbers or names of instances. These may be any pairs.
+     */
+    distances(pairs: readonly Instance[] | Integers): Distances {
+        const numbers = this.#numbers(pairs, "pairs");
+        return answers.distances(this.#call((scene) => scene.distances(numbers)));
+    }
+
+    /** Instances and their paths, as the module takes them. */
+    #ways(paths: ReadonlyMap<Instance, Motion>): [Uint32Array, Uint8Array, Float64Array[]] {
+        if (!(paths instanceof Map)) {
+            throw new TypeError(`paths: expected a Map of instances to paths, found ${described(paths)}`);
+        }
+        const entries = [...paths] as [Instance, Motion][];
+        const numbers = entries.map(([id]) => this.#number(id, "paths"));
+        if (new Set(numbers).size < numbers.length) {
+            throw new TypeError("paths: expected one path for each instance, found two for one");
+        }
+        const ways = entries.map(([id, way]) => onePath(instance(way, Motion, "Motion", `paths[${id}]`), `paths[${id}]`));
+        return [Uint32Array.from(numbers), Uint8Array.from(ways, (way) => way._kind), ways.map((way) => way._numbers)];
+    }
+
+    /**
+     * Are the paths of some instances free, while they move in the world at the same time and the others stand still? The
+     * answer is certain at every moment.
+     *
+     * @param paths The path of each moving instance in the world. Its present pose does not matter, and does not change.
+     */
+    motion(paths: ReadonlyMap<Instance, Motion>, options: MotionOptions = {}): SceneMotionAnswer {
+        const [ways, limit] = [this.#ways(paths), limits(options)];
+        const [kind, freeUntil, at, pair, nearest] = this.#call((scene) => scene.motion(...ways, ...limit));
+        return { kind, freeUntil, at, pair: pairOf(pair, nearest) };
+    }
+
+    /** Whether `motion` answers FREE. It takes less time than `motion`. */
+    isFree(paths: ReadonlyMap<Instance, Motion>, options: MotionOptions = {}): boolean {
+        const [ways, limit] = [this.#ways(paths), limits(options)];
+        return this.#call((scene) => scene.isFree(...ways, ...limit));
+    }
+
+    /** The points of all instances that are closest to N points in the world, 3 N numbers. */
+    closestPoints(points: Numbers, options: { within?: number } = {}): SceneClosestPoints {
+        const { within = Number.POSITIVE_INFINITY } = options;
+        const [array, limit] = [floats(points, "points"), float(within, "within")];
+        const [of, closest] = this.#call((scene) => scene.closestPoints(array, limit));
+        return { instance: of as Int32Array, closest: answers.closest(closest as unknown[]) };
+    }
+
+    /**
+     * On which side of the instances N points in the world are, exactly: numbers of `Side`. A point is INSIDE if it is inside
+     * any instance; else ON if it is on a surface; else UNDEFINED if it is in the box of an instance that has no inside; else
+     * OUTSIDE.
+     */
+    sides(points: Numbers): Int8Array {
+        const array = floats(points, "points");
+        return this.#call((scene) => scene.sides(array));
+    }
+
+    /** Distances of N points in the world from the closest surface, negative inside any instance. NaN if the side is UNDEFINED,
+     * or if no instance is within `within`. */
+    signedDistances(points: Numbers, options: { within?: number } = {}): Float64Array {
+        const { within = Number.POSITIVE_INFINITY } = options;
+        const [array, limit] = [floats(points, "points"), float(within, "within")];
+        return this.#call((scene) => scene.signedDistances(array, limit));
+    }
+
+    #rays<T>(
+        origins: Numbers,
+        directions: Numbers,
+        until: number | Numbers | undefined,
+        ask: (scene: raw.Scene, ...rays: [Float64Array, Float64Array, Float64Array]) => T,
+    ): T {
+        const [from, along] = [floats(origins, "origins"), floats(directions, "directions")];
+        const limits = untils(until);
+        return this.#call((scene) => ask(scene, from, along, limits));
+    }
+
+    /** Where N rays in the world first hit an instance. Arguments are those of `Mesh.firstHits`. */
+    firstHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): SceneRayHits {
+        return answers.sceneHits(
+            this.#rays(origins, directions, options.until, (scene, ...rays) => scene.firstHits(...rays)),
+        );
+    }
+
+    /** Whether N rays in the world hit any instance, exactly: 1 or 0 for each. */
+    anyHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): Uint8Array {
+        return this.#rays(origins, directions, options.until, (scene, ...rays) => scene.anyHits(...rays));
+    }
+
+    /** All hits of N rays in the world, in the exact order along each. Each parameter occurs once, however many instances are
+     * hit at exactly that parameter. */
+    allHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): SceneRayHits[] {
+        const hits = this.#rays(origins, directions, options.until, (scene, ...rays) => scene.allHits(...rays));
+        return hits.map(answers.sceneHits);
+    }
+
+    /** Whether N closed segments in the world meet any instance, exactly: 1 or 0 for each. */
+    segmentHits(starts: Numbers, ends: Numbers): Uint8Array {
+        const [from, to] = [floats(starts, "starts"), floats(ends, "ends")];
+        return this.#call((scene) => scene.segmentHits(from, to));
+    }
+}
+
+/** A pair and its distance, if there is one. */
+function pairOf(pair: Uint32Array, nearest: unknown[]): SceneDistance | undefined {
+    const [a, b] = pair;
+    if (a === undefined || b === undefined) {
+        return undefined;
+    }
+    return { a, b, nearest: answers.onlyDistance(answers.distances(nearest)) };
+}
