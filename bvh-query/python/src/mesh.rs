@@ -5,10 +5,6 @@ use crate::arguments::reserved;
 use crate::asking::detached;
 use crate::errors::{FormatError, bake_error, open_error, query_error};
 use bvh_bake::write_atomically;
-use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
-use bvh_format::page::Page;
-use bvh_format::validate::packets;
 use bvh_query::{Bvh, Object, OwnedShape};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -35,43 +31,17 @@ impl Mesh {
         &self.shape
     }
 
-    /// The nine coordinates of each triangle, after all pages were checked. A duplicate that was left out has the corners of
+    /// The nine coordinates of each triangle. A duplicate that was left out has the corners of
     /// the triangle that is stored.
     fn corners_by_id(&self) -> PyResult<Vec<f64>> {
-        let (shape, bvh) = (self.shape.shape(), self.shape.bvh());
-        let (layout, bytes) = (bvh.layout(), bvh.bytes());
-        let has_ids = layout.has_ids();
-        if !has_ids && shape.objects().len() > 1 {
+        let shape = self.shape.shape();
+        if !shape.bvh().layout().has_ids() && shape.objects().len() > 1 {
             let objects = shape.objects().len();
             let message = format!("triangles: expected one object in a file without ids, found {objects}");
             return Err(PyValueError::new_err(message));
         }
-        bvh.validate().map_err(query_error)?;
         let mut found: Vec<(u32, [[f64; 3]; 3])> = reserved(shape.triangles() as usize)?;
-        for object in shape.objects() {
-            let origin = object.origin();
-            let first = object.record().first_page.get();
-            for number in first..first + object.record().pages.get() {
-                // Every page of a valid file is there.
-                let Some(page) = layout.page_bytes(bytes, number) else { continue };
-                let page = Page::new(page, object.profile());
-                let block = layout.leaf_block(bytes, page.header());
-                let ids = layout.id_block(bytes, page.header());
-                let first_packet = page.header().first_packet.get();
-                for (packet, count) in packets(&page) {
-                    let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
-                    for lane in 0..count {
-                        let place = 4 * (first_packet + u32::from(packet)) + lane as u32;
-                        let id = if has_ids { decode_id(ids, usize::from(packet), lane) } else { place };
-                        let corner = |v: [f32; 3]| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]));
-                        let corners = values.triangle(lane).map(corner);
-                        found.push((id, corners));
-                        let duplicates = bvh.duplicates_of(id).map_err(query_error)?;
-                        found.extend(duplicates.map(|duplicate| (duplicate, corners)));
-                    }
-                }
-            }
-        }
+        shape.visit_triangles(|id, corners| found.push((id, corners))).map_err(query_error)?;
         let count = found.iter().map(|&(id, _)| id as usize + 1).max().unwrap_or(0);
         let mut corners = reserved(9 * count)?;
         corners.resize(9 * count, f64::NAN);
