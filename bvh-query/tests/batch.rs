@@ -12,7 +12,7 @@ use common::shapes::{cube, dirty, moved, soup, sphere, torus};
 use common::{Random, backends, bake, baked, mesh, options, random_pose, translation};
 
 fn pools() -> Vec<cbvh_testkit::Pool> {
-    [1, 2, 3, 8].map(|threads| cbvh_testkit::pool(threads)).into()
+    [1, 2, 3, 8].map(cbvh_testkit::pool).into()
 }
 
 /// Makes poses, first along a line through the mesh, then anywhere.
