@@ -20,6 +20,11 @@ pub(crate) trait Quad: Lanes {
     fn codes_f16(from: &[u8; 8]) -> Self;
     /// Reads four little-endian `f32`.
     fn codes_f32(from: &[u8; 16]) -> Self;
+    /// The high halves of bytes.
+    #[inline(always)]
+    fn high_nibbles(from: &[u8; 16]) -> [u8; 16] {
+        from.map(|byte| byte >> 4)
+    }
     /// The codes of a short treelet for which the low nibbles of sixteen bytes stand.
     fn short_codes(from: &[u8; 16]) -> [u8; 16];
     /// The `f32` for which ordered integers stand.
@@ -192,7 +197,7 @@ impl<Q: Quad> Isa for Quads<Q> {
     }
     #[inline(always)]
     fn codes_high(self, from: &[u8; 16]) -> Four<Q> {
-        Q::codes_u8(&from.map(|byte| byte >> 4))
+        Q::codes_u8(&Q::high_nibbles(from))
     }
     #[inline(always)]
     fn short_codes_low(self, from: &[u8; 16]) -> Four<Q> {
@@ -200,7 +205,7 @@ impl<Q: Quad> Isa for Quads<Q> {
     }
     #[inline(always)]
     fn short_codes_high(self, from: &[u8; 16]) -> Four<Q> {
-        Q::codes_u8(&Q::short_codes(&from.map(|byte| byte >> 4)))
+        Q::codes_u8(&Q::short_codes(&Q::high_nibbles(from)))
     }
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Four<Q> {

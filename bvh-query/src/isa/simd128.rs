@@ -127,13 +127,14 @@ impl Quad for Simd128 {
     fn codes_f32(from: &[u8; 16]) -> Self {
         Self(bytes(from))
     }
+    // Of the portable code, the compiler shifts byte by byte.
+    #[inline(always)]
+    fn high_nibbles(from: &[u8; 16]) -> [u8; 16] {
+        array(u8x16_shr(bytes(from), 4))
+    }
     #[inline(always)]
     fn short_codes(from: &[u8; 16]) -> [u8; 16] {
-        let codes = u8x16_swizzle(bytes(&SHORT_CODES), v128_and(bytes(from), u8x16_splat(15)));
-        let mut to = [0; 16];
-        // SAFETY: see above.
-        unsafe { v128_store(to.as_mut_ptr().cast(), codes) };
-        to
+        array(u8x16_swizzle(bytes(&SHORT_CODES), v128_and(bytes(from), u8x16_splat(15))))
     }
     #[inline(always)]
     fn ordered(from: &[i32; 4]) -> Self {
@@ -166,6 +167,14 @@ impl Quad for Simd128 {
 fn bytes(from: &[u8; 16]) -> v128 {
     // SAFETY: see above.
     unsafe { v128_load(from.as_ptr().cast()) }
+}
+
+#[inline(always)]
+fn array(bytes: v128) -> [u8; 16] {
+    let mut to = [0; 16];
+    // SAFETY: see above.
+    unsafe { v128_store(to.as_mut_ptr().cast(), bytes) };
+    to
 }
 
 #[inline(always)]
