@@ -4,7 +4,7 @@ use crate::answers::{distances, floats, small};
 use crate::arguments::{Answer, refused, with_querier};
 use crate::mesh::Mesh;
 use crate::paths::read;
-use bvh_query::{MotionAnswer, MotionOptions};
+use bvh_query::{MotionAnswer, MotionOptions, RigidPath};
 use js_sys::{Array, Float64Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
@@ -29,12 +29,10 @@ pub fn motion(
     tolerance: Option<f64>,
 ) -> Answer<Array> {
     let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
-    let ask = |querier: &mut bvh_query::Querier| {
-        let of = |path: &Box<dyn bvh_query::RigidPath + Sync>| {
-            querier.motion(&a.shape, &b.shape, path.as_ref(), &options).map_err(refused)
-        };
-        paths.iter().map(of).collect::<Answer<Vec<MotionAnswer>>>()
-    };
+    let found = with_querier(|querier| {
+        let mut of = |path: &dyn RigidPath| querier.motion(&a.shape, &b.shape, path, &options);
+        paths.iter().map(|path| of(path.as_ref()).map_err(refused)).collect::<Answer<Vec<MotionAnswer>>>()
+    })?;
     let row = |answer: MotionAnswer| match answer {
         MotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
         MotionAnswer::Hit { free_until, touching_at, nearest } => {
@@ -42,7 +40,7 @@ pub fn motion(
         }
         MotionAnswer::Near { free_until, at, nearest } => (NEAR, free_until, at, Some(nearest)),
     };
-    let rows: Vec<_> = with_querier(ask)?.into_iter().map(row).collect();
+    let rows: Vec<_> = found.into_iter().map(row).collect();
     let nearest: Vec<_> = rows.iter().map(|row| row.3).collect();
     let times = [floats(rows.iter().map(|row| row.1)), floats(rows.iter().map(|row| row.2))];
     let kinds = JsValue::from(small(rows.iter().map(|row| row.0)));
@@ -60,7 +58,7 @@ pub fn is_free(
 ) -> Answer<Uint8Array> {
     let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
     let found = with_querier(|querier| {
-        let mut of = |path: &dyn bvh_query::RigidPath| querier.is_free(&a.shape, &b.shape, path, &options);
+        let mut of = |path: &dyn RigidPath| querier.is_free(&a.shape, &b.shape, path, &options);
         paths.iter().map(|path| of(path.as_ref()).map_err(refused)).collect::<Answer<Vec<bool>>>()
     })?;
     Ok(small(found.into_iter().map(u8::from)))
