@@ -197,12 +197,13 @@ impl Bvh {
         Ok(of_id.map(|[_, dropped]| dropped.get()))
     }
 
-    /// Checks every page, leaf block and id block now, so that no query has to. Otherwise the first touch of a page
-    /// costs some microseconds. This reads the whole file once.
+    /// Checks all rules and checksums of the whole file now, so that no query has to check a page. Otherwise the first touch
+    /// of a page costs some microseconds.
     ///
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold.
     pub fn validate(&self) -> Result<(), QueryError> {
+        bvh_format::validate::validate(self.bytes())?;
         for object in self.objects() {
             let first = object.record().first_page.get();
             for number in first..first + object.record().pages.get() {

@@ -2,7 +2,6 @@
 
 use crate::answers::floats;
 use crate::arguments::{Answer, bytes, refused, room, wrong};
-use bvh_format::validate::validate;
 use bvh_query::{Bvh, OwnedShape};
 use js_sys::{Float64Array, Uint8Array};
 use wasm_bindgen::prelude::*;
@@ -85,6 +84,6 @@ impl Mesh {
 
     /// Checks the whole file.
     pub fn validate(&self) -> Answer<()> {
-        validate(self.shape.bvh().bytes()).map(|_| ()).map_err(refused)
+        self.shape.bvh().validate().map_err(refused)
     }
 }
