@@ -76,7 +76,7 @@ impl Querier {
                 drain_at: FIRST_DRAIN,
                 stats: QueryStats::default(),
                 recent: Default::default(),
-                visit: |candidate| Ok(ControlFlow::Break(candidate)),
+                visit: &mut |candidate| Ok(ControlFlow::Break(candidate)),
                 found: None,
             },
         };
@@ -89,15 +89,18 @@ impl Querier {
 }
 
 /// Collects pairs of triangles that may be in contact.
-pub(super) struct ContactVisitor<'a, F> {
+pub(super) struct ContactVisitor<'a> {
     /// Of A and of B.
     pub(super) packets: &'a mut [PlacedPackets; 2],
     pub(super) order: Order,
-    pub(super) candidates: Candidates<'a, F>,
+    pub(super) candidates: Candidates<'a>,
 }
 
+/// What is done with a pair of triangles in contact. A reference, so that one walk serves all who look for contacts.
+type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
+
 /// Decides pairs of triangles and passes those in contact to `visit`, until it breaks.
-pub(super) struct Candidates<'a, F> {
+pub(super) struct Candidates<'a> {
     pub(super) placed: &'a PlacedPair<'a>,
     pub(super) queue: &'a mut TriangleQueue,
     /// The number of candidates that are decided together next; after that, a full queue.
@@ -105,12 +108,12 @@ pub(super) struct Candidates<'a, F> {
     pub(super) stats: QueryStats,
     /// Of A and of B.
     pub(super) recent: [RecentTriangles; 2],
-    pub(super) visit: F,
+    pub(super) visit: Visit<'a>,
     /// What `visit` broke with.
     pub(super) found: Option<TrianglePair>,
 }
 
-impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Candidates<'_, F> {
+impl Candidates<'_> {
     #[inline(always)]
     fn drain<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         if self.queue.is_empty() {
@@ -147,9 +150,7 @@ impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Ca
     }
 }
 
-impl<F: FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>> Visitor
-    for ContactVisitor<'_, F>
-{
+impl Visitor for ContactVisitor<'_> {
     const MEASURE: Measure = Measure::Overlap;
 
     fn order(&self) -> Order {

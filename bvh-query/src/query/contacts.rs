@@ -103,7 +103,7 @@ impl Querier {
                 drain_at: TriangleQueue::FULL,
                 stats: QueryStats::default(),
                 recent: Default::default(),
-                visit: |candidate| report(placed, candidate, &mut count),
+                visit: &mut |candidate| report(placed, candidate, &mut count),
                 found: None,
             },
         };

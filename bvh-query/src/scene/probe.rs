@@ -213,7 +213,7 @@ impl Asked<'_> {
     }
 
     /// Asks a question about a line and all instances that it may matter for.
-    fn line(&mut self, question: &mut impl LineQuestion) -> Result<(), SceneError> {
+    fn line(&mut self, question: &mut dyn LineQuestion) -> Result<(), SceneError> {
         let (Line { origin, direction, .. }, until) = (question.line(), question.limit());
         let entry = |bounds: &WorldBox| {
             let magnitude =

@@ -45,7 +45,8 @@ impl Line {
     }
 }
 
-/// A question about a line.
+/// A question about a line. The walk calls it through a reference, so that one walk serves all questions: a call takes
+/// little beside an exact decision.
 pub(crate) trait LineQuestion {
     fn line(&self) -> Line;
 
@@ -90,7 +91,7 @@ impl Querier {
     pub(crate) fn ask_line(
         &mut self,
         placed: &PlacedShape<'_>,
-        question: &mut impl LineQuestion,
+        question: &mut dyn LineQuestion,
     ) -> Result<(), QueryError> {
         for (index, object) in placed.shape.objects().iter().enumerate() {
             self.memory.budget.visit()?;
@@ -106,7 +107,7 @@ impl Querier {
         placed: &PlacedShape<'_>,
         index: usize,
         into: &IntoObject,
-        question: &mut impl LineQuestion,
+        question: &mut dyn LineQuestion,
     ) -> Result<(), QueryError> {
         if let Some(clipped) = Clipped::new(&question.line(), into, question.limit()) {
             let memory = &mut self.memory;
@@ -211,15 +212,15 @@ pub(crate) fn range_in_box(
 }
 
 /// Asks about an object, with the features of a backend.
-struct AskObject<'a, Q> {
+struct AskObject<'a> {
     placed: &'a PlacedShape<'a>,
     index: usize,
     clipped: Clipped,
-    question: &'a mut Q,
+    question: &'a mut dyn LineQuestion,
     memory: &'a mut WalkMemory,
 }
 
-impl<Q: LineQuestion> Task for AskObject<'_, Q> {
+impl Task for AskObject<'_> {
     /// The number of node tests, and what else was done.
     type Output = Result<(u64, QueryStats), QueryError>;
 
@@ -246,8 +247,8 @@ impl<Q: LineQuestion> Task for AskObject<'_, Q> {
 }
 
 /// Hands the triangles of an object that a line may meet to a question.
-struct Walked<'a, Q> {
-    question: &'a mut Q,
+struct Walked<'a> {
+    question: &'a mut dyn LineQuestion,
     bvh: &'a Bvh,
     object: &'a Object,
     placed: &'a PlacedShape<'a>,
@@ -262,7 +263,7 @@ struct Walked<'a, Q> {
     stats: QueryStats,
 }
 
-impl<Q: LineQuestion> Walked<'_, Q> {
+impl Walked<'_> {
     /// Lets the question decide about a triangle.
     fn decide(&mut self, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
         self.stats.exact_tests += 1;
@@ -278,7 +279,7 @@ impl<Q: LineQuestion> Walked<'_, Q> {
     }
 }
 
-impl<Q: LineQuestion> ProbeVisitor for Walked<'_, Q> {
+impl ProbeVisitor for Walked<'_> {
     #[inline(always)]
     fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
         self.test.entries(isa, children)
