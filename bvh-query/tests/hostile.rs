@@ -43,6 +43,8 @@ fn the_frozen_bad_files_do_no_harm() {
         assert_eq!(bvh.is_err(), rule < 15 && rule != 10, "{name}");
         if let Ok(bvh) = bvh {
             let refused = bvh.validate().unwrap_err().to_string();
+            // Where a section is damaged in a page, the page is named.
+            let rule = if rule == 10 { 15 } else { rule };
             assert!(refused.contains(&format!("R{rule:02}")), "{name}: {refused}");
         }
         seen += 1;
