@@ -1,4 +1,4 @@
-/** Moves one mesh past another, and shows what the library says of them. */
+/** Moves one mesh past another, and shows the answers of the library. */
 
 import { init, Mesh, pose, Relation } from "../dist/index.js";
 
@@ -41,7 +41,7 @@ function ringTriangles(around = 64, across = 32) {
     return triangles.flat();
 }
 
-/** A mesh, and its triangles, which do not change while it is moved. */
+/** A mesh, and its triangles in its own frame. */
 class Body {
     constructor(name, mesh) {
         Object.assign(this, { name, mesh, triangles: mesh.triangles() });
@@ -62,7 +62,7 @@ class Body {
 
 let a, b;
 
-/** The pose of B: sliders are in halves of A's size. */
+/** The pose of B. The unit of the sliders for x, y and z is a fifth of A's size. */
 function placeB() {
     const scale = a.size / 5;
     const [x, y, z, turn] = ["x", "y", "z", "turn"].map((name) => Number(sliders[name].value));
@@ -70,7 +70,7 @@ function placeB() {
     return pose([x * scale, y * scale, z * scale], [Math.sin(half), 0, 0, Math.cos(half)]);
 }
 
-/** The name of their relation. A file may have been baked without what that needs. */
+/** The name of the relation, or the error if a file was baked without topology. */
 function relationOf(at) {
     try {
         return Relation[a.mesh.relation(b.mesh, at)];
@@ -140,7 +140,7 @@ function draw(at, nearest, contacts) {
     context.stroke();
 }
 
-/** Takes files that are dropped or chosen for one of the meshes. */
+/** Lets the user drop or choose a file for one of the meshes. */
 function takeFiles(element, put) {
     const take = async (file) => {
         try {

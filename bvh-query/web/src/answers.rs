@@ -1,4 +1,4 @@
-//! Makes arrays of answers: one array per field, in the order in which `ts/answers.ts` names them.
+//! Makes arrays from answers: one array per field, in the order in which `ts/answers.ts` names them.
 
 use bvh_query::{ClosestPoint, Contact, Distance, Pose, RayHit};
 use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
@@ -39,7 +39,7 @@ pub(crate) fn poses(of: &[Pose]) -> Float64Array {
     Float64Array::from(rows.as_flattened())
 }
 
-/// Distance, lower and upper bound, points of A and B, object and triangle of A, and of B. NaN and 0 where there is none.
+/// Distance, lower and upper bound, points of A and B, object and triangle of A, and of B. NaN and 0 for `None`.
 pub(crate) fn distances(of: &[Option<Distance>]) -> Array {
     let numbers = |part: fn(&Distance) -> f64| floats(of.iter().map(|d| d.as_ref().map_or(f64::NAN, part)));
     let places =
@@ -71,7 +71,7 @@ pub(crate) fn hit_row(hit: RayHit) -> Row {
     ([hit.t, hit.lower, hit.upper], hit.point, hit.object, hit.triangle)
 }
 
-/// Whether there is one, distance or parameter, its lower and upper bound, point, object and triangle.
+/// Whether there is an answer, its distance or parameter, lower and upper bound, point, object and triangle.
 pub(crate) fn found(of: impl Iterator<Item = Option<Row>>) -> Array {
     let found: Vec<Option<Row>> = of.collect();
     let rows = || found.iter().map(|row| row.unwrap_or(([f64::NAN; 3], [f64::NAN; 3], 0, 0)));

@@ -1,4 +1,4 @@
-//! Copies arrays of JavaScript, and refuses those of a wrong length.
+//! Copies JavaScript arrays, and refuses those of the wrong length.
 
 use bvh_query::{BackendError, Pose, Querier};
 use js_sys::{Float64Array, Uint8Array, Uint32Array};
@@ -8,7 +8,7 @@ use wasm_bindgen::JsError;
 
 pub(crate) type Answer<T> = Result<T, JsError>;
 
-/// Returns an `Error` with a message of the library.
+/// Returns an `Error` with a message from the library.
 pub(crate) fn refused(error: impl Display) -> JsError {
     JsError::new(&error.to_string())
 }
@@ -18,7 +18,7 @@ pub(crate) fn wrong(name: &str, error: impl Display) -> JsError {
     JsError::new(&format!("{name}: {error}"))
 }
 
-/// Returns as many zeros, or an `Error` if memory runs out.
+/// Returns `count` zeros, or an `Error` if memory runs out.
 pub(crate) fn room<T: Clone>(name: &str, zero: T, count: usize) -> Answer<Vec<T>> {
     let mut room = Vec::new();
     let bytes = count.saturating_mul(size_of::<T>());
@@ -75,7 +75,7 @@ pub(crate) fn bytes(array: &Uint8Array, name: &str) -> Answer<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Makes poses of rows of twelve numbers.
+/// Makes poses from rows of twelve numbers.
 pub(crate) fn poses(array: &Float64Array, name: &str) -> Answer<Vec<Pose>> {
     let rows = rows::<12>(array, name)?;
     let mut poses = room(name, Pose::IDENTITY, rows.len())?;
@@ -85,7 +85,7 @@ pub(crate) fn poses(array: &Float64Array, name: &str) -> Answer<Vec<Pose>> {
     Ok(poses)
 }
 
-/// Makes a pose of twelve numbers.
+/// Makes a pose from twelve numbers.
 pub(crate) fn pose(array: &Float64Array, name: &str) -> Answer<Pose> {
     Pose::from_rows(&row(array, name)?).map_err(|error| wrong(name, error))
 }
@@ -96,7 +96,7 @@ pub(crate) fn pose_or_identity(array: Option<&Float64Array>) -> Answer<Pose> {
 }
 
 thread_local! {
-    /// The querier of the last question, with the memory that it has got.
+    /// The querier of the last question, with the memory that it has allocated.
     static QUERIER: Cell<Option<Querier>> = const { Cell::new(None) };
 }
 

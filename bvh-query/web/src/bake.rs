@@ -1,4 +1,4 @@
-//! Bakes meshes in memory: of arrays, and of the bytes of mesh files.
+//! Bakes meshes in memory, from arrays and from the bytes of mesh files.
 
 use crate::arguments::{Answer, bytes, refused, room, rows, wrong};
 use crate::mesh::Mesh;
@@ -9,7 +9,7 @@ use js_sys::{Float64Array, Function, Reflect, Uint8Array, Uint32Array};
 use std::path::Path;
 use wasm_bindgen::prelude::*;
 
-/// Finds a name among those that are known.
+/// Finds the value with a given name.
 fn named<T>(name: &str, found: Option<String>, known: &[T], name_of: fn(&T) -> &str) -> Answer<Option<T>>
 where
     T: Copy,
@@ -20,7 +20,7 @@ where
     of_name.map(Some).ok_or_else(|| wrong(name, format_args!("expected one of {}, found {found:?}", names())))
 }
 
-/// Reads the options of the command line that have the same names there.
+/// Reads the options of a bake. Their values have the same names on the command line.
 fn options(given: &JsValue) -> Answer<Options> {
     let get = |name: &str| Reflect::get(given, &name.into()).unwrap_or(JsValue::UNDEFINED);
     let text = |name: &str| get(name).as_string();
@@ -50,7 +50,7 @@ fn options(given: &JsValue) -> Answer<Options> {
         .topology(flag("topology")))
 }
 
-/// Bakes a mesh, and calls `onStage` with the name of each stage. What it throws is thrown when the bake has ended.
+/// Bakes a mesh, and calls `onStage` with the name of each stage. An exception thrown there is thrown again after the bake.
 fn bake_mesh(mesh: &Triangles, given: &JsValue) -> Result<Mesh, JsValue> {
     let options = options(given)?;
     let told = Reflect::get(given, &"onStage".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
@@ -65,7 +65,7 @@ fn bake_mesh(mesh: &Triangles, given: &JsValue) -> Result<Mesh, JsValue> {
     Ok(Bvh::from_bytes(bytes).map(Mesh::from).map_err(refused)?)
 }
 
-/// Bakes triangles of numbers of vertices or, without `faces`, of three vertices in turn each.
+/// Bakes a mesh. A triangle is three vertex numbers in `faces` or, without `faces`, the next three vertices.
 #[wasm_bindgen]
 pub fn bake(vertices: &Float64Array, faces: Option<Uint32Array>, options: &JsValue) -> Result<Mesh, JsValue> {
     let vertices = rows::<3>(vertices, "vertices")?;
@@ -84,7 +84,7 @@ pub fn bake(vertices: &Float64Array, faces: Option<Uint32Array>, options: &JsVal
     bake_mesh(&Triangles::from_triangles(vertices, triangles), options)
 }
 
-/// Bakes the bytes of a file, whose name tells the format and stands in errors.
+/// Bakes the bytes of a file. Its name tells the format and appears in errors.
 #[wasm_bindgen(js_name = bakeFile)]
 pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mesh, JsValue> {
     let (path, bytes) = (Path::new(name), bytes(file, name)?);
@@ -96,7 +96,7 @@ pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mes
         )
     })?;
     let mesh = input::read_bytes(&bytes, format, path).map_err(refused)?;
-    // It is not needed while the mesh is baked.
+    // The bake does not need the file.
     drop(bytes);
     bake_mesh(&mesh, options)
 }

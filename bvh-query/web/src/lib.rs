@@ -1,9 +1,8 @@
 //! The WebAssembly module behind the npm package: typed arrays in, typed arrays out.
 //!
-//! The TypeScript in `ts/` gives it the form that users see: it converts arguments to the arrays that these functions
-//! take, and names the parts of answers. What counts as a valid number is decided here, by the libraries.
-//! All functions run on one thread, which is that of the page or worker that has loaded the module. An answer of N questions is
-//! a list of arrays, one per field.
+//! The TypeScript in `ts/` is the API that users see: it converts arguments to the arrays that these functions take, and
+//! names the parts of answers. What counts as a valid number is decided here, by the libraries. All functions run on the
+//! thread of the page or worker that loaded the module. The answer to N questions is a list of arrays, one per field.
 #![forbid(unsafe_code)]
 
 mod answers;

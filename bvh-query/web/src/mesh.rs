@@ -6,7 +6,7 @@ use bvh_query::{Bvh, OwnedShape};
 use js_sys::{Float64Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
-/// A handle of a mesh. Several handles may share the bytes of a file.
+/// A handle to a mesh. Several handles may share the bytes of a file.
 #[wasm_bindgen]
 pub struct Mesh {
     pub(crate) shape: OwnedShape,
@@ -67,7 +67,7 @@ impl Mesh {
         floats(joined.iter().flatten().flatten().copied())
     }
 
-    /// The nine coordinates of each triangle by its number, NaN where there is none.
+    /// The nine coordinates of each triangle in the order of ids, NaN for an id that no triangle has.
     pub fn triangles(&self) -> Answer<Float64Array> {
         let shape = self.shape.shape();
         let objects = shape.objects().len();
@@ -76,7 +76,8 @@ impl Mesh {
             return Err(wrong("triangles", found));
         }
         let mut end = 0;
-        shape.visit_triangles(|id, _| end = end.max(id as usize + 1)).map_err(refused)?;
+        // A forged file may have the id 2^32 - 1. For so many triangles there is never room.
+        shape.visit_triangles(|id, _| end = end.max((id as usize).saturating_add(1))).map_err(refused)?;
         let mut corners = room("triangles", [[f64::NAN; 3]; 3], end)?;
         shape.visit_triangles(|id, triangle| corners[id as usize] = triangle).map_err(refused)?;
         Ok(Float64Array::from(corners.as_flattened().as_flattened()))

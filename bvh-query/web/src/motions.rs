@@ -4,7 +4,7 @@ use crate::answers::{distances, floats, small};
 use crate::arguments::{Answer, refused, with_querier};
 use crate::mesh::Mesh;
 use crate::paths::read;
-use bvh_query::{MotionAnswer, MotionOptions, RigidPath};
+use bvh_query::{MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
 use js_sys::{Array, Float64Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
@@ -18,6 +18,16 @@ pub(crate) fn options(clearance: f64, tolerance: Option<f64>) -> MotionOptions {
     MotionOptions::new().clearance(clearance).tolerance(tolerance)
 }
 
+/// Asks about all paths, one after the other.
+fn ask<T>(
+    kind: u8,
+    numbers: &Float64Array,
+    one: impl Fn(&mut Querier, &dyn RigidPath) -> Result<T, QueryError>,
+) -> Answer<Vec<T>> {
+    let paths = read(kind, numbers)?;
+    with_querier(|querier| paths.iter().map(|path| one(querier, path.as_ref()).map_err(refused)).collect())
+}
+
 /// Kind, time until which the path is free, time of the contact or of the first undecided pose, and the distance there.
 #[wasm_bindgen]
 pub fn motion(
@@ -28,11 +38,8 @@ pub fn motion(
     clearance: f64,
     tolerance: Option<f64>,
 ) -> Answer<Array> {
-    let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
-    let found = with_querier(|querier| {
-        let mut of = |path: &dyn RigidPath| querier.motion(&a.shape, &b.shape, path, &options);
-        paths.iter().map(|path| of(path.as_ref()).map_err(refused)).collect::<Answer<Vec<MotionAnswer>>>()
-    })?;
+    let options = options(clearance, tolerance);
+    let found = ask(kind, numbers, |querier, path| querier.motion(&a.shape, &b.shape, path, &options))?;
     let row = |answer: MotionAnswer| match answer {
         MotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
         MotionAnswer::Hit { free_until, touching_at, nearest } => {
@@ -56,10 +63,7 @@ pub fn is_free(
     clearance: f64,
     tolerance: Option<f64>,
 ) -> Answer<Uint8Array> {
-    let (paths, options) = (read(kind, numbers)?, options(clearance, tolerance));
-    let found = with_querier(|querier| {
-        let mut of = |path: &dyn RigidPath| querier.is_free(&a.shape, &b.shape, path, &options);
-        paths.iter().map(|path| of(path.as_ref()).map_err(refused)).collect::<Answer<Vec<bool>>>()
-    })?;
+    let options = options(clearance, tolerance);
+    let found = ask(kind, numbers, |querier, path| querier.is_free(&a.shape, &b.shape, path, &options))?;
     Ok(small(found.into_iter().map(u8::from)))
 }

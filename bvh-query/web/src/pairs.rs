@@ -45,12 +45,8 @@ pub fn distance(
     absolute_error: f64,
 ) -> Answer<Array> {
     let options = DistanceOptions::new().rel_err(relative_error).abs_err(absolute_error);
-    let exact = relative_error == 0.0 && absolute_error == 0.0;
-    let found = ask([a, b], poses, |querier, [a, b], pose| {
-        let nearest =
-            if exact { querier.distance(a, b, pose) } else { querier.distance_with(a, b, pose, &options) };
-        nearest.map(Some)
-    })?;
+    let found =
+        ask([a, b], poses, |querier, [a, b], pose| querier.distance_with(a, b, pose, &options).map(Some))?;
     Ok(answers::distances(&found))
 }
 

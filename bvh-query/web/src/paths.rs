@@ -1,4 +1,4 @@
-//! Paths, which JavaScript passes as their kind and numbers.
+//! Paths, which JavaScript passes as a kind and numbers.
 
 use crate::answers;
 use crate::arguments::{Answer, poses, rows, wrong};
@@ -6,12 +6,12 @@ use bvh_query::{Motion, Polyline, Pose, RigidPath};
 use js_sys::Float64Array;
 use wasm_bindgen::prelude::*;
 
-/// What `Motion` of `ts/motion.ts` calls its kinds.
+/// The kinds of `Motion` in `ts/motion.ts`.
 const BETWEEN: u8 = 0;
 const SCREW: u8 = 1;
 
-/// Reads motions between a start and an end of twelve numbers each; or screws, of a start, a point, a direction, an angle and a
-/// shift; or one path through poses.
+/// Reads motions, each from the twelve numbers of a start and of an end; or screws, each from a start, a point, a direction,
+/// an angle and a shift; or one path through poses.
 pub(crate) fn read(kind: u8, numbers: &Float64Array) -> Answer<Vec<Box<dyn RigidPath + Sync>>> {
     let pose = |numbers: &[f64], name: &str, place: usize| {
         let row = numbers.first_chunk().ok_or_else(|| wrong(name, "expected 12 numbers, found fewer"))?;
@@ -38,7 +38,7 @@ pub(crate) fn read(kind: u8, numbers: &Float64Array) -> Answer<Vec<Box<dyn Rigid
     Ok(vec![Box::new(polyline)])
 }
 
-/// Refuses what makes no path, when the path is made.
+/// Returns the number of paths. `Motion` refuses invalid paths by this when it is made.
 #[wasm_bindgen(js_name = pathCount)]
 pub fn path_count(kind: u8, numbers: &Float64Array) -> Answer<usize> {
     Ok(read(kind, numbers)?.len())

@@ -1,4 +1,4 @@
-//! Makes poses: from positions and quaternions, of matrices that are not quite rigid, and of one body in the frame of another.
+//! Makes poses from positions and quaternions, from nearly rigid matrices, and from the poses of two bodies in the world.
 
 use crate::answers;
 use crate::arguments::{Answer, poses, rows, same_count, wrong};
@@ -6,27 +6,26 @@ use bvh_query::{Pose, PoseError};
 use js_sys::Float64Array;
 use wasm_bindgen::prelude::*;
 
-/// Makes a pose of each row, and names the row that makes none.
+/// Makes a pose from each row. An error names the row.
 fn each<T>(rows: Vec<T>, name: &str, make: impl Fn(T) -> Result<Pose, PoseError>) -> Answer<Float64Array> {
     let made = rows.into_iter().enumerate();
     let made = made.map(|(place, row)| make(row).map_err(|error| wrong(&format!("{name}[{place}]"), error)));
     Ok(answers::poses(&made.collect::<Answer<Vec<Pose>>>()?))
 }
 
-/// Poses of N positions and as many quaternions, whose real part is last.
+/// Poses from N positions and N quaternions, the real part last.
 #[wasm_bindgen(js_name = posesOf)]
 pub fn poses_of(positions: &Float64Array, quaternions: &Float64Array) -> Answer<Float64Array> {
-    let (positions, quaternions) =
-        (rows::<3>(positions, "positions")?, rows::<4>(quaternions, "quaternions")?);
-    same_count("quaternions", quaternions.len(), "positions", positions.len())?;
+    let (positions, quaternions) = (rows::<3>(positions, "position")?, rows::<4>(quaternions, "quaternion")?);
+    same_count("quaternion", quaternions.len(), "position", positions.len())?;
     let both = quaternions.into_iter().zip(positions).collect();
-    each(both, "quaternions", |(quaternion, position)| Pose::from_quaternion(quaternion, position))
+    each(both, "quaternion", |(quaternion, position)| Pose::from_quaternion(quaternion, position))
 }
 
-/// The nearest poses of rows of twelve numbers.
+/// The poses nearest to rows of twelve numbers.
 #[wasm_bindgen(js_name = nearestPoses)]
 pub fn nearest_poses(matrices: &Float64Array) -> Answer<Float64Array> {
-    each(rows::<12>(matrices, "matrices")?, "matrices", |m| {
+    each(rows::<12>(matrices, "rows")?, "rows", |m| {
         let row = |k: usize| [m[4 * k], m[4 * k + 1], m[4 * k + 2]];
         Pose::nearest([0, 1, 2].map(row), [m[3], m[7], m[11]])
     })

@@ -3,7 +3,7 @@
 use crate::answers::{self, closest_row, hit_row};
 use crate::arguments::{Answer, pose_or_identity, refused, rows, same_count, with_querier};
 use crate::mesh::Mesh;
-use bvh_query::{PlacedShape, Querier, QueryError, Ray};
+use bvh_query::{PlacedShape, Querier, QueryError, Ray, RayHit};
 use js_sys::{Array, Float64Array, Int8Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
@@ -18,20 +18,27 @@ fn ask<T, P>(
     with_querier(|querier| probes.iter().map(|probe| one(querier, placed, probe).map_err(refused)).collect())
 }
 
-/// Reads rays: N origins, N directions, and N greatest parameters or one of all.
-pub(crate) fn rays(
-    origins: &Float64Array,
-    directions: &Float64Array,
-    until: &Float64Array,
-) -> Answer<Vec<Ray>> {
-    let (origins, directions) = (rows::<3>(origins, "origins")?, rows::<3>(directions, "directions")?);
-    let until = rows::<1>(until, "until")?;
-    same_count("directions", directions.len(), "origins", origins.len())?;
-    if until.len() != 1 {
-        same_count("until", until.len(), "origins", origins.len())?;
+/// The rays of a question, which consumes them.
+#[wasm_bindgen]
+pub struct Rays {
+    pub(crate) rays: Vec<Ray>,
+}
+
+#[wasm_bindgen]
+impl Rays {
+    /// Reads N origins, N directions, and N greatest parameters or one for all rays.
+    #[wasm_bindgen(constructor)]
+    pub fn new(origins: &Float64Array, directions: &Float64Array, until: &Float64Array) -> Answer<Rays> {
+        let (origins, directions) = (rows::<3>(origins, "origins")?, rows::<3>(directions, "directions")?);
+        let until = rows::<1>(until, "until")?;
+        same_count("directions", directions.len(), "origins", origins.len())?;
+        if until.len() != 1 {
+            same_count("until", until.len(), "origins", origins.len())?;
+        }
+        let rays = origins.into_iter().zip(directions).zip(until.iter().cycle());
+        let rays = rays.map(|((origin, direction), &[until])| Ray::new(origin, direction).until(until));
+        Ok(Self { rays: rays.collect() })
     }
-    let rays = origins.into_iter().zip(directions).zip(until.iter().cycle());
-    Ok(rays.map(|((origin, direction), &[until])| Ray::new(origin, direction).until(until)).collect())
 }
 
 /// Reads segments: N starts and N ends.
@@ -81,43 +88,22 @@ pub fn signed_distances(
 }
 
 #[wasm_bindgen(js_name = firstHits)]
-pub fn first_hits(
-    mesh: &Mesh,
-    pose: Option<Float64Array>,
-    origins: &Float64Array,
-    directions: &Float64Array,
-    until: &Float64Array,
-) -> Answer<Array> {
-    let rays = rays(origins, directions, until)?;
-    let found = ask(mesh, pose.as_ref(), &rays, |querier, shape, ray| querier.first_hit(shape, ray))?;
+pub fn first_hits(mesh: &Mesh, pose: Option<Float64Array>, rays: Rays) -> Answer<Array> {
+    let found = ask(mesh, pose.as_ref(), &rays.rays, |querier, shape, ray| querier.first_hit(shape, ray))?;
     Ok(answers::found(found.into_iter().map(|hit| hit.map(hit_row))))
 }
 
 #[wasm_bindgen(js_name = anyHits)]
-pub fn any_hits(
-    mesh: &Mesh,
-    pose: Option<Float64Array>,
-    origins: &Float64Array,
-    directions: &Float64Array,
-    until: &Float64Array,
-) -> Answer<Uint8Array> {
-    let rays = rays(origins, directions, until)?;
-    let found = ask(mesh, pose.as_ref(), &rays, |querier, shape, ray| querier.any_hit(shape, ray))?;
+pub fn any_hits(mesh: &Mesh, pose: Option<Float64Array>, rays: Rays) -> Answer<Uint8Array> {
+    let found = ask(mesh, pose.as_ref(), &rays.rays, |querier, shape, ray| querier.any_hit(shape, ray))?;
     Ok(answers::small(found.into_iter().map(u8::from)))
 }
 
 /// A list with the hits of each ray.
 #[wasm_bindgen(js_name = allHits)]
-pub fn all_hits(
-    mesh: &Mesh,
-    pose: Option<Float64Array>,
-    origins: &Float64Array,
-    directions: &Float64Array,
-    until: &Float64Array,
-) -> Answer<Array> {
-    let rays = rays(origins, directions, until)?;
-    let found = ask(mesh, pose.as_ref(), &rays, |querier, shape, ray| querier.all_hits(shape, ray))?;
-    let hits = |hits: Vec<bvh_query::RayHit>| answers::found(hits.into_iter().map(|hit| Some(hit_row(hit))));
+pub fn all_hits(mesh: &Mesh, pose: Option<Float64Array>, rays: Rays) -> Answer<Array> {
+    let found = ask(mesh, pose.as_ref(), &rays.rays, |querier, shape, ray| querier.all_hits(shape, ray))?;
+    let hits = |hits: Vec<RayHit>| answers::found(hits.into_iter().map(|hit| Some(hit_row(hit))));
     Ok(found.into_iter().map(hits).collect())
 }
 

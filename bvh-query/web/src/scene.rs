@@ -1,4 +1,4 @@
-//! Scenes: placed meshes under numbers of their own, which are given once and never again.
+//! Scenes: placed meshes, each with a number that is never given to another.
 
 use crate::answers;
 use crate::arguments::{Answer, bytes, integers, pose_or_identity, poses, refused, same_count, wrong};
@@ -50,13 +50,13 @@ impl Scene {
         [self.number(pair.a), self.number(pair.b)]
     }
 
-    /// Names an instance that an error names: by its name or, without one, by its number.
+    /// What an error calls an instance: its name or, without one, its number.
     fn called(&self, instance: &InstanceLabel) -> String {
         let number = || self.number(instance.id).to_string();
         instance.name.as_ref().map_or_else(number, |name| format!("{name:?}"))
     }
 
-    /// The `Error` of what the scene refuses, which names instances as callers know them.
+    /// Returns the `Error` for a refusal of the scene. It names instances as callers know them.
     pub(crate) fn refused(&self, error: impl Into<SceneError>) -> JsError {
         match error.into() {
             SceneError::Pair { a, b, source } => {
@@ -72,7 +72,7 @@ impl Scene {
         }
     }
 
-    /// The places of instances.
+    /// Finds instances by their numbers.
     pub(crate) fn ids(&self, numbers: &Uint32Array, name: &str) -> Answer<Vec<InstanceId>> {
         integers(numbers, name)?.into_iter().map(|number| self.id(number, name)).collect()
     }
@@ -93,13 +93,13 @@ impl Scene {
         Ok(Self::of(bvh_query::Scene::new().map_err(refused)?))
     }
 
-    /// The instances of the bytes of a scene file, which are copied.
+    /// Makes a scene of the instances in the bytes of a scene file, which are copied.
     pub fn open(file: &Uint8Array) -> Answer<Scene> {
         let bvh = Bvh::from_bytes(bytes(file, "bytes")?).map_err(refused)?;
         bvh_query::Scene::of_file(bvh).map(Self::of).map_err(refused)
     }
 
-    /// Adds a mesh, in the identity where no pose is given, and returns its number.
+    /// Adds a mesh, at the identity if no pose is given, and returns its number.
     pub fn add(
         &mut self,
         mesh: &Mesh,
@@ -109,22 +109,20 @@ impl Scene {
         meets: u32,
     ) -> Answer<u32> {
         let (pose, shape) = (pose_or_identity(pose.as_ref())?, mesh.shape.clone());
-        if self.next == u32::MAX {
-            return Err(wrong(
-                "scene",
-                "expected fewer than 2^32 - 1 instances in all, found no number left",
-            ));
+        // Answers have numbers in an `Int32Array`.
+        if self.next >= 1 << 31 {
+            return Err(wrong("scene", "expected at most 2^31 instances in all, found no number left"));
         }
         let added = match name {
             Some(name) => self.scene.add_named(name, shape, pose),
             None => self.scene.add(shape, pose),
         };
         let id = added.map_err(|error| match error {
-            // It has no number yet.
+            // The instance has no number yet.
             InstanceError::Pose { source, .. } => wrong("pose", source),
             error => refused(error),
         })?;
-        // The instance is there.
+        // This does not fail: the instance is there.
         self.scene.set_groups(id, Groups { member, meets }).map_err(refused)?;
         Ok(self.enter(id))
     }
@@ -170,7 +168,7 @@ impl Scene {
         self.scene.set_allowed(first, second, allowed).map_err(|error| self.refused(error))
     }
 
-    /// The pairs that may touch, lower numbers first.
+    /// The pairs that may touch, the lower number of each first, in ascending order.
     pub fn allowed(&self) -> JsValue {
         let mut allowed: Vec<[u32; 2]> = self.scene.allowed().map(|pair| self.pair(pair)).collect();
         allowed.iter_mut().for_each(|pair| pair.sort_unstable());
@@ -187,7 +185,7 @@ impl Scene {
         Ok(found.map(str::to_owned))
     }
 
-    /// The mesh of an instance, under a handle of its own.
+    /// A new handle to the mesh of an instance.
     pub fn mesh(&self, number: u32) -> Answer<Mesh> {
         Ok(Mesh { shape: self.placed(number, "id")?.1 })
     }

@@ -1,10 +1,10 @@
-//! Questions about all instances of a scene: their pairs, standing still and moving, and probes in the world.
+//! Questions about all instances of a scene: about pairs, at rest and in motion, and about probes in the world.
 
 use crate::answers::{closest_row, contacts, distances, floats, found, hit_row, ids, small};
 use crate::arguments::{Answer, integers, refused, rows, same_count, with_querier, wrong};
 use crate::motions::{FREE, HIT, NEAR, options};
 use crate::paths;
-use crate::probes::{rays, segments};
+use crate::probes::{Rays, segments};
 use crate::scene::{Scene, beside};
 use bvh_query::{Contact, Distance, InstanceId, Pose, RigidPath, SceneError, SceneMotionAnswer};
 use js_sys::{Array, Float64Array, Int8Array, Int32Array, Uint8Array, Uint32Array};
@@ -16,17 +16,17 @@ impl Scene {
     }
 
     /// Reads the paths of instances.
-    fn ways(&self, numbers: &Uint32Array, kinds: &[u8], paths: Vec<Float64Array>) -> Answer<Ways> {
+    fn moving(&self, numbers: &Uint32Array, kinds: &[u8], paths: Vec<Float64Array>) -> Answer<Moving> {
         let ids = self.ids(numbers, "paths")?;
         same_count("paths", paths.len(), "instances", ids.len())?;
-        let mut ways = Ways::new();
+        let mut moving = Moving::new();
         for ((id, &kind), numbers) in ids.into_iter().zip(kinds).zip(&paths) {
-            ways.extend(paths::read(kind, numbers)?.into_iter().map(|path| (id, path)));
+            moving.extend(paths::read(kind, numbers)?.into_iter().map(|path| (id, path)));
         }
-        Ok(ways)
+        Ok(moving)
     }
 
-    /// The numbers of instances, -1 for none.
+    /// The numbers of instances, -1 for `None`.
     fn instances_found(&self, of: impl Iterator<Item = Option<InstanceId>>) -> JsValue {
         let numbers: Vec<i32> = of.map(|id| id.map_or(-1, |id| self.number(id) as i32)).collect();
         Int32Array::from(&numbers[..]).into()
@@ -69,7 +69,7 @@ impl Scene {
         Ok(beside(found.iter().map(|found| self.pair(found.pair)), contacts(triangles.iter()).into()))
     }
 
-    /// The nearest pair, if there is a pair, and its distance.
+    /// The nearest pair, if there are pairs, and its distance.
     pub fn distance(&mut self) -> Answer<Array> {
         let nearest = self.ask(|scene| scene.distance())?;
         let pair = nearest.iter().map(|found| self.pair(found.pair));
@@ -96,7 +96,7 @@ impl Scene {
     }
 
     /// Kind, time until which the paths are free, time of the contact or of the first undecided poses, the pair and its
-    /// distance. The path of instance k is the kind and the numbers of the same place.
+    /// distance. The path of each instance is the element of `kinds` and of `paths` at the same place.
     pub fn motion(
         &mut self,
         numbers: &Uint32Array,
@@ -105,8 +105,8 @@ impl Scene {
         clearance: f64,
         tolerance: Option<f64>,
     ) -> Answer<Array> {
-        let ways = self.ways(numbers, kinds, paths)?;
-        let found = self.ask(|scene| scene.motion(&of(&ways), &options(clearance, tolerance)))?;
+        let moving = self.moving(numbers, kinds, paths)?;
+        let found = self.ask(|scene| scene.motion(&lent(&moving), &options(clearance, tolerance)))?;
         let (kind, until, at, pair) = match found {
             SceneMotionAnswer::Free => (FREE, 1.0, f64::NAN, None),
             SceneMotionAnswer::Hit { free_until, touching_at, pair, nearest } => {
@@ -131,8 +131,8 @@ impl Scene {
         clearance: f64,
         tolerance: Option<f64>,
     ) -> Answer<bool> {
-        let ways = self.ways(numbers, kinds, paths)?;
-        self.ask(|scene| scene.is_free(&of(&ways), &options(clearance, tolerance)))
+        let moving = self.moving(numbers, kinds, paths)?;
+        self.ask(|scene| scene.is_free(&lent(&moving), &options(clearance, tolerance)))
     }
 
     /// Instances, and what is found of each.
@@ -159,14 +159,8 @@ impl Scene {
     }
 
     #[wasm_bindgen(js_name = firstHits)]
-    pub fn first_hits(
-        &mut self,
-        origins: &Float64Array,
-        directions: &Float64Array,
-        until: &Float64Array,
-    ) -> Answer<Array> {
-        let rays = rays(origins, directions, until)?;
-        let hits = self.ask(|scene| scene.first_hits(&rays))?;
+    pub fn first_hits(&mut self, rays: Rays) -> Answer<Array> {
+        let hits = self.ask(|scene| scene.first_hits(&rays.rays))?;
         Ok(self.hits(&hits))
     }
 
@@ -177,26 +171,14 @@ impl Scene {
     }
 
     #[wasm_bindgen(js_name = anyHits)]
-    pub fn any_hits(
-        &mut self,
-        origins: &Float64Array,
-        directions: &Float64Array,
-        until: &Float64Array,
-    ) -> Answer<Uint8Array> {
-        let rays = rays(origins, directions, until)?;
-        Ok(small(self.ask(|scene| scene.any_hits(&rays))?.into_iter().map(u8::from)))
+    pub fn any_hits(&mut self, rays: Rays) -> Answer<Uint8Array> {
+        Ok(small(self.ask(|scene| scene.any_hits(&rays.rays))?.into_iter().map(u8::from)))
     }
 
     /// A list with the hits of each ray.
     #[wasm_bindgen(js_name = allHits)]
-    pub fn all_hits(
-        &mut self,
-        origins: &Float64Array,
-        directions: &Float64Array,
-        until: &Float64Array,
-    ) -> Answer<Array> {
-        let rays = rays(origins, directions, until)?;
-        let hits = self.ask(|scene| scene.all_hits(&rays))?.into_iter();
+    pub fn all_hits(&mut self, rays: Rays) -> Answer<Array> {
+        let hits = self.ask(|scene| scene.all_hits(&rays.rays))?.into_iter();
         Ok(hits.map(|of_ray| self.hits(&of_ray.into_iter().map(Some).collect::<Vec<_>>())).collect())
     }
 
@@ -208,8 +190,9 @@ impl Scene {
 }
 
 /// Instances and their paths.
-type Ways = Vec<(InstanceId, Box<dyn RigidPath + Sync>)>;
+type Moving = Vec<(InstanceId, Box<dyn RigidPath + Sync>)>;
 
-fn of(ways: &Ways) -> Vec<(InstanceId, &(dyn RigidPath + Sync))> {
-    ways.iter().map(|(id, path)| (*id, path.as_ref())).collect()
+/// Lends the paths.
+fn lent(moving: &Moving) -> Vec<(InstanceId, &(dyn RigidPath + Sync))> {
+    moving.iter().map(|(id, path)| (*id, path.as_ref())).collect()
 }

@@ -27,14 +27,18 @@ test("nothing works before the module is loaded, and one that is not there can b
         const bytes = readFileSync(new URL("../dist/raw/cbvh_bg.wasm", "${import.meta.url}"));
         const works = [() => Mesh.open(new Uint8Array(9)), () => new Scene(), () => Motion.through([]), memoryBytes];
         for (const work of works) try { console.log(work()) } catch (error) { console.log(error.message) }
-        await init(new Uint8Array(9)).catch((error) => console.log(error.name));
+        const failing = init(new Uint8Array(9)).catch((error) => console.log(error.name));
+        try { initSync(bytes) } catch (error) { console.log(error.message) }
+        await failing;
         await init("data:text/plain,no").catch((error) => console.log(error.name));
         initSync(bytes);
         initSync(bytes);
         await init();
         console.log(Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]).triangleCount);`;
     const message = "cbvh: expected a loaded module, found none; await init() first";
-    assert.deepEqual(run(program).split("\n"), [message, message, message, "0", "CompileError", "CompileError", "1"]);
+    const under = "cbvh: expected no init under way, found one; await it instead";
+    const found = run(program).split("\n");
+    assert.deepEqual(found, [message, message, message, "0", under, "CompileError", "CompileError", "1"]);
 });
 
 test("without SIMD or WebAssembly, the error says so", () => {

@@ -1,4 +1,4 @@
-/** The types of answers. A question about N poses, points or rays has an answer with N elements or rows in each array. */
+/** The types of answers. The answer to a question about N poses, points or rays has N elements or rows in each array. */
 
 /** The relation of two meshes. `Relation[number]` is its name. */
 export enum Relation {
@@ -44,7 +44,7 @@ export interface Distance {
     distance: number;
     /** A certified lower bound of the least distance. */
     lower: number;
-    /** A certified upper bound of it. */
+    /** A certified upper bound of the least distance. */
     upper: number;
     /** The closest point of the first mesh, in its frame. */
     pointA: Float64Array;
@@ -52,11 +52,11 @@ export interface Distance {
     pointB: Float64Array;
     /** The number of the first mesh's object in its file. */
     objectA: number;
-    /** The number of its triangle in the input or, in a file without ids, of its place. */
+    /** The number of the triangle in the input or, in a file without ids, in the order of the baker. */
     triangleA: number;
-    /** The object of the second mesh. */
+    /** The number of the second mesh's object. */
     objectB: number;
-    /** Its triangle. */
+    /** The number of the triangle in the second mesh. */
     triangleB: number;
 }
 
@@ -81,7 +81,7 @@ export interface MotionAnswer {
     /** For HIT, the earliest time found at which they are within the clearance; for NEAR, that of the first undecided
      * pose; else NaN. */
     at: number;
-    /** Their distance at that time; `undefined` if the path is free. */
+    /** The distance of the meshes at that time; `undefined` if the path is free. */
     nearest: Distance | undefined;
 }
 
@@ -102,13 +102,13 @@ export interface ClosestPoints {
     distance: Float64Array;
     /** Certified lower bounds of the least distances. */
     lower: Float64Array;
-    /** Certified upper bounds of them. */
+    /** Certified upper bounds of the least distances. */
     upper: Float64Array;
     /** The closest points, in the frame of the question: length 3 N. */
     point: Float64Array;
     /** Numbers of objects in the file. */
     object: Uint32Array;
-    /** Numbers of triangles in the input or, in a file without ids, of their places. */
+    /** Numbers of triangles in the input or, in a file without ids, in the order of the baker. */
     triangle: Uint32Array;
 }
 
@@ -120,13 +120,13 @@ export interface RayHits {
     t: Float64Array;
     /** Certified lower bounds of the parameters. */
     lower: Float64Array;
-    /** Certified upper bounds of them. */
+    /** Certified upper bounds of the parameters. */
     upper: Float64Array;
     /** The hits, in the frame of the question: length 3 N. */
     point: Float64Array;
     /** Numbers of objects in the file. */
     object: Uint32Array;
-    /** Numbers of triangles in the input or, in a file without ids, of their places. */
+    /** Numbers of triangles in the input or, in a file without ids, in the order of the baker. */
     triangle: Uint32Array;
 }
 
@@ -180,8 +180,8 @@ export interface SceneMotionAnswer {
     /** For HIT, the earliest time found at which a pair is within the clearance; for NEAR, that of the first undecided
      * poses; else NaN. */
     at: number;
-    /** An instance of that pair, and its distance from the other one at that time; `undefined` if the paths are free. The
-     * first one stands still or, if both move, is the first of the scene. */
+    /** That pair, and its distance at that time; `undefined` if the paths are free. A is the instance that stands still or,
+     * if both move, the first in the scene. */
     pair: SceneDistance | undefined;
 }
 
@@ -203,7 +203,7 @@ export const hits = ([found, t, lower, upper, point, object, triangle]: unknown[
 export const sceneHits = ([instance, of]: unknown[]): SceneRayHits =>
     ({ instance, hit: hits(of as unknown[]) }) as SceneRayHits;
 
-/** The only one of several distances. */
+/** Takes the only element of an answer with one distance. */
 export function onlyDistance(of: Distances): Distance {
     const { pointA, pointB, ...rest } = of;
     const numbers = Object.entries(rest).map(([name, values]) => [name, values[0]]);

@@ -1,4 +1,4 @@
-/** Converts arguments to the arrays that the module takes. What counts as a valid number, it decides itself. */
+/** Converts arguments to the arrays that the module takes. The module decides which numbers are valid. */
 
 /** Numbers, row after row: any array of numbers. A `Float64Array` is passed as it is, others are converted. */
 export type Numbers =
@@ -33,7 +33,16 @@ function wrong(name: string, expected: string, found: string): TypeError {
     return new TypeError(`${name}: expected ${expected}, found ${found}`);
 }
 
-/** An array of numbers whose buffer is still there: one that was sent to a worker has length 0. */
+/** Reads a value whose memory may be gone: a buffer may have been sent to a worker, or made too short. */
+function present<T>(read: () => T, name: string): T {
+    try {
+        return read();
+    } catch {
+        throw wrong(name, "an array with its memory", "one whose buffer was transferred or shrunk");
+    }
+}
+
+/** Checks an array of numbers. */
 function listed(value: unknown, name: string): ArrayLike<number> {
     if (Array.isArray(value)) {
         const place = value.findIndex((element) => typeof element !== "number");
@@ -47,16 +56,9 @@ function listed(value: unknown, name: string): ArrayLike<number> {
     if (!isList || value instanceof BigInt64Array || value instanceof BigUint64Array) {
         throw wrong(name, "an array of numbers", described(value));
     }
-    checkAttached(value.buffer, name);
-    return value as Float64Array;
-}
-
-function checkAttached(buffer: ArrayBufferLike, name: string): void {
-    try {
-        new Uint8Array(buffer);
-    } catch {
-        throw wrong(name, "an array with its memory", "one that was transferred elsewhere");
-    }
+    const list = value as Float64Array;
+    present(() => list.values(), name);
+    return list;
 }
 
 /** Reads an array of numbers. */
@@ -80,29 +82,26 @@ export function integers(value: Integers, name: string): Uint32Array {
     return integers;
 }
 
-/** Reads one number from 0 to 2^32 - 1. */
-export function integer(value: number, name: string): number {
-    if (typeof value !== "number") {
-        throw wrong(name, "a number", described(value));
-    }
-    if (value >>> 0 !== value) {
-        throw wrong(name, "a whole number from 0 to 2^32 - 1", String(value));
+function typed<T>(value: T, type: string, name: string): T {
+    if (typeof value !== type) {
+        throw wrong(name, `a ${type}`, described(value));
     }
     return value;
 }
 
 /** Reads one number. */
-export function float(value: number, name: string): number {
-    if (typeof value !== "number") {
-        throw wrong(name, "a number", described(value));
-    }
-    return value;
-}
+export const float = (value: number, name: string): number => typed(value, "number", name);
 
-/** Reads a text. */
-export function text(value: string, name: string): string {
-    if (typeof value !== "string") {
-        throw wrong(name, "a string", described(value));
+/** Reads a string. */
+export const text = (value: string, name: string): string => typed(value, "string", name);
+
+/** Reads a boolean. */
+export const flag = (value: boolean, name: string): boolean => typed(value, "boolean", name);
+
+/** Reads one number from 0 to 2^32 - 1. */
+export function integer(value: number, name: string): number {
+    if (float(value, name) >>> 0 !== value) {
+        throw wrong(name, "a whole number from 0 to 2^32 - 1", String(value));
     }
     return value;
 }
@@ -110,17 +109,16 @@ export function text(value: string, name: string): string {
 /** Reads the bytes of a file. */
 export function bytes(value: Bytes, name: string): Uint8Array {
     if (value instanceof Uint8Array) {
-        checkAttached(value.buffer, name);
+        present(() => value.values(), name);
         return value;
     }
     if (!(value instanceof ArrayBuffer)) {
         throw wrong(name, "a Uint8Array or an ArrayBuffer", described(value));
     }
-    checkAttached(value, name);
-    return new Uint8Array(value);
+    return present(() => new Uint8Array(value), name);
 }
 
-/** Reads an object of a class. Its name is given, because what bundles code may change that of the class. */
+/** Reads an object of a class. `kind` is the name of the class, which bundlers may change. */
 export function instance<T>(value: T, type: { prototype: T }, kind: string, name: string): T {
     if (!(value instanceof (type as unknown as new () => T))) {
         throw wrong(name, `a ${kind}`, described(value));

@@ -17,7 +17,7 @@ import {
 import { call, Handle, raw } from "./module.js";
 import { Motion, onePath } from "./motion.js";
 
-/** How a mesh is baked. The choices of the command `cbvh bake` have the same names; left out, the baker chooses. */
+/** How a mesh is baked. Values have the names of the command `cbvh bake`. The baker chooses what is left out. */
 export interface BakeOptions {
     /** The layout of the tree. */
     profile?: string;
@@ -27,19 +27,19 @@ export interface BakeOptions {
     maxError?: number;
     /** The time spent on a better tree: "fast" or "default". */
     effort?: string;
-    /** Whether triangles keep their numbers of the input; else the baker numbers them in its own order. True by default. */
+    /** Whether triangles keep their numbers from the input; else the baker numbers them in its own order. True by default. */
     ids?: boolean;
-    /** Whether the file says what is inside. True by default. */
+    /** Whether the file states which objects are closed, which questions about the inside need. True by default. */
     topology?: boolean;
-    /** Is called with the name of each stage when it begins. */
+    /** A function that is called with the name of each stage when the stage begins. */
     onStage?: (stage: string) => void;
 }
 
-/** Lets a distance exceed the least one, which saves time; `lower` is then the certified bound. */
+/** How far a distance may exceed the least one. More saves time; `lower` is still a certified bound. */
 export interface DistanceOptions {
-    /** By this fraction of it. 0 by default. */
+    /** The allowed fraction of the least distance. 0 by default. */
     relErr?: number;
-    /** By this length. 0 by default. */
+    /** A length in mesh units that is allowed as well. 0 by default. */
     absErr?: number;
 }
 
@@ -60,7 +60,7 @@ export interface RayOptions {
     pose?: Numbers;
 }
 
-/** The options of a bake, as the module takes them. */
+/** Checks the types of the options of a bake. */
 function checked(options: BakeOptions): BakeOptions {
     const types: [keyof BakeOptions, string][] = [
         ["profile", "string"],
@@ -79,18 +79,18 @@ function checked(options: BakeOptions): BakeOptions {
     return options;
 }
 
-/** The clearance and the tolerance. */
+/** Reads the clearance and the tolerance. */
 export function limits(options: MotionOptions): [number, number | undefined] {
     const { clearance = 0, tolerance } = options;
     return [float(clearance, "clearance"), tolerance === undefined ? undefined : float(tolerance, "tolerance")];
 }
 
-/** The greatest parameters of rays. */
+/** Reads the greatest parameters of rays. */
 export function untils(until: number | Numbers = Number.POSITIVE_INFINITY): Float64Array {
     return typeof until === "number" ? Float64Array.of(until) : floats(until, "until");
 }
 
-/** One pose. */
+/** Reads one pose. */
 export function onePose(value: Numbers, name = "pose"): Float64Array {
     const numbers = floats(value, name);
     if (numbers.length !== 12) {
@@ -105,7 +105,7 @@ const placed = (value: Numbers | undefined) => (value === undefined ? undefined 
  * A mesh in the bytes of a `.cbvh` file: all objects of the file, or one. It never changes.
  *
  * Questions whose names end in `Each` are about N poses or paths, and answer with arrays; so do those about points and rays.
- * Poses are those of the other mesh in the frame of this one: see `pose`.
+ * A pose is that of the other mesh in the frame of this one: see `pose`.
  */
 export class Mesh extends Handle<raw.Mesh> {
     private constructor(made: raw.Mesh) {
@@ -117,7 +117,8 @@ export class Mesh extends Handle<raw.Mesh> {
         return new Mesh(made);
     }
 
-    /** Opens the bytes of a `.cbvh` file, which are copied. Only the head of the file is read, whatever its size. */
+    /** Opens the bytes of a `.cbvh` file, which are copied. Only the header and the object table are read, whatever the size
+     * of the file. */
     static open(file: Bytes): Mesh {
         const array = bytes(file, "bytes");
         return new Mesh(call(() => raw.Mesh.open(array)));
@@ -130,7 +131,7 @@ export class Mesh extends Handle<raw.Mesh> {
      * does not move. Others move by at most 2^-23 of the diagonal of the object's box. Answers are exact for the stored mesh.
      *
      * @param vertices 3 V numbers, in any unit of length.
-     * @param faces 3 F numbers of vertices; by default, every three vertices are a triangle.
+     * @param faces 3 F vertex numbers; by default, every three vertices are a triangle.
      */
     static bake(vertices: Numbers, faces?: Integers | null, options: BakeOptions = {}): Mesh {
         const points = floats(vertices, "vertices");
@@ -142,15 +143,15 @@ export class Mesh extends Handle<raw.Mesh> {
     /**
      * Bakes the bytes of a mesh file. All its objects become one.
      *
-     * @param name The name of the file, whose ending tells the format: .obj, .stl, .ply, .glb, or .gltf with all its buffers
-     * inside. Another ending leaves it to the content.
+     * @param name The name of the file. Its extension tells the format: .obj, .stl, .ply, .glb, or .gltf with all its
+     * buffers inside. With any other extension, the content tells the format.
      */
     static bakeFile(name: string, file: Bytes, options: BakeOptions = {}): Mesh {
         const [title, array, chosen] = [text(name, "name"), bytes(file, "bytes"), checked(options)];
         return new Mesh(call(() => raw.bakeFile(title, array, chosen)));
     }
 
-    /** A copy of the bytes of the file, to be saved. */
+    /** Returns a copy of the bytes of the file, to save them. */
     bytes(): Uint8Array {
         return this.#call((mesh) => mesh.bytes());
     }
@@ -175,7 +176,7 @@ export class Mesh extends Handle<raw.Mesh> {
         return this.#call((mesh) => mesh.names());
     }
 
-    /** One object of the file, by number or name. It shares the bytes, and is freed by itself. */
+    /** Returns one object of the file, by number or name. It shares the bytes, and is freed separately. */
     object(object: number | string): Mesh {
         return new Mesh(
             this.#call((mesh) => {
@@ -193,14 +194,14 @@ export class Mesh extends Handle<raw.Mesh> {
     }
 
     /**
-     * The corners of all triangles as they are stored: 9 T numbers. Those of triangle `id` begin at `9 * id`. If this mesh
-     * does not have an id, they are NaN. Each call reads and checks the whole file.
+     * Returns the corners of all triangles as they are stored: 9 T numbers. Those of triangle `id` begin at `9 * id`. They
+     * are NaN if no triangle has that id. Each call reads and checks the whole mesh.
      */
     triangles(): Float64Array {
         return this.#call((mesh) => mesh.triangles());
     }
 
-    /** Checks all rules of the whole file. Questions check only the parts that they touch. */
+    /** Checks every rule in the whole file. Questions check only the parts that they touch. */
     validate(): void {
         this.#call((mesh) => mesh.validate());
     }
@@ -340,17 +341,11 @@ export class Mesh extends Handle<raw.Mesh> {
         origins: Numbers,
         directions: Numbers,
         options: RayOptions,
-        ask: (
-            mesh: raw.Mesh,
-            pose: Float64Array | undefined,
-            origins: Float64Array,
-            directions: Float64Array,
-            until: Float64Array,
-        ) => T,
+        ask: (mesh: raw.Mesh, pose: Float64Array | undefined, rays: raw.Rays) => T,
     ): T {
         const [pose, until] = [placed(options.pose), untils(options.until)];
         const [from, along] = [floats(origins, "origins"), floats(directions, "directions")];
-        return this.#call((mesh) => ask(mesh, pose, from, along, until));
+        return this.#call((mesh) => ask(mesh, pose, new raw.Rays(from, along, until)));
     }
 
     /**

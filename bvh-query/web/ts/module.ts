@@ -4,10 +4,10 @@ import start, * as raw from "./raw/cbvh.js";
 
 export { raw };
 
-/** Where the module comes from: its address, a response with it, its bytes, or the compiled module. */
+/** Where the module comes from: its URL, a response with it, its bytes, or the compiled module. */
 export type ModuleSource = string | URL | Response | BufferSource | WebAssembly.Module;
 
-/** A function that returns a vector: browsers before 2021 to 2023 refuse it. */
+/** A module with a function that returns a vector. It is invalid where there is no SIMD. */
 const SIMD_PROBE = new Uint8Array([
     0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11,
 ]);
@@ -42,9 +42,9 @@ async function load(source: ModuleSource): Promise<void> {
  * Loads the module. Everything else needs it: `await init()` first. Each page and each worker loads a module of its own.
  * Later calls do nothing.
  *
- * @param source The module; by default the file beside this package's code. A worker may be sent the compiled module, and a
- * page in one file may have the bytes in it.
- * @throws If there is no WebAssembly with SIMD, or no module at the address. It may then be called again.
+ * @param source The module; by default the file beside this package's code. A worker can be sent the compiled module, and a
+ * page that is a single file can contain the bytes.
+ * @throws If there is no WebAssembly with SIMD, or no module at the URL. It may then be called again.
  */
 export function init(source: ModuleSource = new URL("./raw/cbvh_bg.wasm", import.meta.url)): Promise<void> {
     loading ??= load(source).catch((error: unknown) => {
@@ -54,16 +54,26 @@ export function init(source: ModuleSource = new URL("./raw/cbvh_bg.wasm", import
     return loading;
 }
 
-/** Loads the module from its bytes or from the compiled module, and blocks meanwhile. Browsers refuse it outside workers. */
+/**
+ * Loads the module from its bytes or from the compiled module, and blocks meanwhile. Some browsers refuse this outside
+ * workers. Later calls do nothing.
+ *
+ * @throws If there is no WebAssembly with SIMD, or while `init` is loading the module.
+ */
 export function initSync(source: BufferSource | WebAssembly.Module): void {
     checkSupport();
     if (memory === undefined) {
+        if (loading !== undefined) {
+            // What `init` loads would replace this module, and with it the memory of all objects made meanwhile.
+            throw new Error("cbvh: expected no init under way, found one; await it instead");
+        }
         ({ memory } = raw.initSync({ module: source }));
         loading = Promise.resolve();
     }
 }
 
-/** Calls the module. If memory runs out, what it has in memory is no longer certain, and every later call is refused. */
+/** Calls the module. A trap, as when memory runs out, may leave the module's memory in any state. Every later call is
+ * therefore refused. */
 export function call<T>(work: () => T): T {
     if (memory === undefined) {
         throw new Error("cbvh: expected a loaded module, found none; await init() first");
@@ -90,7 +100,7 @@ export function memoryBytes(): number {
     return memory?.buffer.byteLength ?? 0;
 }
 
-/** The base of classes whose objects stand for something in the module's memory. */
+/** The base class of objects that own something in the module's memory. */
 export abstract class Handle<Raw extends { free(): void }> {
     #raw: Raw | undefined;
     readonly #kind: string;
@@ -109,8 +119,8 @@ export abstract class Handle<Raw extends { free(): void }> {
     }
 
     /**
-     * Frees the memory now. Objects that are not freed are freed some time after nobody refers to them: when the engine
-     * collects them, which it need not do soon. Freeing twice does nothing.
+     * Frees the memory now. The memory of an object that is never freed returns when the engine collects the object, which
+     * may be long after the last reference is gone. Freeing twice does nothing.
      */
     free(): void {
         const held = this.#raw;

@@ -1,4 +1,4 @@
-/** Paths: motions between poses, screws, and lines through poses. */
+/** Paths: motions between two poses, screws, and motions through many poses. */
 
 import { float, floats, type Numbers } from "./arguments.js";
 import { call, raw } from "./module.js";
@@ -7,9 +7,9 @@ const BETWEEN = 0;
 const SCREW = 1;
 const THROUGH = 2;
 
-/** One path or N paths of a body, over times from 0 to 1. They hold plain numbers, and need not be freed. */
+/** One path or N paths of a body, over times from 0 to 1. A `Motion` holds plain numbers, and need not be freed. */
 export class Motion {
-    /** How many paths these are. */
+    /** The number of paths. */
     readonly count: number;
 
     private constructor(
@@ -20,8 +20,8 @@ export class Motion {
     }
 
     /**
-     * N motions, as planners interpolate: the origin of the body's frame moves on a line, and the body turns about one axis
-     * by the shorter angle, both at a constant rate.
+     * Makes N motions that interpolate as planners do: the origin of the body's frame moves on a line, and the body turns
+     * about one axis by the shorter angle, both at a constant rate.
      *
      * @param start N poses of 12 numbers.
      * @param end As many poses.
@@ -44,8 +44,8 @@ export class Motion {
     }
 
     /**
-     * A screw motion from a pose: a rotation by `angle` radians, any number of turns, about the axis through `point` with
-     * `direction` (of any length), and a shift by `shift` mesh units along it.
+     * Makes a screw motion from a pose: a rotation by `angle` radians, which may be many turns, about the axis through
+     * `point` in `direction` (of any length), and a shift by `shift` mesh units along the axis.
      */
     static screw(start: Numbers, point: Numbers, direction: Numbers, angle: number, shift = 0): Motion {
         const lengths: [Numbers, string, number][] = [
@@ -64,14 +64,14 @@ export class Motion {
         return new Motion(SCREW, Float64Array.from([...parts.flat(), ...rest]));
     }
 
-    /** A path through N poses, at least 2, with {@link Motion.between} from each to the next, all in the same time. */
+    /** Makes a path through N poses, at least 2: {@link Motion.between} from each to the next, for equal times. */
     static through(poses: Numbers): Motion {
         return new Motion(THROUGH, Float64Array.from(floats(poses, "poses")));
     }
 
     /**
-     * The poses of the body at T times: T poses of 12 numbers or, for N paths, N times T. Times before 0 and NaN count as
-     * 0, times after 1 as 1.
+     * Returns the poses of the body at T times: T poses of 12 numbers or, for N paths, N times T. Times before 0 and NaN
+     * count as 0, times after 1 as 1.
      */
     poses(times: Numbers): Float64Array {
         const array = floats(times, "times");
@@ -79,7 +79,7 @@ export class Motion {
     }
 }
 
-/** One path. */
+/** Checks that these are not several paths. */
 export function onePath(motion: Motion, name: string): Motion {
     if (motion.count !== 1) {
         throw new TypeError(`${name}: expected one path, found ${motion.count}`);

@@ -13,6 +13,7 @@ import type {
 import {
     bytes,
     described,
+    flag,
     float,
     floats,
     instance,
@@ -32,7 +33,7 @@ export type Instance = number | string;
 
 /** What an instance is called, and which pairs it takes part in. */
 export interface InstanceOptions {
-    /** A name that no other instance has. */
+    /** A name that no other instance of the scene has. */
     name?: string;
     /** The groups that the instance is in, one bit for each of 32. All by default. */
     member?: number;
@@ -59,7 +60,7 @@ export class Scene extends Handle<raw.Scene> {
         super(opened ?? call(() => new raw.Scene()), "Scene");
     }
 
-    /** Opens the bytes of a file of `cbvh bake --scene`: its instances, in their order. */
+    /** Opens the bytes of a file that `cbvh bake --scene` made, with its instances in their order. */
     static open(file: Bytes): Scene {
         const array = bytes(file, "bytes");
         return new Scene(call(() => raw.Scene.open(array)));
@@ -70,7 +71,7 @@ export class Scene extends Handle<raw.Scene> {
         return call(() => work(scene));
     }
 
-    /** The number of an instance. */
+    /** Finds the number of an instance. */
     #number(value: Instance, name: string): number {
         if (typeof value !== "string") {
             return integer(value, name);
@@ -82,7 +83,7 @@ export class Scene extends Handle<raw.Scene> {
         return found;
     }
 
-    /** The numbers of instances. */
+    /** Finds the numbers of instances. */
     #numbers(values: readonly Instance[] | Integers, name: string): Uint32Array {
         if (Array.isArray(values)) {
             return Uint32Array.from(values as Instance[], (value) => this.#number(value, name));
@@ -104,7 +105,7 @@ export class Scene extends Handle<raw.Scene> {
         return this.#call((scene) => scene.add(added, at, called, ...groups));
     }
 
-    /** Removes an instance, and its permissions to touch others. */
+    /** Removes an instance, and forgets which of its contacts were allowed. */
     remove(id: Instance): void {
         const number = this.#number(id, "id");
         this.#call((scene) => scene.remove(number));
@@ -121,7 +122,7 @@ export class Scene extends Handle<raw.Scene> {
         this.#call((scene) => scene.setPoses(numbers, array));
     }
 
-    /** The poses of instances in the world, those of all in their order by default: 12 numbers for each. */
+    /** Returns the poses of instances in the world, by default of all in their order: 12 numbers for each. */
     poses(ids?: readonly Instance[] | Integers): Float64Array {
         const numbers = ids === undefined ? this.instances() : this.#numbers(ids, "ids");
         return this.#call((scene) => scene.poses(numbers));
@@ -136,43 +137,43 @@ export class Scene extends Handle<raw.Scene> {
         this.#call((scene) => scene.setGroups(number, member, meets));
     }
 
-    /** The groups that an instance is in, and those that it meets. */
+    /** Returns the groups that an instance is in, and those that it meets. */
     groups(id: Instance): { member: number; meets: number } {
         const number = this.#number(id, "id");
         const [member, meets] = this.#call((scene) => scene.groups(number)) as Uint32Array;
         return { member: member as number, meets: meets as number };
     }
 
-    /** Allows two instances to touch, or forbids it again. No question is about an allowed pair. */
+    /** Allows two instances to touch or, with `false`, no longer. Questions about all pairs leave out pairs that may touch. */
     setAllowed(a: Instance, b: Instance, allowed = true): void {
-        const [first, second] = [this.#number(a, "a"), this.#number(b, "b")];
-        this.#call((scene) => scene.setAllowed(first, second, allowed));
+        const [first, second, chosen] = [this.#number(a, "a"), this.#number(b, "b"), flag(allowed, "allowed")];
+        this.#call((scene) => scene.setAllowed(first, second, chosen));
     }
 
-    /** The pairs that may touch: 2 K numbers. */
+    /** Returns the pairs that may touch: 2 K numbers of instances. */
     allowed(): Uint32Array {
         return this.#call((scene) => scene.allowed());
     }
 
-    /** The number of the instance with a name. */
+    /** Returns the number of the instance with a name, or `undefined` if there is none. */
     find(name: string): number | undefined {
         const called = text(name, "name");
         return this.#call((scene) => scene.find(called));
     }
 
-    /** The name of an instance, if it has one. */
+    /** Returns the name of an instance, or `undefined` if it has none. */
     name(id: Instance): string | undefined {
         const number = this.#number(id, "id");
         return this.#call((scene) => scene.name(number));
     }
 
-    /** The mesh of an instance: an object of its own, to be freed by itself, which shares the bytes. */
+    /** Returns the mesh of an instance, as a new object. It shares the bytes, and is freed separately. */
     mesh(id: Instance): Mesh {
         const number = this.#number(id, "id");
         return Mesh._of(this.#call((scene) => scene.mesh(number)));
     }
 
-    /** The numbers of all instances, in their order. */
+    /** Returns the numbers of all instances, in their order. */
     instances(): Uint32Array {
         return this.#call((scene) => scene.instances());
     }
@@ -180,7 +181,8 @@ export class Scene extends Handle<raw.Scene> {
     /** Whether the scene reuses earlier results about each pair. This affects no answer, and saves time if instances move
      * little from question to question. Off at first. */
     setTracking(tracking: boolean): void {
-        this.#call((scene) => scene.setTracking(tracking));
+        const chosen = flag(tracking, "tracking");
+        this.#call((scene) => scene.setTracking(chosen));
     }
 
     /** Whether any pair touches, exactly. */
@@ -205,7 +207,7 @@ export class Scene extends Handle<raw.Scene> {
         return this.#call((scene) => scene.pairsWithin(limit));
     }
 
-    /** All pairs that touch, or of which one is inside the other, wholly or in part, with their relations. */
+    /** All pairs that touch or of which one is inside the other, wholly or in part, with their relations. */
     relations(): SceneRelations {
         const [pairs, relations] = this.#call((scene) => scene.relations());
         return { pairs, relations } as SceneRelations;
@@ -226,15 +228,15 @@ export class Scene extends Handle<raw.Scene> {
     /**
      * How far apart pairs of instances are, pair by pair.
      *
-     * @param pairs 2 K numbers or names of instances. These may be any pairs.
+     * @param pairs 2 K numbers or names of instances, of any pairs.
      */
     distances(pairs: readonly Instance[] | Integers): Distances {
         const numbers = this.#numbers(pairs, "pairs");
         return answers.distances(this.#call((scene) => scene.distances(numbers)));
     }
 
-    /** Instances and their paths, as the module takes them. */
-    #ways(paths: ReadonlyMap<Instance, Motion>): [Uint32Array, Uint8Array, Float64Array[]] {
+    /** Reads instances and their paths. */
+    #moving(paths: ReadonlyMap<Instance, Motion>): [Uint32Array, Uint8Array, Float64Array[]] {
         if (!(paths instanceof Map)) {
             throw new TypeError(`paths: expected a Map of instances to paths, found ${described(paths)}`);
         }
@@ -243,8 +245,12 @@ export class Scene extends Handle<raw.Scene> {
         if (new Set(numbers).size < numbers.length) {
             throw new TypeError("paths: expected one path for each instance, found two for one");
         }
-        const ways = entries.map(([id, way]) => onePath(instance(way, Motion, "Motion", `paths[${id}]`), `paths[${id}]`));
-        return [Uint32Array.from(numbers), Uint8Array.from(ways, (way) => way._kind), ways.map((way) => way._numbers)];
+        const motions = entries.map(([id, motion]) => {
+            const name = `paths[${id}]`;
+            return onePath(instance(motion, Motion, "Motion", name), name);
+        });
+        const kinds = Uint8Array.from(motions, (motion) => motion._kind);
+        return [Uint32Array.from(numbers), kinds, motions.map((motion) => motion._numbers)];
     }
 
     /**
@@ -254,15 +260,15 @@ export class Scene extends Handle<raw.Scene> {
      * @param paths The path of each moving instance in the world. Its present pose does not matter, and does not change.
      */
     motion(paths: ReadonlyMap<Instance, Motion>, options: MotionOptions = {}): SceneMotionAnswer {
-        const [ways, limit] = [this.#ways(paths), limits(options)];
-        const [kind, freeUntil, at, pair, nearest] = this.#call((scene) => scene.motion(...ways, ...limit));
+        const [moving, limit] = [this.#moving(paths), limits(options)];
+        const [kind, freeUntil, at, pair, nearest] = this.#call((scene) => scene.motion(...moving, ...limit));
         return { kind, freeUntil, at, pair: pairOf(pair, nearest) };
     }
 
     /** Whether `motion` answers FREE. It takes less time than `motion`. */
     isFree(paths: ReadonlyMap<Instance, Motion>, options: MotionOptions = {}): boolean {
-        const [ways, limit] = [this.#ways(paths), limits(options)];
-        return this.#call((scene) => scene.isFree(...ways, ...limit));
+        const [moving, limit] = [this.#moving(paths), limits(options)];
+        return this.#call((scene) => scene.isFree(...moving, ...limit));
     }
 
     /** The points of all instances that are closest to N points in the world, 3 N numbers. */
@@ -295,29 +301,29 @@ export class Scene extends Handle<raw.Scene> {
         origins: Numbers,
         directions: Numbers,
         until: number | Numbers | undefined,
-        ask: (scene: raw.Scene, ...rays: [Float64Array, Float64Array, Float64Array]) => T,
+        ask: (scene: raw.Scene, rays: raw.Rays) => T,
     ): T {
         const [from, along] = [floats(origins, "origins"), floats(directions, "directions")];
         const limits = untils(until);
-        return this.#call((scene) => ask(scene, from, along, limits));
+        return this.#call((scene) => ask(scene, new raw.Rays(from, along, limits)));
     }
 
     /** Where N rays in the world first hit an instance. Arguments are those of `Mesh.firstHits`. */
     firstHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): SceneRayHits {
         return answers.sceneHits(
-            this.#rays(origins, directions, options.until, (scene, ...rays) => scene.firstHits(...rays)),
+            this.#rays(origins, directions, options.until, (scene, rays) => scene.firstHits(rays)),
         );
     }
 
     /** Whether N rays in the world hit any instance, exactly: 1 or 0 for each. */
     anyHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): Uint8Array {
-        return this.#rays(origins, directions, options.until, (scene, ...rays) => scene.anyHits(...rays));
+        return this.#rays(origins, directions, options.until, (scene, rays) => scene.anyHits(rays));
     }
 
     /** All hits of N rays in the world, in the exact order along each. Each parameter occurs once, however many instances are
      * hit at exactly that parameter. */
     allHits(origins: Numbers, directions: Numbers, options: { until?: number | Numbers } = {}): SceneRayHits[] {
-        const hits = this.#rays(origins, directions, options.until, (scene, ...rays) => scene.allHits(...rays));
+        const hits = this.#rays(origins, directions, options.until, (scene, rays) => scene.allHits(rays));
         return hits.map(answers.sceneHits);
     }
 
@@ -328,7 +334,7 @@ export class Scene extends Handle<raw.Scene> {
     }
 }
 
-/** A pair and its distance, if there is one. */
+/** Makes the answer about a pair, or `undefined` if there is no pair. */
 function pairOf(pair: Uint32Array, nearest: unknown[]): SceneDistance | undefined {
     const [a, b] = pair;
     if (a === undefined || b === undefined) {
