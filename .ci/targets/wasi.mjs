@@ -5,5 +5,5 @@ import { WASI } from "node:wasi";
 const args = process.argv.slice(2);
 const wasi = new WASI({ version: "preview1", args, env: process.env, preopens: { "/": "/" }, returnOnExit: true });
 const module = await WebAssembly.compile(await readFile(args[0]));
-// A program that panics ends by a trap, which node throws as an error.
+// A program that panics ends with a trap, which node throws as an error.
 process.exit(wasi.start(await WebAssembly.instantiate(module, wasi.getImportObject())));

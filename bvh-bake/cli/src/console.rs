@@ -163,7 +163,7 @@ impl From<BackendError> for Failure {
 fn unreadable(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "nothing of this name".to_owned(),
-        // Windows denies to open a folder as a file, and tells nothing about what is no file.
+        // Windows refuses to open a folder as a file, and has no metadata of what is not a file.
         io::ErrorKind::PermissionDenied if path.is_dir() => "a folder".to_owned(),
         _ if cfg!(windows) && std::fs::metadata(path).is_err() => "a device or a pipe".to_owned(),
         io::ErrorKind::PermissionDenied => "one that this user may not read".to_owned(),

@@ -25,7 +25,7 @@ pub(crate) fn current_bytes() -> Option<u64> {
 
 fn status_bytes(label: &str) -> Option<u64> {
     if cfg!(windows) {
-        // Wine has this file, but of another process.
+        // Wine has this file, but it describes another process.
         return None;
     }
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -48,7 +48,7 @@ pub(crate) fn memory_in_words() -> String {
 /// command promises that nobody changes it.
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> Result<Bvh, OpenError> {
-    // WebAssembly has no maps.
+    // WebAssembly cannot map files.
     if cfg!(target_family = "wasm") {
         return Bvh::read(path);
     }

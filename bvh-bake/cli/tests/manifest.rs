@@ -391,7 +391,7 @@ fn what_is_done_when_the_process_is_killed_stays_done() {
             assert!(child.try_wait().unwrap().is_none(), "done before it could be killed");
             std::thread::sleep(Duration::from_millis(1));
         }
-        // Windows has no signals, and ends both like the first.
+        // Windows has no signals: both processes are ended like the first.
         if signal == "-KILL" || cfg!(windows) {
             child.kill().unwrap();
         } else {

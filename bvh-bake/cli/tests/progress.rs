@@ -4,8 +4,7 @@
 mod common;
 
 use common::sheet::write_sheet;
-use common::{Files as _, place};
-use common::{cbvh_in, cube, names};
+use common::{Files as _, cbvh_in, cube, names, place};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Checks what differs on Windows: files in use keep their names, paths have drives and devices, and letters' case is ignored.
+//! Checks what differs on Windows: files in use are not replaced, paths have drives and devices, and the case of names is ignored.
 #![cfg(windows)]
 
 mod common;
@@ -81,7 +81,7 @@ fn an_asset_in_use_fails_alone() {
     assert!(ended.err.contains("a.cbvh: cannot replace: "), "{ended:?}");
     directory.cbvh("verify b.cbvh cube.obj").done();
     assert_eq!(names(directory), ["a.cbvh", "b.cbvh", "cube.obj", "in.jsonl", "out.jsonl"]);
-    // Somebody else writes the results.
+    // Another process writes the results.
     let _part = File::options().append(true).create(true).open(directory.join("out.jsonl.part")).unwrap();
     directory.cbvh(bake).failed(2, &["out.jsonl.part: expected a file that no other process uses"]);
 }

@@ -56,7 +56,7 @@ pub fn to_bytes_with(
     provenance: &str,
     begin: &mut dyn FnMut(Stage),
 ) -> Result<(Vec<u8>, BakeReport), BakeError> {
-    // A web page has no clock of the standard library; asking for the time would panic.
+    // The standard library has no clock in a web page; asking for the time would panic.
     let has_clock = !cfg!(all(target_family = "wasm", target_os = "unknown"));
     let start = has_clock.then(Instant::now);
     mesh.check()?;

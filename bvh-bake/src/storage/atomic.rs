@@ -5,6 +5,7 @@
 //! killed, and the next process that writes the same output removes it.
 
 use crate::error::BakeError;
+use crate::storage::device_names::names_device;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -33,7 +34,7 @@ pub fn discard_unfinished() {
     std::mem::forget(live);
 }
 
-/// Refuses what a rename would replace or at which it would fail late: a device, a directory, or a file in use.
+/// Refuses what a rename would wrongly replace, or would fail on late: a device, a directory, or a file in use.
 pub(crate) fn refuse_special(path: &Path) -> Result<(), BakeError> {
     let found = match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => "a directory",
@@ -64,12 +65,12 @@ fn refuse_in_use(_: &Path) -> Result<(), BakeError> {
     Ok(())
 }
 
-/// Windows' error for a file that another process has opened, and does not share.
+/// Windows' error for a file that another process has opened and does not share.
 #[cfg(windows)]
 const SHARING_VIOLATION: i32 = 32;
 
 /// Returns the error of an output that the system does not let the bake replace. On Windows, the reason is most likely that
-/// somebody uses the file, which its own message does not always say.
+/// another program uses the file, which the system's message does not always say.
 fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
     move |source| {
         if !cfg!(windows) || !path.exists() {
@@ -78,20 +79,6 @@ fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
         let remedy = "close the program that has the file open or mapped, or name another output";
         failed(path, "replace")(io::Error::new(source.kind(), format!("{source}; {remedy}")))
     }
-}
-
-/// Returns whether Windows takes a part of a path for a device, in whatever folder it stands.
-pub(crate) fn names_device(path: &Path) -> bool {
-    path.iter().any(|part| is_device(&part.to_string_lossy()))
-}
-
-fn is_device(part: &str) -> bool {
-    let stem = part.split(['.', ':']).next().unwrap_or_default().trim_end().to_ascii_uppercase();
-    let is_port = |kind: &str| {
-        let number = stem.strip_prefix(kind).map(|rest| rest.chars().collect::<Vec<_>>());
-        matches!(number.as_deref(), Some(['0'..='9' | '¹' | '²' | '³']))
-    };
-    matches!(&*stem, "CON" | "PRN" | "AUX" | "NUL" | "CONIN$" | "CONOUT$") || is_port("COM") || is_port("LPT")
 }
 
 /// Removes the temporary files for `name` that killed processes left in a directory.
@@ -146,7 +133,7 @@ impl Temporary {
     /// Creates an empty file in a directory, hidden and named after `name`.
     pub(crate) fn named(directory: &Path, name: &OsStr) -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        // WebAssembly knows no processes. A name that is in use is never taken, and without locks no file counts as stale.
+        // WebAssembly has no process ids. A name in use is never taken, and without locks no file counts as stale.
         let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
         remove_stale_of(directory, name);
         loop {
@@ -194,7 +181,7 @@ impl Temporary {
         // Without this, a crash soon after the rename could leave an empty file under the name.
         self.file.sync_all().map_err(failed(path, "write"))?;
         if cfg!(windows) {
-            // A lock there keeps others from reading, and a program may wait for the name to appear.
+            // A lock would keep others from reading, and a program may wait for the name to appear.
             let _ = self.file.unlock();
         }
         let mut live = live();
@@ -243,17 +230,6 @@ pub(crate) fn directory_of(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn devices_are_known_by_their_names() {
-        for part in ["NUL", "nul.bin", "con", "COM1", "lpt9.txt", "COM¹", "aux ", "nul:stream"] {
-            assert!(is_device(part), "{part}");
-        }
-        for part in ["null.bin", "COM", "COM10", "a.con", "console", ""] {
-            assert!(!is_device(part), "{part}");
-        }
-        assert!(names_device(Path::new("out/nul.cbvh")) && !names_device(Path::new("out/null.cbvh")));
-    }
 
     #[test]
     #[cfg_attr(target_family = "wasm", ignore = "WASI has no locks, without which no file counts as stale")]

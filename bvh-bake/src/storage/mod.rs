@@ -1,6 +1,7 @@
 //! Stores the data of a bake or a check: in memory, in scratch files, and in the output.
 
 pub(crate) mod atomic;
+pub(crate) mod device_names;
 pub(crate) mod disk_space;
 pub(crate) mod external_sort;
 pub(crate) mod output;

@@ -1,4 +1,4 @@
-//! What tests need of the system, and what they do where it is missing: folders and threads.
+//! What tests need of the system, folders and threads, and what replaces it on WebAssembly.
 
 use tempfile::TempDir;
 
@@ -7,12 +7,12 @@ use tempfile::TempDir;
 /// # Panics
 /// Panics if the system refuses.
 pub fn folder() -> TempDir {
-    // WASI has no directory for temporary files; whoever runs a test there offers this one.
+    // WASI has no directory for temporary files; what runs the tests there must offer this one.
     let made = if cfg!(target_family = "wasm") { tempfile::tempdir_in("/tmp") } else { tempfile::tempdir() };
     made.expect("a folder for temporary files")
 }
 
-/// Threads of their own, or none where there are none.
+/// A pool of threads, or none on WebAssembly.
 pub struct Pool(Option<rayon::ThreadPool>);
 
 /// Makes a pool of `threads` threads. On WebAssembly, which has none, the pool works on the thread that asks.

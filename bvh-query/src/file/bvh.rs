@@ -94,7 +94,7 @@ impl Bvh {
     /// break a rule of the format.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, OpenError> {
         let path = path.as_ref();
-        // WebAssembly has no memory of its own for maps.
+        // WebAssembly has no anonymous maps, into which `memory` reads.
         let bytes = if cfg!(target_family = "wasm") {
             std::fs::read(path).map(Bytes::from)
         } else {
@@ -203,7 +203,7 @@ impl Bvh {
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold.
     pub fn validate(&self) -> Result<(), QueryError> {
-        // The checksum of a page tells better where it is damaged than that of its section does.
+        // The checksum of a page locates damage better than that of its section.
         for object in self.objects() {
             let first = object.record().first_page.get();
             for number in first..first + object.record().pages.get() {

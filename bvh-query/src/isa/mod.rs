@@ -82,7 +82,8 @@ pub(crate) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     /// Returns the larger operand of each lane; the second operand if either is NaN.
     fn max(self, other: Self) -> Self;
-    /// Returns the larger operand of each lane; either operand if either is NaN. For backends where `max` takes longer.
+    /// Returns the larger operand of each lane; either operand if either is NaN. Backends where `max` takes
+    /// longer override it.
     #[inline(always)]
     fn max_of_numbers(self, other: Self) -> Self {
         self.max(other)
@@ -230,8 +231,8 @@ pub(crate) trait Task {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Backend {
-    /// Portable code. On `wasm32-unknown-unknown` with SIMD128, it stands for SIMD128: nobody chooses there, and a page would
-    /// have to load both.
+    /// Portable code. On `wasm32-unknown-unknown` with SIMD128, this runs SIMD128 instead: no user chooses a backend there, and a
+    /// page would have to load the code of both.
     Scalar,
     /// AVX2, FMA and F16C.
     Avx2,

@@ -113,8 +113,8 @@ impl Quad for Simd128 {
             Self(f32x4_convert_u32x4(u32x4_extend_high_u16x8(high))),
         )
     }
-    // Codes are not negative and finite. Below 2^-14 they are multiples of 2^-24; of the others, the exponent counts from
-    // 112 lower than that of an f32. The shift would make f32 of the former that are subnormal, and slow.
+    // Codes are finite and not negative (R38). Those below 2^-14 are multiples of 2^-24. The bias of the others' exponent is 112
+    // less than that of an f32. Shifting the former would make subnormal f32, which are slow.
     #[inline(always)]
     fn codes_f16(from: &[u8; 8]) -> Self {
         // SAFETY: see above.
@@ -127,7 +127,7 @@ impl Quad for Simd128 {
     fn codes_f32(from: &[u8; 16]) -> Self {
         Self(bytes(from))
     }
-    // Of the portable code, the compiler shifts byte by byte.
+    // The compiler shifts byte by byte in the portable code.
     #[inline(always)]
     fn high_nibbles(from: &[u8; 16]) -> [u8; 16] {
         array(u8x16_shr(bytes(from), 4))

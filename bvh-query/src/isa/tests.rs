@@ -215,7 +215,7 @@ fn every_backend_compares_as_the_portable_one_does() {
             assert_eq!(found.0, expected.0, "{backend}: {a:?}, {b:?}");
             for (at, (found, expected)) in found.1.iter().zip(expected.1).enumerate() {
                 for lane in 0..16 {
-                    // Of a number and NaN, the maximum of numbers may be either, and of two zeros, too.
+                    // The maximum of a number and NaN may be either, and so may that of two zeros.
                     let is_free = at == 2 && (a[lane].is_nan() || b[lane].is_nan() || a[lane] == b[lane]);
                     let is_same = found[lane].to_bits() == expected[lane].to_bits()
                         || found[lane].is_nan() && expected[lane].is_nan();

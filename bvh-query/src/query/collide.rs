@@ -96,7 +96,7 @@ pub(super) struct ContactVisitor<'a> {
     pub(super) candidates: Candidates<'a>,
 }
 
-/// What is done with a pair of triangles in contact. A reference, so that one walk serves all who look for contacts.
+/// What is done with a pair of triangles in contact. A reference, so that one walk is compiled for all of them.
 type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
 
 /// Decides pairs of triangles and passes those in contact to `visit`, until it breaks.

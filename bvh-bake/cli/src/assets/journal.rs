@@ -64,15 +64,15 @@ impl Journal {
     }
 }
 
-/// Opens a file to append to it and locks it. Returns `None` if another process has done so. Others may read it.
+/// Opens a file to append to it, and locks it. Returns `None` if another process has locked it. Others may read it.
 #[cfg(not(windows))]
 fn open_alone(path: &Path) -> io::Result<Option<File>> {
     let file = File::options().read(true).append(true).create(true).open(path)?;
     Ok(if let Err(fs::TryLockError::WouldBlock) = file.try_lock() { None } else { Some(file) })
 }
 
-/// Opens a file to append to it, and lets nobody else write to it. Returns `None` if another process has done so. Others may
-/// read it, which a lock would prevent on Windows.
+/// Opens a file to append to it, and lets no other process write to it. Returns `None` if another process has it open for
+/// writing. Others may read it, which a lock would prevent on Windows.
 #[cfg(windows)]
 fn open_alone(path: &Path) -> io::Result<Option<File>> {
     use std::os::windows::fs::OpenOptionsExt;

@@ -102,7 +102,7 @@ fn place(path: &Path) -> PathBuf {
         (Some(folder), Some(name)) => resolve(folder).join(name),
         _ => path,
     };
-    // Windows does not distinguish capital letters in names.
+    // Windows ignores the case of letters in names.
     if cfg!(windows) { place.to_string_lossy().to_lowercase().into() } else { place }
 }
 

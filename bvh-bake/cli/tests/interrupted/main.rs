@@ -4,15 +4,14 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-/// Needs commands and mounts of Linux.
+// Needs commands and mounts of Linux.
 #[cfg(target_os = "linux")]
 mod disks;
 
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
-use common::place;
 use common::sheet::write_sheet;
-use common::{cbvh_in, names};
+use common::{cbvh_in, names, place};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::Path;

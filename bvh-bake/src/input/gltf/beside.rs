@@ -6,7 +6,7 @@
 //! refused.
 
 use crate::error::{Fault, Place, excerpt};
-use crate::storage::atomic::names_device;
+use crate::storage::device_names::names_device;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Component, Path, PathBuf};

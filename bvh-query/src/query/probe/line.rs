@@ -45,8 +45,8 @@ impl Line {
     }
 }
 
-/// A question about a line. The walk calls it through a reference, so that one walk serves all questions: a call takes
-/// little beside an exact decision.
+/// A question about a line. The walk calls it through a reference, so that one walk is compiled for all questions. A call
+/// costs little next to an exact decision.
 pub(crate) trait LineQuestion {
     fn line(&self) -> Line;
 
