@@ -59,6 +59,7 @@ mod pages;
 mod prepare;
 mod progress;
 mod storage;
+mod threads;
 mod topology;
 mod tree;
 mod triangles;

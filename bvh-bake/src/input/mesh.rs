@@ -7,8 +7,8 @@ pub use crate::error::InputError;
 use crate::error::excerpt;
 use crate::limits::coordinate_fits;
 pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
+use crate::threads::prelude::*;
 pub use bvh_format::instances::Instance;
-use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
 /// The most instances of a scene: their numbers have 32 bits.

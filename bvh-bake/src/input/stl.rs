@@ -12,8 +12,8 @@ use super::{COORDINATE, next_ids, text};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::mesh::{Mesh, Object};
 use crate::limits::{MAX_VERTICES, coordinate_fits};
+use crate::threads::prelude::*;
 use crate::triangles::TRIANGLES_PER_PART;
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io::Read;
 

@@ -6,6 +6,8 @@ use crate::progress::{Progress, Stage, Step, Tally, WHOLE};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
+use crate::threads;
+use crate::threads::prelude::*;
 use crate::topology::TopologyLists;
 use bvh_format::checksum::Hasher;
 use bvh_format::header::{Section, SectionKind, head_bytes, write_header};
@@ -15,7 +17,6 @@ use bvh_format::leaf::LINE;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, PagePlace};
 use bvh_format::topology::write_topology_head;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The most bytes of a section that are in memory at a time under a memory budget, unless a single brick has more.
@@ -219,7 +220,7 @@ impl OpenSection<'_> {
                 content.update(&bytes);
             }
         };
-        let hash = || rayon::join(|| checksum.update(&bytes), hash_content);
-        rayon::join(|| output.append(bytes.clone()), hash).0
+        let hash = || threads::join(|| checksum.update(&bytes), hash_content);
+        threads::join(|| output.append(bytes.clone()), hash).0
     }
 }

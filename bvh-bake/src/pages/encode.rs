@@ -5,12 +5,12 @@
 
 use crate::pages::Style;
 use crate::pages::plan::{PagePlan, Place};
+use crate::threads::prelude::*;
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;
 use bvh_format::leaf::PACKET;
 use bvh_format::page::{PAGE, PagePatcher, PagePlace, PageShape, PageWriter, RootRef, WrittenPage};
-use rayon::prelude::*;
 
 /// Pages that are encoded together.
 pub(crate) struct Encoder<'a> {

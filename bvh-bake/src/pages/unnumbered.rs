@@ -7,9 +7,9 @@
 use crate::error::BakeError;
 use crate::pages::encode::Encoded;
 use crate::storage::{Piece, Spill};
+use crate::threads::prelude::*;
 use bvh_format::page::{NO_PARENT, PAGE, Page, PagePatcher, PagePlace, RootRef};
 use bvh_format::profile::Profile;
-use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// The pages of a brick, or those above all bricks, with their blocks.

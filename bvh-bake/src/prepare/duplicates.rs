@@ -12,10 +12,11 @@ use crate::error::{BakeError, LimitError};
 use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
+use crate::threads;
+use crate::threads::prelude::*;
 use crate::topology::MAX_NET;
 use crate::triangles::{Corners, TRIANGLES_PER_PART, TriangleStream, Triangles};
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
@@ -175,7 +176,7 @@ pub(crate) fn find(
         return Ok(shared);
     }
     let mut suspects = Sorter::of_runs(run);
-    let batch = 4 * rayon::current_num_threads();
+    let batch = 4 * threads::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
         let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
         let parts: Vec<Vec<Suspect>> =

@@ -8,6 +8,7 @@
 //! have treelets of the same width. The random numbers have constant seeds, so that equal meshes get equal choices.
 
 use crate::options::Options;
+use crate::threads::prelude::*;
 use crate::tree::{PacketTriangles, Tree};
 use crate::triangles::{Corners, Triangle};
 use bvh_format::kdop::{DIRECTIONS, DirectionSet, Kdop};
@@ -15,7 +16,6 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_format::realign::upper_form;
 use bvh_format::slabs::{Group, NodeSlabs};
-use rayon::prelude::*;
 
 /// A layout, and the reason for choosing it.
 pub(crate) struct Choice {
@@ -135,13 +135,13 @@ fn cheapest(trials: &[Trial], candidates: &[(Profile, f64)]) -> (Profile, String
 
 /// Returns how often nodes that are apart overlap, for each direction set.
 fn overlap_rates(trials: &[Trial]) -> [f64; 3] {
-    let overlaps = trials.par_iter().map(|trial| {
+    let overlaps = |trial: &Trial| {
         let [points_a, points_b] = trial.nodes.each_ref().map(|corners| centred(corners));
-        trial_overlaps(&points_a, &points_b, &trial.rotation, trial.away, trial.gap).map(u32::from)
-    });
-    let overlaps = overlaps.reduce(|| [0; 3], |a, b| [0, 1, 2].map(|set| a[set] + b[set]));
+        trial_overlaps(&points_a, &points_b, &trial.rotation, trial.away, trial.gap)
+    };
+    let found: Vec<[bool; 3]> = trials.par_iter().map(overlaps).collect();
     // One overlap is added to each count, so that no set seems free.
-    overlaps.map(|count| f64::from(count + 1) / TRIAL_COUNT as f64)
+    [0, 1, 2].map(|set| (1 + found.iter().filter(|found| found[set]).count()) as f64 / TRIAL_COUNT as f64)
 }
 
 /// Returns, for each set, whether the k-DOPs overlap if B is placed beside A so that their extents along `away` leave a

@@ -11,11 +11,12 @@ use crate::error::BakeError;
 use crate::progress::{Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
+use crate::threads;
+use crate::threads::prelude::*;
 use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
 use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
 use duplicates::{Found, Hashed, Suspect};
-use rayon::prelude::*;
 
 /// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
 const MEASURE_WEIGHT: u64 = 8;
@@ -46,7 +47,7 @@ pub(crate) fn measure(
     let tally =
         |weight| resources.progress.tally(Step::Bake(Stage::Prepare), weight, stream.count, stream.count);
     let measuring = tally(MEASURE_WEIGHT);
-    let batch = 4 * rayon::current_num_threads();
+    let batch = 4 * threads::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
         let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
         let of_part = |part: usize| {

@@ -2,8 +2,8 @@
 
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
+use crate::threads::prelude::*;
 use bytemuck::Pod;
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

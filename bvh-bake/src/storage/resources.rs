@@ -3,6 +3,7 @@
 use super::{Scratch, Stream};
 use crate::error::Halt;
 use crate::progress::Progress;
+use crate::threads;
 use bytemuck::Pod;
 use std::path::Path;
 use std::sync::Arc;
@@ -92,7 +93,7 @@ fn bytes_of_bricks(bricks: u64) -> u64 {
 impl Resources {
     /// Allows as much memory as the work takes.
     pub(crate) fn unlimited(progress: &Progress) -> Self {
-        let bricks = rayon::current_num_threads();
+        let bricks = threads::current_num_threads();
         Self {
             scratch: Scratch::in_memory(progress),
             progress: progress.clone(),
@@ -109,7 +110,7 @@ impl Resources {
     /// to scratch files in `directory`.
     pub(crate) fn within(budget: u64, taken: u64, directory: &Path, progress: &Progress) -> Self {
         let (whole, budget) = (budget, budget.saturating_sub(taken));
-        let threads = rayon::current_num_threads() as u64;
+        let threads = threads::current_num_threads() as u64;
         let brick = MAX_BRICK_TRIANGLES as u64 * BRICK_BYTES_PER_TRIANGLE;
         let fixed = MIN_BYTES + 2 * BUFFER_BYTES;
         let bricks = (budget.saturating_sub(fixed) / brick).clamp(1, threads);
@@ -185,7 +186,7 @@ impl Resources {
     /// Returns how many tasks of reading may run side by side or wait, each of which takes `bytes_per_task` bytes.
     /// Together they take a quarter of the memory for bricks, which is free until bricks are built.
     pub(crate) fn reading_tasks(&self, bytes_per_task: usize) -> usize {
-        let most = READING_TASKS_PER_THREAD * rayon::current_num_threads();
+        let most = READING_TASKS_PER_THREAD * threads::current_num_threads();
         (self.brick_bytes / 4 / bytes_per_task).clamp(1, most)
     }
 
@@ -207,5 +208,5 @@ impl Resources {
 
 /// Returns the bytes that a check with buffers of `buffer` bytes takes, besides what the scratch keeps in memory.
 fn check_bytes(buffer: u64) -> u64 {
-    MIN_BYTES + rayon::current_num_threads() as u64 * CHECK_BYTES_PER_THREAD + CHECK_BUFFERS * buffer
+    MIN_BYTES + threads::current_num_threads() as u64 * CHECK_BYTES_PER_THREAD + CHECK_BUFFERS * buffer
 }

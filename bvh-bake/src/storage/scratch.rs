@@ -10,6 +10,7 @@
 use super::scratch_file::ScratchFile;
 use crate::error::BakeError;
 use crate::progress::Progress;
+use crate::threads;
 use bytemuck::Pod;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -42,7 +43,7 @@ impl Scratch {
 
     /// Makes a place for the pieces of one stage.
     pub(crate) fn spill(self: &Arc<Self>) -> Spill {
-        let threads = rayon::current_num_threads() + 1;
+        let threads = threads::current_num_threads() + 1;
         Spill { scratch: self.clone(), files: (0..threads).map(|_| Mutex::new(None)).collect() }
     }
 
@@ -93,7 +94,7 @@ impl Spill {
     }
 
     fn file(&self) -> Result<Arc<ScratchFile>, BakeError> {
-        let number = rayon::current_thread_index().map_or(0, |thread| thread + 1) % self.files.len();
+        let number = threads::current_thread_index().map_or(0, |thread| thread + 1) % self.files.len();
         let mut file = self.files[number].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(file) = &*file {
             return Ok(file.clone());

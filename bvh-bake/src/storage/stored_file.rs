@@ -5,6 +5,7 @@
 
 use crate::storage::read_exact_at;
 use crate::storage::resources::{CHECK_BYTES_PER_THREAD, MIN_BYTES};
+use crate::threads;
 use bvh_format::FormatError;
 use bvh_format::source::Source;
 use std::borrow::Cow;
@@ -91,7 +92,7 @@ impl StoredFile {
     /// [`FileError::Memory`] if the limit is exceeded.
     pub fn require_memory(&self, piece: usize) -> Result<(), FileError> {
         let Some(budget) = self.max_memory else { return Ok(()) };
-        let threads = rayon::current_num_threads() as u64;
+        let threads = threads::current_num_threads() as u64;
         let needed = MIN_BYTES + threads * CHECK_BYTES_PER_THREAD;
         // The memory of each thread is counted already.
         let piece = (piece as u64).saturating_sub(CHECK_BYTES_PER_THREAD);

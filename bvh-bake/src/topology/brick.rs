@@ -9,9 +9,9 @@ use super::max_parts;
 use super::nets::Nets;
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
+use crate::threads::prelude::*;
 use crate::tree::Aabb;
 use crate::triangles::Triangle;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The triangles of a run. The components of surfaces that meet along an edge depend on this number.

@@ -4,6 +4,7 @@ use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::swept;
 use super::{Builder, PacketTriangles};
+use crate::threads;
 use wide::f32x4;
 
 /// The number of bins along each axis of a node's box.
@@ -54,7 +55,7 @@ impl Builder {
                 add_right(&mut tree);
                 tree
             };
-            let (left, right) = rayon::join(|| add_left(tree), right_tree);
+            let (left, right) = threads::join(|| add_left(tree), right_tree);
             [left, tree.append(right)]
         } else {
             [add_left(tree), add_right(tree)]

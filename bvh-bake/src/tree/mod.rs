@@ -22,6 +22,7 @@ use crate::options::Effort;
 use crate::progress::{Stage, Step, Tally, WHOLE};
 use crate::storage::Stream;
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
+use crate::threads;
 use crate::triangles::{Kept, Triangle};
 pub(crate) use binary::Tree;
 pub(crate) use boxes::Aabb;
@@ -187,7 +188,7 @@ impl Bricks {
         };
         // One loop per brick that may be in memory. A thread that waits for another may run a second loop, but only loops
         // start bricks.
-        rayon::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
+        threads::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
         let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
         Ok((results.collect::<Result<_, _>>()?, top))
     }

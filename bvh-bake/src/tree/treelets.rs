@@ -6,6 +6,7 @@
 //! the cut hardly matters. Of equal costs, the one with more opened nodes is taken. The tree above the bricks is cut in
 //! the same way, with bricks as leaves.
 
+use crate::threads::prelude::*;
 use crate::tree::MAX_CHILDREN;
 use crate::tree::PacketTriangles;
 use crate::tree::arena::{Arena, Child, ChildKind, TreeletIndex};
@@ -15,7 +16,6 @@ use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{PACKET, Packet};
 use bvh_format::page::TightBound;
-use rayon::prelude::*;
 
 /// Children whose k-DOPs one thread fits at a time.
 const CHILDREN_PER_TASK: usize = 2048;

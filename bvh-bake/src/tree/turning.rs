@@ -4,13 +4,13 @@
 //! cancel. Patches are fitted from the leaves up: normals add up, and the slab of each patch is measured from all its
 //! triangles.
 
+use crate::threads::prelude::*;
 use crate::tree::PacketTriangles;
 use crate::tree::arena::{Arena, ChildKind};
 use crate::tree::treelets::packet_of;
 use crate::triangles::Triangle;
 use bvh_format::leaf::Packet;
 use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, TurningSlab};
-use rayon::prelude::*;
 
 type Vector = [f64; 3];
 

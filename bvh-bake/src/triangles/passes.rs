@@ -4,7 +4,8 @@ use super::{TRIANGLES_PER_PART, Triangle, Triangles};
 use crate::error::BakeError;
 use crate::progress::Tally;
 use crate::storage::{Spill, Stream};
-use rayon::prelude::*;
+use crate::threads;
+use crate::threads::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -15,7 +16,7 @@ pub(crate) fn fold<A: Send>(
     new: impl Fn() -> A + Sync,
     add: impl Fn(&mut A, usize) -> Result<(), BakeError> + Sync,
 ) -> Result<Vec<A>, BakeError> {
-    let run = parts.div_ceil(rayon::current_num_threads()).max(1);
+    let run = parts.div_ceil(threads::current_num_threads()).max(1);
     let starts: Vec<usize> = (0..parts).step_by(run).collect();
     let of_run = |start: usize| {
         let mut sum = new();
@@ -84,7 +85,7 @@ pub(crate) fn distribute<'a>(
     tally: &Tally,
 ) -> Result<(), BakeError> {
     // Only this many parts are in memory at the same time.
-    let batch = 4 * rayon::current_num_threads();
+    let batch = 4 * threads::current_num_threads();
     for start in (0..parts).step_by(batch) {
         let made = (start..(start + batch).min(parts)).into_par_iter().map(&make);
         let made: Vec<Grouped> = made.collect::<Result<_, _>>()?;

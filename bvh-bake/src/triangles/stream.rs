@@ -6,7 +6,7 @@ use super::placement::{Moved, Placement};
 use super::{TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::borrow::Cow;
 
 /// A part of the input as it was read.

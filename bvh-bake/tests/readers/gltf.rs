@@ -129,6 +129,43 @@ fn gltf_that_is_no_tree_or_needs_an_extension_is_refused() {
 }
 
 #[test]
+fn gltf_that_breaks_its_schema_is_refused() {
+    let plain = gltf(r#"{"mesh":0}"#, INDEXED, "");
+    assert_eq!(try_bytes(&glb(&plain), MeshFormat::Gltf).unwrap().triangle_count(), 1);
+    let scenes = r#"{"scenes":[{"nodes":[0]},{"nodes":[7]}],"#;
+    for (from, to, expected) in [
+        (r#""2.0""#, r#""1.0""#, "asset.version 2.0, found 1.0"),
+        (r#""asset":{"version":"2.0"},"#, "", "missing field `asset`"),
+        (r#"{"mesh":0}"#, r#"{"mesh":1}"#, "1 in nodes[0].mesh"),
+        (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[4294967296]}"#, "4294967296 in nodes[0].children"),
+        (r#"{"mesh":0}"#, r#"{"mesh":-1}"#, "invalid value: integer `-1`"),
+        (r#"{"mesh":0}"#, r#"{"mesh":0,"scale":[1,1]}"#, "invalid length 2"),
+        ("{", r#"{"scene":0,"#, "a scene below 0, found 0"),
+        ("{", scenes, "7 in scenes[1].nodes"),
+        (r#""POSITION":1"#, r#""POSITION":6"#, "6 in meshes[0].primitives"),
+        (r#""indices":0"#, r#""indices":99"#, "99 in meshes[0].primitives"),
+        (r#""indices":0"#, r#""indices":0,"mode":7"#, "mode 7, expected 0 to 6"),
+        (r#"{"bufferView":0"#, r#"{"bufferView":9"#, "9 in accessors[0].bufferView"),
+        (r#"{"bufferView":4}"#, r#"{"bufferView":5}"#, "5 in accessors[4].bufferView"),
+        ("5126", "5124", "componentType 5124"),
+        ("VEC3", "VEC5", "unknown variant `VEC5`"),
+        (r#"[{"buffer":0"#, r#"[{"buffer":2"#, "2 in bufferViews[0].buffer"),
+        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":0"#, "0 in bufferViews[1]"),
+        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":256"#, "256 in bufferViews[1]"),
+        (r#""byteLength":36"#, r#""byteLength":37"#, ""),
+        (r#""byteLength":36"#, r#""byteLength":18446744073709551615"#, "at most 0 bytes"),
+    ] {
+        let broken = plain.replacen(from, to, 1);
+        assert_ne!(broken, plain, "{from}");
+        if expected.is_empty() {
+            try_bytes(&glb(&broken), MeshFormat::Gltf).unwrap();
+        } else {
+            refused(&glb(&broken), MeshFormat::Gltf, expected);
+        }
+    }
+}
+
+#[test]
 fn gltf_instances_have_a_limit() {
     // Many nodes place a mesh that draws its primitive many times.
     let nodes = vec![r#"{"mesh":0}"#; 20_000].join(",");

@@ -9,11 +9,12 @@
 mod backward;
 
 use crate::progress::Progress;
+use crate::threads;
+use crate::threads::prelude::*;
 use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
 use bvh_format::source::Source;
 use bvh_format::validate::{Workers, validate_with};
-use rayon::prelude::*;
 use std::ops::Range;
 
 pub(crate) use backward::prove;
@@ -27,7 +28,7 @@ impl Workers for InParallel {
         a: impl FnOnce() -> Result<A, E> + Send,
         b: impl FnOnce() -> Result<B, E> + Send,
     ) -> Result<(A, B), E> {
-        let (a, b) = rayon::join(a, b);
+        let (a, b) = threads::join(a, b);
         Ok((a?, b?))
     }
 

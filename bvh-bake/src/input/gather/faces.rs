@@ -7,7 +7,8 @@ use crate::input::indexed::{FaceRun, IndexedFaces, LookedUp};
 use crate::input::names::Names;
 use crate::input::polygon::Cutter;
 use crate::progress::Tally;
-use rayon::prelude::*;
+use crate::threads;
+use crate::threads::prelude::*;
 
 /// The number of faces that one thread cuts at a time.
 const FACES_PER_TASK: usize = 1 << 12;
@@ -55,7 +56,7 @@ impl Gatherer<'_> {
                     gather()?;
                     count();
                 } else {
-                    rayon::join(gather, count).0?;
+                    threads::join(gather, count).0?;
                 }
             }
             tally.add(corners.len() as u64);

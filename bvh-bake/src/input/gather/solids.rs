@@ -6,7 +6,7 @@ use crate::input::stl;
 use crate::limits::MAX_VERTICES;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Passes solids to a gatherer.

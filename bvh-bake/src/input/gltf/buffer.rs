@@ -3,12 +3,11 @@
 //! Bytes are read where and when an accessor needs them, so that no buffer of a file is in memory.
 
 use super::beside::{Beside, Folder};
+use super::schema::{Document, View};
 use crate::error::{Fault, Place, excerpt};
 use crate::input::input_file::RandomAccess;
 use crate::progress::Progress;
 use crate::storage::read_exact_at;
-use gltf::Buffer;
-use gltf::buffer::Source;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -19,7 +18,8 @@ const MAX_OPEN_FILES: usize = 64;
 
 /// The buffers of a document.
 pub(super) struct Buffers<'a> {
-    document: &'a Path,
+    document: &'a Document,
+    path: &'a Path,
     blob: Option<Bytes<'a>>,
     folder: Folder<'a>,
     progress: &'a Progress,
@@ -75,7 +75,8 @@ impl Bytes<'_> {
 impl<'a> Buffers<'a> {
     /// Makes the buffers of a document. `blob` is where the document has bytes embedded: their offset and number.
     pub(super) fn new(
-        document: &'a Path,
+        document: &'a Document,
+        path: &'a Path,
         access: &'a RandomAccess<'a>,
         blob: Option<(u64, u64)>,
         allows_outside: bool,
@@ -86,12 +87,13 @@ impl<'a> Buffers<'a> {
             start,
             length,
             progress,
-            path: document.into(),
+            path: path.into(),
         });
         Buffers {
             document,
+            path,
             blob,
-            folder: Folder::of(document, allows_outside),
+            folder: Folder::of(path, allows_outside),
             progress,
             decoded: HashMap::new(),
             open: HashMap::new(),
@@ -101,29 +103,29 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// Returns the bytes of a buffer, exactly as many as it declares.
-    pub(super) fn bytes(&mut self, buffer: &Buffer) -> Result<Bytes<'a>, Fault> {
+    pub(super) fn view(&self, view: usize) -> &'a View {
+        &self.document.buffer_views[view]
+    }
+
+    /// Returns the bytes of a view's buffer, exactly as many as that declares.
+    pub(super) fn bytes(&mut self, view: usize) -> Result<Bytes<'a>, Fault> {
+        let buffer = self.view(view).buffer;
         let mut bytes = self.find(buffer)?;
-        let declared = buffer.length() as u64;
+        let declared = self.document.buffers[buffer].byte_length;
         if bytes.length < declared {
-            let expected = format!("{declared} bytes in buffer {}", buffer.index());
+            let expected = format!("{declared} bytes in buffer {buffer}");
             return Err(Fault::new(Place::File, expected, bytes.length.to_string()));
         }
         bytes.length = declared;
         Ok(bytes)
     }
 
-    fn find(&mut self, buffer: &Buffer) -> Result<Bytes<'a>, Fault> {
-        let index = buffer.index();
-        let uri = match buffer.source() {
-            Source::Bin => {
-                let missing =
-                    || Fault::new(Place::File, "a BIN chunk with buffer 0", format!("buffer {index}"));
-                let blob = self.blob.clone().filter(|_| index == 0).ok_or_else(missing)?;
-                self.count_in_memory(index, blob.length);
-                return Ok(blob);
-            }
-            Source::Uri(uri) => uri,
+    fn find(&mut self, index: usize) -> Result<Bytes<'a>, Fault> {
+        let Some(uri) = &self.document.buffers[index].uri else {
+            let missing = || Fault::new(Place::File, "a BIN chunk with buffer 0", format!("buffer {index}"));
+            let blob = self.blob.clone().filter(|_| index == 0).ok_or_else(missing)?;
+            self.count_in_memory(index, blob.length);
+            return Ok(blob);
         };
         if let Some(data) = uri.strip_prefix("data:") {
             let bytes = match self.decoded.get(&index) {
@@ -140,7 +142,7 @@ impl<'a> Buffers<'a> {
             };
             let length = bytes.len() as u64;
             self.count_in_memory(index, length);
-            let (path, progress) = (self.document.into(), self.progress);
+            let (path, progress) = (self.path.into(), self.progress);
             return Ok(Bytes { place: Found::Decoded(bytes), start: 0, length, progress, path });
         }
         if let Some(bytes) = self.open.get(&index) {

@@ -1,12 +1,10 @@
 //! Reads the JSON of a glTF file, which is kept in memory as a whole, after it has been charged.
 
+use super::schema::{self, Document};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::input_file::{InputFile, RandomAccess};
 use crate::progress::Progress;
 use crate::storage::resources::{Allowance, READING_BYTES};
-use gltf::Document;
-use gltf::json::{self, validation::Checked, validation::Validate};
-use gltf::mesh::Semantic;
 
 /// Bytes of memory per byte of JSON: the text, the strings in it, and data URIs decoded.
 const BYTES_PER_BYTE: u64 = 3;
@@ -17,11 +15,9 @@ const BYTES_PER_OBJECT: u64 = 1280;
 const BYTES_PER_COMMA: u64 = 64;
 
 const _: () = {
-    assert!(size_of::<json::Node>() <= BYTES_PER_OBJECT as usize / 3);
-    assert!(size_of::<json::Accessor>() <= BYTES_PER_OBJECT as usize / 3);
-    assert!(size_of::<json::mesh::Primitive>() <= BYTES_PER_OBJECT as usize / 3);
-    assert!(size_of::<json::Material>() <= BYTES_PER_OBJECT as usize / 2);
-    assert!(size_of::<json::Animation>() <= BYTES_PER_OBJECT as usize / 3);
+    assert!(size_of::<schema::Node>() <= BYTES_PER_OBJECT as usize / 3);
+    assert!(size_of::<schema::Accessor>() <= BYTES_PER_OBJECT as usize / 3);
+    assert!(size_of::<schema::Primitive>() <= BYTES_PER_OBJECT as usize / 3);
 };
 
 /// A parsed document, and where the file has bytes embedded: their offset and number.
@@ -59,7 +55,7 @@ pub(super) fn read(
     let (objects, commas) = (count(b'{') * BYTES_PER_OBJECT, count(b',') * BYTES_PER_COMMA);
     memory.require(text.len() as u64 * BYTES_PER_BYTE + objects + commas)?;
     let document = parse(&text, blob.is_some())?;
-    let buffers = document.buffers().fold(0u64, |sum, buffer| sum.saturating_add(buffer.length() as u64));
+    let buffers = document.buffers.iter().fold(0u64, |sum, buffer| sum.saturating_add(buffer.byte_length));
     let reading = (2 * buffers.min(READING_BYTES)).min(READING_BYTES);
     memory.require(text.len() as u64 * BYTES_PER_BYTE + objects + commas + reading)?;
     Ok(Parsed { document, blob })
@@ -103,7 +99,7 @@ fn chunks(
 }
 
 fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
-    let mut root: json::Root = json::deserialize::from_slice(text).map_err(|error| {
+    let document: Document = serde_json::from_slice(text).map_err(|error| {
         let place = if is_binary { Place::File } else { Place::Line(error.line() as u64) };
         Fault::new(place, "a glTF document", excerpt(error.to_string().as_bytes()))
     })?;
@@ -113,37 +109,10 @@ fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
             .any(|kind| name.starts_with(kind))
             && name != "KHR_mesh_quantization"
     };
-    if let Some(name) = root.extensions_required.iter().find(|name| changes_triangles(name)) {
-        return Err(Fault::new(
-            Place::File,
-            "no required extension that changes triangles",
-            excerpt(name.as_bytes()),
-        ));
+    if let Some(name) = document.extensions_required.iter().find(|name| changes_triangles(name)) {
+        let expected = "no required extension that changes triangles";
+        return Err(Fault::new(Place::File, expected, excerpt(name.as_bytes())));
     }
-    root.extensions_required.clear();
-    // The crate's validation looks up each POSITION before it checks the number, and requires bounds that are not used
-    // here.
-    let accessors = root.accessors.len();
-    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-        if let Some(index) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) {
-            let Some(accessor) = root.accessors.get_mut(index.value()) else {
-                let expected = format!("an accessor below {accessors}");
-                return Err(Fault::new(Place::File, expected, index.value().to_string()));
-            };
-            let anything = || json::serialize::to_value([0.0f32; 3]).ok();
-            accessor.min = anything();
-            accessor.max = anything();
-        }
-    }
-    // Only the first error is kept: a file may have more than there is memory for.
-    let mut first = None;
-    root.validate(&root, json::Path::new, &mut |path, error| {
-        first.get_or_insert_with(|| format!("{error} at {}", path()));
-    });
-    match first {
-        None => Ok(Document::from_json_without_validation(root)),
-        Some(found) => {
-            Err(Fault::new(Place::File, "glTF that follows its schema", excerpt(found.as_bytes())))
-        }
-    }
+    document.check()?;
+    Ok(document)
 }

@@ -1,13 +1,21 @@
 //! The transforms of the nodes of a scene, and their division into a rigid pose and the rest, which is baked into the
 //! mesh.
 
-use gltf::scene::Transform;
 use std::collections::BTreeSet;
 
 /// The first three rows of a 4x4 matrix.
 pub(super) type Affine = [[f64; 4]; 3];
 /// The rows of a 3x3 matrix.
 pub(super) type Linear = [[f64; 3]; 3];
+
+/// The transform of a node, as the document states it.
+#[derive(Clone, Copy)]
+pub(super) enum Transform {
+    /// The columns of a 4x4 matrix.
+    Matrix { matrix: [[f32; 4]; 4] },
+    /// Scales, then a rotation by a quaternion x, y, z, w, then a translation.
+    Decomposed { translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3] },
+}
 
 pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 const UNIT: Linear = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -284,17 +292,15 @@ mod tests {
             rotation: [0.1, 0.2, 0.3, 0.9],
             scale: [1.0, 1.0, 2.0],
         };
-        let both = [scale([2.0, 2.0, 2.0]), scale([3.0, 1.0, 1.0]), turn.clone()];
+        let both = [scale([2.0, 2.0, 2.0]), scale([3.0, 1.0, 1.0]), turn];
         let world = |transforms: &[&Transform]| {
             let mut known = Scales::of(std::iter::empty());
-            let child =
-                |frame: Frame, transform: &&Transform| frame.of_child((*transform).clone(), &mut known);
+            let child = |frame: Frame, transform: &&Transform| frame.of_child(**transform, &mut known);
             transforms.iter().fold(Frame::WORLD, child)
         };
         for (first, second) in both.iter().flat_map(|first| both.iter().map(move |second| (first, second))) {
             let frame = world(&[first, second, &turn]);
-            let matrix =
-                product(&product(&local(first.clone()), &local(second.clone())), &local(turn.clone()));
+            let matrix = product(&product(&local(*first), &local(*second)), &local(turn));
             let point = [0.3, -0.7, 1.9];
             let placed = apply_linear(&frame.rotation, frame.shaped(point));
             let expected = apply(&matrix, point);

@@ -1,9 +1,9 @@
 //! Reads glTF 2.0 scenes, in one of two ways. As a mesh, each node with a mesh becomes an object, and the nodes above it
 //! place it. As a scene, each mesh becomes an object, or one per scale (module `frame`), and each node an instance of it.
 //!
-//! The `gltf` crate reads and validates the document (module `document`); nothing else is in memory as a whole. Module
-//! `accessor` reads accessors block by block, because the crate's own iterators panic on counts and strides that a file
-//! may contain. Module `buffer` finds buffers, and module `beside` opens files that the document names.
+//! Module `document` reads the JSON, whose parts module `schema` lists; nothing else is in memory as a whole. Module
+//! `accessor` reads accessors block by block. Module `buffer` finds buffers, and module `beside` opens files that the
+//! document names.
 //!
 //! The reader takes the default scene or, if there is none, the first scene or, if there is no scene, all nodes without
 //! a parent. Transforms are read as f32 and multiplied in f64. Triangles, strips and fans are read; points and lines
@@ -19,6 +19,7 @@ mod beside;
 mod buffer;
 mod document;
 mod frame;
+mod schema;
 mod sink;
 
 use crate::error::{Fault, Halt, Place, excerpt};
@@ -30,8 +31,7 @@ use buffer::Buffers;
 use bvh_format::checksum::Hasher;
 use bvh_format::instances::Instance;
 use frame::{Affine, Frame, IDENTITY, Scales};
-use gltf::Document;
-use gltf::mesh::{Mode, Semantic};
+use schema::{Document, Mode, Node};
 pub(crate) use sink::{InMemory, Sink};
 use std::collections::HashMap;
 
@@ -52,7 +52,7 @@ pub(crate) fn read(
 ) -> Result<u64, Halt> {
     let parsed = document::read(input, access, memory, progress)?;
     let document = &parsed.document;
-    let buffers = Buffers::new(input.path(), access, parsed.blob, input.allows_outside(), progress);
+    let buffers = Buffers::new(document, input.path(), access, parsed.blob, input.allows_outside(), progress);
     let mut scene = Scene {
         document,
         as_scene: input.is_scene(),
@@ -61,7 +61,7 @@ pub(crate) fn read(
         hasher: Hasher::default(),
         objects: 0,
         variants: HashMap::new(),
-        scales: Scales::of(document.nodes().map(|node| node.transform())),
+        scales: Scales::of(document.nodes.iter().map(Node::transform)),
         items: 0,
     };
     scene.read_nodes()?;
@@ -95,7 +95,7 @@ enum Parent {
 }
 
 impl Parent {
-    fn of_child(&self, node: &gltf::Node, scales: &mut Scales) -> Self {
+    fn of_child(&self, node: &Node, scales: &mut Scales) -> Self {
         match self {
             Self::Matrix(matrix) => Self::Matrix(frame::product(matrix, &frame::local(node.transform()))),
             Self::Frame(frame) => Self::Frame(frame.of_child(node.transform(), scales)),
@@ -107,44 +107,39 @@ impl<S: Sink> Scene<'_, S> {
     /// Visits the nodes of the scene, each before its children.
     fn read_nodes(&mut self) -> Result<(), Halt> {
         let document = self.document;
-        let scene = document.default_scene().or_else(|| document.scenes().next());
-        let mut seen = vec![false; document.nodes().len()];
-        let mut todo: Vec<(gltf::Node, Parent)> = match scene {
-            Some(scene) => scene.nodes().map(|node| (node, self.world())).collect(),
+        let nodes = &document.nodes;
+        let mut seen = vec![false; nodes.len()];
+        let topmost = match document.scenes.get(document.scene.unwrap_or(0)) {
+            Some(scene) => scene.nodes.clone(),
             None => {
                 let mut has_parent = seen.clone();
-                document
-                    .nodes()
-                    .flat_map(|node| node.children())
-                    .for_each(|child| has_parent[child.index()] = true);
-                document
-                    .nodes()
-                    .filter(|node| !has_parent[node.index()])
-                    .map(|node| (node, self.world()))
-                    .collect()
+                nodes.iter().flat_map(|node| &node.children).for_each(|&child| has_parent[child] = true);
+                (0..nodes.len()).filter(|&node| !has_parent[node]).collect()
             }
         };
-        todo.reverse();
-        while let Some((node, parent)) = todo.pop() {
-            if std::mem::replace(&mut seen[node.index()], true) {
-                let found = format!("node {} twice", node.index());
-                return Err(Fault::new(Place::File, "nodes that form trees", found).into());
+        let mut todo: Vec<(usize, Parent)> =
+            topmost.into_iter().rev().map(|node| (node, self.world())).collect();
+        while let Some((number, parent)) = todo.pop() {
+            if std::mem::replace(&mut seen[number], true) {
+                return Err(
+                    Fault::new(Place::File, "nodes that form trees", format!("node {number} twice")).into()
+                );
             }
-            let own = parent.of_child(&node, &mut self.scales);
-            if let Some(mesh) = node.mesh() {
-                let name = node.name().or(mesh.name()).unwrap_or_default();
+            let node = &nodes[number];
+            let own = parent.of_child(node, &mut self.scales);
+            if let Some(mesh) = node.mesh {
+                let of_mesh = document.meshes[mesh].name.as_deref();
+                let name = node.name.as_deref().or(of_mesh).unwrap_or_default();
                 match &own {
                     Parent::Matrix(placed) => {
-                        self.read_mesh(name, &mesh, frame::mirrors(placed), |point| {
+                        self.read_mesh(name, mesh, frame::mirrors(placed), |point| {
                             frame::apply(placed, point)
                         })?;
                     }
-                    Parent::Frame(frame) => self.add_instance(name, &mesh, frame)?,
+                    Parent::Frame(frame) => self.add_instance(name, mesh, frame)?,
                 }
             }
-            let first = todo.len();
-            todo.extend(node.children().map(|child| (child, own)));
-            todo[first..].reverse();
+            todo.extend(node.children.iter().rev().map(|&child| (child, own)));
         }
         Ok(())
     }
@@ -155,15 +150,15 @@ impl<S: Sink> Scene<'_, S> {
     }
 
     /// Adds an instance of a mesh, which is read once for each shape.
-    fn add_instance(&mut self, name: &str, mesh: &gltf::Mesh, frame: &Frame) -> Result<(), Halt> {
+    fn add_instance(&mut self, name: &str, mesh: usize, frame: &Frame) -> Result<(), Halt> {
         // An inherited name is a copy.
         self.spend(name.len() as u64 / 8 + PRIMITIVE_ITEMS)?;
-        let key = (mesh.index(), frame.shape.map(|row| row.map(|value| (value + 0.0).to_bits())));
+        let key = (mesh, frame.shape.map(|row| row.map(|value| (value + 0.0).to_bits())));
         let object = match self.variants.get(&key) {
             Some(&object) => object,
             None => {
                 let object = self.objects;
-                let of_mesh = mesh.name().unwrap_or(name);
+                let of_mesh = self.document.meshes[mesh].name.as_deref().unwrap_or(name);
                 self.read_mesh(of_mesh, mesh, frame.mirrors(), |point| frame.shaped(point))?;
                 self.variants.insert(key, object);
                 object
@@ -188,7 +183,7 @@ impl<S: Sink> Scene<'_, S> {
     fn read_mesh(
         &mut self,
         name: &str,
-        mesh: &gltf::Mesh,
+        mesh: usize,
         mirrors: bool,
         place: impl Fn([f64; 3]) -> [f64; 3],
     ) -> Result<(), Halt> {
@@ -199,41 +194,44 @@ impl<S: Sink> Scene<'_, S> {
         // object count, and to its number of vertices.
         let mut shared: HashMap<usize, (u64, u64, u64)> = HashMap::new();
         let mut vertices = 0;
-        for primitive in mesh.primitives() {
-            let mode = primitive.mode();
-            if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        let document = self.document;
+        for primitive in &document.meshes[mesh].primitives {
+            let mode = primitive.mode;
+            let Some(number) = primitive.attributes.position.filter(|_| mode != Mode::PointsOrLines) else {
                 continue;
-            }
-            let Some(accessor) = primitive.get(&Semantic::Positions) else { continue };
-            let (first, own, count) = match shared.get(&accessor.index()) {
+            };
+            let (first, own, count) = match shared.get(&number) {
                 Some(&known) => known,
                 None => {
-                    let count = accessor.count() as u64;
+                    let accessor = &document.accessors[number];
+                    let count = accessor.count;
                     let known = (self.sink.next_vertex(), vertices, count);
-                    accessor::find(&accessor, &mut self.buffers)?;
+                    accessor::find(accessor, &mut self.buffers)?;
                     self.spend(count)?;
                     vertices += count;
                     let Self { buffers, sink, hasher, .. } = self;
-                    accessor::positions(&accessor, buffers, |positions| {
+                    accessor::positions(number, accessor, buffers, |positions| {
                         positions.iter_mut().for_each(|position| *position = place(*position));
                         hasher.update(bytemuck::cast_slice(positions));
                         sink.vertices(positions)
                     })?;
-                    shared.insert(accessor.index(), known);
+                    shared.insert(number, known);
                     known
                 }
             };
             if first + count > MAX_VERTICES {
                 return Err(Fault::Limit { place: Place::File, most: MAX_VERTICES, what: "vertices" }.into());
             }
-            let indices = primitive.indices();
-            if let Some(accessor) = &indices {
+            let indices = primitive.indices.map(|number| (number, &document.accessors[number]));
+            if let Some((_, accessor)) = indices {
                 accessor::find(accessor, &mut self.buffers)?;
             }
-            self.spend(indices.as_ref().map_or(count, |indices| indices.count() as u64) + PRIMITIVE_ITEMS)?;
+            self.spend(
+                indices.map_or(count, |(_, accessor)| accessor.count).saturating_add(PRIMITIVE_ITEMS),
+            )?;
             let mut triangles = Triangles::of(mode, first as u32, mirrors);
             let Self { buffers, sink, hasher, .. } = self;
-            hasher.update(&[mode.as_gl_enum() as u8, u8::from(mirrors)]);
+            hasher.update(&[mode as u8, u8::from(mirrors)]);
             hasher.update(&own.to_le_bytes());
             let mut give = |indices: &[u32]| {
                 if let Some(found) = indices.iter().find(|&&index| u64::from(index) >= count) {
@@ -245,7 +243,7 @@ impl<S: Sink> Scene<'_, S> {
                 sink.triangles(triangles.add(indices))
             };
             match indices {
-                Some(accessor) => accessor::indices(&accessor, buffers, &mut give)?,
+                Some((number, accessor)) => accessor::indices(number, accessor, buffers, &mut give)?,
                 None => {
                     let mut block = Vec::new();
                     for start in (0..count as u32).step_by(PLAIN_INDICES) {
@@ -263,7 +261,7 @@ impl<S: Sink> Scene<'_, S> {
     /// Counts what is about to be read against the limit. Each single accessor is no longer than its buffer.
     fn spend(&mut self, items: u64) -> Result<(), Fault> {
         let most = MAX_COPIES + self.buffers.total;
-        self.items += items;
+        self.items = self.items.saturating_add(items);
         if self.items > most {
             return Err(Fault::Limit {
                 place: Place::File,

@@ -20,9 +20,9 @@ use crate::error::{Fault, Halt, Place};
 use crate::input::names::Names;
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 use crate::storage::resources::Resources;
+use crate::threads::prelude::*;
 use block::{Block, Event};
 use blocks::{BLOCK_BYTES, next_block};
-use rayon::prelude::*;
 use std::io::Read;
 
 /// Bytes of memory per block: its text and its parsed content.
