@@ -137,7 +137,7 @@ fn gltf_that_breaks_its_schema_is_refused() {
         (r#""2.0""#, r#""1.0""#, "asset.version 2.0, found 1.0"),
         (r#""asset":{"version":"2.0"},"#, "", "missing field `asset`"),
         (r#"{"mesh":0}"#, r#"{"mesh":1}"#, "1 in nodes[0].mesh"),
-        (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[4294967296]}"#, "4294967296 in nodes[0].children"),
+        (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[4294967295]}"#, "4294967295 in nodes[0].children"),
         (r#"{"mesh":0}"#, r#"{"mesh":-1}"#, "invalid value: integer `-1`"),
         (r#"{"mesh":0}"#, r#"{"mesh":0,"scale":[1,1]}"#, "invalid length 2"),
         ("{", r#"{"scene":0,"#, "a scene below 0, found 0"),

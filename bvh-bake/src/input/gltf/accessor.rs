@@ -219,7 +219,7 @@ impl<'a> Rows<'a> {
     /// Reads the next rows.
     #[cold]
     fn fill(&mut self) -> Result<(), Fault> {
-        let rows = (self.left as usize).clamp(1, (BLOCK_BYTES / self.stride).max(1));
+        let rows = self.left.clamp(1, (BLOCK_BYTES / self.stride).max(1) as u64) as usize;
         self.block.resize((rows - 1) * self.stride + self.size, 0);
         self.bytes.read(self.offset, &mut self.block)?;
         self.offset += (rows * self.stride) as u64;
