@@ -1,6 +1,8 @@
 //! This process and the system: its resident memory, how to keep it small, mapped files, locks, and signals.
 
-use crate::console::{Failure, tell_line};
+use crate::console::Failure;
+#[cfg(any(unix, windows))]
+use crate::console::tell_line;
 use bvh_query::{Bvh, OpenError, ReadAhead};
 use indicatif::ProgressBar;
 use std::path::Path;

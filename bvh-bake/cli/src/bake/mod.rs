@@ -69,7 +69,9 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
     if let Some(folder) = &arguments.scratch {
         std::fs::read_dir(folder).map_err(|error| Failure::from_folder(folder, &error))?;
     }
-    if let Some(jobs) = arguments.jobs {
+    // WebAssembly has one thread, and a pool would start another.
+    let has_pool = |jobs: &_| !cfg!(target_family = "wasm") || *jobs > 1;
+    if let Some(jobs) = arguments.jobs.filter(has_pool) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build_global();
         pool.map_err(|error| Failure::from_threads(jobs, error))?;
     }
