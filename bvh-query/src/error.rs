@@ -53,6 +53,16 @@ pub enum QueryError {
     /// The file does not state which of its objects are closed.
     #[error("this file does not say which objects are closed; bake it again with topology")]
     NoTopology,
+    /// All hits of a ray were asked for, and a shape has a radius.
+    #[error(
+        "all_hits: expected a shape without a radius, found one with; ask for the first hit, or for the core"
+    )]
+    Rounded,
+    /// A shape was to be solid, and this object of its file is not closed.
+    #[error(
+        "expected closed objects of a solid shape, found object {0} with a boundary or with triangles that face both ways; repair the mesh, or ask about its surface"
+    )]
+    NotClosed(usize),
 }
 
 /// An invalid number, by the parameter that it was given for.
@@ -76,6 +86,9 @@ pub enum NumberError {
     /// The limit of a search for a closest point.
     #[error("within: expected a distance of at least 0, or infinity, found {0}")]
     Within(f64),
+    /// The radius of a shape, or a margin.
+    #[error("radius: expected a length from 0 to 2^118, found {0}")]
+    Radius(f64),
     /// The distance to compare with.
     #[error("d: expected a finite distance of at least 0, found {0}")]
     Distance(f64),

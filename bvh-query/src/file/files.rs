@@ -3,6 +3,7 @@
 use crate::error::{FileChange, OpenError, QueryError};
 use crate::file::bvh::{Bvh, WeakBvh};
 use crate::file::owned_shape::OwnedShape;
+use crate::file::shape::check_radius;
 use bvh_format::object::Object;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -62,8 +63,16 @@ pub struct SceneShape(Held);
 #[derive(Clone, Debug)]
 enum Held {
     Open(OwnedShape),
-    /// The number is that of one object; `None` for all of the file.
-    Stored(Files, Arc<Known>, Option<usize>),
+    Stored(Files, Arc<Known>, Stored),
+}
+
+/// What a shape is, apart from its file.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stored {
+    /// The number of one object; `None` for all of the file.
+    object: Option<usize>,
+    radius: f64,
+    is_solid: bool,
 }
 
 impl Files {
@@ -93,7 +102,7 @@ impl Files {
             bvh: Mutex::default(),
             last_use: AtomicU64::new(0),
         };
-        Ok(SceneShape(Held::Stored(self.clone(), Arc::new(known), None)))
+        Ok(SceneShape(Held::Stored(self.clone(), Arc::new(known), Stored::default())))
     }
 
     /// Returns how many files are open at present.
@@ -113,8 +122,13 @@ impl SceneShape {
     pub fn object(&self, number: usize) -> Option<Self> {
         match &self.0 {
             Held::Open(shape) => OwnedShape::object(shape.bvh().clone(), number).map(Self::from),
-            Held::Stored(files, known, _) => (number < known.objects.len())
-                .then(|| Self(Held::Stored(files.clone(), known.clone(), Some(number)))),
+            Held::Stored(files, known, _) => (number < known.objects.len()).then(|| {
+                Self(Held::Stored(
+                    files.clone(),
+                    known.clone(),
+                    Stored { object: Some(number), ..Stored::default() },
+                ))
+            }),
         }
     }
 
@@ -122,8 +136,42 @@ impl SceneShape {
     pub fn objects(&self) -> &[Object] {
         match &self.0 {
             Held::Open(shape) => shape.shape().objects(),
-            Held::Stored(_, known, Some(number)) => &known.objects[*number..=*number],
-            Held::Stored(_, known, None) => &known.objects,
+            Held::Stored(_, known, Stored { object: Some(number), .. }) => &known.objects[*number..=*number],
+            Held::Stored(_, known, _) => &known.objects,
+        }
+    }
+
+    /// Returns the shape with a radius: see [`Shape::rounded`](crate::Shape::rounded).
+    ///
+    /// # Errors
+    /// The errors of [`Shape::rounded`](crate::Shape::rounded).
+    pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
+        check_radius(radius)?;
+        Ok(Self(match self.0 {
+            Held::Open(shape) => Held::Open(shape.rounded(radius)?),
+            Held::Stored(files, known, stored) => Held::Stored(files, known, Stored { radius, ..stored }),
+        }))
+    }
+
+    /// Returns the shape as a solid, for which its file is opened: see [`Shape::solid`](crate::Shape::solid).
+    ///
+    /// # Errors
+    /// The errors of [`Shape::solid`](crate::Shape::solid), and [`QueryError::File`].
+    pub fn solid(self) -> Result<Self, QueryError> {
+        self.held_open()?.shape().solid()?;
+        Ok(Self(match self.0 {
+            Held::Open(shape) => Held::Open(shape.solid()?),
+            Held::Stored(files, known, stored) => {
+                Held::Stored(files, known, Stored { is_solid: true, ..stored })
+            }
+        }))
+    }
+
+    /// Returns the radius, in mesh units.
+    pub fn radius(&self) -> f64 {
+        match &self.0 {
+            Held::Open(shape) => shape.shape().radius(),
+            Held::Stored(_, _, stored) => stored.radius,
         }
     }
 
@@ -138,14 +186,14 @@ impl SceneShape {
     /// Returns the shape for a question. A shape whose file is open is lent, because threads that count its uses would get in
     /// each other's way.
     pub(crate) fn held_open(&self) -> Result<Cow<'_, OwnedShape>, QueryError> {
-        let (files, known, object) = match &self.0 {
+        let (files, known, stored) = match &self.0 {
             Held::Open(shape) => return Ok(Cow::Borrowed(shape)),
-            Held::Stored(files, known, object) => (files, known, *object),
+            Held::Stored(files, known, stored) => (files, known, *stored),
         };
         let bvh = files.open(known)?;
         // The file has the objects it had, so that the number is one of them.
-        let shape = object.and_then(|number| OwnedShape::object(bvh.clone(), number));
-        Ok(Cow::Owned(shape.unwrap_or_else(|| bvh.into())))
+        let shape = stored.object.and_then(|number| OwnedShape::object(bvh.clone(), number));
+        Ok(Cow::Owned(shape.unwrap_or_else(|| bvh.into()).of_valid(stored.radius, stored.is_solid)))
     }
 }
 

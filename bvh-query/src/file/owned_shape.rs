@@ -1,7 +1,8 @@
 //! A shape that owns its file, for scenes, threads and others that outlive the code that opened it.
 
+use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::file::shape::Shape;
+use crate::file::shape::{Shape, check_radius};
 
 /// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all
 /// objects of a file, a [`Bvh`] is enough. Cloning it copies a pointer. A reference to it converts into a shape, so
@@ -28,19 +29,45 @@ pub struct OwnedShape {
     bvh: Bvh,
     /// The number of one object; `None` for all of the file.
     object: Option<usize>,
+    radius: f64,
+    is_solid: bool,
 }
 
 impl OwnedShape {
     /// Returns one object of a file as a shape, or `None` if the file has no object of this number.
     pub fn object(bvh: Bvh, number: usize) -> Option<Self> {
         bvh.object(number)?;
-        Some(Self { bvh, object: Some(number) })
+        Some(Self { bvh, object: Some(number), radius: 0.0, is_solid: false })
     }
 
     /// Returns the shape in the form that questions take.
     pub fn shape(&self) -> Shape<'_> {
         // The number was checked when the shape was made.
-        self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all())
+        let core = self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all());
+        core.of_valid(self.radius, self.is_solid)
+    }
+
+    /// Returns the shape with a radius: see [`Shape::rounded`].
+    ///
+    /// # Errors
+    /// The errors of [`Shape::rounded`].
+    pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
+        check_radius(radius)?;
+        Ok(Self { radius, ..self })
+    }
+
+    /// Returns the shape as a solid: see [`Shape::solid`].
+    ///
+    /// # Errors
+    /// The errors of [`Shape::solid`].
+    pub fn solid(self) -> Result<Self, QueryError> {
+        self.shape().solid()?;
+        Ok(Self { is_solid: true, ..self })
+    }
+
+    /// Returns the shape with a radius and solidity that were checked.
+    pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
+        Self { radius, is_solid, ..self }
     }
 
     /// Returns the file that the shape is in.
@@ -52,7 +79,7 @@ impl OwnedShape {
 impl From<Bvh> for OwnedShape {
     /// Returns all objects of a file as one shape.
     fn from(bvh: Bvh) -> Self {
-        Self { bvh, object: None }
+        Self { bvh, object: None, radius: 0.0, is_solid: false }
     }
 }
 

@@ -1,7 +1,11 @@
 //! One side of a query: one object of a file, or all of its objects.
 
+use crate::error::{NumberError, QueryError};
 use crate::file::bvh::Bvh;
 use bvh_format::object::Object;
+
+/// The largest radius of a shape and the largest margin, in mesh units: 2^118.
+pub(crate) const MAX_RADIUS: f64 = f64::from_bits((1023 + 118) << 52);
 
 impl Bvh {
     /// Returns the number of the first object with this name.
@@ -11,22 +15,41 @@ impl Bvh {
 
     /// Returns all objects of the file as one shape.
     pub fn all(&self) -> Shape<'_> {
-        Shape { bvh: self, first: 0, end: self.objects().len() }
+        Shape { bvh: self, first: 0, end: self.objects().len(), radius: 0.0, is_solid: false }
     }
 
     /// Returns one object of the file as a shape, or `None` if the file has no object of this number.
     pub fn object(&self, number: usize) -> Option<Shape<'_>> {
-        (number < self.objects().len()).then_some(Shape { bvh: self, first: number, end: number + 1 })
+        (number < self.objects().len()).then_some(Shape {
+            bvh: self,
+            first: number,
+            end: number + 1,
+            radius: 0.0,
+            is_solid: false,
+        })
     }
 }
 
 /// One side of a question, borrowed from its file: one object, or all objects as one. A `&Bvh` converts into the shape
 /// of all its objects.
+///
+/// # Rounded shapes
+/// A shape is a core and a radius: all points at most that far from the triangles of the core. Any mesh may be the core. A
+/// triangle whose corners are equal is a point and makes a ball; a triangle whose corners lie on a line is a segment and makes
+/// a capsule. Two shapes touch if their cores are no farther apart than the sum of their radii, and their distance is that of
+/// the cores less the sum, at least 0. Each addition is rounded to nearest, and the comparison with the sum is exact.
+///
+/// # Solid shapes
+/// Questions are about surfaces. For a solid shape, what is inside counts as well: a shape of which any part is inside a solid
+/// one touches it, and their distance is 0. [`Querier::relation`](crate::Querier::relation) and
+/// [`Querier::side`](crate::Querier::side) know insides anyway.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape<'a> {
     bvh: &'a Bvh,
     first: usize,
     end: usize,
+    radius: f64,
+    is_solid: bool,
 }
 
 impl<'a> Shape<'a> {
@@ -45,6 +68,49 @@ impl<'a> Shape<'a> {
         self.objects().iter().map(|object| object.triangles()).sum()
     }
 
+    /// Returns the shape with a radius in mesh units, which replaces the one it has. The cores stay as they are.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the radius is negative, NaN or above 2^118.
+    pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
+        check_radius(radius)?;
+        Ok(Self { radius, ..self })
+    }
+
+    /// Returns the shape as a solid: what is inside it touches it.
+    ///
+    /// # Errors
+    /// [`QueryError::NotClosed`] if an object of the shape is not closed and consistently oriented, so that it has no inside;
+    /// [`QueryError::NoTopology`] if the file was baked without topology; [`QueryError::Damaged`] if that is damaged.
+    pub fn solid(self) -> Result<Self, QueryError> {
+        for number in self.first..self.end {
+            if !self.bvh.topology(number)?.closed {
+                return Err(QueryError::NotClosed(number));
+            }
+        }
+        Ok(Self { is_solid: true, ..self })
+    }
+
+    /// Returns the radius, in mesh units.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Returns whether what is inside the shape touches it.
+    pub fn is_solid(&self) -> bool {
+        self.is_solid
+    }
+
+    /// Returns the shape with a larger radius: the sum of the present one and a margin that was checked, rounded to nearest.
+    pub(crate) fn with_margin(self, margin: f64) -> Self {
+        Self { radius: self.radius + margin, ..self }
+    }
+
+    /// Returns the shape with a radius and solidity that were checked.
+    pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
+        Self { radius, is_solid, ..self }
+    }
+
     /// Returns what tells this shape from every other one of this process, those of closed files included.
     pub(crate) fn identity(&self) -> (u64, usize, usize) {
         (self.bvh.identity(), self.first, self.end)
@@ -59,6 +125,11 @@ impl<'a> Shape<'a> {
     pub(crate) fn numbered(&self, number: u32) -> Option<&'a Object> {
         self.objects().get((number as usize).checked_sub(self.first)?)
     }
+}
+
+/// Refuses an invalid radius.
+pub(crate) fn check_radius(radius: f64) -> Result<(), QueryError> {
+    if (0.0..=MAX_RADIUS).contains(&radius) { Ok(()) } else { Err(NumberError::Radius(radius).into()) }
 }
 
 impl<'a> From<&'a Bvh> for Shape<'a> {

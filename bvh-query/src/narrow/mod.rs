@@ -21,6 +21,7 @@ mod integers;
 mod intersect;
 mod point;
 mod ray;
+mod rounded;
 mod winding;
 mod within;
 
@@ -28,8 +29,9 @@ pub(crate) use distance::{Closest, triangle_distance};
 pub(crate) use intersect::{segment_intersects, triangles_intersect};
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
+pub(crate) use rounded::rounded_crossing;
 pub(crate) use winding::{AxisRay, Passing};
-pub(crate) use within::triangles_within;
+pub(crate) use within::{triangles_below, triangles_within};
 
 #[cfg(test)]
 mod tests;

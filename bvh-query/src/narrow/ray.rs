@@ -43,6 +43,11 @@ pub(crate) struct Crossing {
 }
 
 impl Crossing {
+    /// A crossing of the surface around a triangle, which is on none of its features.
+    pub(super) fn around(t: f64, lower: f64, upper: f64) -> Self {
+        Self { t, lower, upper, feature: Feature::Face }
+    }
+
     fn meets_same_feature(&self, other: &Self) -> bool {
         self.feature == other.feature && self.feature != Feature::Face
     }

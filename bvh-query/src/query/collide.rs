@@ -27,7 +27,7 @@ impl Querier {
     ///
     /// The answer is exact: it is that of exact predicates on the placed vertices, for all pairs of triangles. Touching
     /// counts as collision. Meshes are surfaces: a mesh wholly inside another one, without touching it, does not
-    /// collide with it. [`Querier::relation`] finds such a mesh.
+    /// collide with it, unless the outer one is solid ([`Shape::solid`]). [`Querier::relation`] finds such a mesh.
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
@@ -39,7 +39,7 @@ impl Querier {
         pose: &Pose,
     ) -> Result<bool, QueryError> {
         self.start();
-        Ok(self.any_contact(a.into(), b.into(), pose)?.is_some())
+        self.shapes_within(a.into(), b.into(), pose, 0.0)
     }
 
     /// Returns one pair of triangles in contact: whichever is found first.
@@ -97,7 +97,7 @@ pub(super) struct ContactVisitor<'a> {
 }
 
 /// What is done with a pair of triangles in contact. A reference, so that one walk is compiled for all of them.
-type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
+pub(super) type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
 
 /// Decides pairs of triangles and passes those in contact to `visit`, until it breaks.
 pub(super) struct Candidates<'a> {

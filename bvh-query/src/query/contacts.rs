@@ -6,11 +6,15 @@ use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
-use crate::query::bounding_volumes::surely_apart;
+use crate::query::bounding_volumes::{sphere_gap, surely_apart};
 use crate::query::collide::{Candidates, ContactVisitor};
+use crate::query::contacts_within::{NearPairs, WithinVisitor};
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
+use crate::query::rounded::sum_of_radii;
 use crate::query::search::ids;
+use crate::traverse::align::round_up;
+use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::PACKET;
@@ -21,7 +25,8 @@ use std::ops::ControlFlow;
 impl Querier {
     /// Returns all pairs of triangles in contact, in ascending order.
     ///
-    /// The answer is that of exact predicates on all pairs of the input's triangles. If the file has ids, an exact
+    /// The answer is that of exact predicates on all pairs of the input's triangles. For shapes with radii, these are the pairs
+    /// of triangles of their cores that are within the sum of the radii. If the file has ids, an exact
     /// duplicate that the baker left out is in contact wherever the triangle that replaces it is. Each contact counts
     /// as a visit ([`Querier::set_budget`]).
     ///
@@ -58,9 +63,9 @@ impl Querier {
         self.start();
         let (a, b) = (a.into(), b.into());
         let most = max_triangles(a).saturating_mul(max_triangles(b));
-        let (mut calls, mut too_many) = (0, false);
+        let (within, mut calls, mut too_many) = (sum_of_radii(a, b), 0, false);
         each_pair(a, b, pose, |placed| {
-            let found = self.contacts_of(placed, &mut |contact| {
+            let found = self.contacts_of(placed, within, &mut |contact| {
                 too_many = calls == most;
                 if too_many {
                     return ControlFlow::Break(());
@@ -76,10 +81,17 @@ impl Querier {
     fn contacts_of(
         &mut self,
         placed: &PlacedPair<'_>,
+        within: f64,
         visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<Option<TrianglePair>, QueryError> {
         self.memory.budget.visit()?;
-        if surely_apart(&placed.pair) {
+        let apart = if within == 0.0 {
+            surely_apart(&placed.pair)
+        } else {
+            let ObjectPair { placement, object_a, object_b, .. } = placed.pair;
+            sphere_gap(placement, object_a, object_b) > f64::from(round_up(within))
+        };
+        if apart {
             return Ok(None);
         }
         self.queue.clear();
@@ -94,22 +106,27 @@ impl Querier {
             contacts += 1;
             Ok(visit(contact))
         };
-        let mut visitor = ContactVisitor {
-            packets: &mut self.packets,
-            order: Order::Any,
-            candidates: Candidates {
+        let visit = &mut |candidate| report(placed, candidate, &mut count);
+        let (pair, memory, packets, queue) =
+            (placed.pair, &mut self.memory, &mut self.packets, &mut self.queue);
+        let (tests, stats, found) = if within == 0.0 {
+            let candidates = Candidates {
                 placed,
-                queue: &mut self.queue,
+                queue,
                 drain_at: TriangleQueue::FULL,
                 stats: QueryStats::default(),
                 recent: Default::default(),
-                visit: &mut |candidate| report(placed, candidate, &mut count),
+                visit,
                 found: None,
-            },
+            };
+            let mut visitor = ContactVisitor { packets, order: Order::Any, candidates };
+            let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
+            (tests, visitor.candidates.stats, visitor.candidates.found)
+        } else {
+            let mut visitor = WithinVisitor { packets, near: NearPairs::new(placed, queue, within, visit) };
+            let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
+            (tests, visitor.near.stats, visitor.near.found)
         };
-        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
-        let tests = self.backend.run(task)?;
-        let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
         self.memory.budget.charge(contacts)?;
         Ok(found)

@@ -13,6 +13,7 @@ use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
+use crate::query::rounded::{limit_of_cores, sum_of_radii};
 use crate::query::search::{Best, Finalists, Nearest, Search, ids};
 
 impl Querier {
@@ -50,10 +51,10 @@ impl Querier {
         options.check()?;
         let (a, b) = (a.into(), b.into());
         self.start();
-        let mut search = Search::new(*options, f64::INFINITY);
+        let mut search = Search::between_shapes(*options, sum_of_radii(a, b));
         // Shapes have triangles, and nothing is pruned before a distance is known.
         let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;
-        Ok(best.distance(search.proved()))
+        self.distance_of_shapes(a, b, pose, best.distance(search.proved()))
     }
 
     /// Returns the answer of [`Querier::distance`] if the distance is at most `limit`; if it is not, perhaps `None`.
@@ -67,9 +68,9 @@ impl Querier {
         let (a, b) = (a.into(), b.into());
         self.start();
         let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
-        search.limit_to(limit);
+        search.limit_to(limit_of_cores(a, b, limit).next_up());
         let best = self.nearest(a, b, pose, &mut search)?;
-        Ok(best.map(|best| best.distance(search.proved())))
+        best.map(|best| self.distance_of_shapes(a, b, pose, best.distance(search.proved()))).transpose()
     }
 
     /// Returns the closest pair of triangles within the limit of `search`; of touching meshes, the first contact.
@@ -113,14 +114,8 @@ impl Querier {
         d: f64,
     ) -> Result<bool, QueryError> {
         check_distance(d)?;
-        let (a, b) = (a.into(), b.into());
-        if d == 0.0 {
-            return self.collide(a, b, pose);
-        }
         self.start();
-        let mut search = Search::new(DistanceOptions::default(), d);
-        self.search(a, b, pose, &mut search)?;
-        Ok(search.done)
+        self.shapes_within(a.into(), b.into(), pose, d)
     }
 
     /// Looks for the closest pair within the limit of `search`.

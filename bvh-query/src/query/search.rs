@@ -72,6 +72,8 @@ impl Best {
 /// What is known of the distance so far, over all pairs of objects.
 pub(super) struct Search {
     options: DistanceOptions,
+    /// The errors that the options allow are of the distance beyond this one, the sum of radii.
+    beyond: f64,
     /// The question of `within`: stop at the first pair at most this far apart.
     enough: Option<f64>,
     pub(super) best: Option<Best>,
@@ -95,6 +97,7 @@ impl Search {
     pub(super) fn new(options: DistanceOptions, enough: f64) -> Self {
         let mut search = Self {
             options,
+            beyond: 0.0,
             enough: enough.is_finite().then_some(enough),
             best: None,
             touching: None,
@@ -107,6 +110,11 @@ impl Search {
         };
         search.lower_upper(round_up(enough * (1.0 + 2f64.powi(-40))));
         search
+    }
+
+    /// Starts a search for the closest pair of two cores, given the sum of the radii around them.
+    pub(super) fn between_shapes(options: DistanceOptions, beyond: f64) -> Self {
+        Self { beyond, ..Self::new(options, f64::INFINITY) }
     }
 
     /// Limits the search by a pair of triangles of the meshes: pairs farther apart are not looked at. The pair itself is
@@ -146,7 +154,12 @@ impl Search {
 
     /// Returns the limit beyond which pairs may be pruned, given an upper bound of the distance.
     fn limit_of(&self, upper: f64) -> f64 {
-        ((upper - self.options.abs_err) / (1.0 + self.options.rel_err)).max(0.0)
+        let DistanceOptions { rel_err, abs_err } = self.options;
+        if self.beyond == 0.0 {
+            return ((upper - abs_err) / (1.0 + rel_err)).max(0.0);
+        }
+        // Where the shapes may touch, nothing is left out: it must be decided whether they do.
+        upper.min(self.beyond + ((upper - self.beyond - abs_err) / (1.0 + rel_err)).max(0.0))
     }
 
     /// Adopts a better upper bound.

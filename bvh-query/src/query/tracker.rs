@@ -30,6 +30,7 @@ use crate::query::exact::{TriangleDistance, placed, stored};
 use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::placed_pair::Found;
 use crate::query::querier::Querier;
+use crate::query::rounded::limit_of_cores;
 use crate::query::search::Search;
 
 /// Reuses the last answers about two meshes, so that an answer about a nearby pose costs less.
@@ -111,9 +112,17 @@ impl Tracker {
         b: impl Into<Shape<'a>>,
         pose: &Pose,
     ) -> Result<bool, QueryError> {
-        let (a, b) = (a.into(), b.into());
-        querier.start();
-        querier.look_at_objects(b)?;
+        self.within(querier, a, b, pose, 0.0)
+    }
+
+    /// Decides whether the surfaces of two cores touch.
+    fn cores_touch(
+        &mut self,
+        querier: &mut Querier,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<bool, QueryError> {
         let moved = self.turn_to(a, b, pose);
         if self.bounds(b, pose).is_some_and(|(lower, _)| lower > 0.0) {
             return Ok(false);
@@ -166,10 +175,10 @@ impl Tracker {
                 querier.nearest(a, b, pose, &mut limited)?.ok_or_else(|| no_answer(a))?
             }
         };
-        let answer = best.distance(limited.proved());
+        let core = best.distance(limited.proved());
         self.pair = Some(best.found);
-        self.bounds = Some(DistanceBounds { pose: *pose, lower: answer.lower, upper: answer.upper });
-        Ok(answer)
+        self.bounds = Some(DistanceBounds { pose: *pose, lower: core.lower, upper: core.upper });
+        querier.distance_of_shapes(a, b, pose, core)
     }
 
     /// Answers [`Querier::within`], by means of `querier`; `d` is in mesh units.
@@ -186,11 +195,24 @@ impl Tracker {
     ) -> Result<bool, QueryError> {
         check_distance(d)?;
         let (a, b) = (a.into(), b.into());
-        if d == 0.0 {
-            return self.collide(querier, a, b, pose);
-        }
         querier.start();
         querier.look_at_objects(b)?;
+        let near = self.cores_within(querier, a, b, pose, limit_of_cores(a, b, d))?;
+        Ok(near || querier.inside_point(a, b, pose)?.is_some())
+    }
+
+    /// Decides whether the surfaces of two cores are within a distance.
+    fn cores_within(
+        &mut self,
+        querier: &mut Querier,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        d: f64,
+    ) -> Result<bool, QueryError> {
+        if d == 0.0 {
+            return self.cores_touch(querier, a, b, pose);
+        }
         let moved = self.turn_to(a, b, pose);
         match self.bounds(b, pose) {
             Some((lower, _)) if lower > d => return Ok(false),

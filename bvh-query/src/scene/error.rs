@@ -51,6 +51,9 @@ pub enum InstanceError {
     /// Another instance has this name.
     #[error("instance {0:?}: expected a name of its own, found it taken")]
     NameTaken(String),
+    /// A margin that is no length.
+    #[error("margin: expected a length from 0 to 2^118, found {0}")]
+    Margin(f64),
     /// A pose with which a pair of instances may have no relative pose.
     #[error("instance {instance}: {source}")]
     Pose {

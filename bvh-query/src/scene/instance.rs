@@ -2,6 +2,7 @@
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
+use crate::query::motion::size_of;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
@@ -46,10 +47,10 @@ pub(super) struct Instance {
     pub(super) generation: u32,
     pub(super) name: Option<String>,
     pub(super) shape: SceneShape,
+    /// What is added to the radius of the shape, in mesh units.
+    pub(super) margin: f64,
     pub(super) world: Pose,
     pub(super) bounds: WorldBox,
-    /// The largest diagonal of the boxes of its objects, in mesh units.
-    pub(super) size: f64,
     pub(super) groups: Groups,
     /// The places of the instances that it may touch, in ascending order.
     pub(super) allowed: Vec<u32>,
@@ -59,6 +60,29 @@ impl Instance {
     /// Returns its identifier, given its place.
     pub(super) fn id(&self, place: u32) -> InstanceId {
         InstanceId { place, generation: self.generation }
+    }
+
+    /// Returns how far from its core it reaches, in mesh units.
+    pub(super) fn radius(&self) -> f64 {
+        self.shape.radius() + self.margin
+    }
+
+    /// Returns the largest diagonal of the boxes of its objects, and twice its radius, in mesh units.
+    pub(super) fn size(&self) -> f64 {
+        size_of(self.shape.objects(), self.radius())
+    }
+
+    /// Returns its box in the world at a pose.
+    pub(super) fn bounds_at(&self, world: &Pose) -> WorldBox {
+        let core = WorldBox::of(self.shape.objects(), world);
+        let radius = self.radius();
+        // A's frame may be stretched against the world: see the module of boxes.
+        if radius == 0.0 { core } else { core.grown(radius * (1.0 + 1.0 / (1 << 18) as f64)) }
+    }
+
+    /// Computes its box after a change.
+    pub(super) fn update_bounds(&mut self) {
+        self.bounds = self.bounds_at(&self.world);
     }
 
     /// Returns what the broad phase knows of it, given its place.

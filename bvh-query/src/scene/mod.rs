@@ -27,10 +27,10 @@ pub use question::{SceneContact, SceneDistance, ScenePair};
 use crate::file::bvh::Bvh;
 use crate::file::files::SceneShape;
 use crate::file::owned_shape::OwnedShape;
+use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
-use crate::query::motion::size;
 use broad_phase::BroadPhase;
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
@@ -85,6 +85,10 @@ pub struct Scene {
     /// Places of removed instances with the generation of the next one.
     free: Vec<(u32, u32)>,
     names: HashMap<String, u32>,
+    /// The margins of pairs that have their own, by the places of both, the lower one first.
+    pair_margins: HashMap<(u32, u32), f64>,
+    /// The largest of them.
+    widest_pair_margin: f64,
     broad: BroadPhase,
     workers: Workers,
     /// The pair that was nearest, or in contact, in the last question: a likely answer of the next.
@@ -110,6 +114,8 @@ impl Scene {
             instances: Vec::new(),
             free: Vec::new(),
             names: HashMap::new(),
+            pair_margins: HashMap::new(),
+            widest_pair_margin: 0.0,
             broad: BroadPhase::default(),
             workers: Workers::new(backend),
             likely: None,
@@ -240,9 +246,17 @@ impl Scene {
         if let Some(name) = &name {
             self.names.insert(name.clone(), place);
         }
-        let bounds = WorldBox::of(shape.objects(), &world);
-        let size = size(shape.objects());
-        let instance = Instance { generation, name, shape, world, bounds, size, groups, allowed: Vec::new() };
+        let mut instance = Instance {
+            generation,
+            name,
+            shape,
+            margin: 0.0,
+            world,
+            bounds: WorldBox::EMPTY,
+            groups,
+            allowed: Vec::new(),
+        };
+        instance.update_bounds();
         if self.free.pop().is_some() {
             self.instances[place as usize] = Some(instance);
         } else {
@@ -267,6 +281,7 @@ impl Scene {
             if let Some(name) = instance.name {
                 self.names.remove(&name);
             }
+            self.pair_margins.retain(|&(a, b), _| a != id.place && b != id.place);
             // After 2^32 instances in one place, the place is given up.
             if let Some(next) = instance.generation.checked_add(1) {
                 self.free.push((id.place, next));
@@ -300,11 +315,71 @@ impl Scene {
         for (id, world) in poses {
             if let Some(instance) = &mut self.instances[id.place as usize] {
                 instance.world = world;
-                instance.bounds = WorldBox::of(instance.shape.objects(), &world);
+                instance.update_bounds();
                 self.broad.set_box(instance.item(id.place));
             }
         }
         Ok(())
+    }
+
+    /// Gives an instance a margin in mesh units, which is added to the radius of its shape in every question. It is 0 at
+    /// first.
+    ///
+    /// # Errors
+    /// [`InstanceError::NoInstance`], or [`InstanceError::Margin`] for a margin that is negative, NaN or above 2^118.
+    pub fn set_margin(&mut self, id: InstanceId, margin: f64) -> Result<(), InstanceError> {
+        let place = self.place(id)?;
+        check_margin(margin)?;
+        if let Some(instance) = &mut self.instances[place] {
+            instance.margin = margin;
+            instance.update_bounds();
+            self.broad.set_box(instance.item(id.place));
+        }
+        Ok(())
+    }
+
+    /// Gives a pair of instances a margin in mesh units, besides those that each of both has. Questions about the pair add it to
+    /// the margin of the lower instance, which is A. It is 0 at first.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::set_margin`].
+    pub fn set_pair_margin(
+        &mut self,
+        a: InstanceId,
+        b: InstanceId,
+        margin: f64,
+    ) -> Result<(), InstanceError> {
+        let (a, b) = (self.place(a)? as u32, self.place(b)? as u32);
+        check_margin(margin)?;
+        let pair = (a.min(b), a.max(b));
+        if margin > 0.0 {
+            self.pair_margins.insert(pair, margin);
+        } else {
+            self.pair_margins.remove(&pair);
+        }
+        self.widest_pair_margin = self.pair_margins.values().fold(0.0, |widest, &margin| widest.max(margin));
+        Ok(())
+    }
+
+    /// Returns the margin of an instance.
+    ///
+    /// # Errors
+    /// [`InstanceError::NoInstance`].
+    pub fn margin(&self, id: InstanceId) -> Result<f64, InstanceError> {
+        Ok(self.instance(id)?.margin)
+    }
+
+    /// Returns the margin that a pair has of its own.
+    ///
+    /// # Errors
+    /// [`InstanceError::NoInstance`].
+    pub fn pair_margin(&self, a: InstanceId, b: InstanceId) -> Result<f64, InstanceError> {
+        Ok(self.margin_of_pair(self.place(a)? as u32, self.place(b)? as u32))
+    }
+
+    /// Returns the margin that the pair in two places has of its own.
+    fn margin_of_pair(&self, a: u32, b: u32) -> f64 {
+        self.pair_margins.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0)
     }
 
     /// Puts an instance into groups.
@@ -449,6 +524,11 @@ impl Scene {
         let item = |(place, instance): (u32, &Option<Instance>)| Some(instance.as_ref()?.item(place));
         self.broad.refresh((0..).zip(&self.instances).filter_map(item), self.instances.len());
     }
+}
+
+/// Refuses an invalid margin.
+fn check_margin(margin: f64) -> Result<(), InstanceError> {
+    check_radius(margin).map_err(|_| InstanceError::Margin(margin))
 }
 
 /// Refuses a pose with which a pair may have no relative pose.

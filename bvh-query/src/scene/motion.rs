@@ -207,7 +207,8 @@ impl Scene {
         for (number, one) in moving.iter().enumerate() {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
             let mut near = Vec::new();
-            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other);
+            let widest = self.widest_pair_margin;
+            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other) + widest * (1.0 + 1e-5);
             self.charged(|budget| {
                 budget.charge((moving.len() - number) as u64)?;
                 self.broad.near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
@@ -241,8 +242,7 @@ impl Scene {
         let objects = instance.shape.objects();
         let radius = radius(objects);
         let time = |end: usize| end as f64 / slices as f64;
-        let ends: Vec<WorldBox> =
-            (0..=slices).map(|end| WorldBox::of(objects, &path.pose(time(end)))).collect();
+        let ends: Vec<WorldBox> = (0..=slices).map(|end| instance.bounds_at(&path.pose(time(end)))).collect();
         let slice = |number: usize| {
             let sagitta = path.sagitta(radius, time(number), time(number + 1));
             let sagitta = if sagitta >= 0.0 { sagitta } else { f64::INFINITY };
@@ -261,8 +261,10 @@ impl Scene {
         if !one.groups.meet(other.groups) || one.allows(b) {
             return None;
         }
-        let tolerance = tolerance(one.size.max(other.size), ways.options);
-        let limit = (ways.options.clearance + tolerance).powi(2);
+        let margin = self.margin_of_pair(a, b);
+        let tolerance = tolerance((one.size() + 2.0 * margin).max(other.size()), ways.options);
+        // More than all roundings.
+        let limit = (ways.options.clearance + tolerance + margin * (1.0 + 1e-5)).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
         let slice = slices.iter().zip(others).position(is_near);
         slice.map(|slice| Encounter { slice, a, b })
@@ -292,7 +294,8 @@ impl Scene {
                 let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
                 let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
                 let pair = ScenePair { a: one.id(a), b: other.id(b) };
-                let (a, b) = (shape_a.shape(), shape_b.shape());
+                let margin = one.margin + scene.margin_of_pair(a, b);
+                let (a, b) = (shape_a.shape().with_margin(margin), shape_b.shape().with_margin(other.margin));
                 scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, &path))
             });
             let found = found.map_err(|(number, source)| {

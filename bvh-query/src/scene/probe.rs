@@ -13,7 +13,6 @@ use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::probe::ray::{All, Any, First, Ray};
 use crate::query::probe::segment::MeetsSegment;
-use crate::query::probe::side::OpenObject;
 use crate::query::querier::Querier;
 use crate::scene::instance::InstanceId;
 use crate::scene::world_box::WorldBox;
@@ -203,7 +202,7 @@ impl Asked<'_> {
         self.visit(
             |bounds| if at.squared_gap(bounds) > 0.0 { f64::INFINITY } else { 0.0 },
             |querier, _, shape, _| {
-                let side = querier.side_of(&shape, point, OpenObject::Undefined)?;
+                let side = querier.side_of_shape(&shape, point)?;
                 found.iter_mut().zip(order).for_each(|(found, of)| *found |= side == of);
                 Ok(if side == Side::Inside { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             },
@@ -253,7 +252,8 @@ impl Asked<'_> {
             let id = instance.id(place);
             let mut ask = || {
                 let shape = instance.shape.held_open()?;
-                let placed = PlacedShape { instance: place, ..shape.shape().at(&instance.world) };
+                let rounded = shape.shape().with_margin(instance.margin);
+                let placed = PlacedShape { instance: place, ..rounded.at(&instance.world) };
                 visit(querier, id, placed, key)
             };
             match ask() {

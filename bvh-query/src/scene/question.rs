@@ -1,7 +1,7 @@
 //! The questions over all pairs of a scene.
 
 use crate::error::QueryError;
-use crate::file::owned_shape::OwnedShape;
+use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
 use crate::query::options::check_distance;
@@ -69,8 +69,8 @@ struct NearPair {
 /// A pair of instances as questions about two shapes take it.
 struct InstancePair<'a> {
     ids: ScenePair,
-    a: &'a OwnedShape,
-    b: &'a OwnedShape,
+    a: Shape<'a>,
+    b: Shape<'a>,
     /// B in A's frame.
     pose: Pose,
     /// What is remembered of the pair, if the scene wants that.
@@ -240,7 +240,7 @@ impl Scene {
         while let Some(mut near_pairs) = self.next_piece(&mut next, limit(&nearest))? {
             nearest_first(&mut near_pairs);
             for run in near_pairs.chunks(self.workers.threads()) {
-                if run[0].squared_gap > limit(&nearest).powi(2) {
+                if run[0].squared_gap > (limit(&nearest) + self.widest_pair_margin * (1.0 + 1e-5)).powi(2) {
                     break;
                 }
                 self.improve(&mut nearest, run)?;
@@ -410,6 +410,7 @@ impl Scene {
     /// there are too many for one piece. All pairs of a piece precede those of the next piece.
     fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
         let mut near_pairs = Vec::new();
+        let limit = limit + self.widest_pair_margin * (1.0 + 1e-5);
         let places = self.instances.len() as u32;
         self.charged(|budget| {
             if matches!(next, Next::All) {
@@ -485,9 +486,11 @@ impl Scene {
             let pose = Pose::relative_of_instances(&a.world, &b.world);
             let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
+            let margins = (a.margin + scene.margin_of_pair(near_pair.a, near_pair.b), b.margin);
             let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
             let tracker = scene.trackers.get((near_pair.a, near_pair.b));
-            let pair = &mut InstancePair { ids, a: &a, b: &b, pose, tracker };
+            let (a, b) = (a.shape().with_margin(margins.0), b.shape().with_margin(margins.1));
+            let pair = &mut InstancePair { ids, a, b, pose, tracker };
             let answer = scene.workers.ask_rest(querier, |querier| ask(querier, pair));
             asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
             answer

@@ -10,6 +10,9 @@
 //!   there.
 //! - Otherwise the cell is undecided, and so is the answer, unless a later cell is a hit.
 //!
+//! If a shape is solid, a cell is a hit as well if a part of the other shape is inside it in the pose at the middle. A part gets
+//! inside only through the surface, so only the start of the path and cells after an undecided one need this test.
+//!
 //! The search skips cells that are certainly clear, many at a time: those of an interval during which everything stays
 //! farther apart than the clearance and an eighth of the tolerance ([`sweep`]). If a sweep leaves few pairs of
 //! triangles, they are kept for the parts of the interval. All other pairs are apart during the whole interval, so
@@ -20,7 +23,7 @@ mod question;
 mod search;
 mod sweep;
 
-pub(crate) use question::{radius, size, tolerance};
+pub(crate) use question::{radius, size_of, tolerance};
 pub(crate) use search::Earliest;
 
 use crate::error::{NumberError, QueryError};
@@ -115,7 +118,8 @@ impl Querier {
     /// The answer is certain: [`MotionAnswer::Free`] holds at every moment, not only at samples, and a
     /// [`MotionAnswer::Hit`] names a pose in which the meshes are within the clearance. Contact at time 0 counts.
     /// Answers have the same bits on every backend and in any order of questions. As for [`Querier::collide`], meshes
-    /// are surfaces.
+    /// are surfaces, unless they are solid ([`Shape::solid`]): a pose in which a part of one shape is inside the other then is
+    /// a hit.
     ///
     /// Cost: about one contact query for each interval that must be tested. There are few intervals if B keeps a
     /// distance that is larger than the bend of its path, and some thirty for a hit. If B moves on at a gap below the
@@ -204,7 +208,7 @@ impl Querier {
         let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
         let best = self.nearest(question.a, question.b, pose, &mut search)?;
         let best = best.ok_or_else(|| crate::query::distance::no_answer(question.a))?;
-        Ok(best.distance(search.proved()))
+        self.distance_of_shapes(question.a, question.b, pose, best.distance(search.proved()))
     }
 }
 

@@ -7,6 +7,7 @@ use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
+use crate::query::rounded::limit_of_cores;
 use bvh_format::object::Object;
 
 /// The default tolerance, as a fraction of the diagonal of the larger object's box.
@@ -19,10 +20,13 @@ pub(super) struct Question<'a> {
     pub(super) a: Shape<'a>,
     pub(super) b: Shape<'a>,
     pub(super) path: &'a dyn RigidPath,
+    /// How far apart the cores may be for a hit: the clearance and the radii.
     pub(super) clearance: f64,
     pub(super) tolerance: f64,
-    /// The diagonal of the larger object's box.
+    /// The diagonal of the larger object's box, and both radii of the shape.
     pub(super) size: f64,
+    /// Whether what is inside a shape counts as a hit.
+    pub(super) is_solid: bool,
     /// How far vertices of B are at most from the origin of its frame.
     radius: f64,
     /// The same of A.
@@ -55,12 +59,12 @@ impl<'a> Question<'a> {
         options.check()?;
         let question = Self::unchecked(a, b, path);
         let tolerance = tolerance(question.size, options);
-        Ok(Self { clearance: options.clearance, tolerance, ..question })
+        Ok(Self { clearance: limit_of_cores(a, b, options.clearance), tolerance, ..question })
     }
 
     /// A question without clearance and tolerance.
     pub(super) fn unchecked(a: Shape<'a>, b: Shape<'a>, path: &'a dyn RigidPath) -> Self {
-        let size = size(a.objects()).max(size(b.objects()));
+        let size = size_of(a.objects(), a.radius()).max(size_of(b.objects(), b.radius()));
         Self {
             a,
             b,
@@ -68,6 +72,7 @@ impl<'a> Question<'a> {
             clearance: 0.0,
             tolerance: 0.0,
             size,
+            is_solid: a.is_solid() || b.is_solid(),
             radius: radius(b.objects()),
             radius_a: radius(a.objects()),
         }
@@ -125,11 +130,11 @@ pub(crate) fn radius(objects: &[Object]) -> f64 {
     objects.iter().map(of).fold(0.0, f64::max) * (1.0 + 1.0 / (1 << 18) as f64)
 }
 
-/// Returns the largest diagonal of the boxes of objects, in mesh units.
-pub(crate) fn size(objects: &[Object]) -> f64 {
+/// Returns the largest diagonal of the boxes of objects and two radii around them, in mesh units.
+pub(crate) fn size_of(objects: &[Object], radius: f64) -> f64 {
     let diagonal = |object: &Object| {
         let [lo, hi] = object.bounding_box();
         (0..3).map(|axis| (hi[axis] - lo[axis]).powi(2)).sum::<f64>().sqrt()
     };
-    objects.iter().map(diagonal).fold(0.0, f64::max)
+    objects.iter().map(diagonal).fold(0.0, f64::max) + 2.0 * radius
 }

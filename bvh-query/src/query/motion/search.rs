@@ -19,10 +19,8 @@ use crate::query::displacement::displacement;
 use crate::query::motion::pairs::{Kept, Sweep};
 use crate::query::motion::question::{Middle, Question, Stretch};
 use crate::query::motion::sweep::Room;
-use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::each_pair;
 use crate::query::querier::Querier;
-use crate::query::search::Search;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -98,11 +96,13 @@ pub(super) struct TimeSearch<'s, 'a> {
     question: &'s Question<'a>,
     /// The start of the interval that is looked at in the order of time: all before has been decided.
     pub(super) decided_until: f64,
+    /// Whether a part may have passed the surface of a solid shape: an undecided cell came before.
+    may_be_inside: bool,
 }
 
 impl<'s, 'a> TimeSearch<'s, 'a> {
     pub(super) fn new(querier: &'s mut Querier, question: &'s Question<'a>) -> Self {
-        Self { querier, question, decided_until: 0.0 }
+        Self { querier, question, decided_until: 0.0, may_be_inside: false }
     }
 
     /// Returns the first hit, or the first cell that is undecided. It ignores the time after the earliest hit of all
@@ -117,12 +117,12 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     fn first_before(&mut self, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let whole = self.whole();
-        if self.is_within(&whole.stretch.poses[0], self.question.clearance)? {
+        if self.is_hit(&whole.stretch.poses[0])? {
             return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
         }
         let found = self.in_order(whole, earliest)?;
         if let Outcome::Undecided { free_until, .. } = found
-            && self.is_within(&self.question.path.pose(1.0), self.question.clearance)?
+            && self.is_hit(&self.question.path.pose(1.0))?
         {
             return Ok(Outcome::Hit { free_until, touching_at: 1.0 });
         }
@@ -149,6 +149,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                     }
                     Cell::Undecided => {
                         undecided.get_or_insert((start, middle.at));
+                        self.may_be_inside = self.question.is_solid;
                     }
                 }
             } else {
@@ -162,7 +163,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// them, because poses that are spread over the path find a hit earlier.
     pub(super) fn is_free(&mut self) -> Result<bool, QueryError> {
         let (whole, clearance) = (self.whole(), self.question.clearance);
-        if self.is_within(&whole.stretch.poses[0], clearance)? {
+        if self.is_hit(&whole.stretch.poses[0])? {
             return Ok(false);
         }
         let mut todo = VecDeque::from([whole]);
@@ -215,10 +216,11 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             None => self.is_within(&middle.pose, d),
         };
         // Rounded up: where the reach is small beside the clearance, it must not vanish.
-        if !is_within((clearance + middle.reach).next_up())? {
-            return Ok(Cell::Clear);
+        let near = is_within((clearance + middle.reach).next_up())?;
+        if near && is_within(clearance)? || self.may_be_inside && self.is_inside(&middle.pose)? {
+            return Ok(Cell::Hit);
         }
-        Ok(if is_within(clearance)? { Cell::Hit } else { Cell::Undecided })
+        Ok(if near { Cell::Undecided } else { Cell::Clear })
     }
 
     /// Adds what is left of an interval to the intervals to look at, of which the last one comes next.
@@ -237,7 +239,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         interval.pairs = self.not_apart(&interval, &middle.pose)?;
         if let Some(pairs) = &interval.pairs {
             if pairs.left().is_empty() {
-                return Ok(());
+                return self.skip(interval, middle, todo);
             }
             if can_halve
                 && middle.reach > LEAST_GUESSED * self.question.tolerance
@@ -256,6 +258,38 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         }
         todo.extend(halves.into_iter().rev());
         Ok(())
+    }
+
+    /// Leaves out an interval in which the surfaces are apart all the time. If a part is inside a solid, it is inside all that
+    /// time, and the first cell is a hit.
+    fn skip(
+        &mut self,
+        mut interval: Interval,
+        middle: &Middle,
+        todo: &mut Vec<Interval>,
+    ) -> Result<(), QueryError> {
+        if !self.may_be_inside || !self.is_inside(&middle.pose)? {
+            return Ok(());
+        }
+        loop {
+            let middle = self.middle(&interval.stretch)?;
+            if self.is_cell(&middle) {
+                todo.push(interval);
+                return Ok(());
+            }
+            [interval, _] = self.halves(&interval, &middle)?;
+        }
+    }
+
+    /// Returns whether a pose is a hit.
+    fn is_hit(&mut self, pose: &Pose) -> Result<bool, QueryError> {
+        Ok(self.is_within(pose, self.question.clearance)?
+            || self.question.is_solid && self.is_inside(pose)?)
+    }
+
+    /// Returns whether a part of one shape is inside the other, which is solid.
+    fn is_inside(&mut self, pose: &Pose) -> Result<bool, QueryError> {
+        Ok(self.querier.inside_point(self.question.a, self.question.b, pose)?.is_some())
     }
 
     /// Descends to the cell of a contact and adds it, with the intervals left on the way down. If a time is given, the
@@ -312,8 +346,10 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                 continue;
             }
             let joined = Interval { stretch, ..first.clone() };
-            let pairs = self.not_apart(&joined, &self.question.middle(&stretch).pose)?;
-            if pairs.as_ref().is_none_or(|pairs| !pairs.left().is_empty()) {
+            let middle = self.question.middle(&stretch).pose;
+            let pairs = self.not_apart(&joined, &middle)?;
+            let is_apart = pairs.as_ref().is_some_and(|pairs| pairs.left().is_empty());
+            if !is_apart || self.may_be_inside && self.is_inside(&middle)? {
                 todo.extend(group.iter().map(|one| Interval { pairs: pairs.clone(), ..one.clone() }));
             }
         }
@@ -386,13 +422,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     /// Returns whether the meshes are at most `d` apart in a pose.
     fn is_within(&mut self, pose: &Pose, d: f64) -> Result<bool, QueryError> {
-        let Question { a, b, .. } = *self.question;
-        if d == 0.0 {
-            return Ok(self.querier.any_contact(a, b, pose)?.is_some());
-        }
-        let mut search = Search::new(DistanceOptions::default(), d);
-        self.querier.search(a, b, pose, &mut search)?;
-        Ok(search.done)
+        self.querier.cores_within(self.question.a, self.question.b, pose, d)
     }
 }
 

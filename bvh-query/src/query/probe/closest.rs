@@ -11,7 +11,7 @@ use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
 use crate::leaf::frame::scale_of;
 use crate::leaf::point::{LocalPoint, point_bounds};
-use crate::narrow::{Closest, Point, point_distance, triangles_within};
+use crate::narrow::{Closest, Point, point_distance, triangles_below, triangles_within};
 use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
@@ -53,7 +53,8 @@ impl Querier {
     /// The distance is that of the stored triangles, to within a few roundings of f64 at the scale of the closest
     /// triangle and its gap. Of equally near triangles, the answer names the one with the lowest numbers of object and
     /// triangle. It is decided exactly whether the mesh is farther away than `within`. The answer has the same bits on
-    /// all backends. A coordinate below 2^-213 counts as 0.
+    /// all backends. A coordinate below 2^-213 counts as 0. The distance from a rounded shape is that from its core less the
+    /// radius; within the radius it is 0, and the closest point is the given one.
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120, or `within` is negative or NaN;
@@ -78,8 +79,33 @@ impl Querier {
         point: &Point,
         within: f64,
     ) -> Result<Option<ClosestPoint>, QueryError> {
+        let radius = placed.shape.radius();
+        if radius == 0.0 {
+            return self.closest_of_core(placed, point, within, IsWithin::Closed);
+        }
+        let Some(core) = self.closest_of_core(placed, point, radius + within, IsWithin::Closed)? else {
+            return Ok(None);
+        };
+        if core.upper <= radius
+            || core.lower <= radius
+                && self.closest_of_core(placed, point, radius, IsWithin::Closed)?.is_some()
+        {
+            return Ok(Some(ClosestPoint { distance: 0.0, lower: 0.0, upper: 0.0, point: *point, ..core }));
+        }
+        Ok(Some(beyond(core, *point, radius)))
+    }
+
+    /// Returns the closest point of a core to one that has been checked, as has `within`.
+    pub(super) fn closest_of_core(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        point: &Point,
+        within: f64,
+        is_within: IsWithin,
+    ) -> Result<Option<ClosestPoint>, QueryError> {
         let mut search = Search {
             point: *point,
+            is_within,
             within,
             limit: within * LIMIT_WIDENING,
             best: None,
@@ -101,9 +127,31 @@ pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
     if within >= 0.0 { Ok(()) } else { Err(NumberError::Within(within).into()) }
 }
 
+/// Whether a triangle that is exactly as far away as the limit counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum IsWithin {
+    Closed,
+    Open,
+}
+
+/// Returns the closest point of a rounded shape, given that of its core, which is farther away than the radius.
+pub(super) fn beyond(core: ClosestPoint, point: Point, radius: f64) -> ClosestPoint {
+    // The point is not on the surface, so the distance must not round to zero.
+    let distance = (core.distance - radius).max(f64::MIN_POSITIVE);
+    let share = (radius / core.distance).min(1.0);
+    ClosestPoint {
+        distance,
+        lower: (core.lower - radius).next_down().clamp(0.0, distance),
+        upper: (core.upper - radius).next_up().max(distance),
+        point: [0, 1, 2].map(|k| core.point[k] + share * (point[k] - core.point[k])),
+        ..core
+    }
+}
+
 /// What is known of a point, over all objects.
 struct Search {
     point: Point,
+    is_within: IsWithin,
     within: f64,
     /// Triangles whose lower bound exceeds it do not matter.
     limit: f64,
@@ -231,8 +279,12 @@ impl<'a> Nearest<'a> {
                 }
                 best => best.as_ref().is_none_or(|best| closest.distance < best.closest.distance),
             };
-            let is_within = |within| triangles_within(&triangle, &[point; 3], &closest, within);
-            if is_better && (search.within == f64::INFINITY || is_within(search.within)) {
+            let is_within = match search.is_within {
+                _ if search.within == f64::INFINITY => true,
+                IsWithin::Closed => triangles_within(&triangle, &[point; 3], &closest, search.within),
+                IsWithin::Open => triangles_below(&triangle, &[point; 3], &closest, search.within),
+            };
+            if is_better && is_within {
                 self.search.best = Some(Best { closest, object: self.number, place });
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);

@@ -6,6 +6,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
+use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
 use crate::leaf::frame::scale_of;
 use crate::leaf::line::{crossed, direction};
@@ -53,6 +54,16 @@ pub(crate) trait LineQuestion {
     /// Returns the limit of the parameter; a negative one if no more need be known.
     fn limit(&self) -> f64;
 
+    /// Returns whether the radii of shapes do not matter.
+    fn is_about_cores(&self) -> bool {
+        false
+    }
+
+    /// Refuses shapes about which the question is not defined.
+    fn admits(&self, _: Shape<'_>) -> Result<(), QueryError> {
+        Ok(())
+    }
+
     /// Decides about a triangle that the line may meet. All that it does meet up to the limit are named, in any order.
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError>;
 }
@@ -61,6 +72,8 @@ pub(crate) trait LineQuestion {
 pub(crate) struct Candidate<'a> {
     /// In the frame of the question.
     pub(super) triangle: Triangle,
+    /// How far around the triangle its shape reaches.
+    pub(super) radius: f64,
     /// The numbers of its instance in a scene and of its object in the file.
     numbers: (u32, u32),
     bvh: &'a Bvh,
@@ -93,6 +106,7 @@ impl Querier {
         placed: &PlacedShape<'_>,
         question: &mut dyn LineQuestion,
     ) -> Result<(), QueryError> {
+        question.admits(placed.shape)?;
         for (index, object) in placed.shape.objects().iter().enumerate() {
             self.memory.budget.visit()?;
             let into = IntoObject::new(placed.pose.as_ref(), object);
@@ -109,7 +123,8 @@ impl Querier {
         into: &IntoObject,
         question: &mut dyn LineQuestion,
     ) -> Result<(), QueryError> {
-        if let Some(clipped) = Clipped::new(&question.line(), into, question.limit()) {
+        let radius = if question.is_about_cores() { 0.0 } else { placed.shape.radius() };
+        if let Some(clipped) = Clipped::new(&question.line(), into, question.limit(), radius) {
             let memory = &mut self.memory;
             let (tests, stats) = self.backend.run(AskObject { placed, index, clipped, question, memory })?;
             self.stats.add(tests, stats);
@@ -128,6 +143,8 @@ struct Clipped {
     /// The parameter at which the segment starts, and how much of it the segment is long.
     start: f64,
     length: f64,
+    /// How far around its triangles the shape reaches.
+    radius: f64,
 }
 
 /// What a share of a segment is enlarged by for all roundings of f64.
@@ -135,10 +152,12 @@ const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
 
 impl Clipped {
     #[inline(always)]
-    fn new(line: &Line, into: &IntoObject, limit: f64) -> Option<Self> {
+    fn new(line: &Line, into: &IntoObject, limit: f64, radius: f64) -> Option<Self> {
         let (origin, direction) = (into.point(line.origin), into.direction(line.direction));
         // A point of the line in the box is at most twice as far along it as the magnitudes of both add up to.
-        let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin)));
+        let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
+        // A pose may stretch: see `closest`.
+        let error = error + radius * (1.0 + 1.0 / (1 << 17) as f64);
         let [start, end] = range_in_box(&origin, &direction, &into.bounds, error)?;
         let (start, end) = (start.max(0.0), end.min(limit));
         if start > end {
@@ -157,6 +176,7 @@ impl Clipped {
             scale: scale_of(size),
             start,
             length,
+            radius,
         })
     }
 
@@ -273,7 +293,8 @@ impl Walked<'_> {
             triangle = placed(&triangle, pose);
         }
         let numbers = (self.placed.instance, self.number);
-        self.question.decide(&Candidate { triangle, numbers, bvh, stored_in: object, leaf, lane })?;
+        let radius = self.clipped.radius;
+        self.question.decide(&Candidate { triangle, radius, numbers, bvh, stored_in: object, leaf, lane })?;
         self.limit = self.clipped.share(self.question.limit());
         Ok(())
     }
@@ -297,7 +318,10 @@ impl ProbeVisitor for Walked<'_> {
         let corner = &packets[0].corners[0];
         let near = self.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
         let point = LocalPoint::new(&near, self.clipped.segment.error, self.clipped.scale as f32);
-        let mut left = valid & crossed(isa, packets, &point, &self.direction);
+        // A line may pass a rounded triangle on any side.
+        let is_rounded = self.clipped.radius > 0.0;
+        let mut left =
+            if is_rounded { valid } else { valid & crossed(isa, packets, &point, &self.direction) };
         while left != 0 && self.limit >= 0.0 {
             let at = left.trailing_zeros() as usize & 15;
             left &= left - 1;

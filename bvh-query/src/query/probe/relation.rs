@@ -11,6 +11,7 @@ use crate::query::exact::stored_at;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
 use crate::query::querier::Querier;
+use crate::query::rounded::sum_of_radii;
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::object::Object;
 use bvh_format::validate::packets;
@@ -40,7 +41,8 @@ impl Querier {
         pose: &Pose,
     ) -> Result<Relation, QueryError> {
         let (a, b) = (a.into(), b.into());
-        if self.collide(a, b, pose)? {
+        self.start();
+        if self.cores_within(a, b, pose, sum_of_radii(a, b))? {
             return Ok(Relation::Touching);
         }
         let (own, placed) = (PlacedShape::from(a), b.at(pose));
@@ -71,7 +73,9 @@ impl Querier {
             for other in 0..container.shape.objects().len() {
                 self.memory.budget.visit()?;
                 let number = container.shape.first() + other;
-                is_known &= container.shape.bvh().topology(number)?.closed || !may_contain(index, other);
+                // An open core within a radius contains nothing: what is around it is outside.
+                let contains_nothing = container.shape.radius() > 0.0 || !may_contain(index, other);
+                is_known &= contains_nothing || container.shape.bvh().topology(number)?.closed;
             }
             let mut listed = topology.components();
             if !is_known {
@@ -79,14 +83,14 @@ impl Querier {
                     if listed.len() == 0 { object.triangles() } else { listed.len() as u64 };
                 continue;
             }
-            let mut ask = |place: TrianglePlace| -> Result<(), QueryError> {
+            let mut ask = |place: TrianglePlace| -> Result<bool, QueryError> {
                 let corner = stored_at(bvh, object, place)?[0];
                 let point = mesh.pose.map_or(corner, |pose| pose.place(corner));
                 components.count(self.side_of(container, &point, OpenObject::Empty)?);
-                Ok(())
+                Ok(false)
             };
             if listed.len() != 0 {
-                listed.try_for_each(|place| ask(bvh.triangle_place(object, place)?))?;
+                listed.try_for_each(|place| ask(bvh.triangle_place(object, place)?).map(drop))?;
             } else {
                 each_triangle(bvh, object, ask)?;
             }
@@ -95,17 +99,60 @@ impl Querier {
     }
 }
 
-/// Visits all stored triangles of an object: where components are not listed, each triangle counts as one.
+impl Querier {
+    /// Returns a point of a connected component of one core that is inside another shape, which is solid.
+    pub(crate) fn first_inside(
+        &mut self,
+        mesh: &PlacedShape<'_>,
+        container: &PlacedShape<'_>,
+    ) -> Result<Option<[f64; 3]>, QueryError> {
+        let bvh = mesh.shape.bvh();
+        for (index, object) in mesh.shape.objects().iter().enumerate() {
+            let mut found = None;
+            let mut ask = |place: TrianglePlace| -> Result<bool, QueryError> {
+                let corner = stored_at(bvh, object, place)?[0];
+                let point = mesh.pose.map_or(corner, |pose| pose.place(corner));
+                if self.side_of(container, &point, OpenObject::Empty)? == Side::Inside {
+                    found = Some(point);
+                }
+                Ok(found.is_some())
+            };
+            let mut listed = match bvh.topology(mesh.shape.first() + index) {
+                Ok(topology) => Some(topology.components()).filter(|listed| listed.len() != 0),
+                Err(QueryError::NoTopology) => None,
+                Err(error) => return Err(error),
+            };
+            match &mut listed {
+                Some(listed) => {
+                    for place in listed {
+                        if ask(bvh.triangle_place(object, place)?)? {
+                            break;
+                        }
+                    }
+                }
+                None => each_triangle(bvh, object, ask)?,
+            }
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Visits the stored triangles of an object until one suffices: where components are not listed, each triangle counts as one.
 fn each_triangle(
     bvh: &Bvh,
     object: &Object,
-    mut visit: impl FnMut(TrianglePlace) -> Result<(), QueryError>,
+    mut visit: impl FnMut(TrianglePlace) -> Result<bool, QueryError>,
 ) -> Result<(), QueryError> {
     for number in object.pages() {
         let page = bvh.page(object, number)?;
         for (packet, triangles) in packets(&page) {
             for lane in 0..triangles as u8 {
-                visit(TrianglePlace { page: number, packet, lane })?;
+                if visit(TrianglePlace { page: number, packet, lane })? {
+                    return Ok(());
+                }
             }
         }
     }

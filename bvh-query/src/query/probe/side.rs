@@ -6,7 +6,8 @@
 use crate::error::QueryError;
 use crate::file::topology::Topology;
 use crate::narrow::{AxisRay, Passing, Point};
-use crate::query::answers::{Side, SignedDistance};
+use crate::query::answers::{ClosestPoint, Side, SignedDistance};
+use crate::query::probe::closest::IsWithin;
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
@@ -29,6 +30,9 @@ impl Querier {
     /// input counts like any other triangle, with its own orientation. The answer is exact and has the same bits on all
     /// backends. If a mesh is not closed and consistently oriented, the side is known only for points on it.
     ///
+    /// A point is inside a rounded shape if it is nearer to the core than the radius, or inside the core. An open core contains
+    /// nothing.
+    ///
     /// Cost: about a microsecond.
     ///
     /// # Errors
@@ -42,7 +46,7 @@ impl Querier {
     ) -> Result<Side, QueryError> {
         let point = check_point(&point)?;
         self.start();
-        self.side_of(&shape.into(), &point, OpenObject::Undefined)
+        self.side_of_shape(&shape.into(), &point)
     }
 
     /// Returns the closest point of a mesh to `point`, and the side that `point` is on. Returns `None` if the mesh is
@@ -58,14 +62,65 @@ impl Querier {
         within: f64,
     ) -> Result<Option<SignedDistance>, QueryError> {
         let shape = shape.into();
-        let Some(closest) = self.closest_point(shape, point, within)? else { return Ok(None) };
+        let Some(mut closest) = self.closest_point(shape, point, within)? else { return Ok(None) };
         let stats = self.stats;
         let side = self.side(shape, point)?;
+        let radius = shape.shape.radius();
+        if radius > 0.0 && side == Side::Inside {
+            closest = self.depth(&shape, &check_point(&point)?)?.unwrap_or(closest);
+        }
         self.stats.add(stats.node_tests, stats);
         Ok(Some(SignedDistance { side, closest }))
     }
 
-    /// Returns the side that a point is on, which has been checked.
+    /// Returns how deep a point is inside a rounded shape, which is at most the distance from where it ends: the radius less the
+    /// distance from the core or, inside the core, the sum of both.
+    pub(crate) fn depth(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        point: &Point,
+    ) -> Result<Option<ClosestPoint>, QueryError> {
+        let radius = placed.shape.radius();
+        let Some(core) = self.closest_of_core(placed, point, f64::INFINITY, IsWithin::Closed)? else {
+            return Ok(None);
+        };
+        let is_inside_core = self.side_of(placed, point, OpenObject::Empty)? == Side::Inside;
+        let sign = if is_inside_core { 1.0 } else { -1.0 };
+        let reach = if core.distance > 0.0 { sign * -radius / core.distance } else { 0.0 };
+        let [near, far] = if is_inside_core { [core.lower, core.upper] } else { [core.upper, core.lower] };
+        let distance = (radius + sign * core.distance).max(f64::MIN_POSITIVE);
+        Ok(Some(ClosestPoint {
+            distance,
+            lower: (radius + sign * near).next_down().clamp(0.0, distance),
+            upper: (radius + sign * far).next_up().max(distance),
+            point: [0, 1, 2].map(|k| core.point[k] + reach * (point[k] - core.point[k])),
+            ..core
+        }))
+    }
+
+    /// Returns the side of a shape that a point is on, which has been checked.
+    pub(crate) fn side_of_shape(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        point: &Point,
+    ) -> Result<Side, QueryError> {
+        let radius = placed.shape.radius();
+        if radius == 0.0 {
+            return self.side_of(placed, point, OpenObject::Undefined);
+        }
+        match self.closest_of_core(placed, point, radius, IsWithin::Closed)? {
+            Some(closest) if closest.upper < radius => Ok(Side::Inside),
+            Some(_) if self.closest_of_core(placed, point, radius, IsWithin::Open)?.is_some() => {
+                Ok(Side::Inside)
+            }
+            found => match (self.side_of(placed, point, OpenObject::Empty)?, found) {
+                (Side::Outside, Some(_)) => Ok(Side::On),
+                (side, _) => Ok(side),
+            },
+        }
+    }
+
+    /// Returns the side of a core that a point is on, which has been checked.
     pub(crate) fn side_of(
         &mut self,
         placed: &PlacedShape<'_>,
@@ -126,6 +181,10 @@ struct Winding<'a> {
 impl LineQuestion for Winding<'_> {
     fn line(&self) -> Line {
         Line::new(self.ray.origin, self.ray.direction())
+    }
+
+    fn is_about_cores(&self) -> bool {
+        true
     }
 
     #[inline(always)]
