@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
+mod margins;
 mod motions;
 mod probes;
 mod shared;
