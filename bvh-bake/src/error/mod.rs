@@ -2,10 +2,12 @@
 
 mod mesh;
 mod read;
+mod shape;
 
 pub use mesh::InputError;
 pub(crate) use read::{Fault, Halt, excerpt};
 pub use read::{Place, ReadError};
+pub use shape::ShapeError;
 
 use bvh_format::FormatError;
 use std::path::PathBuf;

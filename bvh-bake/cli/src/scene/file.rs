@@ -1,11 +1,15 @@
-//! Reads scene files (meshes, instances, moving instances and allowed pairs), and opens baked scenes.
+//! Reads scene files (meshes and other shapes, instances, moving instances, allowed pairs and margins), and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
 use crate::console::Failure;
 use crate::options::LayoutArguments;
 use crate::process::map;
-use bvh_query::{Backend, Groups, InstanceId, Pose, ReadAhead, Scene, SceneFileError};
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{shapes, to_bytes};
+use bvh_query::{
+    Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, QueryError, ReadAhead, Scene, SceneFileError,
+};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -17,16 +21,29 @@ const STILL: u32 = 2;
 /// A scene file, each item with the number of its line.
 #[derive(Default)]
 pub(super) struct SceneText {
-    meshes: Vec<PathBuf>,
+    shapes: Vec<Described>,
     instances: Vec<(usize, String, usize, Pose)>,
     pub(super) moving: Vec<String>,
     /// Places in `instances`.
     moving_instances: Vec<usize>,
     allowed: Vec<(usize, usize)>,
-    /// The places of meshes and of instances by their names.
-    mesh_of: HashMap<String, usize>,
+    margins: Vec<(usize, usize, f64)>,
+    /// The places of shapes and of instances by their names.
+    shape_of: HashMap<String, usize>,
     instance_of: HashMap<String, usize>,
 }
+
+/// A shape that a line describes.
+enum Described {
+    Mesh(PathBuf),
+    /// A core, its radius, whether it is solid, and the line.
+    Core(Mesh, f64, bool, usize),
+    /// A file of points, each a ball of this radius.
+    Cloud(PathBuf, f64),
+}
+
+/// How much larger the prism around a cylinder may be, as a fraction of its radius.
+const CYLINDER_ERROR: f64 = 0.002;
 
 /// A scene that is ready to be asked.
 pub(super) struct LoadedScene {
@@ -100,16 +117,38 @@ impl SceneText {
         };
         match *words {
             [] => {}
-            ["mesh", name, file] => {
-                if self.mesh_of.insert(name.to_owned(), self.meshes.len()).is_some() {
-                    return Err(format!("expected a name of its own, found a second mesh {name:?}"));
-                }
-                self.meshes.push(folder.join(file));
+            ["mesh", name, file] => self.describe(name, Described::Mesh(folder.join(file)))?,
+            ["sphere", name, radius] => {
+                let core = shapes::point([0.0; 3]);
+                self.describe(name, Described::Core(core, length("R", radius)?, false, number))?;
             }
-            ["instance", name, mesh, ..] => {
-                let mesh = find(&self.mesh_of, "a mesh", mesh)?;
+            ["capsule", name, radius, between] => {
+                let half = length("LENGTH", between)? / 2.0;
+                let core = shapes::segment([0.0, 0.0, -half], [0.0, 0.0, half]);
+                self.describe(name, Described::Core(core, length("R", radius)?, false, number))?;
+            }
+            ["box", name, x, y, z] => {
+                let core = shapes::block([length("X", x)?, length("Y", y)?, length("Z", z)?]);
+                let core = core.map_err(|error| error.to_string())?;
+                self.describe(name, Described::Core(core, 0.0, true, number))?;
+            }
+            ["cylinder", name, radius, long] => {
+                let radius = length("R", radius)?;
+                let around = shapes::cylinder(radius, length("LENGTH", long)?, CYLINDER_ERROR * radius);
+                let core = around.map_err(|error| error.to_string())?.mesh;
+                self.describe(name, Described::Core(core, 0.0, true, number))?;
+            }
+            ["cloud", name, file, radius] => {
+                self.describe(name, Described::Cloud(folder.join(file), length("R", radius)?))?;
+            }
+            ["margin", instance, margin] => {
+                let instance = find(&self.instance_of, "an instance", instance)?;
+                self.margins.push((number, instance, length("R", margin)?));
+            }
+            ["instance", name, shape, ..] => {
+                let mesh = find(&self.shape_of, "a shape", shape)?;
                 let pose = files::parse_placed(&words[3..].join(" "))?;
-                let pose = pose.ok_or("expected 12 numbers, or 7, after the mesh, found none")?;
+                let pose = pose.ok_or("expected 12 numbers, or 7, after the shape, found none")?;
                 if self.instance_of.insert(name.to_owned(), self.instances.len()).is_some() {
                     return Err(format!("expected a name of its own, found a second instance {name:?}"));
                 }
@@ -136,13 +175,46 @@ impl SceneText {
             }
             _ => {
                 return Err(format!(
-                    "expected mesh NAME FILE, instance NAME MESH POSE, moving NAME... or allow NAME NAME, found {:?}",
+                    "expected mesh NAME FILE, sphere NAME R, capsule NAME R LENGTH, box NAME X Y Z, cylinder NAME R LENGTH, \
+                     cloud NAME FILE R, instance NAME SHAPE POSE, margin INSTANCE R, moving NAME... or allow NAME NAME, found {:?}",
                     words.join(" ").chars().take(60).collect::<String>()
                 ));
             }
         }
         Ok(())
     }
+
+    /// Adds a shape with a name of its own.
+    fn describe(&mut self, name: &str, shape: Described) -> Result<(), String> {
+        if self.shape_of.insert(name.to_owned(), self.shapes.len()).is_some() {
+            return Err(format!("expected a name of its own, found a second shape {name:?}"));
+        }
+        self.shapes.push(shape);
+        Ok(())
+    }
+}
+
+/// Reads a length, which may be 0.
+fn length(name: &str, word: &str) -> Result<f64, String> {
+    let length = word.parse().ok().filter(|length: &f64| length.is_finite() && *length >= 0.0);
+    length.ok_or_else(|| format!("{name}: expected a finite length of at least 0, found {word:?}"))
+}
+
+/// Reads the points of a cloud.
+fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, Failure> {
+    let lines = files::read_lines(path, "expected at least one line of a point, found none", |text| {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let number = |word: &str| {
+            let number = word.parse().ok().filter(|number: &f64| number.is_finite());
+            number.ok_or_else(|| format!("expected finite numbers, found {word:?}"))
+        };
+        match *words {
+            [] => Ok(None),
+            [x, y, z] => Ok(Some([number(x)?, number(y)?, number(z)?])),
+            _ => Err(format!("expected three numbers, found {}", words.len())),
+        }
+    })?;
+    Ok(lines.into_iter().map(|(_, point)| point).collect())
 }
 
 impl LoadedScene {
@@ -198,10 +270,29 @@ pub(super) fn load(
         build_seconds: 0.0,
         pairs_asked: 0,
     };
-    let mut shapes = Vec::new();
+    let mut shapes: Vec<OwnedShape> = Vec::new();
     // The smallest and the largest mesh.
     let mut ends: Option<[(f64, &Path); 2]> = None;
-    for file in &text.meshes {
+    for described in &text.shapes {
+        let file = match described {
+            Described::Mesh(file) => file,
+            Described::Cloud(file, radius) => {
+                let cloud = bake_core(&shapes::cloud(&read_points(file)?), layout, file, &mut loaded)?;
+                shapes.push(cloud.rounded(*radius).map_err(|error| Failure::invalid(file, error))?);
+                continue;
+            }
+            Described::Core(mesh, radius, is_solid, number) => {
+                let at_line =
+                    |error: QueryError| Failure::invalid(path, format_args!("line {number}: {error}"));
+                let mut core =
+                    bake_core(mesh, layout, path, &mut loaded)?.rounded(*radius).map_err(at_line)?;
+                if *is_solid {
+                    core = core.solid().map_err(at_line)?;
+                }
+                shapes.push(core);
+                continue;
+            }
+        };
         require_regular(file)?;
         let mesh = LoadedMesh::load(file, &how)?;
         mesh.check()?;
@@ -210,7 +301,7 @@ pub(super) fn load(
         let this = (mesh.size(), file.as_path());
         let [least, most] = ends.unwrap_or([this; 2]);
         ends = Some([if this.0 < least.0 { this } else { least }, if this.0 > most.0 { this } else { most }]);
-        shapes.push(mesh.bvh);
+        shapes.push(mesh.bvh.into());
     }
     ends.into_iter().for_each(point_out_units);
     let mut ids = Vec::new();
@@ -233,7 +324,26 @@ pub(super) fn load(
     for &(a, b) in &text.allowed {
         loaded.scene.set_allowed(ids[a], ids[b], true).map_err(refused)?;
     }
+    for &(number, instance, margin) in &text.margins {
+        let set = loaded.scene.set_margin(ids[instance], margin);
+        set.map_err(|error| Failure::invalid(path, format_args!("line {number}: {error}")))?;
+    }
     Ok(loaded)
+}
+
+/// Bakes a core in memory.
+fn bake_core(
+    mesh: &Mesh,
+    layout: &LayoutArguments,
+    path: &Path,
+    loaded: &mut LoadedScene,
+) -> Result<OwnedShape, Failure> {
+    let start = Instant::now();
+    let bytes = to_bytes(mesh, &layout.to_options()).map_err(|error| Failure::invalid(path, error))?.0;
+    let bvh = Bvh::from_bytes(bytes).map_err(|error| Failure::invalid(path, error))?;
+    loaded.triangles = loaded.triangles.saturating_add(triangles_of(bvh.objects()));
+    loaded.build_seconds += start.elapsed().as_secs_f64();
+    Ok(bvh.into())
 }
 
 /// The poses of the moving instances, their number from 1, and the line that they stand in.
