@@ -16,6 +16,7 @@ mod poses;
 mod probes;
 mod scene;
 mod scene_pairs;
+mod shapes;
 
 use pyo3::prelude::*;
 
@@ -29,6 +30,8 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
     }
     functions![bake::bake, bake::bake_files];
+    functions![shapes::cloud_core, shapes::segment_core, shapes::block_core, shapes::ground_core];
+    functions![shapes::cylinder_core, shapes::cone_core, shapes::height_field_core, shapes::voxels_core];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
     functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];

@@ -79,6 +79,25 @@ impl Mesh {
         Ok(Self { shape })
     }
 
+    /// The same core with a radius.
+    fn rounded(&self, radius: f64) -> PyResult<Self> {
+        Ok(Self { shape: self.shape.clone().rounded(radius).map_err(query_error)? })
+    }
+
+    /// The same mesh, of which the inside counts as well.
+    fn solid(&self, py: Python<'_>) -> PyResult<Self> {
+        let shape = detached(py, || self.shape.clone().solid()).map_err(query_error)?;
+        Ok(Self { shape })
+    }
+
+    fn radius(&self) -> f64 {
+        self.shape.shape().radius()
+    }
+
+    fn is_solid(&self) -> bool {
+        self.shape.shape().is_solid()
+    }
+
     /// The names of all objects of the file.
     fn names(&self) -> Vec<String> {
         self.shape.bvh().objects().iter().map(|object| object.name().to_owned()).collect()

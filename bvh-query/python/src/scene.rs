@@ -217,6 +217,8 @@ impl Scene {
                     }
                 })();
                 let added = known.map_err(|error| state.refused(error))?;
+                let margin = state.scene.margin(id).map_err(|error| state.refused(error))?;
+                only.scene.set_margin(added, margin).map_err(|error| state.refused(error))?;
                 let number = state.number(id);
                 let mesh = Arc::clone(&state.entry(number, "instances")?.mesh);
                 only.entries.insert(number, Entry { id: added, mesh });
@@ -318,6 +320,35 @@ impl Scene {
         allowed.iter_mut().for_each(|pair| pair.sort_unstable());
         allowed.sort_unstable();
         table(py, allowed.into_iter())
+    }
+
+    fn set_margin(&self, py: Python<'_>, number: i64, margin: f64) -> PyResult<()> {
+        self.of(py, number, |scene, id| scene.set_margin(id, margin))
+    }
+
+    fn margin(&self, py: Python<'_>, number: i64) -> PyResult<f64> {
+        self.of(py, number, |scene, id| scene.margin(id))
+    }
+
+    fn set_pair_margin(&self, py: Python<'_>, a: i64, b: i64, margin: f64) -> PyResult<()> {
+        self.with(py, |state| {
+            let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
+            state.scene.set_pair_margin(first, second, margin).map_err(|error| state.refused(error))
+        })
+    }
+
+    /// The pairs with margins of their own, lower numbers first, and these.
+    fn pair_margins(&self, py: Python<'_>) -> Vec<(i64, i64, f64)> {
+        let mut found: Vec<(i64, i64, f64)> = self.with(py, |state| {
+            let of_pair = |(pair, margin)| {
+                let mut numbers = state.pair(pair);
+                numbers.sort_unstable();
+                (numbers[0], numbers[1], margin)
+            };
+            state.scene.pair_margins().map(of_pair).collect()
+        });
+        found.sort_unstable_by_key(|&(a, b, _)| (a, b));
+        found
     }
 
     fn find(&self, py: Python<'_>, name: &str) -> Option<i64> {

@@ -191,5 +191,25 @@ class Manager(unittest.TestCase):
         self.assertFalse(failures or any(thread.is_alive() for thread in threads))
 
 
+class Primitives(unittest.TestCase):
+    """Balls and capsules of trimesh, by classes that look like them to the manager."""
+
+    @staticmethod
+    def primitive(kind, **numbers):
+        made = type(kind, (), {"__module__": "trimesh.primitives", "primitive": types.SimpleNamespace(**numbers)})()
+        return made
+
+    def test_balls_and_capsules_are_exact(self):
+        manager = cbvh.CollisionManager()
+        manager.add_object("ball", self.primitive("Sphere", radius=2.0, center=np.array([3.0, 4.0, 0.0])))
+        capsule = self.primitive("Capsule", radius=1.0, height=2.0, transform=shifts([0, 0, 0.5])[0])
+        manager.add_object("capsule", capsule)
+        self.assertEqual(manager.min_distance_internal(), 2.0)
+        manager.set_transform("ball", shifts([-1.2, -1.6, 0])[0])
+        self.assertAlmostEqual(manager.min_distance_internal(), 0.0, delta=1e-14)
+        manager.set_transform("ball", shifts([-2, -2, 0])[0])
+        self.assertTrue(manager.in_collision_internal())
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -377,6 +377,15 @@ impl Scene {
         Ok(self.margin_of_pair(self.place(a)? as u32, self.place(b)? as u32))
     }
 
+    /// Returns the pairs that have margins of their own, in ascending order.
+    pub fn pair_margins(&self) -> impl Iterator<Item = (ScenePair, f64)> {
+        let id = |place: u32| Some(self.instances.get(place as usize)?.as_ref()?.id(place));
+        let mut pairs: Vec<_> = self.pair_margins.iter().collect();
+        pairs.sort_unstable_by_key(|(places, _)| **places);
+        let pair = move |(&(a, b), &margin): (&(u32, u32), &f64)| Some((ScenePair { a: id(a)?, b: id(b)? }, margin));
+        pairs.into_iter().filter_map(pair)
+    }
+
     /// Returns the margin that the pair in two places has of its own.
     fn margin_of_pair(&self, a: u32, b: u32) -> f64 {
         self.pair_margins.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0)

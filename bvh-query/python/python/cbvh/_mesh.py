@@ -30,6 +30,12 @@ def _other(mesh: Mesh) -> _cbvh.Mesh:
     return mesh._mesh
 
 
+def _length(value: Any, name: str) -> float:
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__float__"):
+        raise TypeError(f"{name}: expected a number, found {type(value).__name__}")
+    return float(value)
+
+
 class Mesh:
     """A mesh in a ``.cbvh`` file: all objects of the file, or one. Made by `open` and `bake`.
 
@@ -50,9 +56,10 @@ class Mesh:
         return Mesh(_cbvh.Mesh.from_bytes(bytes(memoryview(data))))
 
     def __reduce__(self) -> tuple[Any, ...]:
+        shape = (self._object, self.radius, self.is_solid)
         if self._path is not None:
-            return (open, (self._path, self._object))
-        return (_unpickle, (self._mesh.bytes(), self._object))
+            return (_unpickle, (self._path, *shape))
+        return (_unpickle, (self._mesh.bytes(), *shape))
 
     def __copy__(self) -> Mesh:
         return self
@@ -63,7 +70,9 @@ class Mesh:
     def __repr__(self) -> str:
         place = "in memory" if self._path is None else repr(self._path)
         object = "" if self._object is None else f", object {self._object}"
-        return f"<cbvh.Mesh {place}{object}: {self.triangle_count} triangles>"
+        radius = f", radius {self.radius:g}" if self.radius else ""
+        solid = ", solid" if self.is_solid else ""
+        return f"<cbvh.Mesh {place}{object}: {self.triangle_count} triangles{radius}{solid}>"
 
     @property
     def triangle_count(self) -> int:
@@ -135,6 +144,29 @@ class Mesh:
         # A number that is too large for the compiled module names no object either.
         found = self._mesh.object(number if 0 <= number < 2**63 else -1)
         return Mesh(found, self._path, number)
+
+    def rounded(self, radius: float) -> Mesh:
+        """The same triangles with a radius in mesh units: all points at most that far from them.
+
+        The radius replaces the one that the mesh has. Two shapes touch if their triangles are no farther apart than the sum of
+        their radii, exactly, and their distance is that of the triangles less the sum, at least 0. The file stays the same, and
+        is shared.
+        """
+        return Mesh(self._mesh.rounded(_length(radius, "radius")), self._path, self._object)
+
+    def solid(self) -> Mesh:
+        """The same mesh as a solid: what is inside it touches it, at distance 0. Raises ValueError if it is not closed."""
+        return Mesh(self._mesh.solid(), self._path, self._object)
+
+    @property
+    def radius(self) -> float:
+        """How far the shape reaches from its triangles, in mesh units."""
+        return self._mesh.radius()
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether what is inside touches the mesh."""
+        return self._mesh.is_solid()
 
     def validate(self) -> None:
         """Checks all checksums and rules of the whole file. Questions check only the parts that they touch.
@@ -346,6 +378,8 @@ def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     return mesh if object is None else mesh.object(object)
 
 
-def _unpickle(data: bytes, object: int | None) -> Mesh:
-    mesh = Mesh.from_bytes(data)
-    return mesh if object is None else mesh.object(object)
+def _unpickle(data: bytes | str, object: int | None, radius: float, is_solid: bool) -> Mesh:
+    mesh = open(data) if isinstance(data, str) else Mesh.from_bytes(data)
+    mesh = mesh if object is None else mesh.object(object)
+    mesh = mesh.rounded(radius) if radius else mesh
+    return mesh.solid() if is_solid else mesh

@@ -27,7 +27,7 @@ from ._answers import (
     Side,
     named,
 )
-from ._mesh import Mesh
+from ._mesh import Mesh, _length
 from ._motion import Path, read_path
 
 ALL_GROUPS = 0xFFFF_FFFF
@@ -107,10 +107,11 @@ class Scene:
         scene = self.copy()
         poses = scene.poses()
         rows = [
-            (number, scene.mesh(number), scene.name(number), scene.groups(number), poses[place])
+            (number, scene.mesh(number), scene.name(number), scene.groups(number), poses[place], scene.margin(number))
             for place, number in enumerate(scene)
         ]
-        return (_scene_of, (rows, scene.allowed(), scene._scene.next(), scene._scene.switches()))
+        pairs = (scene.allowed(), scene._scene.pair_margins())
+        return (_scene_of, (rows, pairs, scene._scene.next(), scene._scene.switches()))
 
     def __repr__(self) -> str:
         return f"<cbvh.Scene: {len(self)} instances>"
@@ -170,6 +171,18 @@ class Scene:
     def allowed(self) -> NDArray[np.int64]:
         """The pairs that may touch, shape (K, 2)."""
         return self._scene.allowed()
+
+    def set_margin(self, id: int | str, margin: float) -> None:
+        """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first."""
+        self._scene.set_margin(self._number(id, "id"), _length(margin, "margin"))
+
+    def margin(self, id: int | str) -> float:
+        """The margin of an instance."""
+        return self._scene.margin(self._number(id, "id"))
+
+    def set_pair_margin(self, a: int | str, b: int | str, margin: float) -> None:
+        """Gives a pair of instances a further margin in mesh units. 0 at first."""
+        self._scene.set_pair_margin(self._number(a, "a"), self._number(b, "b"), _length(margin, "margin"))
 
     def find(self, name: str) -> int | None:
         """The number of the instance with a name, or None."""
@@ -308,15 +321,22 @@ class Scene:
         of_rows = of_rows.reshape(rows.shape)
         poses, meshes = scene.poses(places), [scene.mesh(number) for number in places.tolist()]
         relative_poses = _cbvh.relative_poses(poses[of_rows[:, 0]], poses[of_rows[:, 1]])
-        # One question per pair of meshes, of which a scene has few.
-        numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
-        kinds = np.array([numbers[mesh] for mesh in meshes], np.int64)[of_rows]
+        # One question per pair of meshes and margins, of which a scene has few.
+        of_pair = {(a, b): margin for a, b, margin in scene._scene.pair_margins()}
+        margins = [scene.margin(number) for number in places.tolist()]
+        numbers: dict[tuple[Mesh, float], int] = {}
+        kinds = np.zeros(rows.shape, np.int64)
+        for row, (pair, (a, b)) in enumerate(zip(rows.tolist(), of_rows.tolist())):
+            further = of_pair.get((min(pair), max(pair)), 0.0)
+            for side, key in enumerate(((meshes[a], margins[a] + further), (meshes[b], margins[b]))):
+                kinds[row, side] = numbers.setdefault(key, len(numbers))
+        shapes = [mesh.rounded(mesh.radius + margin) if margin else mesh for mesh, margin in numbers]
         floats, ids, count = np.float64, np.uint32, len(rows)
         parts = [np.zeros(count, floats) for _ in range(3)] + [np.zeros((count, 3), floats) for _ in range(2)]
         parts += [np.zeros(count, ids) for _ in range(4)]
         for a, b in np.unique(kinds, axis=0).tolist():
             chosen = np.flatnonzero((kinds == [a, b]).all(axis=1))
-            mesh_a, mesh_b = list(numbers)[a], list(numbers)[b]
+            mesh_a, mesh_b = shapes[a], shapes[b]
             for part, found in zip(parts, mesh_a.distance(mesh_b, relative_poses[chosen], parallel=parallel)):
                 part[chosen] = found
         return SceneDistances(rows, Distance(*parts))
@@ -432,17 +452,21 @@ def _nearest(found: tuple[int, int, tuple[Any, ...]] | None) -> SceneDistance | 
 
 
 def _scene_of(
-    rows: list[tuple[int, Mesh, str | None, tuple[int, int], Floats]],
-    allowed: NDArray[np.int64],
+    rows: list[tuple[int, Mesh, str | None, tuple[int, int], Floats, float]],
+    pairs: tuple[NDArray[np.int64], list[tuple[int, int, float]]],
     next: int,
     switches: tuple[bool, bool],
 ) -> Scene:
     """A scene as it was pickled."""
     scene = Scene()
-    for number, mesh, name, groups, pose in rows:
+    for number, mesh, name, groups, pose, margin in rows:
         scene._scene.add(mesh._mesh, mesh, pose, name, list(groups), number)
+        scene.set_margin(number, margin)
+    allowed, margins = pairs
     for a, b in allowed.tolist():
         scene.set_allowed(a, b)
+    for a, b, margin in margins:
+        scene.set_pair_margin(a, b, margin)
     scene._scene.skip_to(next)
     scene._scene.set_switches(*switches)
     return scene

@@ -5,6 +5,7 @@ It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 
 - Meshes are surfaces, whether convex or not. A mesh that is inside another without touching it does not collide with
   it.
+- Balls and capsules of ``trimesh.primitives`` are exact. They have one triangle, of which only the number 0 is in answers.
 - Contact is exact, and distances are 0 if meshes touch. There is no penetration depth and no normal: answers do not
   have the attributes ``depth`` and ``normal``, and no distance is negative.
 - Contacts are all pairs of triangles that touch, each once.
@@ -30,6 +31,7 @@ from ._baking import bake
 from ._mesh import Mesh
 from ._poses import relative
 from ._scene import Scene
+from ._shapes import sphere
 
 EXTERNAL = "__external"
 """The name in answers of an object that is not in the manager, as in trimesh."""
@@ -61,6 +63,8 @@ def _geometry(mesh: Any) -> _Geometry:
     """A mesh as it is, or baked from its vertices and faces: each content once, as long as anybody holds it."""
     if isinstance(mesh, Mesh):
         return _Geometry(mesh)
+    if (rounded := _rounded(mesh)) is not None:
+        return _Geometry(rounded)
     try:
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
     except AttributeError:
@@ -84,6 +88,20 @@ def _geometry(mesh: Any) -> _Geometry:
         if len(_recent) > _KEPT:
             _recent.popitem(last=False)
     return geometry
+
+
+def _rounded(mesh: Any) -> Mesh | None:
+    """A ball or a capsule of trimesh as what it is, not as the faces that trimesh gives it."""
+    if not type(mesh).__module__.startswith("trimesh.primitives"):
+        return None
+    numbers, kind = mesh.primitive, type(mesh).__name__
+    if kind == "Sphere":
+        return sphere(float(numbers.radius), numbers.center)
+    if kind != "Capsule":
+        return None
+    axis, centre = numbers.transform[:3, 2] * numbers.height / 2, numbers.transform[:3, 3]
+    segment = Mesh(_cbvh.segment_core(list(centre - axis), list(centre + axis)))
+    return segment.rounded(float(numbers.radius))
 
 
 def _transform(transform: ArrayLike | None) -> Floats:

@@ -1,0 +1,88 @@
+"""Simple shapes: balls, capsules, boxes, cylinders, cones, grounds, height fields, clouds of points and voxels.
+
+Each is a `Mesh`, alone at the origin of its frame, and goes wherever a mesh goes. Round ones are a few triangles without area
+and a radius, which is exact; cylinders and cones are polyhedra around them, and say how much larger they are.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _cbvh
+from ._mesh import Mesh, _length
+
+# How much larger a polyhedron may be by default, as a fraction of the radius.
+_ROUNDNESS = 0.002
+
+
+def _lengths(values: Any, name: str, count: int) -> list[float]:
+    lengths = [_length(value, name) for value in values]
+    if len(lengths) != count:
+        raise ValueError(f"{name}: expected {count} lengths, found {len(lengths)}")
+    return lengths
+
+
+def sphere(radius: float, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
+    """A ball: a point with a radius."""
+    return Mesh(_cbvh.cloud_core(np.asarray(centre, np.float64).reshape(1, -1))).rounded(radius)
+
+
+def capsule(radius: float, length: float) -> Mesh:
+    """A segment along z with a radius, its middle at the origin. ``length``: between the centres of its caps."""
+    half = _length(length, "length") / 2
+    return Mesh(_cbvh.segment_core([0.0, 0.0, -half], [0.0, 0.0, half])).rounded(radius)
+
+
+def box(sides: ArrayLike, *, rounding: float = 0.0) -> Mesh:
+    """A solid box, its middle at the origin. ``rounding``: the radius of its edges and corners, within the sides."""
+    rounding = _length(rounding, "rounding")
+    core = [side - 2 * rounding for side in _lengths(sides, "sides", 3)]
+    return Mesh(_cbvh.block_core(core)).solid().rounded(rounding)
+
+
+def ground(sides: ArrayLike = (1000.0, 1000.0), thickness: float = 1.0) -> Mesh:
+    """The solid ground under z = 0: a box of these sides along x and y. Beyond its sides there is nothing."""
+    return Mesh(_cbvh.ground_core(_lengths(sides, "sides", 2), _length(thickness, "thickness"))).solid()
+
+
+def cylinder(radius: float, length: float, *, max_error: float | None = None) -> Mesh:
+    """A solid prism around a cylinder along z, its middle at the origin, at most ``max_error`` larger in mesh units; by
+    default 0.002 of the radius."""
+    radius = _length(radius, "radius")
+    error = _ROUNDNESS * radius if max_error is None else _length(max_error, "max_error")
+    return Mesh(_cbvh.cylinder_core(radius, _length(length, "length"), error)[0]).solid()
+
+
+def cone(radius: float, height: float, *, max_error: float | None = None) -> Mesh:
+    """A solid pyramid around a cone, its base at z = 0 and its apex at z = ``height``: see `cylinder`."""
+    radius = _length(radius, "radius")
+    error = _ROUNDNESS * radius if max_error is None else _length(max_error, "max_error")
+    return Mesh(_cbvh.cone_core(radius, _length(height, "height"), error)[0]).solid()
+
+
+def height_field(heights: ArrayLike, cell: ArrayLike) -> Mesh:
+    """A surface over a grid: ``heights`` of shape (rows, columns), rows along y, columns along x, from the origin on.
+    ``cell``: how far columns and rows are apart."""
+    grid = np.ascontiguousarray(heights, np.float64)
+    if grid.ndim != 2:
+        raise ValueError(f"heights: expected shape (rows, columns), found {grid.shape}")
+    return Mesh(_cbvh.height_field_core(grid, _lengths(cell, "cell", 2)))
+
+
+def cloud(points: ArrayLike, radius: float = 0.0) -> Mesh:
+    """Points, each a ball of this radius. ``points`` has shape (N, 3). Triangle ``i`` of answers is point ``i``."""
+    return Mesh(_cbvh.cloud_core(points)).rounded(radius)
+
+
+def voxels(cells: ArrayLike, side: float) -> Mesh:
+    """The surface of full cells of a grid, without faces between two full cells. ``cells`` has shape (N, 3), int: cell
+    (i, j, k) is the cube from (i, j, k) times the side on. Use `Mesh.solid` if what is inside counts."""
+    grid = np.asarray(cells)
+    if grid.ndim != 2 or grid.shape[1] != 3 or grid.dtype.kind not in "iu":
+        raise ValueError(f"cells: expected integers of shape (N, 3), found {grid.dtype} of shape {grid.shape}")
+    if grid.size and (grid.min() < -(2**31) or grid.max() >= 2**31):
+        raise ValueError("cells: expected numbers of 32 bits")
+    return Mesh(_cbvh.voxels_core(np.ascontiguousarray(grid, np.int32), _length(side, "side")))
