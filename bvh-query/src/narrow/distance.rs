@@ -83,6 +83,13 @@ pub(crate) fn triangle_distance(a: &Triangle, b: &Triangle) -> Closest {
     }
 }
 
+/// Does what [`triangle_distance`] does where that is rare: once for all callers.
+#[cold]
+#[inline(never)]
+pub(crate) fn triangle_distance_apart(a: &Triangle, b: &Triangle) -> Closest {
+    triangle_distance(a, b)
+}
+
 /// The largest accepted ratio of `distance - lower` to `upper - distance`; beyond it a better lower bound is sought.
 pub(super) const MAX_ERROR_ASYMMETRY: f64 = 8.0;
 

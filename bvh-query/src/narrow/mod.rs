@@ -25,7 +25,7 @@ mod rounded;
 mod winding;
 mod within;
 
-pub(crate) use distance::{Closest, triangle_distance};
+pub(crate) use distance::{Closest, triangle_distance, triangle_distance_apart};
 pub(crate) use intersect::{segment_intersects, triangles_intersect};
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};

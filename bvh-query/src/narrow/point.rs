@@ -1,4 +1,4 @@
-//! Measures the distance of a point from a closed triangle, to the bits of [`triangle_distance`] for a triangle whose corners
+//! Measures the distance of a point from a closed triangle, to the bits of [`super::triangle_distance`] for a triangle whose corners
 //! are all that point.
 //!
 //! Of the 42 candidates there, those of edges and faces without length drop out. Of three equal ones the first stays.
@@ -10,7 +10,7 @@ use super::distance::{
     perpendicular_part, reciprocal_exponent, times,
 };
 use super::intersect::triangle_contains;
-use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, subtract, triangle_distance};
+use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, subtract, triangle_distance_apart};
 
 /// Returns the distance of a point from a closed triangle, with bounds and the closest point.
 ///
@@ -51,7 +51,7 @@ pub(crate) fn point_distance(triangle: &Triangle, point: Point) -> Closest {
     let length = dot(between, between).sqrt();
     let upper = length * (1.0 + 8.0 * UNIT_ROUNDOFF) + 8.0 * UNIT_ROUNDOFF * magnitude;
     if length - lower > MAX_ERROR_ASYMMETRY * (upper - length) {
-        return triangle_distance(triangle, &[point; 3]);
+        return triangle_distance_apart(triangle, &[point; 3]);
     }
     let distance = (length * unit).max(f64::MIN_POSITIVE);
     let lower = lower * unit;

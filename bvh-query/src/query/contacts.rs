@@ -8,11 +8,11 @@ use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
 use crate::query::bounding_volumes::{sphere_gap, surely_apart};
 use crate::query::collide::{Candidates, ContactVisitor};
-use crate::query::contacts_within::{NearPairs, WithinVisitor};
+use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
-use crate::query::search::ids;
+use crate::query::search::{EachWithin, Finalists, Nearest, Search, ids};
 use crate::traverse::align::round_up;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
@@ -123,9 +123,14 @@ impl Querier {
             let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
             (tests, visitor.candidates.stats, visitor.candidates.found)
         } else {
-            let mut visitor = WithinVisitor { packets, near: NearPairs::new(placed, queue, within, visit) };
+            let (search, bounded) = (&mut Search::new(DistanceOptions::default(), within), &mut self.bounded);
+            let each_within = Some(EachWithin { d: within, visit, found: None });
+            let stats = QueryStats::default();
+            let finalists = Finalists { placed, direction: None, search, each_within, queue, bounded, stats };
+            let mut visitor = Nearest { packets, finalists };
             let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
-            (tests, visitor.near.stats, visitor.near.found)
+            let Finalists { stats, each_within, .. } = visitor.finalists;
+            (tests, stats, each_within.and_then(|each| each.found))
         };
         self.stats.add(tests, stats);
         self.memory.budget.charge(contacts)?;

@@ -139,6 +139,7 @@ impl Querier {
                 placed,
                 direction: search.direction(),
                 search,
+                each_within: None,
                 queue: &mut self.queue,
                 bounded: &mut self.bounded,
                 stats: QueryStats::default(),

@@ -6,7 +6,6 @@ pub(crate) mod batch;
 mod bounding_volumes;
 mod collide;
 mod contacts;
-mod contacts_within;
 pub(crate) mod displacement;
 mod distance;
 mod exact;

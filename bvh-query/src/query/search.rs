@@ -14,6 +14,7 @@ use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_intersect, triangles_within};
 use crate::query::answers::{Distance, QueryStats};
+use crate::query::collide::Visit;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{Found, PlacedPair};
@@ -228,10 +229,20 @@ pub(super) struct Nearest<'a> {
     pub(super) finalists: Finalists<'a>,
 }
 
+/// The question for all pairs of triangles within a distance: the contacts of rounded shapes.
+pub(super) struct EachWithin<'a> {
+    pub(super) d: f64,
+    pub(super) visit: Visit<'a>,
+    /// What `visit` broke with.
+    pub(super) found: Option<TrianglePair>,
+}
+
 /// Bounds pairs of triangles and measures those that still may be the closest.
 pub(super) struct Finalists<'a> {
     pub(super) placed: &'a PlacedPair<'a>,
     pub(super) search: &'a mut Search,
+    /// With it, the limit stays as it is, and each pair is decided.
+    pub(super) each_within: Option<EachWithin<'a>>,
     pub(super) queue: &'a mut TriangleQueue,
     pub(super) bounded: &'a mut Vec<BoundedPair>,
     /// The direction of the closest pair so far, at most of length 1.
@@ -256,6 +267,12 @@ impl Finalists<'_> {
             if lower > self.search.limit {
                 continue;
             }
+            if self.each_within.is_some() {
+                if self.decide(isa, pair)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+                continue;
+            }
             if upper < self.search.upper {
                 self.search.lower_upper(upper);
                 self.look_along(bounds.direction.map(|axis| axis[lane]));
@@ -271,6 +288,23 @@ impl Finalists<'_> {
                     return Ok(ControlFlow::Break(()));
                 }
             }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// Decides whether a pair is within the distance, and tells of it if it is.
+    #[inline(never)]
+    fn decide<I: Isa>(&mut self, isa: I, pair: TrianglePair) -> Result<ControlFlow<()>, QueryError> {
+        self.stats.exact_tests += 1;
+        let Some(each) = &mut self.each_within else { return Ok(ControlFlow::Continue(())) };
+        let a = self.placed.triangle_a(pair.a, pair.lane_a)?;
+        let b = self.placed.triangle_b(pair.b, pair.lane_b)?;
+        let closest = isa.run(TriangleDistance(&a, &b));
+        if triangles_within(&a, &b, &closest, each.d)
+            && let ControlFlow::Break(last) = (each.visit)(pair)?
+        {
+            each.found = Some(last);
+            return Ok(ControlFlow::Break(()));
         }
         Ok(ControlFlow::Continue(()))
     }
@@ -313,7 +347,8 @@ impl Visitor for Nearest<'_> {
     const MEASURE: Measure = Measure::Distance;
 
     fn order(&self) -> Order {
-        self.finalists.search.order
+        // Other orders may visit a pair of leaves twice, and each pair is told of once.
+        if self.finalists.each_within.is_some() { Order::Any } else { self.finalists.search.order }
     }
 
     #[inline(always)]

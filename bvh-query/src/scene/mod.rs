@@ -382,7 +382,8 @@ impl Scene {
         let id = |place: u32| Some(self.instances.get(place as usize)?.as_ref()?.id(place));
         let mut pairs: Vec<_> = self.pair_margins.iter().collect();
         pairs.sort_unstable_by_key(|(places, _)| **places);
-        let pair = move |(&(a, b), &margin): (&(u32, u32), &f64)| Some((ScenePair { a: id(a)?, b: id(b)? }, margin));
+        let pair =
+            move |(&(a, b), &margin): (&(u32, u32), &f64)| Some((ScenePair { a: id(a)?, b: id(b)? }, margin));
         pairs.into_iter().filter_map(pair)
     }
 

@@ -35,6 +35,25 @@ impl Mesh {
         self.shape.bvh().bytes().len()
     }
 
+    /// The same core with a radius, which shares the bytes.
+    pub fn rounded(&self, radius: f64) -> Answer<Mesh> {
+        Ok(Self { shape: self.shape.clone().rounded(radius).map_err(refused)? })
+    }
+
+    /// The same mesh, of which the inside counts as well.
+    pub fn solid(&self) -> Answer<Mesh> {
+        Ok(Self { shape: self.shape.clone().solid().map_err(refused)? })
+    }
+
+    pub fn radius(&self) -> f64 {
+        self.shape.shape().radius()
+    }
+
+    #[wasm_bindgen(js_name = isSolid)]
+    pub fn is_solid(&self) -> bool {
+        self.shape.shape().is_solid()
+    }
+
     /// One object of the file, which shares its bytes.
     pub fn object(&self, number: f64) -> Answer<Mesh> {
         let bvh = self.shape.bvh().clone();

@@ -176,6 +176,28 @@ impl Scene {
         answers::ids(allowed.into_iter().flatten())
     }
 
+    #[wasm_bindgen(js_name = setMargin)]
+    pub fn set_margin(&mut self, number: u32, margin: f64) -> Answer<()> {
+        let id = self.id(number, "id")?;
+        self.scene.set_margin(id, margin).map_err(|error| self.refused(error))
+    }
+
+    pub fn margin(&self, number: u32) -> Answer<f64> {
+        self.scene.margin(self.id(number, "id")?).map_err(|error| self.refused(error))
+    }
+
+    #[wasm_bindgen(js_name = setPairMargin)]
+    pub fn set_pair_margin(&mut self, a: u32, b: u32, margin: f64) -> Answer<()> {
+        let (first, second) = (self.id(a, "a")?, self.id(b, "b")?);
+        self.scene.set_pair_margin(first, second, margin).map_err(|error| self.refused(error))
+    }
+
+    #[wasm_bindgen(js_name = pairMargin)]
+    pub fn pair_margin(&self, a: u32, b: u32) -> Answer<f64> {
+        let (first, second) = (self.id(a, "a")?, self.id(b, "b")?);
+        self.scene.pair_margin(first, second).map_err(|error| self.refused(error))
+    }
+
     pub fn find(&self, name: &str) -> Option<u32> {
         self.scene.find(name).map(|id| self.number(id))
     }

@@ -6,7 +6,7 @@ use crate::motions::{FREE, HIT, NEAR, options};
 use crate::paths;
 use crate::probes::{Rays, segments};
 use crate::scene::{Scene, beside};
-use bvh_query::{Contact, Distance, InstanceId, Pose, RigidPath, SceneError, SceneMotionAnswer};
+use bvh_query::{Contact, Distance, InstanceId, OwnedShape, Pose, RigidPath, SceneError, SceneMotionAnswer};
 use js_sys::{Array, Float64Array, Int8Array, Int32Array, Uint8Array, Uint32Array};
 use wasm_bindgen::prelude::*;
 
@@ -88,7 +88,14 @@ impl Scene {
             ));
         }
         let distance = |&[a, b]: &[u32; 2]| {
+            // The margin of the pair goes to A.
+            let margins = [self.margin(a)? + self.pair_margin(a, b)?, self.margin(b)?];
             let ((pose_a, a), (pose_b, b)) = (self.placed(a, "pairs")?, self.placed(b, "pairs")?);
+            let grown = |shape: OwnedShape, margin: f64| {
+                let radius = shape.shape().radius() + margin;
+                shape.rounded(radius).map_err(refused)
+            };
+            let (a, b) = (grown(a, margins[0])?, grown(b, margins[1])?);
             let pose = Pose::relative(&pose_a, &pose_b).map_err(refused)?;
             with_querier(|querier| querier.distance(&a, &b, &pose).map(Some).map_err(refused))
         };

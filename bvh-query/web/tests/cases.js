@@ -235,6 +235,40 @@ export const cases = {
         equal(scene.segmentHits([2, 0, 1], [2, 0, 9]), [0]);
     },
 
+    "simple shapes are exact, and margins count in every question": (cbvh) => {
+        const [two, three] = [cbvh.sphere(2), cbvh.sphere(3)];
+        ok(two.collide(three, at(3, 4, 0)), "radii that add up to the distance");
+        ok(!two.collide(cbvh.sphere(3 - 2 ** -50), at(3, 4, 0)), "radii that do not");
+        equal(two.distance(three, at(0, 0, 7)).distance, 2);
+        equal(two.radius, 2);
+        equal([...two.sides([2, 0, 0, 1, 1, 1, 3, 0, 0])], [cbvh.Side.ON, cbvh.Side.INSIDE, cbvh.Side.OUTSIDE]);
+        equal(two.anyHits([-5, 0, 0, -5, 2, 0, -5, 2.5, 0], [1, 0, 0, 1, 0, 0, 1, 0, 0]), [1, 1, 0]);
+        ok(/all_hits/.test(refused(() => two.allHits([-5, 0, 0], [1, 0, 0]))), "why not");
+        const box = cbvh.box([2, 2, 2], 0.25);
+        ok(box.isSolid && box.collide(cbvh.sphere(0), at(0.5, 0, 0)), "what is inside a solid");
+        ok(!cubeOf(cbvh).collide(cbvh.sphere(0), at(0.5, 0, 0)), "what is inside a surface");
+        equal(box.distance(cbvh.sphere(0), at(2, 0, 0)).distance, 1);
+        equal(cbvh.capsule(0.5, 2).distance(cbvh.sphere(0.5), at(0, 0, 3)).distance, 1);
+        const cloud = cbvh.cloud([0, 0, 0, 1, 0, 0, 1, 0, 0], 0.25);
+        equal([...cloud.contacts(cbvh.sphere(0.25), at(1.5, 0, 0))].filter((_, k) => k % 4 === 1), [1, 2]);
+        const scene = new cbvh.Scene();
+        scene.add(two, null, { name: "two" });
+        scene.add(three, at(0, 0, 6), { name: "three" });
+        equal([scene.collide(), scene.distance().nearest.distance], [false, 1]);
+        scene.setMargin("two", 0.25);
+        scene.setPairMargin("three", "two", 0.5);
+        equal([scene.margin("two"), scene.pairMargin(0, 1)], [0.25, 0.5]);
+        equal([scene.distance().nearest.distance, scene.distances([0, 1]).distance[0]], [0.25, 0.25]);
+        scene.setMargin("three", 0.25);
+        equal([scene.collide(), [...scene.pairsInContact()]], [true, [0, 1]]);
+        for (const wrong of [-1, NaN, Infinity]) {
+            ok(/radius/.test(refused(() => two.rounded(wrong))), "radius");
+            ok(/margin/.test(refused(() => scene.setMargin("two", wrong))), "margin");
+            ok(/sides/.test(refused(() => cbvh.box([1, 1, wrong]))), "sides");
+        }
+        ok(/closed/.test(refused(() => cbvh.Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]).solid())), "open");
+    },
+
     "poses come of quaternions, rounded matrices and pairs of poses": (cbvh) => {
         equal(cbvh.pose([1, 2, 3, 4, 5, 6]), [...at(1, 2, 3), ...at(4, 5, 6)]);
         equal(cbvh.pose([1, 2, 3], [0, 0, 1, 0]), [-1, 0, 0, 1, 0, -1, 0, 2, 0, 0, 1, 3]);

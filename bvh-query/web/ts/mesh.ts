@@ -176,6 +176,31 @@ export class Mesh extends Handle<raw.Mesh> {
         return this.#call((mesh) => mesh.names());
     }
 
+    /**
+     * Returns the same triangles with a radius in mesh units: all points at most that far from them. It replaces the radius that
+     * the mesh has. Two shapes touch if their triangles are no farther apart than the sum of their radii, exactly, and their
+     * distance is that of the triangles less the sum, at least 0. The new mesh shares the bytes, and is freed separately.
+     */
+    rounded(radius: number): Mesh {
+        const length = float(radius, "radius");
+        return new Mesh(this.#call((mesh) => mesh.rounded(length)));
+    }
+
+    /** Returns the same mesh as a solid: what is inside it touches it, at distance 0. It must be closed. */
+    solid(): Mesh {
+        return new Mesh(this.#call((mesh) => mesh.solid()));
+    }
+
+    /** How far the shape reaches from its triangles, in mesh units. */
+    get radius(): number {
+        return this.#call((mesh) => mesh.radius());
+    }
+
+    /** Whether what is inside touches the mesh. */
+    get isSolid(): boolean {
+        return this.#call((mesh) => mesh.isSolid());
+    }
+
     /** Returns one object of the file, by number or name. It shares the bytes, and is freed separately. */
     object(object: number | string): Mesh {
         return new Mesh(

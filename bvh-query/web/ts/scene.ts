@@ -155,6 +155,30 @@ export class Scene extends Handle<raw.Scene> {
         return this.#call((scene) => scene.allowed());
     }
 
+    /** Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first. */
+    setMargin(id: Instance, margin: number): void {
+        const [number, length] = [this.#number(id, "id"), float(margin, "margin")];
+        this.#call((scene) => scene.setMargin(number, length));
+    }
+
+    /** Returns the margin of an instance. */
+    margin(id: Instance): number {
+        const number = this.#number(id, "id");
+        return this.#call((scene) => scene.margin(number));
+    }
+
+    /** Gives a pair of instances a further margin in mesh units. 0 at first. */
+    setPairMargin(a: Instance, b: Instance, margin: number): void {
+        const [first, second, length] = [this.#number(a, "a"), this.#number(b, "b"), float(margin, "margin")];
+        this.#call((scene) => scene.setPairMargin(first, second, length));
+    }
+
+    /** Returns the margin that a pair has of its own. */
+    pairMargin(a: Instance, b: Instance): number {
+        const [first, second] = [this.#number(a, "a"), this.#number(b, "b")];
+        return this.#call((scene) => scene.pairMargin(first, second));
+    }
+
     /** Returns the number of the instance with a name, or `undefined` if there is none. */
     find(name: string): number | undefined {
         const called = text(name, "name");
