@@ -210,13 +210,13 @@ fn bad_files_are_named_with_line_and_remedy() {
     let good = directory.text("s.scene");
     let pose = "1 0 0 0 0 1 0 0 0 0 1 0";
     for (line, code, words) in [
-        ("mesh ring cube.obj", 3, "line 8: expected a name of its own, found a second mesh \"ring\""),
+        ("mesh ring cube.obj", 3, "line 8: expected a name of its own, found a second shape \"ring\""),
         ("mesh new no.obj", 2, "no.obj: expected a readable file"),
         (&format!("instance a ring {pose}"), 3, "found a second instance \"a\""),
-        (&format!("instance d sphere {pose}"), 3, "expected a mesh of an earlier line, found \"sphere\""),
+        (&format!("instance d sphere {pose}"), 3, "expected a shape of an earlier line, found \"sphere\""),
         ("instance d ring 1 2 3", 3, "line 8: expected 12 numbers"),
         ("instance d ring 9 0 0 0 0 0 2", 3, "line 8: expected a quaternion"),
-        ("instance d ring", 3, "expected 12 numbers, or 7, after the mesh, found none"),
+        ("instance d ring", 3, "expected 12 numbers, or 7, after the shape, found none"),
         ("instance d ring 2 0 0 0 0 2 0 0 0 0 2 0", 3, "scaled by 2; bake the mesh at its size"),
         ("instance d ring 1 3e-7 0 0 0 1 0 0 0 0 1 0", 3, "instance d: expected a rotation within 2^-23"),
         ("moving b", 3, "expected each instance once, found \"b\" again"),
@@ -224,7 +224,7 @@ fn bad_files_are_named_with_line_and_remedy() {
         ("allow a d", 3, "expected an instance of an earlier line, found \"d\""),
         ("allow a a", 3, "line 8: expected two instances, found \"a\" twice"),
         ("moving", 3, "line 8: expected the names of instances after moving, found none"),
-        ("allow a", 3, "line 8: expected mesh NAME FILE, instance NAME MESH POSE"),
+        ("allow a", 3, "line 8: expected mesh NAME FILE, sphere NAME R"),
         ("robot x", 3, "found \"robot x\""),
     ] {
         directory.write("s.scene", format!("{good}{line}\n"));
@@ -397,4 +397,121 @@ fn meshes_of_very_different_size_are_pointed_out_once() {
     let ended = directory.cbvh("scene s.scene");
     assert_eq!((ended.code, ended.err.lines().count()), (0, 1), "{ended:?}");
     assert!(ended.err.contains("small.obj is about 2.000") && ended.err.contains("same unit?"), "{ended:?}");
+}
+
+/// Simple shapes, with distances that are known.
+#[test]
+fn scenes_have_simple_shapes_and_margins() {
+    let place = place();
+    place.write("p.xyz", "# two points\n0 0 0\n\n1 0 0 # the second\n");
+    let at = |x: &str| format!("1 0 0 {x}  0 1 0 0  0 0 1 0");
+    let shapes =
+        "sphere ball 2\ncapsule pill 0.5 2\nbox brick 2 4 6\ncylinder pipe 1 4\ncloud dots p.xyz 0.25\n";
+    for (pair, more, expected) in [
+        (["ball 0", "ball 5"], "", 1.0),
+        (["ball 0", "ball 4"], "", 0.0),
+        (["ball 0", "pill 5"], "", 2.5),
+        (["brick 0", "ball 5"], "", 2.0),
+        (["brick 0", "dots 0.5"], "", 0.0),
+        (["dots 0", "ball 4"], "", 0.75),
+        (["ball 0", "ball 5"], "margin a 0.25\nmargin b 0.5\n", 0.25),
+        (["ball 0", "ball 5"], "margin a 0.5\nmargin b 0.5\n", 0.0),
+    ] {
+        let instance = |name: &str, text: &str| {
+            let (shape, x) = text.split_once(' ').unwrap();
+            format!("instance {name} {shape} {}\n", at(x))
+        };
+        let [a, b] = [instance("a", pair[0]), instance("b", pair[1])];
+        place.write("s.scene", format!("{shapes}{a}{b}{more}"));
+        let distance = cbvh_in(&place, &["scene", "s.scene", "--mode", "distance"]).done().out;
+        assert_eq!(distance.trim().parse::<f64>().unwrap(), expected, "{pair:?} {more}");
+        let touching = cbvh_in(&place, &["scene", "s.scene", "--mode", "collide"]).done().out;
+        assert_eq!(touching.trim() == "1", expected == 0.0, "{pair:?} {more}");
+        let list =
+            cbvh_in(&place, &["scene", "s.scene", "--mode", "distance", "--list", "--json"]).done().out;
+        assert!(list.contains("\"others\":[]"), "{list}");
+    }
+    // Of the prism around a cylinder, the distance may be that much less.
+    place.write("s.scene", format!("{shapes}instance a pipe {}\ninstance b ball {}\n", at("0"), at("5")));
+    let distance = cbvh_in(&place, &["scene", "s.scene", "--mode", "distance"]).done().out;
+    let distance: f64 = distance.trim().parse().unwrap();
+    assert!((2.0 - 0.005..=2.0).contains(&distance), "{distance}");
+    for (line, expected) in [
+        ("sphere s -1", "line 6: R: expected a finite length of at least 0, found \"-1\""),
+        ("capsule s 1 nan", "line 6: LENGTH: expected a finite length"),
+        ("box s 1 0 1", "line 6: side: expected a finite length above 0, found 0"),
+        ("cylinder s 1 inf", "line 6: LENGTH: expected a finite length"),
+        (
+            "sphere s 1e300\ninstance c s 1 0 0 0  0 1 0 0  0 0 1 0",
+            "line 6: radius: expected a length from 0 to 2^118",
+        ),
+        ("sphere ball 1", "line 6: expected a name of its own, found a second shape \"ball\""),
+        ("margin a 1", "line 6: expected an instance of an earlier line, found \"a\""),
+        ("cloud more none.xyz 1", "none.xyz"),
+    ] {
+        place.write("s.scene", format!("{shapes}{line}\ninstance a ball {}\n", at("0")));
+        let ended = cbvh_in(&place, &["scene", "s.scene"]);
+        assert!(ended.err.contains(expected), "{line}: {}", ended.err);
+    }
+    for (points, expected) in [
+        ("0 0 0\n1 nan 0\n", "line 2: expected finite numbers, found \"nan\""),
+        ("0 0\n", "line 1: expected three numbers, found 2"),
+        ("# none\n", "expected at least one line of a point, found none"),
+    ] {
+        place.write("p.xyz", points);
+        place.write("s.scene", format!("cloud dots p.xyz 1\ninstance a dots {}\n", at("0")));
+        let ended = cbvh_in(&place, &["scene", "s.scene"]);
+        assert!(ended.code == 3 && ended.err.contains(expected), "{points}: {}", ended.err);
+    }
+}
+
+/// The open scenes with shapes: every answer is right, and the same on every backend and on two threads.
+#[test]
+fn open_scenes_with_shapes_have_true_answers() {
+    let Some(folder) = common::shared("shapes") else {
+        common::skip("there is no folder shared beside the checkout, with scenes of shapes");
+        return;
+    };
+    let place = place();
+    for name in ["cell", "cloud", "padded", "robot"] {
+        let [scene, frames] = [".scene", "_frames.txt"].map(|end| folder.join(format!("{name}{end}")));
+        let truth = fs::read_to_string(folder.join(format!("{name}.truth"))).unwrap();
+        let size = truth.lines().find_map(|line| line.strip_prefix("# size ")).unwrap();
+        let slack = 1e-9 * size.parse::<f64>().unwrap();
+        let ask = |mode: &str, more: &[&str]| {
+            let asked = [&["scene", scene.to_str().unwrap(), frames.to_str().unwrap(), "--mode", mode], more]
+                .concat();
+            cbvh_in(&place, &asked).done().out
+        };
+        let (distances, pairs) = (ask("distance", &[]), ask("pairs", &[]));
+        let lines = truth.lines().filter(|line| !line.starts_with('#'));
+        let (mut frames, mut touching) = (0, 0);
+        for ((line, distance), count) in lines.zip(distances.lines()).zip(pairs.lines()) {
+            let words: Vec<&str> = line.split(' ').collect();
+            let (distance, count): (f64, u32) = (distance.parse().unwrap(), count.parse().unwrap());
+            let (most, least): (f64, f64) = (words[0].parse().unwrap(), words[2].parse().unwrap());
+            assert!(
+                least - slack <= distance && distance <= most + slack,
+                "{name} {frames}: {distance}, {line}"
+            );
+            assert_eq!(distance == 0.0, count > 0, "{name} {frames}");
+            if words[1] != "?" {
+                let (least, most): (u32, u32) =
+                    (words[1].parse().unwrap(), words[3].parse().unwrap_or(u32::MAX));
+                assert!((least..=most).contains(&count), "{name} {frames}: {count}, {line}");
+            }
+            frames += 1;
+            touching += u32::from(count > 0);
+        }
+        assert!(frames > 40 && touching > 10, "{name}: {frames} frames");
+        for isa in backends(&place) {
+            for jobs in ["1", "2"] {
+                assert_eq!(
+                    ask("distance", &["--isa", isa, "--jobs", jobs]),
+                    distances,
+                    "{name} {isa} {jobs}"
+                );
+            }
+        }
+    }
 }

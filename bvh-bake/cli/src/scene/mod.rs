@@ -9,7 +9,8 @@ use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure};
 use crate::options::not_negative;
 use bvh_query::{
-    Backend, InstanceError, Pose, Querier, QueryError, Relation, Scene, SceneDistance, SceneError, ScenePair,
+    Backend, InstanceError, OwnedShape, Pose, Querier, QueryError, Relation, Scene, SceneDistance,
+    SceneError, ScenePair,
 };
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
@@ -27,10 +28,16 @@ SCENE is a file made by cbvh bake --scene, or a text file. FRAMES move all insta
 stand where the file says. A text file has one item per line; # starts a comment, and file names are relative to it:
 
   mesh NAME FILE              a mesh file, which is baked in memory first, or a .cbvh file
-  instance NAME MESH POSE     a mesh in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: x y z \
+  sphere NAME R               a ball
+  capsule NAME R LENGTH       a capsule along z; LENGTH is between the centres of its caps
+  box NAME X Y Z              a solid box with these sides
+  cylinder NAME R LENGTH      a solid prism along z around a cylinder, at most 0.002 R larger
+  cloud NAME FILE R           the points of a file, three numbers per line, each a ball
+  instance NAME SHAPE POSE    a shape in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: x y z \
 of the position, then x y z w of a unit quaternion
   moving NAME...              the instances that frames move, in the order of their poses
   allow NAME NAME             two instances that may touch; this pair is never asked about
+  margin NAME R               an instance that reaches R farther on all sides
 
 Write names and files with spaces in quotes: \"left arm\".
 
@@ -225,7 +232,12 @@ fn others(
     let mut found = Vec::new();
     let mut querier = Querier::with_backend(backend);
     for pair in scene.pairs_within(f64::MAX)? {
-        let (a, b) = (scene.shape(pair.a)?.opened()?, scene.shape(pair.b)?.opened()?);
+        let shape = |id| -> Result<OwnedShape, SceneError> {
+            let shape = scene.shape(id)?.opened()?;
+            let radius = shape.shape().radius() + scene.margin(id)?;
+            Ok(shape.rounded(radius)?)
+        };
+        let (a, b) = (shape(pair.a)?, shape(pair.b)?);
         let Ok(pose) = Pose::relative(scene.pose(pair.a)?, scene.pose(pair.b)?) else { continue };
         if Some(pair) != nearest {
             found.push((pair, querier.distance(&a, &b, &pose)?.distance));
