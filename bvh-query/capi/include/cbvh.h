@@ -32,9 +32,10 @@
  * Threads. Functions may be called on any thread. Many threads may use a mesh or a path at the same time. Only one
  * thread at a time may use a querier, a tracker or a scene; a second one gets CBVH_BUSY. Make one querier for each
  * thread. While no thread uses or changes a scene, many threads may clone it or call cbvh_scene_find, _instances,
- * _instance_name, _instance_pose, _instance_mesh or _stats. A mesh or a path may be freed while other threads use it:
- * it lives until their questions end. cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all
- * cores. The number of threads is that of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
+ * _instance_name, _instance_pose, _instance_mesh, _instance_margin, _pair_margin or _stats. A mesh or a path may be
+ * freed while other threads use it: it lives until their questions end. cbvh_querier_set_parallel and
+ * cbvh_scene_set_parallel let one question use all cores. The number of threads is that of the environment variable
+ * RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
  * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
@@ -112,7 +113,7 @@ cbvh_status cbvh_abi(uint32_t *abi);
 
 /* --------------------------------------------------------------------------------------------------------- handles */
 
-/* A baked mesh: all objects of a file, or one of them. */
+/* A baked mesh: all objects of a file, or one of them. It may have a radius, and may be solid. */
 typedef struct cbvh_mesh { uint64_t id; } cbvh_mesh;
 /* A querier answers questions. It keeps its working memory from question to question. */
 typedef struct cbvh_querier { uint64_t id; } cbvh_querier;
@@ -183,7 +184,8 @@ cbvh_status cbvh_mesh_clone(cbvh_mesh mesh, cbvh_mesh *other);
  * questions until it is freed, or until the next question about any open mesh. */
 cbvh_status cbvh_mesh_free(cbvh_mesh mesh);
 
-/* Makes a mesh of one object in the file of a mesh. CBVH_NOT_FOUND if the file has no object of this number. */
+/* Makes a mesh of one object in the file of a mesh, without a radius and not solid. CBVH_NOT_FOUND if the file has no
+ * object of this number. */
 cbvh_status cbvh_mesh_object(cbvh_mesh mesh, size_t number, cbvh_mesh *object);
 /* Writes how many objects the file of a mesh has: at least one. */
 cbvh_status cbvh_mesh_object_count(cbvh_mesh mesh, size_t *count);
@@ -198,13 +200,28 @@ cbvh_status cbvh_mesh_triangle_count(cbvh_mesh mesh, uint64_t *count);
  * triangles are stored once. */
 cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *triangles, size_t capacity,
                                  size_t *count);
-/* Writes the bytes of the file that a mesh is in, and how many there are. */
+/* Writes the bytes of the file that a mesh is in, and how many there are. Neither a radius nor solidity is in them. */
 cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_t *size);
 /* Writes a mesh to a file, completely or not at all: it writes another file, which then replaces the first. Anything
  * under this name is replaced, also a symbolic link. */
 cbvh_status cbvh_mesh_save(cbvh_mesh mesh, const char *path);
 /* Checks the whole file of a mesh, which is read once. CBVH_DAMAGED, with the first rule that the file breaks. */
 cbvh_status cbvh_mesh_validate(cbvh_mesh mesh);
+
+/* Makes another handle of the same mesh with a radius, in mesh units from 0 to 2^118, which replaces the one that it
+ * has. Nothing is copied. The new mesh is all points at most that far from the triangles. Two meshes touch if their
+ * triangles are no farther apart than the sum of both radii, which is rounded to nearest; the comparison is exact.
+ * Their distance is that of the triangles less the sum. CBVH_INVALID_ARGUMENT for a radius that is negative, NaN or
+ * above 2^118. */
+cbvh_status cbvh_mesh_rounded(cbvh_mesh mesh, double radius, cbvh_mesh *rounded);
+/* Makes another handle of the same mesh as a solid, with the same radius: what is inside it touches it, and is at
+ * distance 0. CBVH_INVALID_ARGUMENT if an object of the mesh is not closed and consistently oriented, or if the file
+ * was baked without topology. CBVH_DAMAGED if the topology is damaged. */
+cbvh_status cbvh_mesh_solid(cbvh_mesh mesh, cbvh_mesh *solid);
+/* Writes the radius of a mesh: 0 if it was given none. */
+cbvh_status cbvh_mesh_radius(cbvh_mesh mesh, double *radius);
+/* Writes whether a mesh is solid. */
+cbvh_status cbvh_mesh_is_solid(cbvh_mesh mesh, bool *is_solid);
 
 /* How a mesh is baked. The names are those of the command `cbvh bake`, which explains them. */
 typedef struct cbvh_bake_options {
@@ -245,6 +262,50 @@ cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_
  * output that is up to date is not written again. `was_up_to_date` then gets 1, else 0; it may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);
+
+/* --------------------------------------------------------------------------------------------------- simple shapes
+ *
+ * Each function bakes a mesh in memory, with the default options. With cbvh_mesh_rounded and cbvh_mesh_solid, it
+ * becomes
+ *
+ *     a ball            a cloud of one point, with a radius
+ *     a capsule         a segment, with a radius
+ *     a rounded box     a box whose sides are shorter by two radii, solid, with a radius
+ *     balls             a cloud, with the radius of each ball
+ *     a solid           a box, ground, cylinder or cone, or voxels, solid
+ *
+ * Lengths are in mesh units. CBVH_INVALID_ARGUMENT for a length that is not finite and above 0. Points and sides are 3
+ * numbers each, unless stated otherwise. CBVH_BAKE_FAILED if a coordinate is not finite or beyond 2^120, or if there
+ * are no points or cells. Vertices are rounded as those of cbvh_bake are, to floats around one origin in double.
+ * Surfaces look outwards. */
+
+/* Bakes points, as triangles without area. Triangle `i` of answers is point `i`. Equal points stay: in contacts, each
+ * is a triangle of its own. */
+cbvh_status cbvh_bake_cloud(const double *points, size_t count, cbvh_mesh *mesh);
+/* Bakes the segment between two points, which may be equal. */
+cbvh_status cbvh_bake_segment(const double *from, const double *to, cbvh_mesh *mesh);
+/* Bakes a box with these sides along x, y and z. Its middle is at the origin. */
+cbvh_status cbvh_bake_box(const double *sides, cbvh_mesh *mesh);
+/* Bakes the ground under z = 0: a box with two sides along x and y, centred at the origin, and a thickness along z.
+ * There is nothing beyond its sides. */
+cbvh_status cbvh_bake_ground(const double *sides, double thickness, cbvh_mesh *mesh);
+/* Bakes a prism around a cylinder, whose axis is z and whose middle is at the origin. No point of the prism is farther
+ * from the cylinder than `error`, which is at most `most_error` and what the rounding of vertices adds; `error` may be
+ * NULL. CBVH_INVALID_ARGUMENT if the prism would need more than 4,096 sides: if `most_error` is less than about 3e-7 of
+ * the radius. */
+cbvh_status cbvh_bake_cylinder(double radius, double length, double most_error, double *error, cbvh_mesh *mesh);
+/* Bakes a pyramid around a cone, whose base is centred at the origin in the plane z = 0 and whose apex is at z =
+ * `height`. The errors are those of cbvh_bake_cylinder. */
+cbvh_status cbvh_bake_cone(double radius, double height, double most_error, double *error, cbvh_mesh *mesh);
+/* Bakes a surface over a grid, without a thickness: `heights` has the z of `columns` points along x, row by row along
+ * y. `cell` is 2 numbers: how far columns and rows are apart. The first point is at x = y = 0. There are 2 triangles
+ * per cell. CBVH_INVALID_ARGUMENT for fewer than 2 columns or 2 rows. */
+cbvh_status cbvh_bake_height_field(const double *heights, size_t columns, size_t rows, const double *cell,
+                                   cbvh_mesh *mesh);
+/* Bakes the surface of full cells of a grid, without the faces between two full cells. A cell is 3 numbers i, j, k, and
+ * stands for the cube from (i, j, k) times `side` to (i + 1, j + 1, k + 1) times `side`. A cell that is given twice
+ * counts once. The mesh can be solid unless cells touch in an edge or a corner only. */
+cbvh_status cbvh_bake_voxels(const int32_t *cells, size_t count, double side, cbvh_mesh *mesh);
 
 /* -------------------------------------------------------------------------------------------------------- queriers */
 
@@ -290,10 +351,10 @@ cbvh_status cbvh_querier_stats(cbvh_querier querier, cbvh_stats *stats);
 
 /* --------------------------------------------------------------------------------------- questions about two meshes
  *
- * Each function takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces. Touching is
- * contact, exactly. The functions fail with CBVH_DAMAGED if a page that a question touches is damaged, and with
- * CBVH_LIMIT if the budget of the querier does not suffice. A question about small or separated meshes takes about a
- * microsecond; a call adds some 0.1. */
+ * Each function takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces unless they are
+ * solid. Touching is contact, exactly. The functions fail with CBVH_DAMAGED if a page that a question touches is
+ * damaged, and with CBVH_LIMIT if the budget of the querier does not suffice. A question about small or separated
+ * meshes takes about a microsecond; a call adds some 0.1. */
 
 /* Answers whether the meshes touch. */
 cbvh_status cbvh_collide(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
@@ -327,8 +388,8 @@ cbvh_status cbvh_relations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const
 typedef struct cbvh_distance_answer {
     /* The distance; 0 if and only if the meshes touch. */
     double distance;
-    /* A certified lower bound: the two triangles named here are at least this far apart. If an error was allowed, no two
-     * triangles are nearer. */
+    /* A certified lower bound: the two triangles named here are at least this far apart, less the radii of the meshes.
+     * If an error was allowed, no two triangles are nearer. */
     double lower;
     /* A certified upper bound: the meshes are at most this far apart. */
     double upper;
@@ -363,15 +424,17 @@ typedef struct cbvh_contact {
     uint32_t triangle_b;
 } cbvh_contact;
 
-/* Lists all pairs of triangles in contact in ascending order, pose after pose. `counts` gets the number of pairs of
- * each pose, and may be NULL. On one core, this takes at most four times the memory of the buffer, however many pairs
- * there are. For many poses on all cores, it takes the memory of all pairs. */
+/* Lists all pairs of triangles in contact in ascending order, pose after pose: those no farther apart than the sum of
+ * the radii. What is wholly inside a solid mesh has none. `counts` gets the number of pairs of each pose, and may be
+ * NULL. On one core, this takes at most four times the memory of the buffer, however many pairs there are. For many
+ * poses on all cores, it takes the memory of all pairs. */
 cbvh_status cbvh_contacts(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t pose_count,
                           size_t *counts, cbvh_contact *contacts, size_t capacity, size_t *count);
 /* Writes the number of the first pose in which the meshes touch, or `count` if they touch in none. */
 cbvh_status cbvh_first_collision(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                                  size_t *number);
-/* Writes an upper bound of how far any point of B moves from one pose to another. */
+/* Writes an upper bound of how far any point of B's triangles moves from one pose to another. No distance from B
+ * changes by more, whatever its radius. */
 cbvh_status cbvh_displacement(cbvh_mesh b, const cbvh_pose *from, const cbvh_pose *to, double *bound);
 
 /* Makes a tracker. */
@@ -426,7 +489,8 @@ cbvh_status cbvh_callback_message(const char *message);
 cbvh_status cbvh_path_free(cbvh_path path);
 /* Writes where B is at a time from 0 to 1. */
 cbvh_status cbvh_path_pose(cbvh_path path, double t, cbvh_pose *result);
-/* Writes an upper bound of how far any point of B is, from t0 to t1, from its place in the middle of that time. */
+/* Writes an upper bound of how far any point of B's triangles is, from t0 to t1, from its place in the middle of that
+ * time. */
 cbvh_status cbvh_path_reach(cbvh_mesh b, cbvh_path path, double t0, double t1, double *bound);
 
 /* What counts as a hit, and how exactly time is searched. */
@@ -434,8 +498,9 @@ typedef struct cbvh_motion_options {
     size_t size;
     /* Meshes that are at most this far apart count as a hit; 0 for contact. Finite, at least 0. */
     double clearance;
-    /* The width of the undecided range beyond the clearance: if B comes that near and is no hit, the answer may be near. 0
-     * for a millionth of the diagonal of the larger object's box. A smaller tolerance costs more. */
+    /* The width of the undecided range beyond the clearance: if B comes that near and is no hit, the answer may be
+     * near. 0 for a millionth of the diagonal of the larger object's box, radius included. A smaller tolerance costs
+     * more. */
     double tolerance;
 } cbvh_motion_options;
 
@@ -503,8 +568,9 @@ enum {
 
 /* The closest point of a mesh. */
 typedef struct cbvh_closest_point {
-    /* The distance; 0 if and only if the given point is on the mesh. It is not negative inside; `side` tells the side.
-     * */
+    /* The distance; 0 if and only if the given point is on the mesh or within its radius. It is not negative inside;
+     * `side` tells the side. The signed distance inside a mesh with a radius is the radius less the distance from the
+     * triangles or, inside these, the sum of both. */
     double distance;
     /* The distance certainly lies between these. */
     double lower;
@@ -525,7 +591,8 @@ typedef struct cbvh_closest_point {
 /* Answers where the closest surface to each point is, if it is at most `within` away, which may be infinite. */
 cbvh_status cbvh_closest_points(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
                                 size_t count, double within, cbvh_closest_point *answers);
-/* Answers on which side each point is, exactly. */
+/* Answers on which side each point is, exactly. A point is inside a mesh with a radius if it is nearer to the triangles
+ * than the radius, or inside them. */
 cbvh_status cbvh_sides(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points, size_t count,
                        cbvh_side *answers);
 /* Answers both questions. */
@@ -560,14 +627,15 @@ typedef struct cbvh_ray_hit {
 } cbvh_ray_hit;
 
 /* Answers where each ray first hits. It is decided exactly which triangle is hit. Edges and corners belong to
- * triangles. */
+ * triangles. A ray hits a mesh with a radius where it first comes within the radius, and at 0 if it starts there.
+ * Whether it does is exact. */
 cbvh_status cbvh_first_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                             size_t count, cbvh_ray_hit *answers);
 /* Answers whether each ray hits at all. */
 cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t count, bool *answers);
 /* Lists all hits, ray after ray, in the order along each ray. Hits at exactly the same parameter count as one. `counts`
- * gets the number of hits of each ray, and may be NULL. */
+ * gets the number of hits of each ray, and may be NULL. CBVH_INVALID_ARGUMENT for a mesh with a radius. */
 cbvh_status cbvh_all_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t ray_count, size_t *counts, cbvh_ray_hit *hits, size_t capacity, size_t *count);
 
@@ -591,7 +659,7 @@ cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
 /* Makes a scene with the instances of a file of `cbvh bake --scene`, which is mapped as by CBVH_MAP.
  * CBVH_INVALID_ARGUMENT for a .cbvh file without instances. */
 cbvh_status cbvh_scene_open(const char *path, cbvh_scene *scene);
-/* Makes a scene with the instances in the file of a mesh. */
+/* Makes a scene with the instances in the file of a mesh. They have no radius. */
 cbvh_status cbvh_scene_of_mesh(cbvh_mesh mesh, cbvh_scene *scene);
 /* Makes a copy of a scene with the same instances, which shares their meshes. */
 cbvh_status cbvh_scene_clone(cbvh_scene scene, cbvh_scene *other);
@@ -623,6 +691,12 @@ cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instance
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
 /* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
 cbvh_status cbvh_scene_set_allowed(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t allowed);
+/* Gives an instance a margin in mesh units from 0 to 2^118, which is added to the radius of its mesh in every question.
+ * It is 0 at first. CBVH_INVALID_ARGUMENT for a margin that is negative, NaN or above 2^118. */
+cbvh_status cbvh_scene_set_margin(cbvh_scene scene, cbvh_instance instance, double margin);
+/* Gives a pair of instances a margin besides those of both. Questions about the pair add it to the margin of A. It is 0
+ * at first, and goes when an instance of the pair is removed. */
+cbvh_status cbvh_scene_set_pair_margin(cbvh_scene scene, cbvh_instance a, cbvh_instance b, double margin);
 /* Writes the instance with a name. CBVH_NOT_FOUND if there is none. */
 cbvh_status cbvh_scene_find(cbvh_scene scene, const char *name, cbvh_instance *instance);
 /* Lists all instances in ascending order. */
@@ -632,8 +706,12 @@ cbvh_status cbvh_scene_instance_name(cbvh_scene scene, cbvh_instance instance, c
                                      size_t *length);
 /* Writes where an instance is in the world. */
 cbvh_status cbvh_scene_instance_pose(cbvh_scene scene, cbvh_instance instance, cbvh_pose *world);
-/* Makes a handle of the mesh of an instance, to be freed. */
+/* Makes a handle of the mesh of an instance, to be freed. Its radius is without the margin. */
 cbvh_status cbvh_scene_instance_mesh(cbvh_scene scene, cbvh_instance instance, cbvh_mesh *mesh);
+/* Writes the margin of an instance. */
+cbvh_status cbvh_scene_instance_margin(cbvh_scene scene, cbvh_instance instance, double *margin);
+/* Writes the margin that a pair of instances has besides those of both, in either order. */
+cbvh_status cbvh_scene_pair_margin(cbvh_scene scene, cbvh_instance a, cbvh_instance b, double *margin);
 /* Writes how much work the last question took, over all its pairs. */
 cbvh_status cbvh_scene_stats(cbvh_scene scene, cbvh_stats *stats);
 

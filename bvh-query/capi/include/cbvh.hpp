@@ -381,6 +381,44 @@ public:
             return cbvh_bake(detail::numbers(vertices), vertices.size(), corners, faces.size(), &raw, mesh);
         });
     }
+    /// Points, each a triangle without area: a ball if there is one and it is rounded.
+    static Mesh cloud(const std::vector<Point> &points) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cloud(detail::numbers(points), points.size(), mesh); });
+    }
+    /// The segment between two points: a capsule if it is rounded.
+    static Mesh segment(const Point &from, const Point &to) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_segment(from.data(), to.data(), mesh); });
+    }
+    /// A box with its middle at the origin.
+    static Mesh box(const std::array<double, 3> &sides) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_box(sides.data(), mesh); });
+    }
+    /// The ground under z = 0, with these sides along x and y.
+    static Mesh ground(const std::array<double, 2> &sides, double thickness) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_ground(sides.data(), thickness, mesh); });
+    }
+    /// A prism around a cylinder along z: see cbvh_bake_cylinder. `error` gets how far it reaches beyond that.
+    static Mesh cylinder(double radius, double length, double most_error, double *error = nullptr) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cylinder(radius, length, most_error, error, mesh); });
+    }
+    /// A pyramid around a cone along z: see cbvh_bake_cone.
+    static Mesh cone(double radius, double height, double most_error, double *error = nullptr) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cone(radius, height, most_error, error, mesh); });
+    }
+    /// A surface over a grid: whole rows of heights along y, each of `columns` numbers along x.
+    static Mesh height_field(const std::vector<double> &heights, std::size_t columns,
+                             const std::array<double, 2> &cell) {
+        const std::size_t rows = columns == 0 ? 0 : heights.size() / columns;
+        detail::same_length(heights.size(), rows * columns, "heights: expected whole rows, found a part of one");
+        return made([&](cbvh_mesh *mesh) {
+            return cbvh_bake_height_field(heights.data(), columns, rows, cell.data(), mesh);
+        });
+    }
+    /// The surface of full cells of a grid: see cbvh_bake_voxels.
+    static Mesh voxels(const std::vector<std::array<std::int32_t, 3>> &cells, double side) {
+        const std::int32_t *numbers = cells.empty() ? nullptr : cells[0].data();
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_voxels(numbers, cells.size(), side, mesh); });
+    }
     /// Bakes mesh files into a .cbvh file, unless it is up to date, and opens it.
     static Mesh bake_files(const std::vector<std::string> &inputs, const std::string &output,
                            const BakeOptions &options = {}) {
@@ -406,7 +444,25 @@ public:
     explicit Mesh(cbvh_mesh raw) : handle_(raw) {}
     cbvh_mesh raw() const noexcept { return handle_.raw(); }
 
-    /// One object of the file.
+    /// The same triangles with a radius, which replaces the one that the mesh has: see cbvh_mesh_rounded.
+    Mesh rounded(double radius) const {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_rounded(raw(), radius, mesh); });
+    }
+    /// The same mesh as a solid: what is inside it touches it. Throws unless it is closed.
+    Mesh solid() const {
+        return made([&](cbvh_mesh *mesh) { return cbvh_mesh_solid(raw(), mesh); });
+    }
+    double radius() const {
+        double radius = 0;
+        check(cbvh_mesh_radius(raw(), &radius));
+        return radius;
+    }
+    bool is_solid() const {
+        bool is_solid = false;
+        check(cbvh_mesh_is_solid(raw(), &is_solid));
+        return is_solid;
+    }
+    /// One object of the file, without a radius and not solid.
     Mesh object(std::size_t number) const {
         return made([&](cbvh_mesh *mesh) { return cbvh_mesh_object(raw(), number, mesh); });
     }
@@ -450,7 +506,7 @@ public:
     void save(const std::string &path) const { check(cbvh_mesh_save(raw(), detail::c_text("path", path))); }
     /// Throws with the first rule that the file breaks.
     void validate() const { check(cbvh_mesh_validate(raw())); }
-    /// A bound of how far any point moves from one pose to another.
+    /// A bound of how far any point of the triangles moves from one pose to another.
     double displacement(const Pose &from, const Pose &to) const {
         double bound = 0;
         check(cbvh_displacement(raw(), &from, &to, &bound));
@@ -891,6 +947,12 @@ public:
         check(cbvh_scene_set_groups(raw(), instance, member, meets));
     }
     void set_allowed(Instance a, Instance b, bool allowed) { check(cbvh_scene_set_allowed(raw(), a, b, allowed)); }
+    /// Adds a margin to the radius of an instance's mesh in every question.
+    void set_margin(Instance instance, double margin) { check(cbvh_scene_set_margin(raw(), instance, margin)); }
+    /// Gives a pair a margin besides those of both.
+    void set_pair_margin(Instance a, Instance b, double margin) {
+        check(cbvh_scene_set_pair_margin(raw(), a, b, margin));
+    }
     std::optional<Instance> find(const std::string &name) const {
         Instance instance{0};
         const cbvh_status status = cbvh_scene_find(raw(), detail::c_text("name", name), &instance);
@@ -919,6 +981,16 @@ public:
         cbvh_mesh mesh{0};
         check(cbvh_scene_instance_mesh(raw(), instance, &mesh));
         return Mesh(mesh);
+    }
+    double margin(Instance instance) const {
+        double margin = 0;
+        check(cbvh_scene_instance_margin(raw(), instance, &margin));
+        return margin;
+    }
+    double pair_margin(Instance a, Instance b) const {
+        double margin = 0;
+        check(cbvh_scene_pair_margin(raw(), a, b, &margin));
+        return margin;
     }
 
     bool collide() {

@@ -7,8 +7,9 @@ use crate::input::{array, each, flag, optional, options, path, text};
 use crate::output::One;
 use crate::status::Failure;
 use crate::types::{BakeChoices, MeshHandle};
+use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
-use bvh_query::Bvh;
+use bvh_query::{Bvh, OwnedShape};
 use std::ffi::c_char;
 use std::path::PathBuf;
 
@@ -72,6 +73,15 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
     Ok(Choices { options, scratch, max_memory, force: flag("options.force", given.force)? })
 }
 
+/// Makes triangles and bakes them in memory.
+pub(crate) fn in_memory(
+    options: &Options,
+    triangles: impl FnOnce() -> Result<Mesh, Failure> + Send,
+) -> Result<OwnedShape, Failure> {
+    let (bytes, _) = cores::work(|| Ok(to_bytes(&triangles()?, options)?))?;
+    Ok(Bvh::from_bytes(bytes).map_err(BakeError::from)?.into())
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_bake(
     vertices: *const f64,
@@ -100,10 +110,7 @@ pub unsafe extern "C" fn cbvh_bake(
                 return Err(Failure::argument(name, "nothing, as arrays are baked in memory", "a value"));
             }
         }
-        let source = bvh_bake::mesh::Mesh::from_triangles(positions, triangles);
-        let (bytes, _) = cores::work(|| Ok(to_bytes(&source, &choices.options)?))?;
-        drop(source);
-        Ok(Bvh::from_bytes(bytes).map_err(BakeError::from)?.into())
+        in_memory(&choices.options, || Ok(Mesh::from_triangles(positions, triangles)))
     };
     // SAFETY: the header asks for it.
     unsafe { hand_out(("mesh", mesh), &MESHES, baked) }

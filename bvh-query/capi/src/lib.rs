@@ -25,6 +25,7 @@ mod poses;
 mod probes;
 mod queriers;
 mod scene;
+mod shapes;
 mod status;
 mod table;
 mod trackers;

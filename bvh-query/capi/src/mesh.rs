@@ -1,4 +1,4 @@
-//! Meshes: opened files, whole or object by object.
+//! Meshes: opened files, whole or object by object, with a radius or solid.
 
 use crate::at_hand::MESHES;
 use crate::entry::{caller_floats, entry, hand_out, write};
@@ -165,6 +165,32 @@ pub unsafe extern "C" fn cbvh_mesh_object(mesh: MeshHandle, number: usize, objec
     };
     // SAFETY: the header asks for it.
     unsafe { hand_out(("object", object), &MESHES, found) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_rounded(mesh: MeshHandle, radius: f64, rounded: *mut MeshHandle) -> i32 {
+    let made = || Ok(MESHES.share("mesh", mesh.id)?.rounded(radius)?);
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("rounded", rounded), &MESHES, made) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_solid(mesh: MeshHandle, solid: *mut MeshHandle) -> i32 {
+    let made = || Ok(MESHES.share("mesh", mesh.id)?.solid()?);
+    // SAFETY: the header asks for it.
+    unsafe { hand_out(("solid", solid), &MESHES, made) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_radius(mesh: MeshHandle, radius: *mut f64) -> i32 {
+    // SAFETY: the header asks for it.
+    ask(mesh, |shape| unsafe { write("radius", radius, || Ok(shape.shape().radius())) })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_mesh_is_solid(mesh: MeshHandle, is_solid: *mut bool) -> i32 {
+    // SAFETY: the header asks for it.
+    ask(mesh, |shape| unsafe { write("is_solid", is_solid, || Ok(shape.shape().is_solid())) })
 }
 
 #[unsafe(no_mangle)]

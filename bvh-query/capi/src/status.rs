@@ -1,6 +1,6 @@
 //! What a function returns when it fails: a status for the program, and a message for a person.
 
-use bvh_bake::{BakeError, ReadError};
+use bvh_bake::{BakeError, ReadError, ShapeError};
 use bvh_query::{
     BackendError, InstanceError, OpenError, PathError, PoseError, QueryError, SceneError, SceneFileError,
 };
@@ -101,3 +101,4 @@ macro_rules! failures {
 failures!(QueryError: of_query, SceneError: of_scene, OpenError: of_open, BakeError: of_bake);
 failures!(InstanceError: of_instance, SceneFileError: of_scene_file, BackendError: |_| Status::InvalidArgument);
 failures!(PoseError: |_| Status::InvalidArgument, PathError: |_| Status::InvalidArgument);
+failures!(ShapeError: |_| Status::InvalidArgument);

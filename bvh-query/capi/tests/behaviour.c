@@ -1,5 +1,5 @@
 /* What the header promises beyond answers: lists and text that do not fit, what lives on, borrowed bytes, paths of the
- * caller, files, scenes, and cubes whose answers are known. */
+ * caller, files, scenes, and cubes, simple shapes and margins whose answers are known. */
 #include "support.h"
 #include <sys/stat.h>
 
@@ -516,6 +516,257 @@ static void scenes(int parallel, int tracking) {
     OK(cbvh_scene_free(scene));
 }
 
+/* A ball around the origin. */
+static cbvh_mesh ball(double radius) {
+    const double origin[3] = {0, 0, 0};
+    cbvh_mesh core, rounded;
+    OK(cbvh_bake_cloud(origin, 1, &core));
+    OK(cbvh_mesh_rounded(core, radius, &rounded));
+    OK(cbvh_mesh_free(core));
+    return rounded;
+}
+
+static bool touch(cbvh_mesh a, cbvh_mesh b, cbvh_pose pose) {
+    bool answer;
+    OK(cbvh_collide(querier, a, b, &pose, 1, &answer));
+    return answer;
+}
+
+static double gap(cbvh_mesh a, cbvh_mesh b, cbvh_pose pose) {
+    cbvh_distance_answer answer;
+    OK(cbvh_distances(querier, a, b, &pose, 1, NULL, &answer));
+    CHECK(answer.lower <= answer.distance && answer.distance <= answer.upper);
+    return answer.distance;
+}
+
+/* Makes a mesh solid, and frees the handle that it was. */
+static cbvh_mesh solid_of(cbvh_mesh core) {
+    cbvh_mesh solid;
+    OK(cbvh_mesh_solid(core, &solid));
+    OK(cbvh_mesh_free(core));
+    return solid;
+}
+
+/* Radii: balls, capsules and clouds, and what rays and points find of them. */
+static void rounded(void) {
+    const cbvh_mesh two = ball(2), three = ball(3), less = ball(3 - 0x1p-50), point = ball(0);
+    const cbvh_pose here = shift(0, 0, 0), away = shift(3, 4, 0), far = shift(6, 8, 0);
+    CHECK(touch(two, three, away) && !touch(two, less, away) && touch(three, two, away));
+    CHECK(gap(two, three, far) == 5 && gap(two, three, away) == 0 && gap(two, less, away) > 0);
+    bool near;
+    OK(cbvh_within(querier, two, three, &far, 1, 5, &near));
+    CHECK(near);
+    double radius;
+    bool is_solid;
+    OK(cbvh_mesh_radius(two, &radius));
+    OK(cbvh_mesh_is_solid(two, &is_solid));
+    CHECK(radius == 2 && !is_solid);
+    /* A radius replaces the last one, a clone has it, and neither the file nor an object of it. */
+    cbvh_mesh again, other;
+    OK(cbvh_mesh_rounded(two, 4, &again));
+    OK(cbvh_mesh_clone(again, &other));
+    OK(cbvh_mesh_free(again));
+    OK(cbvh_mesh_radius(other, &radius));
+    CHECK(radius == 4);
+    OK(cbvh_mesh_object(other, 0, &again));
+    OK(cbvh_mesh_radius(again, &radius));
+    CHECK(radius == 0);
+    OK(cbvh_mesh_free(again));
+    OK(cbvh_mesh_free(other));
+    unsigned char bytes[16384];
+    size_t size;
+    OK(cbvh_mesh_bytes(two, bytes, sizeof bytes, &size));
+    OK(cbvh_mesh_from_bytes(bytes, size, &again));
+    OK(cbvh_mesh_radius(again, &radius));
+    CHECK(radius == 0);
+    OK(cbvh_mesh_free(again));
+    /* Points on all sides of a ball, and rays through it, past it and along it. */
+    const double points[9] = {1, 0, 0, 2, 0, 0, 5, 0, 0};
+    cbvh_side sides[3];
+    cbvh_closest_point closest[3];
+    OK(cbvh_sides(querier, two, NULL, points, 3, sides));
+    CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_ON && sides[2] == CBVH_OUTSIDE);
+    OK(cbvh_closest_points(querier, two, NULL, points, 3, INFINITY, closest));
+    CHECK(closest[0].distance == 0 && closest[1].distance == 0 && closest[2].distance == 3);
+    OK(cbvh_signed_distances(querier, two, NULL, points, 3, INFINITY, closest));
+    CHECK(closest[0].side == CBVH_INSIDE && closest[0].distance == 1 && closest[2].distance == 3);
+    const cbvh_ray rays[3] = {{{-5, 0, 0}, {1, 0, 0}, INFINITY},
+                              {{-5, 2, 0}, {1, 0, 0}, INFINITY},
+                              {{-5, 2 + 0x1p-50, 0}, {1, 0, 0}, INFINITY}};
+    bool any[3];
+    cbvh_ray_hit hits[3];
+    size_t count;
+    OK(cbvh_any_hits(querier, two, NULL, rays, 3, any));
+    CHECK(any[0] && any[1] && !any[2]);
+    OK(cbvh_first_hits(querier, two, NULL, rays, 3, hits));
+    CHECK(fabs(hits[0].t - 3) < 1e-9 && hits[1].found && !hits[2].found);
+    FAILS(cbvh_all_hits(querier, two, NULL, rays, 3, NULL, hits, 3, &count), CBVH_INVALID_ARGUMENT,
+          "all_hits: expected a shape without a radius");
+    OK(cbvh_all_hits(querier, point, NULL, rays, 3, NULL, hits, 3, &count));
+    /* A capsule along z: beside its axis, and beyond a cap by 3-4-5. */
+    const double from[3] = {0, 0, -1}, to[3] = {0, 0, 1};
+    cbvh_mesh axis, capsule;
+    OK(cbvh_bake_segment(from, to, &axis));
+    OK(cbvh_mesh_rounded(axis, 0.5, &capsule));
+    CHECK(gap(capsule, point, shift(2, 0, 0.75)) == 1.5 && gap(capsule, point, shift(3, 0, 5)) == 4.5);
+    CHECK(touch(capsule, point, shift(0.5, 0, 0.25)) && !touch(capsule, point, shift(0.5, 0, 1 + 0x1p-20)));
+    OK(cbvh_mesh_free(axis));
+    OK(cbvh_mesh_free(capsule));
+    /* Equal points of a cloud stay. */
+    const double twice[9] = {0, 0, 0, 9, 0, 0, 0, 0, 0};
+    cbvh_mesh core, cloud;
+    OK(cbvh_bake_cloud(twice, 3, &core));
+    OK(cbvh_mesh_rounded(core, 1, &cloud));
+    cbvh_contact contacts[4];
+    OK(cbvh_contacts(querier, cloud, point, &here, 1, NULL, contacts, 4, &count));
+    CHECK(count == 2 && contacts[0].triangle_a == 0 && contacts[1].triangle_a == 2);
+    CHECK(gap(cloud, two, shift(14, 0, 0)) == 2);
+    OK(cbvh_mesh_free(core));
+    OK(cbvh_mesh_free(cloud));
+    /* A ball that moves at a ball: from 9 to 0, and they meet at 5. */
+    cbvh_path path;
+    cbvh_motion_answer motion;
+    const cbvh_pose start = shift(9, 0, 0);
+    OK(cbvh_path_between(&start, &here, &path));
+    OK(cbvh_motions(querier, two, three, &path, 1, NULL, &motion));
+    CHECK(motion.outcome == CBVH_HIT && fabs(motion.at - 4.0 / 9) < 1e-5 && motion.free_until <= 4.0 / 9);
+    OK(cbvh_path_free(path));
+    OK(cbvh_mesh_free(two));
+    OK(cbvh_mesh_free(three));
+    OK(cbvh_mesh_free(less));
+    OK(cbvh_mesh_free(point));
+}
+
+/* Solids: what is inside touches, from either side, and nothing outside does. */
+static void solids(void) {
+    const cbvh_mesh point = ball(0), hollow = cube(1);
+    const double cell[2] = {1, 2}, block[3] = {1, 1, 1}, plain[2] = {10, 4};
+    const int32_t cells[12] = {0, 0, 0, 0, 0, -1, 0, 0, 0, -1, 0, 0};
+    cbvh_mesh all[6];
+    double error_of_cylinder, error_of_cone;
+    OK(cbvh_bake_box(block, &all[0]));
+    OK(cbvh_bake_ground(plain, 0.75, &all[1]));
+    OK(cbvh_bake_cylinder(0.5, 1, 0.001, &error_of_cylinder, &all[2]));
+    OK(cbvh_bake_cone(0.5, 1, 0.001, &error_of_cone, &all[3]));
+    OK(cbvh_bake_voxels(cells, 4, 0.5, &all[4]));
+    OK(cbvh_mesh_clone(hollow, &all[5]));
+    /* The polyhedra are larger, by as much as they say. */
+    CHECK(error_of_cylinder > 0 && error_of_cylinder < 0.001001 && error_of_cone > 0 && error_of_cone < 0.001001);
+    const double beside = gap(all[2], point, shift(0.4, 0.6, 0)), exact = sqrt(0.52) - 0.5;
+    CHECK(beside < exact && beside >= exact - error_of_cylinder);
+    /* Each with a point inside, one beside it, and how far away that is at least. */
+    const struct { double inside[3], outside[3], gap; } places[6] = {
+        {{0.25, 0, 0}, {0, 2, 0}, 1.5},   {{4.5, 1, -0.5}, {0, 0, 1}, 1}, {{0.25, 0.25, 0}, {0, 0, 2.5}, 2},
+        {{0, 0.25, 0.25}, {0, 0, -1}, 1}, {{-0.25, 0.125, 0.25}, {0.25, 0.25, 2}, 1.5}, {{0.125, 0, 0}, {1, 0, 0}, 0.5},
+    };
+    for (int k = 0; k < 6; k++) {
+        const cbvh_pose inside = shift(places[k].inside[0], places[k].inside[1], places[k].inside[2]);
+        const cbvh_pose outside = shift(places[k].outside[0], places[k].outside[1], places[k].outside[2]);
+        cbvh_pose back;
+        OK(cbvh_pose_inverse(&inside, &back));
+        CHECK(!touch(all[k], point, inside) && gap(all[k], point, inside) > 0);
+        const cbvh_mesh solid = solid_of(all[k]);
+        bool is_solid;
+        OK(cbvh_mesh_is_solid(solid, &is_solid));
+        CHECK(is_solid && touch(solid, point, inside) && touch(point, solid, back) && gap(solid, point, inside) == 0);
+        CHECK(!touch(solid, point, outside) && gap(solid, point, outside) == places[k].gap);
+        /* A radius keeps it solid, and is around it. */
+        cbvh_mesh padded;
+        OK(cbvh_mesh_rounded(solid, 0.125, &padded));
+        OK(cbvh_mesh_is_solid(padded, &is_solid));
+        CHECK(is_solid && touch(padded, point, inside) && gap(padded, point, outside) == places[k].gap - 0.125);
+        size_t count;
+        OK(cbvh_contacts(querier, solid, point, &inside, 1, NULL, NULL, 0, &count));
+        CHECK(count == 0);
+        OK(cbvh_mesh_free(padded));
+        OK(cbvh_mesh_free(solid));
+    }
+    /* Nobody may want to know how much larger they are. */
+    cbvh_mesh mesh;
+    OK(cbvh_bake_cylinder(1, 1, 10, NULL, &mesh));
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_bake_cone(1, 1, 10, NULL, &mesh));
+    OK(cbvh_mesh_free(mesh));
+    /* Rows go along y: the point at x = 0, y = 2 has the fourth height. */
+    const double heights[6] = {0, 0, 0, 1, 0, 0};
+    uint64_t triangles;
+    OK(cbvh_bake_height_field(heights, 3, 2, cell, &mesh));
+    OK(cbvh_mesh_triangle_count(mesh, &triangles));
+    CHECK(triangles == 4 && gap(mesh, point, shift(0, 2, 3)) == 2 && gap(mesh, point, shift(4, 0, 0)) == 2);
+    cbvh_mesh solid = {7};
+    FAILS(cbvh_mesh_solid(mesh, &solid), CBVH_INVALID_ARGUMENT,
+          "expected closed objects of a solid shape, found object 0");
+    CHECK(solid.id == 0);
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_mesh_free(hollow));
+    OK(cbvh_mesh_free(point));
+}
+
+/* Margins in a scene: of an instance, of a pair, and of copies. */
+static void margins(void) {
+    const cbvh_mesh one = ball(1);
+    cbvh_scene scene, copy;
+    cbvh_instance a, b, c;
+    const cbvh_pose here = shift(0, 0, 0), at_b = shift(3, 4, 0), at_c = shift(0, 0, 100);
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, one, &here, NULL, &a));
+    OK(cbvh_scene_add(scene, one, &at_b, NULL, &b));
+    OK(cbvh_scene_add(scene, one, &at_c, NULL, &c));
+    OK(cbvh_mesh_free(one));
+    bool answer;
+    double margin, between;
+    cbvh_scene_distance_answer nearest;
+    OK(cbvh_scene_instance_margin(scene, a, &margin));
+    OK(cbvh_scene_pair_margin(scene, a, b, &between));
+    CHECK(margin == 0 && between == 0);
+    OK(cbvh_scene_distance(scene, &nearest));
+    CHECK(nearest.nearest.distance == 3);
+    OK(cbvh_scene_set_margin(scene, a, 1));
+    OK(cbvh_scene_set_pair_margin(scene, b, a, 1.5));
+    OK(cbvh_scene_distance(scene, &nearest));
+    CHECK(nearest.nearest.distance == 0.5 && nearest.pair.a.id == a.id && nearest.pair.b.id == b.id);
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_clone(scene, &copy));
+    OK(cbvh_scene_set_margin(scene, b, 0.5));
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(answer);
+    OK(cbvh_scene_collide(copy, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_instance_margin(copy, a, &margin));
+    OK(cbvh_scene_pair_margin(copy, a, b, &between));
+    CHECK(margin == 1 && between == 1.5);
+    OK(cbvh_scene_instance_margin(copy, b, &margin));
+    OK(cbvh_scene_pair_margin(copy, c, b, &between));
+    CHECK(margin == 0 && between == 0);
+    /* The mesh of an instance has its own radius. */
+    cbvh_mesh of_a;
+    double radius;
+    OK(cbvh_scene_instance_mesh(scene, a, &of_a));
+    OK(cbvh_mesh_radius(of_a, &radius));
+    CHECK(radius == 1);
+    OK(cbvh_mesh_free(of_a));
+    /* A margin is around an instance for probes, too. */
+    const double point[3] = {0, 0, 5};
+    cbvh_closest_point closest;
+    OK(cbvh_scene_closest_points(scene, point, 1, INFINITY, &closest));
+    CHECK(closest.distance == 3 && closest.instance.id == a.id);
+    const cbvh_ray ray = {{0, 0, 50}, {0, 0, -1}, INFINITY};
+    cbvh_ray_hit hit;
+    size_t count;
+    FAILS(cbvh_scene_all_hits(scene, &ray, 1, NULL, &hit, 1, &count), CBVH_INVALID_ARGUMENT, "all_hits: ");
+    /* What is removed takes the margins of its pairs along, and who is refused one keeps the last. */
+    FAILS(cbvh_scene_set_margin(scene, a, -1), CBVH_INVALID_ARGUMENT,
+          "margin: expected a length from 0 to 2^118, found -1");
+    OK(cbvh_scene_instance_margin(scene, a, &margin));
+    CHECK(margin == 1);
+    OK(cbvh_scene_remove(scene, b));
+    FAILS(cbvh_scene_set_margin(scene, b, 1), CBVH_NOT_FOUND, "was it removed?");
+    FAILS(cbvh_scene_pair_margin(scene, a, b, &between), CBVH_NOT_FOUND, "was it removed?");
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_scene_free(copy));
+}
+
 /* Files: baked, opened in all ways, and a scene file, in the folder that the program is given. */
 static void files(const char *folder, const char *testdata) {
     char input[1000], output[1000];
@@ -601,6 +852,9 @@ int main(int count, char **arguments) {
     trackers();
     scenes(0, 0);
     scenes(1, 1);
+    rounded();
+    solids();
+    margins();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));
     puts("behaviour: as the header says");

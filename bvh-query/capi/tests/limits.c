@@ -67,6 +67,9 @@ static void memory(void) {
     FAILS(cbvh_segment_hits(querier, mesh, NULL, (const cbvh_segment *)(const void *)numbers, many, &answer),
           CBVH_LIMIT, "segments: expected ");
     FAILS(cbvh_bake(numbers, many, NULL, 0, NULL, &made), CBVH_LIMIT, "vertices: expected ");
+    FAILS(cbvh_bake_cloud(numbers, many, &made), CBVH_LIMIT, "points: expected ");
+    FAILS(cbvh_bake_voxels((const int32_t *)(const void *)numbers, many, 1, &made), CBVH_LIMIT, "cells: expected ");
+    FAILS(cbvh_bake_height_field(numbers, many, 2, numbers, &made), CBVH_LIMIT, "heights: expected ");
     FAILS(cbvh_motions(querier, mesh, mesh, (const cbvh_path *)(const void *)numbers, many, NULL, &motion), CBVH_LIMIT,
           "paths: expected ");
     CHECK(setrlimit(RLIMIT_AS, &before) == 0);
@@ -119,6 +122,17 @@ static void *ask(void *parallel) {
         OK(cbvh_scene_motion(scene, &instance, &path, 1, NULL, &motion));
         OK(cbvh_scene_is_free(scene, &instance, &path, 1, NULL, answer));
     }
+    cbvh_mesh cylinder, solid, padded;
+    bool touching;
+    cbvh_distance_answer apart;
+    OK(cbvh_bake_cylinder(0.5, 1, 0.001, NULL, &cylinder));
+    OK(cbvh_mesh_solid(cylinder, &solid));
+    OK(cbvh_mesh_rounded(solid, 0.25, &padded));
+    OK(cbvh_collide(querier, padded, other, &start, 1, &touching));
+    OK(cbvh_distances(querier, padded, other, &start, 1, NULL, &apart));
+    OK(cbvh_mesh_free(cylinder));
+    OK(cbvh_mesh_free(solid));
+    OK(cbvh_mesh_free(padded));
     OK(cbvh_path_free(path));
     OK(cbvh_scene_free(scene));
     OK(cbvh_tracker_free(tracker));

@@ -62,6 +62,8 @@ static void handles(void) {
     } while (0)
     MAKES_NONE(cbvh_mesh, cbvh_mesh_clone(no_mesh, &out), "mesh");
     MAKES_NONE(cbvh_mesh, cbvh_mesh_object(no_mesh, 0, &out), "mesh");
+    MAKES_NONE(cbvh_mesh, cbvh_mesh_rounded(no_mesh, 1, &out), "mesh");
+    MAKES_NONE(cbvh_mesh, cbvh_mesh_solid(no_mesh, &out), "mesh");
     MAKES_NONE(cbvh_mesh, cbvh_scene_instance_mesh(no_scene, instance, &out), "scene");
     MAKES_NONE(cbvh_scene, cbvh_scene_clone(no_scene, &out), "scene");
     MAKES_NONE(cbvh_scene, cbvh_scene_of_mesh(no_mesh, &out), "mesh");
@@ -268,6 +270,103 @@ static void bakes(void) {
           "number: expected a number below 1, found 7");
 }
 
+/* Radii, lengths, arrays and counts of shapes. */
+static void shapes(void) {
+    const cbvh_mesh no_mesh = {0};
+    cbvh_mesh made = {7};
+    double number;
+    bool is_solid;
+    const double wrong[] = {NAN, -1, INFINITY, -INFINITY, 0x1.0000000000001p118, -0x1p-1074};
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        FAILS(cbvh_mesh_rounded(mesh, wrong[k], &made), CBVH_INVALID_ARGUMENT,
+              "radius: expected a length from 0 to 2^118, found");
+        CHECK(made.id == 0);
+        FAILS(cbvh_scene_set_margin(scene, instance, wrong[k]), CBVH_INVALID_ARGUMENT,
+              "margin: expected a length from 0 to 2^118, found");
+        FAILS(cbvh_scene_set_pair_margin(scene, instance, instance, wrong[k]), CBVH_INVALID_ARGUMENT, "margin: ");
+    }
+    OK(cbvh_mesh_rounded(mesh, 0x1p118, &made));
+    OK(cbvh_mesh_free(made));
+    FAILS(cbvh_mesh_rounded(no_mesh, 1, &made), CBVH_INVALID_HANDLE, "mesh: ");
+    CHECK(made.id == 0);
+    FAILS(cbvh_mesh_solid(no_mesh, &made), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_mesh_radius(no_mesh, &number), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_mesh_is_solid(no_mesh, &is_solid), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_mesh_rounded(mesh, 1, NULL), CBVH_INVALID_ARGUMENT, "rounded: expected a pointer, found NULL");
+    FAILS(cbvh_mesh_solid(mesh, NULL), CBVH_INVALID_ARGUMENT, "solid: expected a pointer, found NULL");
+    FAILS(cbvh_mesh_radius(mesh, NULL), CBVH_INVALID_ARGUMENT, "radius: expected a pointer, found NULL");
+    FAILS(cbvh_mesh_is_solid(mesh, NULL), CBVH_INVALID_ARGUMENT, "is_solid: expected a pointer, found NULL");
+    const cbvh_bake_options bare = {.size = sizeof bare, .no_topology = 1};
+    cbvh_mesh unknown;
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &bare, &unknown));
+    FAILS(cbvh_mesh_solid(unknown, &made), CBVH_INVALID_ARGUMENT, "does not say which objects are closed");
+    OK(cbvh_mesh_free(unknown));
+    const cbvh_instance none = {0};
+    FAILS(cbvh_scene_set_margin(scene, none, 1), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_set_pair_margin(scene, instance, none, 1), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_instance_margin(scene, none, &number), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_pair_margin(scene, none, instance, &number), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_instance_margin(scene, instance, NULL), CBVH_INVALID_ARGUMENT, "margin: expected a pointer");
+    FAILS(cbvh_scene_pair_margin(scene, instance, instance, NULL), CBVH_INVALID_ARGUMENT, "margin: expected a pointer");
+    /* Points and cells: none, too many, not there, not finite. */
+    const int32_t cells[3] = {0, 0, 0};
+    const double points[6] = {0, 0, 0, 1, NAN, 0}, far[3] = {0, 0, INFINITY};
+    FAILS(cbvh_bake_cloud(points, 0, &made), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh_bake_cloud(NULL, 0, &made), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh_bake_cloud(points, 2, &made), CBVH_BAKE_FAILED, "NaN");
+    FAILS(cbvh_bake_cloud(NULL, 1, &made), CBVH_INVALID_ARGUMENT, "points: expected a pointer, found NULL");
+    FAILS(cbvh_bake_cloud(MISALIGNED(double), 1, &made), CBVH_INVALID_ARGUMENT, "points: expected an address");
+    FAILS(cbvh_bake_cloud(points, SIZE_MAX / 8, &made), CBVH_INVALID_ARGUMENT, "points: expected at most");
+    FAILS(cbvh_bake_cloud(points, 1, NULL), CBVH_INVALID_ARGUMENT, "mesh: expected a pointer, found NULL");
+    FAILS(cbvh_bake_segment(points, far, &made), CBVH_BAKE_FAILED, "inf");
+    FAILS(cbvh_bake_segment(NULL, far, &made), CBVH_INVALID_ARGUMENT, "from: expected a pointer, found NULL");
+    FAILS(cbvh_bake_segment(points, NULL, &made), CBVH_INVALID_ARGUMENT, "to: expected a pointer, found NULL");
+    FAILS(cbvh_bake_voxels(cells, 0, 1, &made), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh_bake_voxels(NULL, 1, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected a pointer, found NULL");
+    FAILS(cbvh_bake_voxels(cells, SIZE_MAX, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected at most");
+    FAILS(cbvh_bake_box(NULL, &made), CBVH_INVALID_ARGUMENT, "sides: expected a pointer, found NULL");
+    FAILS(cbvh_bake_ground(NULL, 1, &made), CBVH_INVALID_ARGUMENT, "sides: expected a pointer, found NULL");
+    FAILS(cbvh_bake_cylinder(1, 1, 0.1, MISALIGNED(double), &made), CBVH_INVALID_ARGUMENT,
+          "error: expected an address");
+    FAILS(cbvh_bake_cone(1, 1, 0.1, MISALIGNED(double), &made), CBVH_INVALID_ARGUMENT, "error: expected an address");
+    /* Lengths. */
+    const double lengths[] = {NAN, 0, -1, INFINITY};
+    for (int k = 0; k < 4; k++) {
+        const double l = lengths[k], sides[3] = {1, l, 1}, one[3] = {1, 1, 1};
+        FAILS(cbvh_bake_box(sides, &made), CBVH_INVALID_ARGUMENT, "side: expected a finite length above 0, found");
+        FAILS(cbvh_bake_ground(sides, 1, &made), CBVH_INVALID_ARGUMENT, "side: ");
+        FAILS(cbvh_bake_ground(one, l, &made), CBVH_INVALID_ARGUMENT, "thickness: ");
+        FAILS(cbvh_bake_cylinder(l, 1, 0.1, &number, &made), CBVH_INVALID_ARGUMENT, "radius: ");
+        FAILS(cbvh_bake_cylinder(1, l, 0.1, &number, &made), CBVH_INVALID_ARGUMENT, "length: ");
+        FAILS(cbvh_bake_cylinder(1, 1, l, &number, &made), CBVH_INVALID_ARGUMENT, "most_error: ");
+        FAILS(cbvh_bake_cone(l, 1, 0.1, NULL, &made), CBVH_INVALID_ARGUMENT, "radius: ");
+        FAILS(cbvh_bake_cone(1, l, 0.1, NULL, &made), CBVH_INVALID_ARGUMENT, "height: ");
+        FAILS(cbvh_bake_voxels(cells, 1, l, &made), CBVH_INVALID_ARGUMENT, "side: ");
+        FAILS(cbvh_bake_height_field(room, 2, 2, sides, &made), CBVH_INVALID_ARGUMENT,
+              "cell: expected a finite length");
+        CHECK(made.id == 0);
+    }
+    FAILS(cbvh_bake_cone(1, 1, 1e-12, NULL, &made), CBVH_INVALID_ARGUMENT, "most_error: expected an error for which");
+    const double box_beyond[3] = {1e300, 1, 1};
+    FAILS(cbvh_bake_box(box_beyond, &made), CBVH_BAKE_FAILED, "2^120");
+    /* Grids. */
+    const double cell[2] = {1, 1};
+    const size_t grids[][2] = {{0, 0}, {0, 2}, {2, 0}, {1, 2}, {2, 1}, {SIZE_MAX, 0}};
+    for (size_t k = 0; k < sizeof grids / sizeof *grids; k++) {
+        FAILS(cbvh_bake_height_field(room, grids[k][0], grids[k][1], cell, &made), CBVH_INVALID_ARGUMENT,
+              "heights: expected two or more rows of two or more columns");
+    }
+    /* A product that wraps around to a small one is not small. */
+    FAILS(cbvh_bake_height_field(room, SIZE_MAX / 2 + 2, 2, cell, &made), CBVH_INVALID_ARGUMENT,
+          "heights: expected at most");
+    FAILS(cbvh_bake_height_field(room, SIZE_MAX, SIZE_MAX, cell, &made), CBVH_INVALID_ARGUMENT,
+          "heights: expected at most");
+    FAILS(cbvh_bake_height_field(NULL, 2, 2, cell, &made), CBVH_INVALID_ARGUMENT,
+          "heights: expected a pointer, found NULL");
+    FAILS(cbvh_bake_height_field(room, 2, 2, NULL, &made), CBVH_INVALID_ARGUMENT,
+          "cell: expected a pointer, found NULL");
+}
+
 static void scenes(void) {
     cbvh_instance none = {0}, found, foreign = {1ull << 40};
     cbvh_pose rounded = CBVH_IDENTITY;
@@ -332,6 +431,7 @@ int main(void) {
     pointers();
     numbers();
     bakes();
+    shapes();
     scenes();
     limits();
     OK(cbvh_scene_free(scene));

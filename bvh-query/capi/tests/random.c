@@ -79,9 +79,10 @@ static const void *any_options(void) {
     bake.max_error = below(2) ? 0 : any_number();
     bake.no_ids = any_flag();
     bake.force = below(8) == 0;
-    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(100), fabs(any_number()),
+    /* The size of the options of a bake would claim bytes that these do not have. */
+    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(sizeof bake), fabs(any_number()),
         below(2) ? 0 : any_number()};
-    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(100), any_number(),
+    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(sizeof bake), any_number(),
         below(2) ? 0 : any_number()};
     switch (below(4)) {
     case 0: return &bake;
@@ -144,7 +145,7 @@ int main(void) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(58)) {
+        switch (below(75)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -203,6 +204,23 @@ int main(void) {
         case 54: status = cbvh_scene_first_hits(s, in, n, out); break;
         case 55: status = cbvh_scene_signed_distances(s, in, n, x, out); break;
         case 56: status = cbvh_pose_then(in, more, out); break;
+        case 57: status = cbvh_mesh_rounded(a, below(2) ? fabs(x) : x, (cbvh_mesh *)&made); break;
+        case 58: status = cbvh_mesh_solid(a, (cbvh_mesh *)&made); break;
+        case 59: status = cbvh_mesh_radius(a, out); break;
+        case 60: status = cbvh_mesh_is_solid(a, out); break;
+        case 61: status = cbvh_bake_cloud(in, n, (cbvh_mesh *)&made); break;
+        case 62: status = cbvh_bake_segment(in, more, (cbvh_mesh *)&made); break;
+        case 63: status = cbvh_bake_box(in, (cbvh_mesh *)&made); break;
+        case 64: status = cbvh_bake_ground(in, x, (cbvh_mesh *)&made); break;
+        case 65: status = cbvh_bake_cylinder(fabs(x), fabs(y), 0.5, below(2) ? NULL : out, (cbvh_mesh *)&made); break;
+        case 66: status = cbvh_bake_cone(fabs(x), y, 0.5, below(2) ? NULL : out, (cbvh_mesh *)&made); break;
+        case 67: status = cbvh_bake_height_field(in, n, any_count(), more, (cbvh_mesh *)&made); break;
+        case 68: status = cbvh_bake_voxels(in, n, x, (cbvh_mesh *)&made); break;
+        case 69: status = cbvh_scene_set_margin(s, i, below(2) ? fabs(x) : x); break;
+        case 70: status = cbvh_scene_set_pair_margin(s, i, instance, x); break;
+        case 71: status = cbvh_scene_instance_margin(s, i, out); break;
+        case 72: status = cbvh_scene_pair_margin(s, instance, i, out); break;
+        case 73: status = cbvh_scene_collide(s, out); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;

@@ -311,6 +311,50 @@ void scenes() {
     FAILS(scene.add(cube(1), cbvh::Pose(), "a"), CBVH_INVALID_ARGUMENT, "expected a name of its own");
 }
 
+// Radii, solids, simple shapes and margins.
+void shapes() {
+    cbvh::Querier querier;
+    const cbvh::Mesh two = cbvh::Mesh::cloud({{0, 0, 0}}).rounded(2), three = two.rounded(3), point = two.rounded(0);
+    const cbvh::Pose away = cbvh::Pose::translation(3, 4, 0);
+    CHECK(querier.collide(two, three, away) && !querier.collide(two, three.rounded(3 - 0x1p-50), away));
+    CHECK(querier.distance(two, three, cbvh::Pose::translation(6, 8, 0)).distance == 5);
+    CHECK(two.radius() == 2 && !two.is_solid());
+    const cbvh::Mesh capsule = cbvh::Mesh::segment({0, 0, -1}, {0, 0, 1}).rounded(0.5);
+    CHECK(querier.within(capsule, point, cbvh::Pose::translation(3, 0, 5), 4.5));
+    CHECK(!querier.within(capsule, point, cbvh::Pose::translation(3, 0, 5), 4.4999));
+    FAILS(querier.all_hits(two, {{{-5, 0, 0}, {1, 0, 0}}}), CBVH_INVALID_ARGUMENT, "all_hits: ");
+    double around_cylinder = 0, around_cone = 0;
+    const cbvh::Pose inside = cbvh::Pose::translation(0.125, 0.125, 0.25);
+    const std::vector<cbvh::Mesh> cores{cbvh::Mesh::box({1, 1, 1}), cbvh::Mesh::cylinder(0.5, 1, 0.01, &around_cylinder),
+                                        cbvh::Mesh::cone(0.5, 1, 0.01, &around_cone),
+                                        cbvh::Mesh::voxels({{0, 0, 0}}, 0.5)};
+    for (const cbvh::Mesh &core : cores) {
+        const cbvh::Mesh solid = core.solid(), copy = solid;
+        CHECK(copy.is_solid() && querier.collide(copy, point, inside) && !querier.collide(core, point, inside));
+    }
+    CHECK(around_cylinder > 0 && around_cylinder < 0.011 && around_cone > 0 && around_cone < 0.011);
+    CHECK(querier.collide(cbvh::Mesh::ground({9, 9}, 1).solid(), point, cbvh::Pose::translation(0, 0, -0.5)));
+    const cbvh::Mesh field = cbvh::Mesh::height_field({0, 0, 0, 1, 0, 0}, 3, {1, 2});
+    CHECK(field.triangle_count() == 4 && querier.within(field, point, cbvh::Pose::translation(0, 2, 3), 2));
+    FAILS(field.solid(), CBVH_INVALID_ARGUMENT, "expected closed objects of a solid shape");
+    FAILS(cbvh::Mesh::height_field({0, 0, 0, 1, 0}, 3, {1, 2}), CBVH_INVALID_ARGUMENT, "heights: expected whole rows");
+    FAILS(cbvh::Mesh::height_field({0, 0}, 0, {1, 2}), CBVH_INVALID_ARGUMENT, "heights: expected whole rows");
+    FAILS(cbvh::Mesh::height_field({}, 0, {1, 2}), CBVH_INVALID_ARGUMENT, "heights: expected two or more rows");
+    FAILS(cbvh::Mesh::cloud({}), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh::Mesh::voxels({}, 1), CBVH_BAKE_FAILED, "triangle");
+    FAILS(two.rounded(-1), CBVH_INVALID_ARGUMENT, "radius: expected a length from 0 to 2^118, found -1");
+    cbvh::Scene scene;
+    const cbvh::Instance a = scene.add(point, cbvh::Pose()), b = scene.add(two, away);
+    CHECK(scene.margin(a) == 0 && scene.pair_margin(a, b) == 0 && !scene.collide());
+    scene.set_margin(a, 1);
+    scene.set_pair_margin(a, b, 2);
+    const cbvh::Scene copy = scene;
+    CHECK(copy.margin(a) == 1 && copy.pair_margin(b, a) == 2 && copy.mesh(b).radius() == 2 && scene.collide());
+    scene.set_pair_margin(b, a, 1.5);
+    CHECK(!scene.collide());
+    FAILS(scene.set_margin(b, std::numeric_limits<double>::quiet_NaN()), CBVH_INVALID_ARGUMENT, "margin: ");
+}
+
 } // namespace
 
 int main() {
@@ -321,6 +365,7 @@ int main() {
     lists();
     motions();
     scenes();
+    shapes();
     // A thread of its own has messages of its own.
     std::thread([] { FAILS(cbvh::Mesh::open(""), CBVH_SYSTEM, ""); }).join();
     std::puts("wrapper: C++ as the header says");

@@ -189,6 +189,21 @@ pub extern "C" fn cbvh_scene_set_allowed(scene: SceneHandle, a: Instance, b: Ins
 }
 
 #[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_margin(scene: SceneHandle, instance: Instance, margin: f64) -> i32 {
+    with(scene, |scene| Ok(scene.set_margin(instance.into(), margin)?))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_pair_margin(
+    scene: SceneHandle,
+    a: Instance,
+    b: Instance,
+    margin: f64,
+) -> i32 {
+    with(scene, |scene| Ok(scene.set_pair_margin(a.into(), b.into(), margin)?))
+}
+
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_find(
     scene: SceneHandle,
     name: *const c_char,
@@ -254,6 +269,27 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     let found = || SCENES.see("scene", scene.id, |asked| Ok(asked.scene.shape(instance.into())?.opened()?));
     // SAFETY: the header asks for it.
     unsafe { hand_out(("mesh", mesh), &MESHES, found) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_instance_margin(
+    scene: SceneHandle,
+    instance: Instance,
+    margin: *mut f64,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    see(scene, |scene| unsafe { write("margin", margin, || Ok(scene.margin(instance.into())?)) })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_pair_margin(
+    scene: SceneHandle,
+    a: Instance,
+    b: Instance,
+    margin: *mut f64,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    see(scene, |scene| unsafe { write("margin", margin, || Ok(scene.pair_margin(a.into(), b.into())?)) })
 }
 
 #[unsafe(no_mangle)]
