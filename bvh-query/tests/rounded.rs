@@ -448,3 +448,49 @@ fn rays_hit_rounded_cores_exactly() {
     }
     assert!(seen.iter().all(|&count| count > 10), "{seen:?}: tangents among them");
 }
+
+/// Cores much smaller than their radii, and much larger; and far away.
+#[test]
+fn radii_of_any_size_have_answers() {
+    let mut queriers = queriers();
+    let tiny = |x: f64| [[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, x, 0.0]];
+    for core in [[[0.0; 3]; 3], tiny(1e-30), tiny(1.0), tiny(1e30)] {
+        let bvh = baked(&[core]);
+        for radius in [1e-60, 1e-30, 1.0, 1e10, 1e30, 2f64.powi(116)] {
+            let shape = bvh.all().rounded(radius).unwrap();
+            let size = radius + core[1][0];
+            for querier in &mut queriers {
+                // From beside the core, along the axis that the triangle has no extent in.
+                for (from, is_hit) in [(4.0 * size, true), (-4.0 * size, false)] {
+                    let ray = Ray::new([0.0, 0.0, from], [0.0, 0.0, -1.0]);
+                    let hit = querier.first_hit(shape, &ray).unwrap();
+                    assert_eq!(hit.is_some(), is_hit, "{core:?} {radius} from {from}");
+                    assert_eq!(querier.any_hit(shape, &ray).unwrap(), is_hit);
+                    if let Some(hit) = hit {
+                        let expected = from - radius;
+                        assert!((hit.t - expected).abs() <= 1e-9 * from, "{core:?} {radius}: {hit:?}");
+                        assert!(
+                            hit.lower <= expected * (1.0 + 1e-15) && expected * (1.0 - 1e-15) <= hit.upper
+                        );
+                    }
+                    let end = [0.0, 0.0, -from];
+                    assert!(querier.segment_hit(shape, [0.0, 0.0, from], end).unwrap());
+                }
+                let beside = Ray::new([-4.0 * size, 1.5 * size, 0.0], [1.0, 0.0, 0.0]);
+                let (above, reach) = (1.5 * size, core[2][1] + radius);
+                assert_eq!(querier.any_hit(shape, &beside).unwrap(), above <= reach, "{core:?} {radius}");
+                assert_eq!(querier.side(shape, [0.0, 0.0, radius / 2.0]).unwrap(), Side::Inside);
+                assert_eq!(querier.side(shape, [0.0, 0.0, radius]).unwrap(), Side::On);
+                assert_eq!(querier.side(shape, [0.0, 0.0, 2.0 * radius]).unwrap(), Side::Outside);
+                let closest = querier.closest_point(shape, [0.0, 0.0, 3.0 * radius], f64::INFINITY);
+                assert!((closest.unwrap().unwrap().distance - 2.0 * radius).abs() <= 1e-15 * radius);
+                let pose = translation(0.0, 0.0, 2.0 * radius);
+                assert!(querier.collide(shape, shape, &pose).unwrap(), "{core:?} {radius}");
+                let pose = translation(0.0, 0.0, 3.0 * radius);
+                assert!(!querier.collide(shape, shape, &pose).unwrap(), "{core:?} {radius}");
+                let found = querier.distance(shape, shape, &pose).unwrap();
+                assert!((found.distance - radius).abs() <= 1e-14 * radius, "{core:?} {radius}: {found:?}");
+            }
+        }
+    }
+}

@@ -669,12 +669,13 @@ static void solids(void) {
         bool is_solid;
         OK(cbvh_mesh_is_solid(solid, &is_solid));
         CHECK(is_solid && touch(solid, point, inside) && touch(point, solid, back) && gap(solid, point, inside) == 0);
-        CHECK(!touch(solid, point, outside) && gap(solid, point, outside) == places[k].gap);
+        const double least = places[k].gap - (k == 2 ? error_of_cylinder : 0), found = gap(solid, point, outside);
+        CHECK(!touch(solid, point, outside) && least <= found && found <= places[k].gap);
         /* A radius keeps it solid, and is around it. */
         cbvh_mesh padded;
         OK(cbvh_mesh_rounded(solid, 0.125, &padded));
         OK(cbvh_mesh_is_solid(padded, &is_solid));
-        CHECK(is_solid && touch(padded, point, inside) && gap(padded, point, outside) == places[k].gap - 0.125);
+        CHECK(is_solid && touch(padded, point, inside) && gap(padded, point, outside) == found - 0.125);
         size_t count;
         OK(cbvh_contacts(querier, solid, point, &inside, 1, NULL, NULL, 0, &count));
         CHECK(count == 0);
