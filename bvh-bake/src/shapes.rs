@@ -10,7 +10,7 @@
 //! | cylinder, cone | [`cylinder`], [`cone`]: polyhedra around them | 0 | yes |
 //! | ground | [`ground`] | 0 | yes |
 //! | cloud of points | [`cloud`] | that of each point | |
-//! | voxels | [`voxels`] | 0 | yes, if no cells touch in an edge or corner only |
+//! | voxels | [`voxels`] | 0 | yes |
 //!
 //! Each function places its shape at the origin of the mesh's frame, with lengths in mesh units, and looks outwards: the
 //! corners of a triangle turn counter-clockwise as seen from outside. Vertices are rounded to f32 when they are baked.
@@ -56,7 +56,7 @@ pub fn block(sides: [f64; 3]) -> Result<Mesh, ShapeError> {
 /// Makes the solid ground under z = 0: a box of these sides along x and y, and of this thickness.
 ///
 /// # Errors
-/// [`ShapeError::Length`] if a side is not finite and above 0. A ground without end is none: state how far it goes.
+/// [`ShapeError::Length`] if a side is not finite and above 0. A ground cannot be endless, because files have finite coordinates.
 pub fn ground(sides: [f64; 2], thickness: f64) -> Result<Mesh, ShapeError> {
     for side in sides {
         check("side", side)?;

@@ -9,7 +9,7 @@ use bvh_query::{
 use cbvh_testkit::exact::Length;
 use common::nearest::point_triangle;
 use common::shapes::{cube, outward, soup};
-use common::{Random, Stored, Triangle, baked, placed, queriers, random_pose, stored, translation};
+use common::{Random, Stored, Triangle, bake, baked, placed, queriers, random_pose, stored, translation};
 use std::cmp::Ordering;
 
 /// How far off a witness may be.
@@ -264,6 +264,15 @@ fn what_is_inside_a_solid_touches_it() {
             }
         }
     }
+    // Cells that have only an edge or a corner in common are solid, too.
+    let cells = bvh_bake::shapes::voxels(&[[0, 0, 0], [1, 1, 0], [2, 2, 1]], 1.0).unwrap();
+    let cells = bake(&cells, &bvh_bake::Options::default());
+    let (solid, point) = (cells.all().solid().unwrap(), baked(&[[[0.5, 0.5, 0.5]; 3]]));
+    for (x, y, z, is_inside) in
+        [(0.0, 0.0, 0.0, true), (1.0, 1.0, 0.0, true), (2.0, 2.0, 1.0, true), (1.0, 0.0, 0.0, false)]
+    {
+        assert_eq!(queriers[0].collide(solid, &point, &translation(x, y, z)).unwrap(), is_inside);
+    }
     let open = baked(&common::shapes::plate(2));
     assert_eq!(open.all().solid().unwrap_err(), QueryError::NotClosed(0));
 }
@@ -493,4 +502,51 @@ fn radii_of_any_size_have_answers() {
             }
         }
     }
+}
+
+/// Rays that graze long slivers: all before `lower` is outside, and at `upper` the ray is inside, unless it only grazes.
+#[test]
+fn bounds_of_hits_hold_for_slivers() {
+    let mut queriers = queriers();
+    let mut random = Random::new(11);
+    let mut hits = 0;
+    for _ in 0..cbvh_testkit::depth::rounds(400) {
+        let (from, along) = (random.point().map(|x| 500.0 * x), random.point().map(|x| 1000.0 * x));
+        let thin = 10f64.powi(-(random.below(12) as i32));
+        let corner = |share: f64, random: &mut Random| {
+            let off = random.point();
+            [0, 1, 2].map(|k| f64::from((from[k] + share * along[k] + thin * off[k]) as f32))
+        };
+        let core = [corner(0.0, &mut random), corner(1.0, &mut random), corner(random.unit(), &mut random)];
+        let bvh = baked(&[core]);
+        let radius = 10f64.powi(-(random.below(4) as i32));
+        let shape = bvh.all().rounded(radius).unwrap();
+        // Past a point of the sliver, about as far away as the radius.
+        let share = random.unit();
+        let goal = [0, 1, 2].map(|k| core[0][k] + share * (core[1][k] - core[0][k]));
+        let away = random.point().map(|x| radius * x * (1.0 + 1e-9 * random.signed()));
+        let direction = random.point();
+        let origin = [0, 1, 2].map(|k| goal[k] + away[k] - 3.0 * direction[k]);
+        let ray = Ray::new(origin, direction);
+        let exactly = |t: f64| {
+            let point = [0, 1, 2].map(|k| origin[k] + t * direction[k]);
+            Length::between(&core, &[point; 3])
+        };
+        let mut first = None;
+        for querier in &mut queriers {
+            let hit = querier.first_hit(shape, &ray).unwrap();
+            assert_eq!(hit, *first.get_or_insert(hit), "{}", querier.backend());
+            assert_eq!(querier.any_hit(shape, &ray).unwrap(), hit.is_some());
+        }
+        let Some(hit) = first.flatten() else { continue };
+        hits += 1;
+        // Three terms of up to 1,000 are each rounded twice: 2^-52 of 3,000.
+        let slack = 1e-12;
+        for part in 0..=10 {
+            let before = exactly(hit.lower * f64::from(part) / 10.0);
+            assert!(hit.lower == 0.0 || before.compare(radius - slack).is_ge(), "{core:?} {ray:?} {hit:?}");
+        }
+        assert!(hit.lower <= hit.t && hit.t <= hit.upper, "{hit:?}");
+    }
+    assert!(hits > 100, "{hits}");
 }

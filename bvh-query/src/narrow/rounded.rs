@@ -30,6 +30,8 @@ struct Value {
 struct Along<'a> {
     ray: &'a Ray,
     triangle: &'a Triangle,
+    /// The sum of the magnitudes of the triangle's coordinates.
+    magnitude: f64,
     radius: f64,
 }
 
@@ -49,8 +51,9 @@ impl Along<'_> {
             lower: (closest.lower - error).next_down(),
             upper: (closest.upper + error).next_up(),
             slope: dot(subtract(point, closest.point_a), self.ray.direction),
-            // Both points are off by a few roundings, and components of the direction are below 2.
-            slope_error: 64.0 * (error + UNIT_ROUNDOFF * closest.distance),
+            // Along each axis, the point of the ray is off by at most `error`, and that of the triangle by a few roundings of
+            // the coordinates, edges and gaps that it is made of. Components of the direction are below 2.
+            slope_error: 64.0 * (error + UNIT_ROUNDOFF * (self.magnitude + closest.distance)),
         }
     }
 
@@ -117,7 +120,8 @@ impl Along<'_> {
 /// Returns where a ray, whose parameter goes up to `until`, first comes within a radius above 0 of a triangle. Whether it does is
 /// exact.
 pub(crate) fn rounded_crossing(ray: &Ray, until: f64, triangle: &Triangle, radius: f64) -> Option<Crossing> {
-    let along = Along { ray, triangle, radius };
+    let magnitude = triangle.as_flattened().iter().map(|x| x.abs()).sum();
+    let along = Along { ray, triangle, magnitude, radius };
     let start = along.value(0.0);
     if triangles_within(triangle, &[ray.origin; 3], &start.closest, radius) {
         return Some(Crossing::around(0.0, 0.0, 0.0));

@@ -13,7 +13,8 @@ pub struct Contact {
     pub triangle_b: u32,
 }
 
-/// The least distance of two meshes.
+/// The least distance of two shapes. For shapes with radii, `triangle_a` and `triangle_b` are those of the cores, and the points
+/// are on the rounded surfaces; where the shapes touch, both are one common point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Distance {

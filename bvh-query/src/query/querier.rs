@@ -18,8 +18,8 @@ use crate::traverse::walk_memory::WalkMemory;
 /// affect answers. Use one querier per thread.
 ///
 /// # Worst case
-/// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0
-/// takes a second walk. Let the pages of the two objects have t and u treelets, and p and q leaf packets.
+/// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0, or
+/// one near the sum of two radii, takes a second walk. Let the pages of the two objects have t and u treelets, and p and q leaf packets.
 ///
 /// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or one packet
 ///   test each. Ordinary meshes need a few hundred visits. For files from strangers, limit the time further with
@@ -90,7 +90,8 @@ impl Querier {
     /// - a pair of objects, and a pair of nodes or of leaf packets of both trees;
     /// - for a point or a line: an object, a node that is opened, and a leaf packet;
     /// - a contact that is reported: one that stands for duplicates counts once for each pair of them;
-    /// - for [`Querier::relation`]: each pair of a component of one mesh and an object of the other;
+    /// - for [`Querier::relation`], and where a shape is solid: each pair of a component of one mesh and an object of the
+    ///   other;
     /// - for a motion: each interval of time, and each object of B in it beyond the first.
     ///
     /// A visit takes some 100 ns; the first one of a page takes some microseconds more, because the page is checked.

@@ -2,7 +2,6 @@
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
-use crate::query::motion::size_of;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
@@ -49,6 +48,8 @@ pub(super) struct Instance {
     pub(super) shape: SceneShape,
     /// What is added to the radius of the shape, in mesh units.
     pub(super) margin: f64,
+    /// The largest diagonal of the boxes of its objects, in mesh units.
+    pub(super) size: f64,
     pub(super) world: Pose,
     pub(super) bounds: WorldBox,
     pub(super) groups: Groups,
@@ -67,9 +68,9 @@ impl Instance {
         self.shape.radius() + self.margin
     }
 
-    /// Returns the largest diagonal of the boxes of its objects, and twice its radius, in mesh units.
-    pub(super) fn size(&self) -> f64 {
-        size_of(self.shape.objects(), self.radius())
+    /// Returns its size and twice its radius with a further margin, in mesh units: the size that questions know.
+    pub(super) fn size_with(&self, margin: f64) -> f64 {
+        self.size + 2.0 * (self.shape.radius() + (self.margin + margin))
     }
 
     /// Returns its box in the world at a pose.

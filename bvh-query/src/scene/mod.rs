@@ -31,6 +31,7 @@ use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
+use crate::query::motion::size_of;
 use broad_phase::BroadPhase;
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use instance::Instance;
@@ -43,7 +44,8 @@ use world_box::WorldBox;
 ///
 /// An instance is a shape with a pose in the world. A question is about all pairs of instances whose [`Groups`] meet
 /// and whose contact is not allowed ([`Scene::set_allowed`]). The lower [`InstanceId`] of a pair is A. The answer about
-/// a pair is that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, to the bit. Answers are in
+/// a pair is that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, and for the radii that margins
+/// make, to the bit. Answers are in
 /// ascending order of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of
 /// threads, nor on earlier questions.
 ///
@@ -246,11 +248,13 @@ impl Scene {
         if let Some(name) = &name {
             self.names.insert(name.clone(), place);
         }
+        let size = size_of(shape.objects(), 0.0);
         let mut instance = Instance {
             generation,
             name,
             shape,
             margin: 0.0,
+            size,
             world,
             bounds: WorldBox::EMPTY,
             groups,
@@ -385,6 +389,11 @@ impl Scene {
         let pair =
             move |(&(a, b), &margin): (&(u32, u32), &f64)| Some((ScenePair { a: id(a)?, b: id(b)? }, margin));
         pairs.into_iter().filter_map(pair)
+    }
+
+    /// Returns how much farther apart than a limit the boxes of a pair may be, at most, because it has a margin of its own.
+    fn reach_of_pairs(&self) -> f64 {
+        reach_of(self.widest_pair_margin)
     }
 
     /// Returns the margin that the pair in two places has of its own.
@@ -534,6 +543,12 @@ impl Scene {
         let item = |(place, instance): (u32, &Option<Instance>)| Some(instance.as_ref()?.item(place));
         self.broad.refresh((0..).zip(&self.instances).filter_map(item), self.instances.len());
     }
+}
+
+/// Returns how much farther apart the boxes of a pair with a margin of its own may be. The default tolerance of a motion grows
+/// by two millionths of the margin, and A's frame may be stretched against the world by 2^-22.
+fn reach_of(pair_margin: f64) -> f64 {
+    pair_margin * (1.0 + 1e-5)
 }
 
 /// Refuses an invalid margin.

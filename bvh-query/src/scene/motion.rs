@@ -13,7 +13,7 @@ use crate::query::querier::Querier;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Scene, SceneError, reach_of};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -207,8 +207,7 @@ impl Scene {
         for (number, one) in moving.iter().enumerate() {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
             let mut near = Vec::new();
-            let widest = self.widest_pair_margin;
-            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other) + widest * (1.0 + 1e-5);
+            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other) + self.reach_of_pairs();
             self.charged(|budget| {
                 budget.charge((moving.len() - number) as u64)?;
                 self.broad.near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
@@ -262,9 +261,8 @@ impl Scene {
             return None;
         }
         let margin = self.margin_of_pair(a, b);
-        let tolerance = tolerance((one.size() + 2.0 * margin).max(other.size()), ways.options);
-        // More than all roundings.
-        let limit = (ways.options.clearance + tolerance + margin * (1.0 + 1e-5)).powi(2);
+        let tolerance = tolerance(one.size_with(margin).max(other.size_with(0.0)), ways.options);
+        let limit = (ways.options.clearance + tolerance + reach_of(margin)).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
         let slice = slices.iter().zip(others).position(is_near);
         slice.map(|slice| Encounter { slice, a, b })

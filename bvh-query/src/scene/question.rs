@@ -240,7 +240,7 @@ impl Scene {
         while let Some(mut near_pairs) = self.next_piece(&mut next, limit(&nearest))? {
             nearest_first(&mut near_pairs);
             for run in near_pairs.chunks(self.workers.threads()) {
-                if run[0].squared_gap > (limit(&nearest) + self.widest_pair_margin * (1.0 + 1e-5)).powi(2) {
+                if run[0].squared_gap > (limit(&nearest) + self.reach_of_pairs()).powi(2) {
                     break;
                 }
                 self.improve(&mut nearest, run)?;
@@ -410,7 +410,7 @@ impl Scene {
     /// there are too many for one piece. All pairs of a piece precede those of the next piece.
     fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
         let mut near_pairs = Vec::new();
-        let limit = limit + self.widest_pair_margin * (1.0 + 1e-5);
+        let limit = limit + self.reach_of_pairs();
         let places = self.instances.len() as u32;
         self.charged(|budget| {
             if matches!(next, Next::All) {

@@ -28,6 +28,9 @@ impl Querier {
     /// mesh may meet that box, it is unknown whether the open object contains it. The answer is then
     /// [`Relation::Undefined`], unless other objects decide it: an open mesh inside a closed one is inside it.
     ///
+    /// Shapes with radii touch if their cores are within the sum of the radii, and an open core within a radius contains
+    /// nothing. Whether a shape is solid does not matter here.
+    ///
     /// Cost: that of `collide`, and about a microsecond per connected component.
     ///
     /// # Errors
