@@ -64,6 +64,10 @@ pub struct Options {
     /// Whether children get turning slabs, if the profile has room for them. Answers and the size of files are the
     /// same.
     pub turning_slabs: bool,
+    /// The radius of all objects, from 0 to 2^118 mesh units: each stands for all points this near to its triangles.
+    pub radius: f64,
+    /// Whether what is inside the objects touches them. All of them must be closed.
+    pub solid: bool,
     /// Whether the file states which objects are closed, with a triangle of each component. Questions about what is
     /// inside a mesh need it. It takes less than 0.01 bytes per triangle, unless a mesh has many components or duplicates.
     pub topology: bool,
@@ -80,6 +84,8 @@ impl Default for Options {
             scene: false,
             ids: true,
             turning_slabs: true,
+            radius: 0.0,
+            solid: false,
             topology: true,
         }
     }
@@ -134,6 +140,18 @@ impl Options {
         Self { turning_slabs, ..self }
     }
 
+    /// Sets the radius of all objects, in mesh units.
+    #[must_use]
+    pub fn radius(self, radius: f64) -> Self {
+        Self { radius, ..self }
+    }
+
+    /// Sets whether what is inside the objects touches them. The file then states which objects are closed.
+    #[must_use]
+    pub fn solid(self, solid: bool) -> Self {
+        Self { solid, ..self }
+    }
+
     /// Sets whether the file states which objects are closed.
     #[must_use]
     pub fn topology(self, topology: bool) -> Self {
@@ -143,7 +161,7 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
@@ -152,7 +170,9 @@ impl Options {
             self.ids,
             if self.turning_slabs { "" } else { " turning_slabs=false" },
             if self.scene { " scene=true" } else { "" },
-            if self.topology { "" } else { " topology=false" }
+            if self.topology { "" } else { " topology=false" },
+            if self.radius == 0.0 { String::new() } else { format!(" radius={:?}", self.radius) },
+            if self.solid { " solid=true" } else { "" }
         )
     }
 }

@@ -98,6 +98,13 @@ fn topology() -> Vec<u8> {
     to_bytes(&mesh, &options.split_objects(true)).unwrap().0
 }
 
+/// A cloud of 150 points with a radius, some of which coincide.
+fn points() -> Vec<u8> {
+    let at = |number: u32| [number % 7, number / 7 % 5, number % 3].map(|c| f64::from(c) / 10.0);
+    let cloud = bvh_bake::shapes::cloud(&(0..150).map(at).collect::<Vec<_>>());
+    to_bytes(&cloud, &Options::default().radius(0.05)).unwrap().0
+}
+
 fn check(name: &str, bytes: Vec<u8>) {
     validate(&bytes).unwrap();
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata");
@@ -123,4 +130,5 @@ fn the_baker_still_makes_the_frozen_files() {
     check("profiles", profiles());
     check("turning", turning());
     check("topology", topology());
+    check("points", points());
 }

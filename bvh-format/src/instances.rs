@@ -3,6 +3,7 @@
 //! An instance is an object with a pose in the world. Section 3.1 of `spec/format.md` states the place of each byte.
 
 use crate::error::{FormatError, ensure};
+use crate::object::MAX_RADIUS;
 use crate::rule::Rule;
 use std::collections::HashSet;
 use zerocopy::byteorder::little_endian::{F64, U32};
@@ -29,8 +30,10 @@ pub struct InstanceRecord {
     pub member: U32,
     /// The groups that it meets: it is tested against their instances.
     pub meets: U32,
-    /// Zero.
-    pub reserved: [u8; 12],
+    /// 1 if what is inside the instance touches it, even if its object is not solid; else 0.
+    pub solid: U32,
+    /// What is added to the radius of the object, in mesh units.
+    pub margin: F64,
     /// The rotation, row by row.
     pub rotation: [F64; 9],
     /// The translation in mesh units.
@@ -50,6 +53,10 @@ pub struct Instance {
     pub member: u32,
     /// The groups that it meets, one bit per group: it is tested against their instances.
     pub meets: u32,
+    /// Whether what is inside the instance touches it, even if its object is not solid.
+    pub solid: bool,
+    /// What is added to the radius of the object, from 0 to 2^118 mesh units.
+    pub margin: f64,
     /// The rows of the rotation R.
     pub rotation: [[f64; 3]; 3],
     /// The translation t in mesh units.
@@ -64,6 +71,8 @@ impl Instance {
             object,
             member: u32::MAX,
             meets: u32::MAX,
+            solid: false,
+            margin: 0.0,
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             translation: [0.0; 3],
         }
@@ -128,7 +137,8 @@ pub fn write_instances(instances: &[Instance]) -> Vec<u8> {
             object: instance.object.into(),
             member: instance.member.into(),
             meets: instance.meets.into(),
-            reserved: [0; 12],
+            solid: u32::from(instance.solid).into(),
+            margin: number(instance.margin),
             rotation: std::array::from_fn(|entry| number(rotation[entry])),
             translation: instance.translation.map(number),
         };
@@ -142,7 +152,7 @@ pub fn write_instances(instances: &[Instance]) -> Vec<u8> {
 /// Reads the instances section, which starts at byte `at` of a file with this number of objects.
 ///
 /// # Errors
-/// The first of rules 40 to 43 that does not hold.
+/// The first of rules 40 to 43 and 50 that does not hold.
 pub(crate) fn read_instances(section: &[u8], at: u64, objects: usize) -> Result<Vec<Instance>, FormatError> {
     let table =
         |found: String| FormatError::new(Rule::InstanceTable, at, "a whole table of instances", found);
@@ -187,9 +197,16 @@ pub(crate) fn read_instances(section: &[u8], at: u64, objects: usize) -> Result<
             object,
             member: record.member.get(),
             meets: record.meets.get(),
+            solid: record.solid.get() == 1,
+            margin: record.margin.get(),
             rotation: [x, y, z],
             translation: record.translation.map(|t| t.get()),
         };
+        let fits = record.solid.get() <= 1 && (0.0..=MAX_RADIUS).contains(&instance.margin);
+        ensure(fits, Rule::InstanceMargin, at + 20, || {
+            let found = format!("{} and {:e} in instance {index} {name:?}", record.solid, instance.margin);
+            ("0 or 1, and a margin from 0 to 2^118".into(), found)
+        })?;
         if let Some((what, found)) = instance.pose_fault() {
             let found = format!("{found:e} in instance {index} {name:?}");
             return Err(FormatError::new(Rule::InstancePose, at + 32, what, found));
@@ -216,6 +233,7 @@ mod tests {
         turned.rotation = [[0.0, -1.0, -0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         turned.translation = [1e30, -2.5, MAX_WORLD];
         (turned.member, turned.meets) = (5, 0);
+        (turned.solid, turned.margin) = (true, 0.25);
         let all = [named("", 0), turned, named("", 0), named("\u{e9}", 1)];
         let read = read_instances(&write_instances(&all), 0, 3).unwrap();
         assert_eq!(read, all);
@@ -247,6 +265,13 @@ mod tests {
         assert_eq!(of(|a| a.translation[0] = f64::INFINITY), Some(Rule::InstancePose));
         assert_eq!(of(|a| a.rotation = [[1e200; 3]; 3]), Some(Rule::InstancePose));
         assert_eq!(of(|a| a.object = 1), Some(Rule::InstanceObject));
+        assert_eq!(of(|a| a.margin = MAX_RADIUS), None);
+        for wrong in [MAX_RADIUS.next_up(), -1e-300, f64::NAN, f64::INFINITY] {
+            let mut instance = named("a", 0);
+            instance.margin = wrong;
+            let error = read_instances(&write_instances(&[instance]), 0, 1).unwrap_err();
+            assert_eq!(error.rule, Rule::InstanceMargin, "{wrong}");
+        }
         assert_eq!(read_instances(&write_instances(&[]), 0, 1).unwrap_err().rule, Rule::InstanceTable);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A block has one of two forms. `F32` holds plain lanes, 144 bytes per packet: corner by corner, axis by axis, four
 //! lanes. `Packed` holds each distinct vertex of the page once, and states for each packet which vertices its corners
-//! are: see [`PackedHead`]. `Quantized` has the same form, after the baker has moved the vertices to a grid. Lanes
+//! are, unless all of them are points: see [`PackedHead`]. `Quantized` has the same form, after the baker has moved the vertices to a grid. Lanes
 //! beyond a packet's triangles repeat its last triangle. A block fills whole lines of 64 bytes.
 
 mod encode;

@@ -14,6 +14,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 pub const MAX_COORDINATE: f64 = (1u128 << 120) as f64;
 /// The exponents e for which every product of an f16 code and 2^e mesh units is exact.
 pub const F16_EXPONENTS: std::ops::RangeInclusive<i32> = -125..=112;
+/// The largest radius of a shape and the largest margin of an instance: 2^118 mesh units.
+pub const MAX_RADIUS: f64 = (1u128 << 118) as f64;
 /// The number of bytes before the first record.
 const TABLE_HEAD: usize = 16;
 
@@ -63,8 +65,12 @@ pub struct ObjectRecord {
     pub sphere_centre: [F32; 3],
     /// The radius of that sphere, rounded up.
     pub sphere_radius: F32,
+    /// The radius of the object: it stands for all points this near to its triangles, in mesh units. The same for all objects.
+    pub radius: F64,
+    /// 1 if what is inside the object touches it, else 0. The same for all objects.
+    pub solid: u8,
     /// Zero.
-    pub reserved_end: [u8; 40],
+    pub reserved_end: [u8; 31],
 }
 
 const _: () = assert!(size_of::<ObjectRecord>() == 192);
@@ -134,6 +140,18 @@ impl Object {
             }
             inside
         })
+    }
+
+    /// The radius in mesh units: the object stands for all points this near to its triangles.
+    #[inline]
+    pub fn radius(&self) -> f64 {
+        self.record.radius.get()
+    }
+
+    /// Whether what is inside the object touches it.
+    #[inline]
+    pub fn is_solid(&self) -> bool {
+        self.record.solid == 1
     }
 
     /// The profile: how the nodes of the tree are stored.
@@ -209,7 +227,7 @@ pub(crate) fn read_objects(section: &[u8], at: u64, node_pages: u64) -> Result<V
     let mut objects = Vec::with_capacity(count);
     for (index, record) in records.iter().enumerate() {
         let at = at + (TABLE_HEAD + index * size_of::<ObjectRecord>()) as u64;
-        check_numbers(record, at)?;
+        check_numbers(record, &records[0], at)?;
         let first = u64::from(record.first_page.get());
         let follows = first == next_page && record.pages.get() > 0;
         ensure(follows, Rule::ObjectPages, at + 80, || {
@@ -261,7 +279,8 @@ fn is_multiple_of_smallest(value: f64) -> bool {
     (value * 2f64.powi(149)).fract() == 0.0
 }
 
-fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
+/// Checks rule 12 for a record. All have the radius and the solidity of the first one.
+fn check_numbers(record: &ObjectRecord, first: &ObjectRecord, at: u64) -> Result<(), FormatError> {
     let limit = MAX_COORDINATE;
     let coordinate = |v: f64| v.abs() <= limit;
     let origin = record.origin.iter().all(|v| coordinate(v.get()) && is_multiple_of_smallest(v.get()));
@@ -280,7 +299,11 @@ fn check_numbers(record: &ObjectRecord, at: u64) -> Result<(), FormatError> {
         && record.input_triangles.get() < 1 << 32
         && record.packets.get() < 1 << 30
         && record.triangles.get() <= 4 * record.packets.get();
-    let holds = origin && boxed && errors && exponent && sphere && counts;
+    let rounded = (0.0..=MAX_RADIUS).contains(&record.radius.get())
+        && record.radius.get().to_bits() == first.radius.get().to_bits()
+        && record.solid <= 1
+        && record.solid == first.solid;
+    let holds = origin && boxed && errors && exponent && sphere && counts && rounded;
     ensure(holds, Rule::ObjectNumbers, at, || {
         ("finite, ordered numbers within the limits".into(), format!("{record:?}"))
     })
@@ -352,7 +375,7 @@ mod tests {
             (f64::NAN, false),
         ] {
             record.origin[1] = origin.into();
-            assert_eq!(check_numbers(&record, 0).is_ok(), holds, "{origin:e}");
+            assert_eq!(check_numbers(&record, &record, 0).is_ok(), holds, "{origin:e}");
         }
     }
 }

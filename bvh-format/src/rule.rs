@@ -72,6 +72,8 @@ rules! {
     TopologyNet = 47, "a listed net is not 1";
     TopologyClosed = 48, "a closed object has no boundary";
     Nested = 49, "the slabs of a node lie within those of its parent";
+    InstanceMargin = 50, "an instance's margin is within the limits, and it is solid or not";
+    SolidClosed = 51, "what is solid is closed";
 }
 
 impl Rule {

@@ -102,7 +102,7 @@ pub fn validate_with<S: Source + ?Sized>(source: &S, workers: &impl Workers) -> 
 /// topology section shows by itself.
 ///
 /// # Errors
-/// The first of rules 10, 36 and 40 to 47 that does not hold, or an error of the source.
+/// The first of rules 10, 36, 40 to 47, 50 and 51 that does not hold, or an error of the source.
 pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(), S::Error> {
     let mut content = ContentHasher::default();
     let mut pairs = PairsInOrder::default();
@@ -127,9 +127,18 @@ pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result
     require(Rule::SectionChecksum, 24, hex(layout.content_checksum), hex(content.finish()))?;
     let duplicates = layout.sections.iter().find(|section| section.kind == SectionKind::Duplicates);
     duplicates.map_or(Ok(()), |section| pairs.check(section))?;
-    layout.read_instances(source)?;
-    layout.check_topology(source)?;
-    Ok(())
+    let instances = layout.read_instances(source)?;
+    let topology = layout.check_topology(source)?;
+    let is_closed = |object: usize| topology.get(object).is_some_and(|topology| topology.closed);
+    let mut solids =
+        (0..).zip(&layout.objects).filter(|(_, object)| object.is_solid()).map(|(number, _)| number);
+    let mut placed =
+        instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
+    let open =
+        solids.find(|&object| !is_closed(object)).or_else(|| placed.find(|&object| !is_closed(object)));
+    let found =
+        || ("a closed object".to_owned(), format!("object {}, which is not", open.unwrap_or_default()));
+    Ok(ensure(open.is_none(), Rule::SolidClosed, layout.sections[0].range.start as u64, found)?)
 }
 
 fn check_object<S: Source + ?Sized>(

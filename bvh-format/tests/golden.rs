@@ -34,7 +34,7 @@ fn scene() -> Vec<u8> {
     let mut turned = Instance { name: "turned".to_owned(), ..Instance::of_object(0) };
     turned.rotation = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     turned.translation = [1.5, 0.0, -2.5];
-    (turned.member, turned.meets) = (6, 1);
+    (turned.member, turned.meets, turned.margin) = (6, 1, 0.25);
     let first = Instance { name: "cube".to_owned(), ..Instance::of_object(0) };
     let instances = [first, turned, Instance::of_object(0)];
     sections.push((7, 0, write_instances(&instances)));
@@ -140,7 +140,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
         (2, "major-5", header(|f| f.header(8, &[5]))),
-        (2, "another-candidate", header(|f| f.header(10, &[2]))),
+        (2, "another-candidate", header(|f| f.header(10, &[1]))),
         (3, "short", change(&[], |f| f.bytes.truncate(60))),
         (4, "flipped-bit", change(&[], |f| f.bytes[60] ^= 1)),
         (5, "truncated", change(&[1], |f| f.bytes.truncate(100))),
@@ -163,6 +163,8 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
         (12, "box-inverted", objects_alone(|f| f.record(44, &(-1e9f32).to_le_bytes()))),
         (13, "no-pages", objects_alone(|f| f.record(84, &[0]))),
         (13, "more-pages", objects_alone(|_| ())),
+        (12, "negative-radius", objects_alone(|f| f.record(152, &(-1f64).to_le_bytes()))),
+        (12, "solid-2", objects_alone(|f| f.record(160, &[2]))),
         (14, "profile-6", objects_alone(|f| f.record(132, &[6]))),
         (14, "encoding-3", objects_alone(|f| f.record(133, &[3]))),
     ]
@@ -284,6 +286,7 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
         (28, "kind-3", block(|f| f.leaves(20, &[3]))),
         (28, "16-decimals", block(|f| f.leaves(20, &[2, 16]))),
         (28, "a-further-slot", block(|f| f.leaves(2, &[1]))),
+        (28, "points", block(|f| f.leaves(20, &[f.bytes[section(&f.bytes, 3).start + 20] | 1 << 6]))),
         (
             29,
             "fewer-vertices",
@@ -350,6 +353,8 @@ fn bad_instances() -> Vec<(u32, &'static str, Vec<u8>)> {
         (42, "mirrored", instances(2, |instance| instance.rotation[2][2] = -1.0)),
         (42, "nan", instances(1, |instance| instance.translation[2] = f64::NAN)),
         (43, "twice", instances(2, |_| ())),
+        (50, "negative-margin", instances(2, |instance| instance.margin = -1.0)),
+        (51, "open-solid", instances(1, |instance| instance.solid = true)),
     ]
 }
 
@@ -436,7 +441,8 @@ fn bad_files_break_the_rule_in_their_name() {
 #[test]
 fn every_flipped_bit_that_means_something_is_found() {
     let topology = std::fs::read(testdata().join("ok-topology.cbvh")).unwrap();
-    for bytes in [scene(), topology] {
+    let points = std::fs::read(testdata().join("ok-points.cbvh")).unwrap();
+    for bytes in [scene(), topology, points] {
         let head = 64 + 32 * bytes[12] as usize;
         let sections: Vec<_> = (1..=8).map(|kind| section(&bytes, kind)).collect();
         for at in (0..bytes.len()).step_by(7) {

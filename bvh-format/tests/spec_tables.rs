@@ -16,7 +16,7 @@ use bvh_format::leaf::{
     F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PATTERNS, PackedHead, RECORD_HEAD_BITS,
     TriangleEncoding, decode_packet,
 };
-use bvh_format::object::{MAX_COORDINATE, ObjectRecord, write_objects};
+use bvh_format::object::{MAX_COORDINATE, MAX_RADIUS, ObjectRecord, write_objects};
 use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
@@ -103,8 +103,9 @@ fn structures() {
     compare!(ObjectRecord: name_offset, name_length, origin, box_lo, box_hi, triangles, packets, treelets,
         first_page, pages, max_vertex_rounding, max_quantization_error, input_triangles, degenerate,
         duplicates, f16_exponent, profile, triangle_encoding, reserved, sphere_centre, sphere_radius,
-        reserved_end);
-    compare!(InstanceRecord: name_offset, name_length, object, member, meets, reserved, rotation, translation);
+        radius, solid, reserved_end);
+    compare!(InstanceRecord: name_offset, name_length, object, member, meets, solid, margin, rotation,
+        translation);
     compare!(TopologyRecord: closed, components, nets, reserved);
     compare!(Net: place, net);
     compare!(PageHeader: checksum, leaf_checksum, id_checksum, leaf_line, id_word, first_packet,
@@ -258,8 +259,10 @@ fn constants() {
     const LOG2_MAX_COORDINATE: i32 = 120;
     const TURNING_TRIANGLES: usize = MAX_TRIANGLES;
     const LOG2_MAX_WORLD: i32 = 118;
+    const LOG2_MAX_RADIUS: i32 = 118;
     const RIGID_BITS: i32 = 23;
     assert_eq!(2f64.powi(LOG2_MAX_COORDINATE), MAX_COORDINATE);
+    assert_eq!(2f64.powi(LOG2_MAX_RADIUS), MAX_RADIUS);
     assert_eq!((2f64.powi(LOG2_MAX_WORLD), 2f64.powi(-RIGID_BITS)), (MAX_WORLD, MAX_RIGID_ERROR));
     let mut expected = named![
         PAGE,
@@ -282,6 +285,7 @@ fn constants() {
         LOG2_MAX_COORDINATE,
         TURNING_TRIANGLES,
         LOG2_MAX_WORLD,
+        LOG2_MAX_RADIUS,
         RIGID_BITS
     ]
     .to_vec();

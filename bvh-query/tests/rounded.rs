@@ -550,3 +550,42 @@ fn bounds_of_hits_hold_for_slivers() {
     }
     assert!(hits > 100, "{hits}");
 }
+
+/// A file that states a radius and solidity gives the answers of a shape that is rounded and made solid after it was opened.
+#[test]
+fn files_state_radii_and_solids() {
+    let mut random = Random::new(77);
+    let (block, cloud) =
+        (bvh_bake::shapes::block([2.0; 3]).unwrap(), bvh_bake::shapes::cloud(&[[0.5, 0.25, 0.0]; 3]));
+    let bake = |mesh, options: &bvh_bake::Options| {
+        Bvh::from_bytes(bvh_bake::to_bytes(mesh, options).unwrap().0).unwrap()
+    };
+    let options = bvh_bake::Options::default;
+    let stated = [bake(&block, &options().radius(0.25).solid(true)), bake(&cloud, &options().radius(0.5))];
+    let plain = [bake(&block, &options()), bake(&cloud, &options())];
+    let made = [plain[0].all().rounded(0.25).unwrap().solid().unwrap(), plain[1].all().rounded(0.5).unwrap()];
+    for (shape, made) in stated.iter().zip(&made) {
+        for shape in
+            [shape.all(), shape.object(0).unwrap(), bvh_query::OwnedShape::from(shape.clone()).shape()]
+        {
+            assert_eq!((shape.radius(), shape.is_solid()), (made.radius(), made.is_solid()));
+        }
+    }
+    let (mut inside, mut apart) = (0, 0);
+    for querier in &mut queriers() {
+        for _ in 0..200 {
+            let pose = random_pose(&mut random, 2.5);
+            let found = querier.distance(&stated[0], &stated[1], &pose).unwrap();
+            assert_eq!(found, querier.distance(made[0], made[1], &pose).unwrap());
+            let touches = querier.collide(&stated[0], &stated[1], &pose).unwrap();
+            assert_eq!(touches, found.distance == 0.0);
+            inside += usize::from(touches);
+            apart += usize::from(!touches);
+            // A radius that the caller gives replaces that of the file.
+            let bare = stated[1].all().rounded(0.0).unwrap();
+            let expected = querier.collide(made[0], &plain[1], &pose).unwrap();
+            assert_eq!(querier.collide(&stated[0], bare, &pose).unwrap(), expected);
+        }
+    }
+    assert!(inside > 50 && apart > 50, "{inside} {apart}");
+}

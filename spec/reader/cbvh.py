@@ -13,7 +13,7 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR, MINOR = 0, 1
+MAJOR, MINOR = 0, 2
 MAX_SECTIONS = 64
 SHORT_TREELET_BYTES = 32
 NO_PARENT = 0xFFFFFFFF
@@ -25,7 +25,7 @@ ID_GROUP = 8
 ID_ENTRY_BYTES = 6
 ID_GROUP_HEAD_BITS = 54
 TURNING_TRIANGLES = 1024
-LOG2_MAX_WORLD, RIGID_BITS = 118, 23
+LOG2_MAX_WORLD, LOG2_MAX_RADIUS, RIGID_BITS = 118, 118, 23
 STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
 
 MAGIC = bytes.fromhex("89636276680d0a1a")
@@ -70,7 +70,9 @@ OBJECT_RECORD = np.dtype(
         ("reserved", "u1", 2),
         ("sphere_centre", "<f4", 3),
         ("sphere_radius", "<f4"),
-        ("reserved_end", "u1", 40),
+        ("radius", "<f8"),
+        ("solid", "u1"),
+        ("reserved_end", "u1", 31),
     ]
 )
 INSTANCE_HEAD = np.dtype([("instances", "<u4"), ("names_length", "<u4"), ("reserved", "u1", 8)])
@@ -81,7 +83,8 @@ INSTANCE_RECORD = np.dtype(
         ("object", "<u4"),
         ("member", "<u4"),
         ("meets", "<u4"),
-        ("reserved", "u1", 12),
+        ("solid", "<u4"),
+        ("margin", "<f8"),
         ("rotation", "<f8", 9),
         ("translation", "<f8", 3),
     ]
@@ -226,6 +229,11 @@ def aligned(at, unit):
 def records_of(head):
     """The number of records that the head of a section with named records states, in its first field."""
     return getattr(head, head.dtype.names[0])
+
+
+def has_points(head):
+    """Whether a packed leaf block is one of points (11.2)."""
+    return bool(head.kinds & 1 << 6)
 
 
 def kinds_of_axes(head):
@@ -621,7 +629,7 @@ class Page(Record):
 
     def packed_arrays(self, head):
         """The bits that the three bit arrays of the block take: records, further slots and pool (11.2)."""
-        record = RECORD_HEAD_BITS + RECORD_SLOTS * head.index_bits
+        record = 0 if has_points(head) else RECORD_HEAD_BITS + RECORD_SLOTS * head.index_bits
         return self.packets * record, head.further * head.index_bits, head.vertices * int(head.bits.sum(dtype=int))
 
     def packed_places(self, head):
@@ -659,6 +667,8 @@ class Page(Record):
 
     def packed_corners(self, head):
         """The place in the pool of each corner: [packet, lane, corner]."""
+        if has_points(head):
+            return np.arange(PACKET * self.packets).repeat(3).reshape(-1, PACKET, 3)
         pattern, rotation, _ = self.packed_records(head)
         turned = (np.arange(3) + rotation[..., None]) % 3
         places = np.take_along_axis(PATTERNS[pattern], turned, axis=2).reshape(-1, 3 * PACKET)

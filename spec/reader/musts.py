@@ -63,6 +63,8 @@ def of_object_table(file):
     for one in file.objects:
         if one.reserved.any() or one.reserved_end.any():
             yield f"(1.2) object {one.number}: nonzero reserved bytes"
+        if one.radius == 0 and np.signbit(one.radius):
+            yield f"(3.3) object {one.number}: -0"
 
 
 def of_instances(file):
@@ -70,9 +72,7 @@ def of_instances(file):
         return
     yield from of_names(file, cbvh.INSTANCES, file.instances, "(3.1) instance")
     for one in file.instances:
-        if one.reserved.any():
-            yield f"(1.2) instance {one.number}: nonzero reserved bytes"
-        numbers = np.concatenate([one.rotation, one.translation])
+        numbers = np.concatenate([one.rotation, one.translation, [one.margin]])
         if ((numbers == 0) & np.signbit(numbers)).any():
             yield f"(3.1) instance {one.number}: -0"
 
@@ -273,8 +273,11 @@ def of_leaf_block(page, lines):
     for start, end, bits in zip(starts, starts[1:], page.packed_arrays(head)):
         if int.from_bytes(block[start:end], "little") >> bits:
             yield f"{where}: bits after an array are not zero"
+    points = (lanes.view(np.uint32) == lanes[:, :, :1].view(np.uint32)).all()
+    if points != cbvh.has_points(head):
+        yield f"{where}: a block of points exactly where all triangles are points"
     pattern, _, held = page.packed_records(head)
-    if held[np.arange(cbvh.RECORD_SLOTS) >= cbvh.slots_of(pattern)[:, None]].any():
+    if not cbvh.has_points(head) and held[np.arange(cbvh.RECORD_SLOTS) >= cbvh.slots_of(pattern)[:, None]].any():
         yield f"{where}: slots of a record that its pattern lacks are not zero"
     for axis, kind in enumerate(cbvh.kinds_of_axes(head)):
         exact = page.packed_numbers(head)[:, axis] * 2.0 ** int(head.exponent[axis])

@@ -17,6 +17,7 @@ MAX_COORDINATE = 2.0**120  # R12, R30
 MAX_SLAB = 2.0**122  # R19, R38
 MAX_WORLD = 2.0**cbvh.LOG2_MAX_WORLD  # R42
 MAX_RIGID_ERROR = 2.0**-cbvh.RIGID_BITS  # R42
+MAX_RADIUS = 2.0**cbvh.LOG2_MAX_RADIUS  # R12, R50
 LARGEST_F16 = 0x7BFF
 
 
@@ -132,7 +133,7 @@ def check_objects(file):
     first_page = named = 0
     for number in range(head.objects):
         one = cbvh.Object(file, number)
-        check_numbers(one)
+        check_numbers(one, file.objects[0] if file.objects else one)
         need(one.first_page == first_page, 13, one.place("first_page"), first_page, one.first_page)
         need(one.pages >= 1, 13, one.place("pages"), "at least 1", 0)
         first_page += one.pages
@@ -150,8 +151,8 @@ def check_objects(file):
     need(first_page * PAGE == nodes.length, 13, nodes.place("length"), first_page * PAGE, nodes.length)
 
 
-def check_numbers(one):
-    """Checks R12 for an object record."""
+def check_numbers(one, first):
+    """Checks R12 for an object record. `first` is that of object 0."""
 
     def need_field(field, holds, expected):
         need(holds, 12, one.place(field), expected, getattr(one, field))
@@ -168,6 +169,10 @@ def check_numbers(one):
     need_field("triangles", 1 <= one.triangles <= PACKET * one.packets, "1 to 4 for each packet")
     need_field("packets", one.packets < 1 << 30, "below 2^30")
     need_field("input_triangles", one.input_triangles < 1 << 32, "below 2^32")
+    need_field("radius", 0 <= one.radius <= MAX_RADIUS, "0 to 2^118")
+    need_field("solid", one.solid <= 1, "0 or 1")
+    need_field("radius", repr(one.radius) == repr(first.radius), "that of object 0")
+    need_field("solid", one.solid == first.solid, "that of object 0")
 
 
 # Touch
@@ -311,10 +316,13 @@ def check_leaf_block(page):
         need(head.index_bits <= 16, 28, head.place("index_bits"), "at most 16", head.index_bits)
         need(head.vertices >= 1, 28, head.place("vertices"), "at least 1", 0)
         kinds = cbvh.kinds_of_axes(head)
-        need(head.kinds < 64 and max(kinds) <= cbvh.DECIMAL, 28, head.place("kinds"), "known kinds", head.kinds)
+        need(head.kinds < 128 and max(kinds) <= cbvh.DECIMAL, 28, head.place("kinds"), "known kinds", head.kinds)
         for kind, exponent in zip(kinds, head.exponent.tolist()):
             least, most = {cbvh.ORDERED: (0, 0), cbvh.BINARY: (-128, 127), cbvh.DECIMAL: (0, 15)}[kind]
             need(least <= exponent <= most, 28, head.place("exponent"), f"{least} to {most}", exponent)
+        if cbvh.has_points(head):
+            for field, only in (("index_bits", 0), ("further", 0), ("vertices", PACKET * page.packets)):
+                need(getattr(head, field) == only, 28, head.place(field), only, getattr(head, field))
         _, further_at, pool_at, _ = page.packed_places(head)
         need(head.further_at == further_at, 28, head.place("further_at"), further_at, head.further_at)
         need(head.pool_at == pool_at, 28, head.place("pool_at"), pool_at, head.pool_at)
@@ -355,6 +363,8 @@ def check_scene(file):
         one = cbvh.Instance(file, number)
         named = check_name(one, 40, head, named)
         need(one.object < len(file.objects), 41, one.place("object"), f"below {len(file.objects)}", one.object)
+        need(one.solid <= 1, 50, one.place("solid"), "0 or 1", one.solid)
+        need(0 <= one.margin <= MAX_RADIUS, 50, one.place("margin"), "0 to 2^118", one.margin)
         check_pose(one)
         need(one.name not in names, 43, one.place("name_offset"), "no name twice", repr(one.name))
         if one.name:
@@ -439,11 +449,20 @@ def validate(data):
     check_duplicates(file)
     check_scene(file)
     check_topology(file)
+    for number in solids(file):
+        closed = file.topology and file.topology[number].closed
+        need(closed, 51, file.sections[OBJECTS].offset, "a closed object", f"object {number}, which is not")
     for one in file.objects:
         validate_object(one)
         if file.topology:
             check_surface(one, file.topology[one.number])
     return file
+
+
+def solids(file):
+    """The numbers of the objects that are solid, and of those of which an instance is."""
+    yield from (one.number for one in file.objects if one.solid)
+    yield from (one.object for one in file.instances if one.solid)
 
 
 def check_surface(one, topology):
@@ -484,7 +503,7 @@ def validate_object(one):
 def check_packets(page):
     """Checks each packet of a page in turn: its record (R29), each coordinate (R30 and R37), and ids (R33)."""
     bad_record = np.zeros(page.packets, bool)
-    if page.is_packed() and page.packets:
+    if page.is_packed() and page.packets and not cbvh.has_points(page.packed_head()):
         head = page.packed_head()
         _, rotation, _ = page.packed_records(head)
         slots, number = page.packed_slots(head)

@@ -55,7 +55,7 @@ fn the_report_has_the_fields_of_the_contract() {
     let size = fs::metadata(directory.join("c.cbvh")).unwrap().len();
     assert_eq!(baked["input"], "cube.obj");
     assert_eq!(baked["output"], "c.cbvh");
-    assert_eq!(baked["format_version"], "1.0-rc1");
+    assert_eq!(baked["format_version"], "1.0-rc2");
     assert_eq!((&baked["triangles_in"], &baked["triangles"]), (&14.into(), &12.into()));
     assert_eq!((&baked["duplicates"], &baked["degenerate"]), (&2.into(), &0.into()));
     assert_eq!((&baked["vertices"], &baked["objects"]), (&8.into(), &1.into()));
@@ -294,4 +294,34 @@ fn a_summary_has_the_size_and_a_folder_is_no_output() {
         said.contains("  size         14 by 6 by 6 mesh units\n") && !said.contains("MiB without ids"),
         "{said}"
     );
+}
+
+#[test]
+fn clouds_radii_and_solids_are_baked() {
+    let directory = &place();
+    directory.write("points.xyz", "0 0 0\n1 0 0\n1 0 0\n");
+    directory.write("cube.obj", cube());
+    directory.write("pose.txt", "1 0 0 3 0 1 0 0 0 0 1 0\n");
+    let baked = directory.cbvh("bake points.xyz -o p.cbvh --radius 0.5 --json -q").done().json();
+    assert_eq!((&baked["triangles"], &baked["duplicates"]), (&3.into(), &0.into()));
+    directory.cbvh("verify p.cbvh points.xyz").done();
+    let dumped = &directory.cbvh("dump p.cbvh --json").done().json()["objects"][0];
+    assert_eq!((&dumped["radius"], &dumped["solid"]), (&0.5.into(), &false.into()));
+    assert_eq!(directory.cbvh("query p.cbvh p.cbvh pose.txt --mode distance").done().out, "1\n");
+    directory.cbvh("bake cube.obj -o c.cbvh --solid").done();
+    assert_eq!(directory.cbvh("dump c.cbvh --json").done().json()["objects"][0]["solid"], true);
+    // The same mesh with another radius is another file.
+    assert_eq!(directory.cbvh("bake cube.obj -o c.cbvh --json -q").done().json()["skipped"], false);
+    directory.write("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    directory.cbvh("bake sheet.obj -o s.cbvh --solid").failed(1, &["sheet.obj", "closed surface"]);
+    directory.cbvh("bake cube.obj -o s.cbvh --radius=-1").failed(1, &["--radius", "at least 0"]);
+    directory.cbvh("bake cube.obj -o s.cbvh --radius 1e40").failed(1, &["2^118"]);
+    directory.write(
+        "in.jsonl",
+        "{\"input\": \"cube.obj\", \"output\": \"m.cbvh\", \"radius\": 0.25, \"solid\": true}\n",
+    );
+    directory.cbvh("bake --manifest in.jsonl --out-manifest out.jsonl").done();
+    let dumped = &directory.cbvh("dump m.cbvh --json").done().json()["objects"][0];
+    assert_eq!((&dumped["radius"], &dumped["solid"]), (&0.25.into(), &true.into()));
+    assert!(!names(directory).contains(&"s.cbvh".to_owned()));
 }

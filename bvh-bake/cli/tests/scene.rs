@@ -454,9 +454,9 @@ fn scenes_have_simple_shapes_and_margins() {
         assert!(ended.err.contains(expected), "{line}: {}", ended.err);
     }
     for (points, expected) in [
-        ("0 0 0\n1 nan 0\n", "line 2: expected finite numbers, found \"nan\""),
-        ("0 0\n", "line 1: expected three numbers, found 2"),
-        ("# none\n", "expected at least one line of a point, found none"),
+        ("0 0 0\n1 nan 0\n", "line 2: expected a finite coordinate of at most 2^120 in magnitude, found NaN"),
+        ("0 0\n", "line 1: expected a point: three numbers, found 0 0"),
+        ("# none\n", "expected at least one point, found none"),
     ] {
         place.write("p.xyz", points);
         place.write("s.scene", format!("cloud dots p.xyz 1\ninstance a dots {}\n", at("0")));

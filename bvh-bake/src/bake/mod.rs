@@ -5,10 +5,10 @@ mod provenance;
 pub(crate) mod report;
 
 use crate::check::prove::prove;
-use crate::error::{BakeError, LimitError};
+use crate::error::{BakeError, LimitError, excerpt};
 use crate::input::gather::Gatherer;
-use crate::input::mesh::Mesh;
-use crate::options::Options;
+use crate::input::mesh::{Instance, Mesh};
+use crate::options::{Effort, Options};
 use crate::pages::Style;
 use crate::pages::assemble::{Contents, assemble};
 use crate::pages::brick::{EncodedObject, encode_object};
@@ -20,10 +20,10 @@ use crate::progress::{Progress, Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::resources::Resources;
-use crate::topology::{Nets, Survey, TopologyLists};
+use crate::topology::{MAX_FEW_PARTS, Nets, Survey, TopologyLists};
 use crate::tree::{Aabb, Bricks};
 use crate::triangles::{Gathered, Kept};
-use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
+use bvh_format::object::{F16_EXPONENTS, MAX_RADIUS, ObjectRecord};
 use bvh_format::page::MAX_PAGES;
 use report::{BakeReport, FileSummary};
 use std::path::Path;
@@ -83,10 +83,12 @@ fn bake(
     let resources = gatherer.resources();
     let (triangles, id_end) = (gatherer.triangles(), gatherer.id_end());
     let instances = gatherer.take_instances();
+    if !(0.0..=MAX_RADIUS).contains(&options.radius) {
+        return Err(BakeError::Radius(options.radius));
+    }
     let gathered = gatherer.finish(|name, diagonal| grid_error(options, name, diagonal))?;
     resources.progress.expect(triangles);
-    let mut baker = Baker::new(options, id_end, resources);
-    baker.contents.instances = instances;
+    let mut baker = Baker::new(options, instances, id_end, resources);
     for object in gathered {
         begin(Stage::Prepare);
         baker.add(object, begin)?;
@@ -98,6 +100,8 @@ fn bake(
 struct Baker<'a> {
     options: &'a Options,
     resources: &'a Resources,
+    /// Whether the file states which objects are closed.
+    has_topology: bool,
     /// One more than the largest triangle id.
     id_count: u64,
     contents: Contents,
@@ -114,11 +118,12 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(options: &'a Options, id_count: u64, resources: &'a Resources) -> Self {
+    fn new(options: &'a Options, instances: Vec<Instance>, id_count: u64, resources: &'a Resources) -> Self {
+        let has_solids = options.solid || instances.iter().any(|instance| instance.solid);
         let contents = Contents {
             records: Vec::new(),
             objects: Vec::new(),
-            instances: Vec::new(),
+            instances,
             topology: TopologyLists::new(),
             duplicates: Sorter::of_runs(resources.sorted_at_once::<[u32; 2]>(id_count)),
             spill: resources.scratch.spill(),
@@ -126,6 +131,7 @@ impl<'a> Baker<'a> {
         Self {
             options,
             resources,
+            has_topology: options.topology || has_solids,
             id_count,
             contents,
             reason: None,
@@ -140,12 +146,14 @@ impl<'a> Baker<'a> {
 
     /// Bakes an object up to its pages.
     fn add(&mut self, prepared: Gathered, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
-        let Self { options, resources, .. } = *self;
-        let Gathered { name, origin, stream, moved, vertices } = prepared;
+        let Self { options, resources, has_topology, .. } = *self;
+        let Gathered { name, origin, stream, moved, vertices, is_cloud } = prepared;
         let Contents { duplicates, spill, topology, .. } = &mut self.contents;
         let before = duplicates.count();
-        let mut nets = options.topology.then(|| Nets::new(resources));
-        let measured = measure(&stream, resources, |found| match (found, &mut nets) {
+        // The edges of points do not count.
+        let is_counted = has_topology && !(is_cloud && stream.count > MAX_FEW_PARTS);
+        let mut nets = is_counted.then(|| Nets::new(resources));
+        let measured = measure(&stream, is_cloud, resources, |found| match (found, &mut nets) {
             (Found::Pair(pair), _) => duplicates.extend(&[pair], spill),
             (Found::Net { id, net, corners }, Some(nets)) => nets.add(id, net, corners, spill),
             (Found::Net { .. }, None) => Ok(()),
@@ -162,20 +170,30 @@ impl<'a> Baker<'a> {
         begin(Stage::Build);
         let f16_exponent = f16_exponent(&measured.bounds);
         let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
-        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, options.effort, resources)?;
+        // Points have no extent, so that finer splits make no better tree of them.
+        let effort = if is_cloud { Effort::Fast } else { options.effort };
+        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, effort, resources)?;
         let triangles = kept.count();
         drop(stream);
         let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles));
         let (tree, of_brick) = bricks.first_tree(resources)?;
-        let Choice { profile, encoding, reason } = layout_choice::choose(triangles, tree, of_brick, options);
+        let Choice { profile, encoding, reason } =
+            layout_choice::choose(triangles, tree, of_brick, is_cloud, options);
         let style = Style {
             profile,
             encoding,
             f16_scale: 2f32.powi(f16_exponent),
             ids: options.ids,
-            turning_slabs: options.turning_slabs && profile.has_turning_slabs(),
+            is_cloud,
+            turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
         };
+        if has_topology && survey.is_none() {
+            topology.add_cloud();
+        }
         let encoded = encode_object(bricks, style, survey, topology, resources)?;
+        if options.solid && !topology.is_closed(topology.records.len() - 1) {
+            return Err(BakeError::NotClosed { object: excerpt(name.as_bytes()) });
+        }
         let EncodedObject { pages, packets, treelets, children } = encoded;
         self.kept += triangles;
         resources.progress.reach(Step::Bake(Stage::Build), self.kept);
@@ -205,6 +223,9 @@ impl<'a> Baker<'a> {
             triangle_encoding: style.encoding as u8,
             sphere_centre: surveyed.centre.map(Into::into),
             sphere_radius: surveyed.radius.into(),
+            // -0.0 + 0.0 is 0.0.
+            radius: (options.radius + 0.0).into(),
+            solid: options.solid.into(),
             ..ObjectRecord::new_zeroed()
         };
         self.reason.get_or_insert(reason);
@@ -224,6 +245,12 @@ impl<'a> Baker<'a> {
         begin: &mut dyn FnMut(Stage),
     ) -> Result<BakeReport, BakeError> {
         let progress = &self.resources.progress;
+        let Contents { instances, topology, records, .. } = &self.contents;
+        let mut solids =
+            instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
+        if let Some(open) = solids.find(|&object| !topology.is_closed(object)) {
+            return Err(BakeError::NotClosed { object: excerpt(records[open].0.as_bytes()) });
+        }
         begin(Stage::Encode);
         let instances = self.contents.instances.len() as u64;
         assemble(self.contents, self.options.ids, provenance, target, progress)?;

@@ -82,6 +82,18 @@ pub enum BakeError {
         /// The diagonal of the object's box, in mesh units.
         diagonal: f64,
     },
+    /// The radius of the objects is no length, or too large.
+    #[error("expected a radius from 0 to 2^118, found {0:e}")]
+    Radius(f64),
+    /// An object that is to be solid has no inside.
+    #[error(
+        "{}expected a closed surface, which a solid needs, found one with a boundary; close it, or leave it hollow",
+        of_object(object)
+    )]
+    NotClosed {
+        /// The object's name, shortened; empty if it has none.
+        object: String,
+    },
     /// There is too little room for scratch files and the output.
     #[error("{}: expected room for {needed} bytes of scratch files and output, found {found}", directory.display())]
     Room {

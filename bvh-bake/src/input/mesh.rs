@@ -9,6 +9,7 @@ use crate::limits::coordinate_fits;
 pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 use crate::threads::prelude::*;
 pub use bvh_format::instances::Instance;
+use bvh_format::object::MAX_RADIUS;
 use std::collections::{HashMap, HashSet};
 
 /// The most instances of a scene: their numbers have 32 bits.
@@ -224,6 +225,9 @@ pub(crate) fn check_instances(instances: &[Instance], objects: usize) -> Result<
         }
         if instance.object as usize >= objects {
             return Err(wrong(&format!("an object below {objects}"), instance.object.to_string()));
+        }
+        if !(0.0..=MAX_RADIUS).contains(&instance.margin) {
+            return Err(wrong("a margin from 0 to 2^118", format!("{:e}", instance.margin)));
         }
         if let Some((expected, found)) = instance.pose_fault() {
             return Err(wrong(expected, format!("{found:e}")));

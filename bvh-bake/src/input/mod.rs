@@ -1,4 +1,4 @@
-//! Reads meshes from files: OBJ, STL, PLY and glTF.
+//! Reads meshes from files: OBJ, STL, PLY and glTF, and clouds of points: XYZ, PCD and PLY.
 //!
 //! There is one reader per format. It reads a file piece by piece and passes what it finds either to a bake (module
 //! `gather`), which keeps to its memory budget, or into a [`Mesh`] that keeps the contract of [`Mesh::check`]
@@ -19,12 +19,14 @@ mod input_file;
 pub mod mesh;
 mod names;
 mod obj;
+mod pcd;
 mod ply;
 pub(crate) mod polygon;
 #[cfg(not(target_family = "wasm"))]
 mod read_ahead;
 mod stl;
 mod text;
+mod xyz;
 
 use crate::error::BakeError;
 use crate::error::{Fault, Halt, excerpt};
@@ -42,7 +44,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::thread;
 
-/// A format of mesh files.
+/// A format of mesh files, or of files of points. A point becomes a triangle whose corners are equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum MeshFormat {
@@ -50,13 +52,18 @@ pub enum MeshFormat {
     Obj,
     /// STL, text or binary.
     Stl,
-    /// PLY, text or binary of either byte order.
+    /// PLY, text or binary of either byte order. Without an element `face`, its vertices are points.
     Ply,
     /// glTF 2.0, as JSON or as one binary file (GLB).
     Gltf,
+    /// XYZ, text with a point per line.
+    Xyz,
+    /// PCD, the points of the Point Cloud Library, as text, binary or compressed.
+    Pcd,
 }
 
-const KNOWN: &str = "a mesh in a file named .obj, .stl, .ply, .gltf or .glb";
+const KNOWN: &str =
+    "a mesh in a file named .obj, .stl, .ply, .gltf or .glb, or points in one named .xyz, .pcd or .ply";
 
 impl MeshFormat {
     /// Returns the format that the extension of a file's name stands for, in upper or lower case.
@@ -67,11 +74,13 @@ impl MeshFormat {
             "stl" => Some(MeshFormat::Stl),
             "ply" => Some(MeshFormat::Ply),
             "gltf" | "glb" => Some(MeshFormat::Gltf),
+            "xyz" => Some(MeshFormat::Xyz),
+            "pcd" => Some(MeshFormat::Pcd),
             _ => None,
         }
     }
 
-    /// Recognises the format from the beginning of a file.
+    /// Recognises the format from the beginning of a file. XYZ has no mark of its own, and is not recognised.
     pub fn from_content(bytes: &[u8]) -> Option<MeshFormat> {
         Self::from_head(bytes, bytes.len() as u64)
     }
@@ -85,6 +94,8 @@ impl MeshFormat {
         };
         if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
             Some(MeshFormat::Ply)
+        } else if head.starts_with(b"# .PCD") || head.starts_with(b"VERSION .7\n") {
+            Some(MeshFormat::Pcd)
         } else if head.starts_with(b"glTF") || trimmed.starts_with(b"{") {
             Some(MeshFormat::Gltf)
         } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes, length) {
@@ -169,6 +180,14 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
                 MeshFormat::Stl => stl::read_mesh(open(true)?),
                 MeshFormat::Ply => {
                     ply::read(open, &mut faces)?;
+                    mesh_of_faces(&faces, &Names::unnamed())
+                }
+                MeshFormat::Xyz => {
+                    xyz::read(open(true)?, &mut faces)?;
+                    mesh_of_faces(&faces, &Names::unnamed())
+                }
+                MeshFormat::Pcd => {
+                    pcd::read(open(true)?, &mut faces, &resources)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 _ => {

@@ -1,7 +1,7 @@
 //! Reads PLY: text, or binary of either byte order, with any elements and properties in any order.
 //!
 //! The reader needs `x`, `y` and `z` of the element `vertex` and the list `vertex_indices` (or `vertex_index`) of the
-//! element `face`. It reads and drops the rest. All numbers are read as f64, which represents numbers of every type
+//! element `face`. Without an element `face`, vertices are points, and become triangles whose corners are equal. It reads and drops the rest. All numbers are read as f64, which represents numbers of every type
 //! exactly. Text is read word by word, wherever its lines end. Bytes after the last element are ignored.
 
 use super::byte_reader::{ByteReader, Words};
@@ -60,7 +60,8 @@ fn stream<R: Read>(reader: ByteReader<R>, faces: &mut impl Faces) -> Result<(), 
     };
     let format = header.format;
     let mut body = Body { words, format };
-    let mut reader = Reader { faces, corners: Vec::new(), triangles: 0 };
+    let has_faces = header.elements.iter().any(|element| element.name == "face");
+    let mut reader = Reader { faces, corners: Vec::new(), triangles: 0, has_faces };
     let result = header.elements.iter().try_for_each(|element| {
         body.expect_room(element)?;
         reader.read_element(element, &mut body)
@@ -191,9 +192,12 @@ impl Header {
         ] {
             let element = elements.iter().find(|element| element.name == name);
             let has = |role: &Role| element.is_some_and(|e| e.properties.iter().any(|p| p.role == *role));
-            if !roles.iter().all(has) {
-                let expected =
-                    "an element vertex with x, y and z, and an element face with a list vertex_indices";
+            // A file of points has no lists.
+            let has_list =
+                |element: &Element| element.properties.iter().any(|property| property.count.is_some());
+            let may_lack = name == "face" && element.is_none() && !elements.iter().any(has_list);
+            if !may_lack && !roles.iter().all(has) {
+                let expected = "an element vertex with x, y and z, and no element face or one with a list vertex_indices";
                 return Err(Fault::new(lines.place(), expected, format!("no such {name}")));
             }
         }
@@ -314,6 +318,8 @@ struct Reader<'a, F> {
     /// The corners of the current face.
     corners: Vec<u32>,
     triangles: u64,
+    /// Whether there is an element of faces. Without it, vertices are points.
+    has_faces: bool,
 }
 
 impl<F: Faces> Reader<'_, F> {
@@ -350,7 +356,15 @@ impl<F: Faces> Reader<'_, F> {
                     let (place, most) = (body.place(), MAX_VERTICES);
                     return Err(Fault::Limit { place, most, what: "vertices" }.into());
                 }
+                let number = self.faces.vertices();
                 self.faces.vertex(position)?;
+                if !self.has_faces {
+                    if number == MAX_TRIANGLES {
+                        let (place, most) = (body.place(), MAX_TRIANGLES);
+                        return Err(Fault::Limit { place, most, what: "points" }.into());
+                    }
+                    self.faces.face(&[number as u32; 3])?;
+                }
             }
         }
         Ok(())

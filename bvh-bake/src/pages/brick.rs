@@ -130,7 +130,7 @@ fn encode_brick(
     spill: &Spill,
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
-    let mut arena = cut_brick(&tree, triangles, width, slabs);
+    let mut arena = cut_brick(&tree, triangles, width, slabs, !style.is_cloud);
     if style.turning_slabs {
         turning::fit(&mut arena, triangles);
     }

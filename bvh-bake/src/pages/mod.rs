@@ -17,6 +17,8 @@ pub(crate) struct Style {
     pub(crate) f16_scale: f32,
     pub(crate) ids: bool,
     pub(crate) turning_slabs: bool,
+    /// Whether all triangles are points.
+    pub(crate) is_cloud: bool,
 }
 
 impl Style {

@@ -41,6 +41,8 @@ const U4_TESTS: f64 = 1.4;
 const MAX_PLAIN_BYTES: u64 = 256 << 20;
 /// Bytes of nodes and plain lanes per triangle.
 const PLAIN_BYTES_PER_TRIANGLE: u64 = 52;
+/// The profile of clouds of points.
+const CLOUD_PROFILE: Profile = Profile::Dop14U8;
 /// The number of trials per object.
 const TRIAL_COUNT: usize = 400;
 
@@ -81,13 +83,28 @@ fn trials(tree: &Tree<PacketTriangles>, triangles: &[Triangle]) -> Vec<Trial> {
     (0..TRIAL_COUNT).map(&mut trial).collect()
 }
 
+/// Chooses what the options leave open for a cloud of points, without trials.
+fn of_cloud(options: &Options) -> Choice {
+    let encoding = options.triangles.unwrap_or(TriangleEncoding::Packed);
+    let profile = options.profile.unwrap_or(CLOUD_PROFILE);
+    Choice {
+        profile,
+        encoding,
+        reason: format!("{} and {} for a cloud of points", profile.name(), encoding.name()),
+    }
+}
+
 /// Chooses what the options leave open for an object of `count` triangles, given the tree of one of its bricks.
 pub(crate) fn choose(
     count: u64,
     tree: &Tree<PacketTriangles>,
     triangles: &[Triangle],
+    is_cloud: bool,
     options: &Options,
 ) -> Choice {
+    if is_cloud {
+        return of_cloud(options);
+    }
     let mut reasons = Vec::new();
     let encoding = options.triangles.unwrap_or_else(|| {
         let bytes = count * PLAIN_BYTES_PER_TRIANGLE;
@@ -262,7 +279,7 @@ mod tests {
             corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id }).collect();
         let tree = tree_of(&triangles, width(options), options.effort);
         let rates = overlap_rates(&trials(&tree, &triangles));
-        (choose(corners.len() as u64, &tree, &triangles, options), rates)
+        (choose(corners.len() as u64, &tree, &triangles, false, options), rates)
     }
 
     /// Numbers of a permutation of `count` numbers.

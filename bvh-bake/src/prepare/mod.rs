@@ -34,9 +34,10 @@ pub(crate) struct Measured {
     pub(crate) dropped: Vec<u64>,
 }
 
-/// Runs the first pass. Passes the pairs and the nets of duplicates to `found`.
+/// Runs the first pass. Passes the pairs and the nets of duplicates to `found`. Equal points of a cloud are no duplicates.
 pub(crate) fn measure(
     stream: &TriangleStream,
+    is_cloud: bool,
     resources: &Resources,
     found: impl FnMut(Found) -> Result<(), BakeError>,
 ) -> Result<Measured, BakeError> {
@@ -53,12 +54,14 @@ pub(crate) fn measure(
         let of_part = |part: usize| {
             let (triangles, moved) = stream.measured_part(part)?;
             let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
-            let mut hashes = Vec::with_capacity(triangles.len());
+            let mut hashes = Vec::with_capacity(if is_cloud { 0 } else { triangles.len() });
             for (triangle, place) in triangles.iter().zip((part * TRIANGLES_PER_PART) as u64..) {
                 let own = Aabb::of_triangle(&triangle.corners);
                 bounds.join(&own);
                 centres.join(&Aabb::of_point(own.centre()));
-                hashes.push(duplicates::hashed(&triangle.corners, place));
+                if !is_cloud {
+                    hashes.push(duplicates::hashed(&triangle.corners, place));
+                }
             }
             measuring.add(triangles.len() as u64);
             Ok((moved, bounds, centres, hashes))
@@ -71,8 +74,14 @@ pub(crate) fn measure(
             hashes.extend(&part_hashes, &spill)?;
         }
     }
-    let run = resources.sorted_at_once::<Suspect>(stream.count);
-    let dropped = duplicates::find(stream, hashes, run, &spill, &tally(DUPLICATES_WEIGHT), found)?;
+    let counted = tally(DUPLICATES_WEIGHT);
+    let dropped = if is_cloud {
+        counted.add(stream.count);
+        Vec::new()
+    } else {
+        let run = resources.sorted_at_once::<Suspect>(stream.count);
+        duplicates::find(stream, hashes, run, &spill, &counted, found)?
+    };
     Ok(Measured { moved, bounds, centres, dropped })
 }
 

@@ -9,6 +9,7 @@ use crate::storage::resources::Resources;
 use crate::storage::{Spill, Stream};
 use crate::triangles::Triangle;
 use bvh_format::topology::TopologyRecord;
+use zerocopy::FromZeros;
 
 /// The topology of all objects, in the form of the section.
 pub(crate) struct TopologyLists {
@@ -25,6 +26,16 @@ impl TopologyLists {
     pub(crate) fn new() -> Self {
         let nets = Stream::of_pieces(ENTRIES_PER_PIECE);
         Self { records: Vec::new(), components: Stream::of_pieces(ENTRIES_PER_PIECE), nets }
+    }
+
+    /// Adds an object of more points than are listed: it has no boundary, and each point is a component.
+    pub(crate) fn add_cloud(&mut self) {
+        self.records.push(TopologyRecord { closed: 1.into(), ..TopologyRecord::new_zeroed() });
+    }
+
+    /// Returns whether an object is known to be closed.
+    pub(crate) fn is_closed(&self, object: usize) -> bool {
+        self.records.get(object).is_some_and(|record| record.closed == 1)
     }
 
     /// Returns the number of bytes of the section.

@@ -25,7 +25,7 @@ pub(crate) use nets::{MAX_NET, Nets};
 /// An object has at least this many triangles for each component listed, unless it has at most [`MAX_FEW_PARTS`].
 const TRIANGLES_PER_PART: u64 = 100;
 /// This many parts are listed however few triangles they have.
-const MAX_FEW_PARTS: u64 = 64;
+pub(crate) const MAX_FEW_PARTS: u64 = 64;
 
 /// Returns the most parts that an object may have to get a list of components. A soup of loose triangles would need
 /// four bytes for each of them.

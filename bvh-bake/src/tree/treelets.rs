@@ -23,19 +23,23 @@ const CHILDREN_PER_TASK: usize = 2048;
 /// The fixed cost of a treelet, in mean sizes of nodes with two leaves.
 const TREELET_COST: f64 = 1.0;
 
-/// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child.
+/// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child. Puts the
+/// triangles of packets in the order of lanes on request.
 pub(crate) fn cut_brick(
     tree: &Tree<PacketTriangles>,
     triangles: &[Triangle],
     width: usize,
     slabs: usize,
+    in_order_of_lanes: bool,
 ) -> Arena {
     let leaf = |packet| Child { bound: TightBound::EMPTY, kind: ChildKind::Leaf(packet) };
     let mut arena = cut(tree, width, leaf);
     arena.children_mut().par_chunks_mut(CHILDREN_PER_TASK).for_each(|children| {
         for child in children {
             if let ChildKind::Leaf(packet) = &mut child.kind {
-                *packet = packet.in_order_of_lanes(triangles);
+                if in_order_of_lanes {
+                    *packet = packet.in_order_of_lanes(triangles);
+                }
                 child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
             }
         }

@@ -27,6 +27,19 @@ impl Extent {
         }
     }
 
+    /// Adds the corners of a triangle, and returns whether it is a point.
+    #[inline]
+    pub(crate) fn add_triangle(&mut self, corners: &[[f64; 3]; 3]) -> bool {
+        let [a, b, c] = *corners;
+        self.add(a);
+        if a == b && b == c {
+            return true;
+        }
+        self.add(b);
+        self.add(c);
+        false
+    }
+
     pub(crate) fn joined(self, other: Self) -> Self {
         Self {
             lo: [0, 1, 2].map(|axis| self.lo[axis].min(other.lo[axis])),

@@ -32,6 +32,8 @@ pub(crate) struct Gathered {
     pub(crate) moved: Moved,
     /// The number of distinct vertices that the input's triangles refer to.
     pub(crate) vertices: u64,
+    /// Whether all triangles are points.
+    pub(crate) is_cloud: bool,
 }
 
 impl TriangleStream {

@@ -1,5 +1,6 @@
 //! Reads malformed files: a folder of them, random bytes and damaged files.
 
+use crate::clouds::{pcd, ply_of_points};
 use crate::gltf::{INDEXED, glb, gltf};
 use crate::{CORNERS, TWO, binary_stl, one_line, ply, try_bytes};
 use bvh_bake::input::{MeshFormat, read};
@@ -124,12 +125,18 @@ fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
         (MeshFormat::Ply, ply("ascii")),
         (MeshFormat::Ply, ply("binary_little_endian")),
         (MeshFormat::Ply, ply("binary_big_endian")),
+        (MeshFormat::Ply, ply_of_points("ascii")),
+        (MeshFormat::Xyz, b"# points\n0 1 2, 7\n1e3;-.5;3\n".to_vec()),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "ascii")),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "binary")),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0]; 9], "binary_compressed")),
         (MeshFormat::Gltf, glb(&gltf(r#"{"children":[1]},{"mesh":0}"#, sparse, ""))),
         (MeshFormat::Gltf, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"data:;base64,AgEAAAAA""#).into_bytes()),
     ]
 }
 
-const FORMATS: [MeshFormat; 4] = [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply, MeshFormat::Gltf];
+const FORMATS: [MeshFormat; 6] =
+    [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply, MeshFormat::Gltf, MeshFormat::Xyz, MeshFormat::Pcd];
 
 /// Asserts what must hold for any bytes.
 fn survives(bytes: &[u8], format: MeshFormat) {

@@ -1,6 +1,7 @@
 //! Tests every reader, on small files that are written here and on a folder of malformed ones.
 
 mod any_bytes;
+mod clouds;
 mod gltf;
 /// Windows lets few users make links, and has no pipes in folders.
 #[cfg(unix)]

@@ -8,20 +8,38 @@ use crate::ordered::to_ordered;
 
 /// Makes a packed block, without the zeros that fill its last line.
 pub(super) fn packed(packets: &[Packet], order: &[u16]) -> Vec<u8> {
+    if let Some(points) = points_of(packets) {
+        return block(&points, &[], true);
+    }
     let mut pool = Pool::new(packets.len() * MAX_SLOTS);
     let mut records = vec![Record::NONE; packets.len()];
     for number in order.iter().copied().map(usize::from) {
         records[number] = Record::new(&packets[number], &mut pool);
     }
+    block(&pool.vertices, &records, false)
+}
+
+/// Returns the vertices of packets that hold nothing but points, in the order of lanes.
+fn points_of(packets: &[Packet]) -> Option<Vec<[f32; 3]>> {
+    let is_point = |packet: &Packet| {
+        let [a, b, c] = packet.corners.map(|axes| axes.map(|lanes| lanes.map(f32::to_bits)));
+        a == b && b == c
+    };
+    let vertex = |packet: &Packet, lane: usize| packet.corners[0].map(|lanes| lanes[lane]);
+    let lanes = packets.iter().flat_map(|packet| (0..PACKET).map(move |lane| vertex(packet, lane)));
+    packets.iter().all(is_point).then(|| lanes.collect())
+}
+
+/// Makes a block of a pool and of records, or of points, which have none.
+fn block(pool: &[[f32; 3]], records: &[Record], has_points: bool) -> Vec<u8> {
     let further = records.iter().map(|record| record.further().len()).sum::<usize>();
-    let pool = pool.vertices;
     let axes = [0, 1, 2].map(|axis| Axis::fit(pool.iter().map(move |vertex| vertex[axis])));
     let parts = axes.map(|axis| axis.unit.parts());
     let mut head = PackedHead {
         vertices: pool.len() as u16,
         further: further as u16,
         // A slot may also be the number of the first further one.
-        index_bits: bit_width((pool.len() as u32 - 1).max(further as u32)) as u8,
+        index_bits: if has_points { 0 } else { bit_width((pool.len() as u32 - 1).max(further as u32)) as u8 },
         bits: axes.map(|axis| axis.bits),
         base: axes.map(|axis| axis.base),
         kinds: (0..3).map(|axis| parts[axis].0 << (2 * axis)).sum(),
@@ -29,12 +47,15 @@ pub(super) fn packed(packets: &[Packet], order: &[u16]) -> Vec<u8> {
         further_at: 0,
         pool_at: 0,
     };
-    head.lay_out(packets.len());
+    if has_points {
+        head.set_points();
+    }
+    head.lay_out(records.len());
     let mut block = Vec::with_capacity(head.block_bytes() + LINE);
     head.write(&mut block);
     let width = u32::from(head.index_bits);
     let (mut writer, mut first) = (BitWriter::default(), 0);
-    for record in &records {
+    for record in records {
         record.write(width, first, &mut writer);
         first += record.further().len() as u32;
     }
@@ -43,7 +64,7 @@ pub(super) fn packed(packets: &[Packet], order: &[u16]) -> Vec<u8> {
     records.iter().flat_map(Record::further).for_each(|&place| writer.push(place, width));
     block.extend_from_slice(&writer.finish());
     let mut writer = BitWriter::default();
-    for vertex in &pool {
+    for vertex in pool {
         for (axis, &value) in axes.iter().zip(vertex) {
             writer.push(axis.offset(value), u32::from(axis.bits));
         }

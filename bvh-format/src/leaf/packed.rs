@@ -4,6 +4,9 @@
 //! vertices in the pool. If a pattern has more than six slots, the last field of the record leads to the others. All
 //! records of a block therefore have one size, and a packet is found by its number.
 //!
+//! A block whose packets hold points alone has no records: the corners of a packet's lane are all the same vertex, and the
+//! pool has these vertices in the order of packets and lanes.
+//!
 //! Each coordinate in the pool is an offset of a few bits from the block's base. The sum of both stands for a number in
 //! one of three ways, whichever takes the fewest bits on its axis. For an *ordered* coordinate, the sum is the bits of
 //! the `f32`, made monotone (`b ^ ((b >> 31) >>> 1)`). A *binary* or *decimal* coordinate is the sum times a power of 2
@@ -27,6 +30,8 @@ pub const RECORD_HEAD_BITS: usize = PATTERN_BITS + PACKET * ROTATION_BITS;
 pub(crate) const PATTERN_BITS: usize = 6;
 /// Bits of the rotation of a lane.
 pub(crate) const ROTATION_BITS: usize = 2;
+/// The bit of a head's kinds that stands for a block of points.
+const POINTS: u8 = 1 << 6;
 /// The most bits of a place in the pool.
 pub(crate) const MAX_INDEX_BITS: u8 = 16;
 
@@ -101,7 +106,8 @@ pub struct PackedHead {
     pub bits: [u8; 3],
     /// The number that offsets count from, per axis.
     pub base: [i32; 3],
-    /// How the coordinates of each axis are stored, two bits each: 0 ordered, 1 binary, 2 decimal.
+    /// How the coordinates of each axis are stored, two bits each: 0 ordered, 1 binary, 2 decimal. Bit 6 is set if the packets
+    /// hold points alone.
     pub kinds: u8,
     /// The exponent of 2 of each binary axis, and the number of decimals of each decimal one.
     pub exponent: [i8; 3],
@@ -159,10 +165,21 @@ impl PackedHead {
         usize::from(self.index_bits.min(MAX_INDEX_BITS))
     }
 
+    /// Returns true if all corners of each triangle are equal.
+    #[inline(always)]
+    fn has_points(&self) -> bool {
+        self.kinds & POINTS != 0
+    }
+
+    /// Makes this the head of a block of points.
+    pub(super) fn set_points(&mut self) {
+        self.kinds |= POINTS;
+    }
+
     /// Bits of the record of a packet.
     #[inline]
     fn record_bits(&self) -> usize {
-        RECORD_HEAD_BITS + RECORD_SLOTS * self.index_width()
+        if self.has_points() { 0 } else { RECORD_HEAD_BITS + RECORD_SLOTS * self.index_width() }
     }
 
     /// The bytes of a block that have the records of some packets.
@@ -184,8 +201,10 @@ impl PackedHead {
         let mut again = *self;
         again.lay_out(packets);
         let within = self.bits.iter().all(|&bits| bits <= 32) && self.index_bits <= MAX_INDEX_BITS;
-        let known = self.kinds < 1 << 6 && (0..3).all(|axis| self.unit(axis).is_some());
-        within && known && self.vertices > 0 && again == *self
+        let known = self.kinds < 1 << 7 && (0..3).all(|axis| self.unit(axis).is_some());
+        let points =
+            usize::from(self.vertices) == PACKET * packets && self.further == 0 && self.index_bits == 0;
+        within && known && self.vertices > 0 && (points || !self.has_points()) && again == *self
     }
 
     /// The bytes that a block needs, before zeros fill its last line.
@@ -196,6 +215,9 @@ impl PackedHead {
     /// Reads the record of a packet, and its further slots. Bytes beyond the block read as zero.
     #[inline(always)]
     pub fn record(&self, block: &[u8], packet: usize) -> Record {
+        if self.has_points() {
+            return Record::of_points(packet);
+        }
         let width = self.index_width();
         let bits = load(block, PACKED_HEAD_BYTES * 8 + packet * self.record_bits());
         let slots = bits >> RECORD_HEAD_BITS;
@@ -307,6 +329,21 @@ pub struct Record {
 }
 
 impl Record {
+    /// The record that a packet of points would have.
+    #[inline(always)]
+    fn of_points(packet: usize) -> Self {
+        const WIDTH: u32 = MAX_INDEX_BITS as u32;
+        let place = |lane: usize| ((PACKET * packet + lane) & 0xffff) as u64;
+        let first_words = [place(0) | place(1) << WIDTH | place(2) << (2 * WIDTH), place(3)];
+        Self {
+            pattern: PATTERNS as u8,
+            rotations: 0,
+            width: MAX_INDEX_BITS,
+            first_words,
+            further_words: [0; 2],
+        }
+    }
+
     #[inline(always)]
     fn rotation(&self, lane: usize) -> usize {
         usize::from(self.rotations >> (ROTATION_BITS * lane) & 3)
@@ -315,7 +352,7 @@ impl Record {
     /// The number of slots: at most twelve.
     #[inline(always)]
     fn count(&self) -> usize {
-        usize::from(SLOTS[usize::from(self.pattern) & (PATTERNS - 1)])
+        usize::from(SLOTS[usize::from(self.pattern).min(PATTERNS)])
     }
 
     #[inline(always)]
@@ -358,7 +395,7 @@ impl Record {
     /// For each corner of a lane, the number of its vertex among the slots.
     #[inline(always)]
     fn lane(&self, lane: usize) -> [u8; 3] {
-        let pattern = &CORNERS[usize::from(self.pattern) & (PATTERNS - 1)];
+        let pattern = &CORNERS[usize::from(self.pattern).min(PATTERNS)];
         let corners = pattern[lane & 3][self.rotation(lane)] >> (8 * lane);
         [0, 1, 2].map(|corner| (corners >> (8 * PACKET * corner)) as u8)
     }
@@ -367,7 +404,7 @@ impl Record {
     /// The last four elements have no meaning.
     #[inline(always)]
     pub fn corners(&self) -> [u8; 16] {
-        let pattern = &CORNERS[usize::from(self.pattern) & (PATTERNS - 1)];
+        let pattern = &CORNERS[usize::from(self.pattern).min(PATTERNS)];
         let lane = |lane: usize| pattern[lane][self.rotation(lane)];
         (lane(0) | lane(1) | lane(2) | lane(3)).to_le_bytes()
     }

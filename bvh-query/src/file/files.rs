@@ -3,7 +3,7 @@
 use crate::error::{FileChange, OpenError, QueryError};
 use crate::file::bvh::{Bvh, WeakBvh};
 use crate::file::owned_shape::OwnedShape;
-use crate::file::shape::check_radius;
+use crate::file::shape::{check_radius, rounding};
 use bvh_format::object::Object;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ enum Held {
 }
 
 /// What a shape is, apart from its file.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Stored {
     /// The number of one object; `None` for all of the file.
     object: Option<usize>,
@@ -95,14 +95,15 @@ impl Files {
     pub fn shape(&self, path: impl AsRef<Path>) -> Result<SceneShape, OpenError> {
         let path = path.as_ref();
         let bvh = (self.0.open_file)(path)?;
-        let known = Known {
+        let known = Arc::new(Known {
             path: path.to_owned(),
             content_checksum: bvh.layout().content_checksum,
             objects: bvh.objects().to_vec(),
             bvh: Mutex::default(),
             last_use: AtomicU64::new(0),
-        };
-        Ok(SceneShape(Held::Stored(self.clone(), Arc::new(known), Stored::default())))
+        });
+        let stored = known.stored(None);
+        Ok(SceneShape(Held::Stored(self.clone(), known, stored)))
     }
 
     /// Returns how many files are open at present.
@@ -122,13 +123,8 @@ impl SceneShape {
     pub fn object(&self, number: usize) -> Option<Self> {
         match &self.0 {
             Held::Open(shape) => OwnedShape::object(shape.bvh().clone(), number).map(Self::from),
-            Held::Stored(files, known, _) => (number < known.objects.len()).then(|| {
-                Self(Held::Stored(
-                    files.clone(),
-                    known.clone(),
-                    Stored { object: Some(number), ..Stored::default() },
-                ))
-            }),
+            Held::Stored(files, known, _) => (number < known.objects.len())
+                .then(|| Self(Held::Stored(files.clone(), known.clone(), known.stored(Some(number))))),
         }
     }
 
@@ -224,6 +220,12 @@ impl Files {
 }
 
 impl Known {
+    /// Returns one object or all, with what the file states for all of its objects.
+    fn stored(&self, object: Option<usize>) -> Stored {
+        let (radius, is_solid) = rounding(&self.objects);
+        Stored { object, radius, is_solid }
+    }
+
     fn open_again(&self, open_file: fn(&Path) -> Result<Bvh, OpenError>) -> Result<Bvh, QueryError> {
         let failed = |found| QueryError::File { path: self.path.clone(), found };
         let bvh = open_file(&self.path).map_err(|error| {

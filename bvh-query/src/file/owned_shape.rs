@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::file::shape::{Shape, check_radius};
+use crate::file::shape::{Shape, check_radius, rounding};
 
 /// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all
 /// objects of a file, a [`Bvh`] is enough. Cloning it copies a pointer. A reference to it converts into a shape, so
@@ -37,7 +37,7 @@ impl OwnedShape {
     /// Returns one object of a file as a shape, or `None` if the file has no object of this number.
     pub fn object(bvh: Bvh, number: usize) -> Option<Self> {
         bvh.object(number)?;
-        Some(Self { bvh, object: Some(number), radius: 0.0, is_solid: false })
+        Some(Self { object: Some(number), ..Self::from(bvh) })
     }
 
     /// Returns the shape in the form that questions take.
@@ -65,6 +65,11 @@ impl OwnedShape {
         Ok(Self { is_solid: true, ..self })
     }
 
+    /// Returns the shape, and as a solid if the argument says so, which the file has promised to be closed.
+    pub(crate) fn solid_if(self, is_solid: bool) -> Self {
+        Self { is_solid: self.is_solid || is_solid, ..self }
+    }
+
     /// Returns the shape with a radius and solidity that were checked.
     pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
         Self { radius, is_solid, ..self }
@@ -79,7 +84,8 @@ impl OwnedShape {
 impl From<Bvh> for OwnedShape {
     /// Returns all objects of a file as one shape.
     fn from(bvh: Bvh) -> Self {
-        Self { bvh, object: None, radius: 0.0, is_solid: false }
+        let (radius, is_solid) = rounding(bvh.objects());
+        Self { bvh, object: None, radius, is_solid }
     }
 }
 

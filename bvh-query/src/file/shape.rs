@@ -2,10 +2,7 @@
 
 use crate::error::{NumberError, QueryError};
 use crate::file::bvh::Bvh;
-use bvh_format::object::Object;
-
-/// The largest radius of a shape and the largest margin, in mesh units: 2^118.
-pub(crate) const MAX_RADIUS: f64 = f64::from_bits((1023 + 118) << 52);
+use bvh_format::object::{MAX_RADIUS, Object};
 
 impl Bvh {
     /// Returns the number of the first object with this name.
@@ -13,20 +10,15 @@ impl Bvh {
         self.objects().iter().position(|object| object.name() == name)
     }
 
-    /// Returns all objects of the file as one shape.
+    /// Returns all objects of the file as one shape, with the radius that the file states, and solid if it says so.
     pub fn all(&self) -> Shape<'_> {
-        Shape { bvh: self, first: 0, end: self.objects().len(), radius: 0.0, is_solid: false }
+        Shape::of_objects(self, 0, self.objects().len())
     }
 
-    /// Returns one object of the file as a shape, or `None` if the file has no object of this number.
+    /// Returns one object of the file as a shape, with the radius that the file states, and solid if it says so. Returns
+    /// `None` if the file has no object of this number.
     pub fn object(&self, number: usize) -> Option<Shape<'_>> {
-        (number < self.objects().len()).then_some(Shape {
-            bvh: self,
-            first: number,
-            end: number + 1,
-            radius: 0.0,
-            is_solid: false,
-        })
+        (number < self.objects().len()).then(|| Shape::of_objects(self, number, number + 1))
     }
 }
 
@@ -53,6 +45,12 @@ pub struct Shape<'a> {
 }
 
 impl<'a> Shape<'a> {
+    /// Returns some objects of a file, which all have the same radius, and are all solid or none of them.
+    fn of_objects(bvh: &'a Bvh, first: usize, end: usize) -> Self {
+        let (radius, is_solid) = rounding(bvh.objects());
+        Self { bvh, first, end, radius, is_solid }
+    }
+
     /// Returns the file that the shape is in.
     pub fn bvh(&self) -> &'a Bvh {
         self.bvh
@@ -125,6 +123,11 @@ impl<'a> Shape<'a> {
     pub(crate) fn numbered(&self, number: u32) -> Option<&'a Object> {
         self.objects().get((number as usize).checked_sub(self.first)?)
     }
+}
+
+/// Returns the radius of the objects of a file, and whether they are solid: the same for all.
+pub(super) fn rounding(objects: &[Object]) -> (f64, bool) {
+    objects.first().map_or((0.0, false), |object| (object.radius(), object.is_solid()))
 }
 
 /// Refuses an invalid radius.

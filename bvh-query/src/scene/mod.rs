@@ -151,12 +151,14 @@ impl Scene {
         }
         let mut scene = Self::with_backend(backend);
         for instance in instances {
-            // The instance is of an object of the file (rule 41), rigid (rule 42), and has a name of its own (rule 43).
+            // The instance is of an object of the file (rule 41), rigid (rule 42), has a name of its own (rule 43), and its
+            // margin is valid (rule 50).
             let shape = OwnedShape::object(bvh.clone(), instance.object as usize);
+            let shape = shape.unwrap_or_else(|| bvh.clone().into()).solid_if(instance.solid);
             let world = Pose::of_valid(instance.rotation, instance.translation);
             let name = Some(instance.name).filter(|name| !name.is_empty());
             let groups = Groups { member: instance.member, meets: instance.meets };
-            scene.insert(name, shape.unwrap_or_else(|| bvh.clone().into()).into(), world, groups);
+            scene.insert(name, shape.into(), world, groups, instance.margin);
         }
         Ok(scene)
     }
@@ -232,7 +234,7 @@ impl Scene {
         }
         match name {
             Some(name) if self.names.contains_key(&name) => Err(InstanceError::NameTaken(name)),
-            name => Ok(self.insert(name, shape, world, Groups::ALL)),
+            name => Ok(self.insert(name, shape, world, Groups::ALL, 0.0)),
         }
     }
 
@@ -243,7 +245,14 @@ impl Scene {
     }
 
     /// Adds an instance that the scene does not refuse.
-    fn insert(&mut self, name: Option<String>, shape: SceneShape, world: Pose, groups: Groups) -> InstanceId {
+    fn insert(
+        &mut self,
+        name: Option<String>,
+        shape: SceneShape,
+        world: Pose,
+        groups: Groups,
+        margin: f64,
+    ) -> InstanceId {
         let id @ InstanceId { place, generation } = self.next_id();
         if let Some(name) = &name {
             self.names.insert(name.clone(), place);
@@ -253,7 +262,7 @@ impl Scene {
             generation,
             name,
             shape,
-            margin: 0.0,
+            margin,
             size,
             world,
             bounds: WorldBox::EMPTY,

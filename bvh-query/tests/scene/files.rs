@@ -28,12 +28,14 @@ fn a_scene_file_is_the_scene_of_its_instances() {
     built.add_named("cube", cube.clone(), Pose::IDENTITY).unwrap();
     let turned = built.add_named("turned", cube.clone(), Pose::new(turn, [1.5, 0.0, -2.5]).unwrap()).unwrap();
     built.set_groups(turned, Groups { member: 6, meets: 1 }).unwrap();
+    built.set_margin(turned, 0.25).unwrap();
     built.add(cube, Pose::IDENTITY).unwrap();
     assert_eq!(opened.len(), 3);
     assert_eq!(opened.instances().collect::<Vec<_>>(), built.instances().collect::<Vec<_>>());
     for id in built.instances() {
         assert_eq!(opened.name(id), built.name(id));
         assert_eq!(opened.pose(id), built.pose(id));
+        assert_eq!(opened.margin(id), built.margin(id));
     }
     assert_eq!(ask(&mut opened), ask(&mut built));
     assert_eq!(opened.pairs_in_contact().unwrap().len(), 1);
@@ -44,9 +46,13 @@ fn a_scene_file_is_the_scene_of_its_instances() {
 
     let plain = path.with_file_name("ok-plain.cbvh");
     assert_eq!(Scene::of_file(Bvh::read(plain).unwrap()).unwrap_err(), SceneFileError::NoInstances);
-    for (bad, rule) in
-        [("R40-no-instances", "R40"), ("R41-object-1", "R41"), ("R42-scaled", "R42"), ("R43-twice", "R43")]
-    {
+    for (bad, rule) in [
+        ("R40-no-instances", "R40"),
+        ("R41-object-1", "R41"),
+        ("R42-scaled", "R42"),
+        ("R43-twice", "R43"),
+        ("R50-negative-margin", "R50"),
+    ] {
         let bad = path.with_file_name(format!("bad-{bad}.cbvh"));
         // Without its world, the file is as good as any.
         let said = Scene::of_file(Bvh::read(bad).unwrap()).unwrap_err().to_string();
@@ -130,4 +136,27 @@ fn a_file_that_vanishes_or_changes_is_named() {
     assert!(scene.collide().unwrap());
     std::fs::remove_file(&paths[1]).unwrap();
     assert!(scene.collide().unwrap());
+}
+
+/// Shapes whose files open at first need have the radius that their files state, and solid instances are solid.
+#[test]
+fn stored_shapes_and_instances_have_what_their_files_state() {
+    let folder = cbvh_testkit::folder();
+    let path = folder.path().join("point.cbvh");
+    let options = bvh_bake::Options::default().radius(0.5);
+    let point = bvh_bake::shapes::point([0.0; 3]);
+    std::fs::write(&path, bvh_bake::to_bytes(&point, &options).unwrap().0).unwrap();
+    let stored = Files::new(1).shape(&path).unwrap();
+    assert_eq!((stored.radius(), stored.object(0).unwrap().radius()), (0.5, 0.5));
+    assert_eq!(stored.opened().unwrap().shape().radius(), 0.5);
+
+    let mut block = bvh_bake::shapes::block([4.0; 3]).unwrap();
+    let hollow = bvh_bake::mesh::Instance::of_object(0);
+    for (solid, touches) in [(false, false), (true, true)] {
+        block.instances = vec![bvh_bake::mesh::Instance { solid, ..hollow.clone() }];
+        let bytes = bvh_bake::to_bytes(&block, &bvh_bake::Options::default()).unwrap().0;
+        let mut scene = Scene::of_file(Bvh::from_bytes(bytes).unwrap()).unwrap();
+        scene.add(stored.clone(), Pose::IDENTITY).unwrap();
+        assert_eq!(scene.pairs_in_contact().unwrap().len(), usize::from(touches));
+    }
 }

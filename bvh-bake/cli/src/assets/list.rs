@@ -136,6 +136,8 @@ struct Line {
     scene: Option<bool>,
     ids: Option<bool>,
     topology: Option<bool>,
+    radius: Option<f64>,
+    solid: Option<bool>,
 }
 
 /// Returns all assets of a manifest, in order. Paths are relative to its folder. Empty lines are skipped, but counted.
@@ -227,6 +229,8 @@ impl Line {
         options.scene = self.scene.unwrap_or(options.scene);
         options.ids = self.ids.unwrap_or(options.ids);
         options.topology = self.topology.unwrap_or(options.topology);
+        options.radius = self.radius.unwrap_or(options.radius);
+        options.solid = self.solid.unwrap_or(options.solid);
         Ok(options)
     }
 }
@@ -259,7 +263,7 @@ pub(super) fn read_folder(
     }
     if inputs.is_empty() {
         // Most likely the name is wrong, so that this counts as a missing file.
-        let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf or .glb, found none";
+        let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf, .glb, .xyz or .pcd, found none";
         return Err(Failure::system(folder, what));
     }
     inputs.sort();

@@ -4,7 +4,7 @@ mod report;
 mod screen;
 
 use crate::console::{self, Failure, names};
-use crate::options::{LayoutArguments, positive, size, threads};
+use crate::options::{LayoutArguments, not_negative, positive, size, threads};
 use crate::process;
 use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome};
 use clap::Args;
@@ -86,7 +86,9 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
         .ids(!arguments.no_ids)
-        .topology(!arguments.no_topology);
+        .topology(!arguments.no_topology)
+        .radius(arguments.radius)
+        .solid(arguments.solid);
     Ok(options)
 }
 
@@ -121,6 +123,7 @@ Examples:
   cbvh bake part.stl -o part.cbvh --triangles quantized --max-error 0.01
   cbvh bake arm.obj hand.ply -o robot.cbvh --split-objects --json
   cbvh bake factory.glb -o factory.cbvh --scene
+  cbvh bake points.pcd -o points.cbvh --radius 0.003 --no-ids
 
 Several inputs are baked as one mesh, and triangle ids run on from file to file. With --split-objects each object keeps \
 its own name; an object that its file does not name is called after the file, without the extension.
@@ -135,6 +138,9 @@ occurs again. cbvh scene asks about such a file.
 
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
+
+An XYZ file has a point per line; what follows its three numbers is ignored. Each point becomes a triangle whose corners are \
+equal, and points that coincide all stay. --radius and --solid are kept in the file, and every question respects them.
 
 A glTF file may name files that hold its buffers. They must be in the folder of the glTF file or below it, after symbolic \
 links are followed. --allow-outside allows buffers elsewhere: whoever made the glTF file then chooses which files are read.
@@ -159,7 +165,7 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, effort, split_objects, scene, ids and topology; the options on the command line are their \
+profile, triangles, max_error, effort, split_objects, scene, ids, topology, radius and solid; the options on the command line are their \
 defaults. Paths are relative to the manifest and may lead anywhere. Inputs must be regular files, so that the command never \
 waits for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
@@ -175,7 +181,8 @@ that have the same output, exits with code 3 before anything is baked.";
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct BakeArguments {
-    /// Meshes: OBJ, STL, PLY or glTF files; or one folder, whose meshes are baked to separate files
+    /// Meshes: OBJ, STL, PLY or glTF files; clouds of points: XYZ, PCD, or PLY files without faces; or one folder, whose
+    /// files are baked to separate files
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "IN")]
     pub(crate) inputs: Vec<PathBuf>,
     /// The file to write; for a folder of meshes, the folder to write to
@@ -222,6 +229,12 @@ pub(crate) struct BakeArguments {
     /// Bake a scene, with one tree per object: the nodes of glTF files become instances that share their meshes
     #[arg(long)]
     pub(crate) scene: bool,
+    /// Give the mesh a radius, in mesh units: it stands for all points this near to it, as each point of a cloud does for a ball
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) radius: f64,
+    /// Make the mesh solid: what is inside touches it. All its objects must be closed
+    #[arg(long)]
+    pub(crate) solid: bool,
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,

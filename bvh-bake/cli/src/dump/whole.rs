@@ -46,8 +46,8 @@ pub(super) fn file(name: &str, contents: &Contents) -> Result<Record, FileError>
     });
     let instances = instances.iter().enumerate().map(|(number, of)| {
         record! {
-            number: number, name: of.name, object: of.object, member: of.member, meets: of.meets,
-            rotation: of.rotation, translation: of.translation,
+            number: number, name: of.name, object: of.object, member: of.member, meets: of.meets, margin: of.margin,
+            solid: of.solid, rotation: of.rotation, translation: of.translation,
         }
     });
     Ok(record! {
@@ -103,6 +103,8 @@ fn object_json(
         box_hi: record.box_hi.map(|value| value.get()),
         sphere_centre: record.sphere_centre.map(|value| value.get()),
         sphere_radius: record.sphere_radius.get(),
+        radius: object.radius(),
+        solid: object.is_solid(),
         input_triangles: record.input_triangles.get(),
         triangles: record.triangles.get(),
         degenerate: record.degenerate.get(),

@@ -5,8 +5,9 @@ use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
 use crate::console::Failure;
 use crate::options::LayoutArguments;
 use crate::process::map;
+use bvh_bake::input::{MeshFormat, read_bytes};
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{shapes, to_bytes};
+use bvh_bake::{BakeError, shapes, to_bytes};
 use bvh_query::{
     Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, QueryError, ReadAhead, Scene, SceneFileError,
 };
@@ -200,21 +201,15 @@ fn length(name: &str, word: &str) -> Result<f64, String> {
     length.ok_or_else(|| format!("{name}: expected a finite length of at least 0, found {word:?}"))
 }
 
-/// Reads the points of a cloud.
-fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, Failure> {
-    let lines = files::read_lines(path, "expected at least one line of a point, found none", |text| {
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let number = |word: &str| {
-            let number = word.parse().ok().filter(|number: &f64| number.is_finite());
-            number.ok_or_else(|| format!("expected finite numbers, found {word:?}"))
-        };
-        match *words {
-            [] => Ok(None),
-            [x, y, z] => Ok(Some([number(x)?, number(y)?, number(z)?])),
-            _ => Err(format!("expected three numbers, found {}", words.len())),
-        }
-    })?;
-    Ok(lines.into_iter().map(|(_, point)| point).collect())
+/// Reads the points of a cloud: a file of a format that has points, or else text with a point per line.
+fn read_points(path: &Path) -> Result<Mesh, Failure> {
+    require_regular(path)?;
+    let known = MeshFormat::from_extension(path);
+    let format =
+        known.filter(|format| matches!(format, MeshFormat::Ply | MeshFormat::Pcd)).unwrap_or(MeshFormat::Xyz);
+    let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
+    let read = read_bytes(&bytes, format, path);
+    read.map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error)))
 }
 
 impl LoadedScene {
@@ -277,7 +272,7 @@ pub(super) fn load(
         let file = match described {
             Described::Mesh(file) => file,
             Described::Cloud(file, radius) => {
-                let cloud = bake_core(&shapes::cloud(&read_points(file)?), layout, file, &mut loaded)?;
+                let cloud = bake_core(&read_points(file)?, layout, file, &mut loaded)?;
                 shapes.push(cloud.rounded(*radius).map_err(|error| Failure::invalid(file, error))?);
                 continue;
             }

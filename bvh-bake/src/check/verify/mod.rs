@@ -330,11 +330,12 @@ fn match_objects(layout: &Layout, full: &[u64]) -> Result<(), VerifyError> {
 /// Returns the first field in which two instances differ, and its values.
 fn difference(expected: &Instance, found: &Instance) -> (&'static str, String, String) {
     let of = |instance: &Instance| {
-        let Instance { name, object, member, meets, rotation, translation } = instance;
+        let Instance { name, object, member, meets, solid, margin, rotation, translation } = instance;
         [
             ("name", format!("{name:?}")),
             ("object", object.to_string()),
             ("groups", format!("{member:#x}, meets {meets:#x}")),
+            ("margin", format!("{margin:?}, {}", if *solid { "solid" } else { "not solid" })),
             ("rotation", format!("{rotation:?}")),
             ("translation", format!("{translation:?}")),
         ]

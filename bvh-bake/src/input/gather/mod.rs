@@ -15,7 +15,7 @@ pub(crate) use input_order::InputOrder;
 use super::indexed::IndexedFaces;
 use super::input_file::Opener;
 use super::names::Names;
-use super::{Checksums, InputFile, MeshFormat, obj, ply, stl};
+use super::{Checksums, InputFile, MeshFormat, obj, pcd, ply, stl, xyz};
 use crate::error::BakeError;
 use crate::error::InputError;
 use crate::error::{Fault, Halt, Place, ReadError};
@@ -33,10 +33,11 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use std::thread;
 
-/// The shares of OBJ text and of PLY bytes in the work of reading, in parts of [`WHOLE`]. The rest is spent on their
+/// The shares of OBJ text, of PLY bytes and of the bytes of points in the work of reading, in parts of [`WHOLE`]. The rest is spent on their
 /// corners.
 const OBJ_TEXT: u64 = 10;
 const PLY_BYTES: u64 = 10;
+const POINT_BYTES: u64 = 12;
 
 /// Bytes of memory per object, besides its name.
 const BYTES_PER_OBJECT: u64 = 64;
@@ -78,12 +79,14 @@ struct Body {
     count: u64,
     /// The number of distinct vertices.
     vertices: u64,
+    /// Whether all triangles are points.
+    is_cloud: bool,
 }
 
 impl Body {
     fn new() -> Self {
         let (parts, open) = (Vec::new(), Vec::new());
-        Self { parts, open, parked: None, extent: Extent::EMPTY, count: 0, vertices: 0 }
+        Self { parts, open, parked: None, extent: Extent::EMPTY, count: 0, vertices: 0, is_cloud: true }
     }
 }
 
@@ -163,6 +166,14 @@ impl<'a> Gatherer<'a> {
                 (Names::unnamed(), WHOLE - PLY_BYTES)
             }
             MeshFormat::Obj => (obj::read(open(OBJ_TEXT), &mut faces, self.resources)?, WHOLE - OBJ_TEXT),
+            MeshFormat::Xyz => {
+                xyz::read(open(POINT_BYTES)(true)?, &mut faces)?;
+                (Names::unnamed(), WHOLE - POINT_BYTES)
+            }
+            MeshFormat::Pcd => {
+                pcd::read(open(POINT_BYTES)(true)?, &mut faces, self.resources)?;
+                (Names::unnamed(), WHOLE - POINT_BYTES)
+            }
             MeshFormat::Gltf => return Ok(()),
         };
         let length = opener.input.length();
@@ -266,7 +277,7 @@ impl<'a> Gatherer<'a> {
         let fill_open = |body: &mut Body, places: Range<usize>| {
             for place in places {
                 let triangle = triangle(place);
-                triangle.corners.iter().for_each(|&corner| body.extent.add(corner));
+                body.is_cloud &= body.extent.add_triangle(&triangle.corners);
                 body.open.push(triangle);
             }
         };
@@ -284,17 +295,22 @@ impl<'a> Gatherer<'a> {
         let full: Vec<usize> = full.collect();
         for batch in full.chunks(self.resources.reading_tasks(BYTES_PER_OPEN_PART)) {
             let filled = batch.par_iter().map(|&start| {
-                let mut extent = Extent::EMPTY;
-                let triangles = (start..start + TRIANGLES_PER_PART).map(|place| {
+                let places = start..start + TRIANGLES_PER_PART;
+                let (mut extent, mut is_cloud) = (Extent::EMPTY, true);
+                let mut measured = |place: usize| {
                     let triangle = triangle(place);
-                    triangle.corners.iter().for_each(|&corner| extent.add(corner));
+                    is_cloud &= extent.add_triangle(&triangle.corners);
                     triangle
-                });
-                let triangles = triangles.collect();
-                Ok::<_, BakeError>((part(triangles, spill)?, extent))
+                };
+                let part = match all_narrow(TRIANGLES_PER_PART, places.clone().map(&mut measured)) {
+                    Some(triangles) => Part::Narrow(spill.put(triangles)?),
+                    None => Part::Wide(spill.put(places.map(measured).collect())?),
+                };
+                Ok::<_, BakeError>((part, extent, is_cloud))
             });
-            for (part, extent) in filled.collect::<Result<Vec<_>, _>>()? {
+            for (part, extent, is_cloud) in filled.collect::<Result<Vec<_>, _>>()? {
                 body.parts.push(part);
+                body.is_cloud &= is_cloud;
                 body.extent = body.extent.joined(extent);
             }
         }
@@ -365,6 +381,7 @@ impl<'a> Gatherer<'a> {
                 stream,
                 moved,
                 vertices: body.vertices,
+                is_cloud: body.is_cloud,
             });
         }
         Ok(gathered)
@@ -373,16 +390,21 @@ impl<'a> Gatherer<'a> {
 
 /// Stores triangles, as `f32` numbers if these represent them exactly.
 fn part(triangles: Vec<WideTriangle>, spill: &Spill) -> Result<Part, BakeError> {
-    let fits = |triangle: &WideTriangle| {
-        triangle.corners.as_flattened().iter().all(|&value| f64::from(value as f32) == value)
-    };
-    let narrow = |triangle: &WideTriangle| Triangle {
-        corners: triangle.corners.map(|corner| corner.map(|value| value as f32)),
-        id: triangle.id,
-    };
-    Ok(if triangles.iter().all(fits) {
-        Part::Narrow(spill.put(triangles.iter().map(narrow).collect())?)
-    } else {
-        Part::Wide(spill.put(triangles)?)
+    Ok(match all_narrow(triangles.len(), triangles.iter().copied()) {
+        Some(triangles) => Part::Narrow(spill.put(triangles)?),
+        None => Part::Wide(spill.put(triangles)?),
     })
+}
+
+/// Returns `count` triangles in `f32` numbers, if these represent all of them exactly.
+fn all_narrow(count: usize, triangles: impl Iterator<Item = WideTriangle>) -> Option<Vec<Triangle>> {
+    let mut narrow = Vec::with_capacity(count);
+    for WideTriangle { corners: wide, id, .. } in triangles {
+        let corners = wide.map(|corner| corner.map(|value| value as f32));
+        if corners.map(|corner| corner.map(f64::from)) != wide {
+            return None;
+        }
+        narrow.push(Triangle { corners, id });
+    }
+    Some(narrow)
 }
