@@ -12,6 +12,12 @@ pub enum ShapeError {
         /// The number.
         found: f64,
     },
+    /// A ground without end, which would be a half-space.
+    #[error(
+        "{0}: expected a finite length above 0, found inf: a half-space cannot be baked; make a ground that reaches beyond \
+         everything that it is asked about"
+    )]
+    HalfSpace(&'static str),
     /// An error for which a polygon around a circle would need too many sides.
     #[error(
         "most_error: expected an error for which 4096 sides suffice, at least 3e-7 of the radius, found {0}"
@@ -26,5 +32,40 @@ pub enum ShapeError {
         columns: usize,
         /// The number of heights.
         heights: usize,
+    },
+    /// A point that cannot be in a file.
+    #[error(
+        "points: expected finite coordinates of at most 2^120 in magnitude, found {found:?} at number {number}"
+    )]
+    Point {
+        /// The number of the point.
+        number: usize,
+        /// Its coordinates.
+        found: [f64; 3],
+    },
+    /// Points without a volume, of which there is no solid hull.
+    #[error(
+        "points: expected four or more that are not in one plane, found {points} {}: bake triangles, a segment or a cloud, \
+         with a radius if it should be thick",
+        ["at one place", "on one line", "in one plane"][*dimension]
+    )]
+    Flat {
+        /// The number of points.
+        points: usize,
+        /// 0 if all are at one place, 1 if they are on a line, and 2 if they are in a plane.
+        dimension: usize,
+    },
+    /// A cell that is not of an octree.
+    #[error(
+        "cells: expected as size a power of two and as corner multiples of it, found size {size} at {corner:?}, number \
+         {number}"
+    )]
+    Cell {
+        /// The number of the cell.
+        number: usize,
+        /// Its corner.
+        corner: [i32; 3],
+        /// Its size.
+        size: u32,
     },
 }

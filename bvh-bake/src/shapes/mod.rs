@@ -10,14 +10,20 @@
 //! | cylinder, cone | [`cylinder`], [`cone`]: polyhedra around them | 0 | yes |
 //! | ground | [`ground`] | 0 | yes |
 //! | cloud of points | [`cloud`] | that of each point | |
-//! | voxels | [`voxels`] | 0 | yes |
+//! | convex hull of points | [`hull`] | 0 | yes |
+//! | voxels, octree | [`voxels`], [`octree`] | 0 | yes |
 //!
 //! Each function places its shape at the origin of the mesh's frame, with lengths in mesh units, and looks outwards: the
 //! corners of a triangle turn counter-clockwise as seen from outside. Vertices are rounded to f32 when they are baked.
 
+mod cells;
+mod hull;
+
+pub use cells::{OctreeCell, octree, voxels};
+pub use hull::hull;
+
 use crate::error::ShapeError;
 use crate::input::mesh::Mesh;
-use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 /// The most sides of the polygon around a circle.
@@ -58,12 +64,15 @@ pub fn block(sides: [f64; 3]) -> Result<Mesh, ShapeError> {
 /// Makes the solid ground under z = 0: a box of these sides along x and y, and of this thickness.
 ///
 /// # Errors
-/// [`ShapeError::Length`] if a side is not finite and above 0. A ground cannot be endless, because files have finite coordinates.
+/// [`ShapeError::HalfSpace`] if a side or the thickness is infinite, because files have finite coordinates, and
+/// [`ShapeError::Length`] if one is not above 0.
 pub fn ground(sides: [f64; 2], thickness: f64) -> Result<Mesh, ShapeError> {
-    for side in sides {
-        check("side", side)?;
+    for (name, length) in [("side", sides[0]), ("side", sides[1]), ("thickness", thickness)] {
+        if length == f64::INFINITY {
+            return Err(ShapeError::HalfSpace(name));
+        }
+        check(name, length)?;
     }
-    check("thickness", thickness)?;
     let [x, y] = sides.map(|side| side / 2.0);
     Ok(between([-x, -y, -thickness], [x, y, 0.0]))
 }
@@ -177,49 +186,6 @@ pub fn height_field(columns: usize, heights: &[f64], cell: [f64; 2]) -> Result<M
     Ok(Mesh::from_triangles(heights.iter().enumerate().map(position).collect(), triangles))
 }
 
-/// Makes the surface of full cells of a grid, without the faces between two full cells. Cell (i, j, k) is the cube of this side
-/// from (i, j, k) times the side on. A cell that is given twice counts once.
-///
-/// # Errors
-/// [`ShapeError::Length`] if the side is not finite and above 0.
-pub fn voxels(cells: &[[i32; 3]], side: f64) -> Result<Mesh, ShapeError> {
-    check("side", side)?;
-    let full: std::collections::HashSet<[i32; 3]> = cells.iter().copied().collect();
-    let mut ordered: Vec<[i32; 3]> = full.iter().copied().collect();
-    ordered.sort_unstable();
-    let (mut numbers, mut positions, mut triangles) = (HashMap::new(), Vec::new(), Vec::new());
-    for cell in ordered {
-        for axis in 0..3 {
-            for above in [false, true] {
-                let mut neighbour = cell.map(i64::from);
-                neighbour[axis] += if above { 1 } else { -1 };
-                let within = |i: i64| i32::try_from(i).ok();
-                let neighbour = [within(neighbour[0]), within(neighbour[1]), within(neighbour[2])];
-                if let [Some(i), Some(j), Some(k)] = neighbour
-                    && full.contains(&[i, j, k])
-                {
-                    continue;
-                }
-                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                let mut number = |along_u: bool, along_v: bool| {
-                    let mut corner = cell.map(i64::from);
-                    corner[axis] += i64::from(above);
-                    corner[u] += i64::from(along_u);
-                    corner[v] += i64::from(along_v);
-                    *numbers.entry(corner).or_insert_with(|| {
-                        positions.push(corner.map(|i| i as f64 * side));
-                        positions.len() as u32 - 1
-                    })
-                };
-                let [a, b, c, d] =
-                    [number(false, false), number(true, false), number(true, true), number(false, true)];
-                triangles.extend(if above { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
-            }
-        }
-    }
-    Ok(Mesh::from_triangles(positions, triangles))
-}
-
 /// Refuses what is no length.
 fn check(name: &'static str, found: f64) -> Result<(), ShapeError> {
     if found.is_finite() && found > 0.0 { Ok(()) } else { Err(ShapeError::Length { name, found }) }
@@ -228,9 +194,10 @@ fn check(name: &'static str, found: f64) -> Result<(), ShapeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     /// Returns the volume of a closed mesh, and checks that each edge has a partner in the other direction.
-    fn volume(mesh: &Mesh) -> f64 {
+    pub(super) fn volume(mesh: &Mesh) -> f64 {
         let object = &mesh.objects[0];
         let mut edges = HashMap::new();
         let mut sum = 0.0;
@@ -308,7 +275,7 @@ mod tests {
             let is_refused = |found: Result<(), ShapeError>| matches!(found, Err(ShapeError::Length { .. }));
             assert!(
                 is_refused(block([1.0, wrong, 1.0]).map(drop))
-                    && is_refused(ground([1.0; 2], wrong).map(drop))
+                    && (wrong == f64::INFINITY || is_refused(ground([1.0; 2], wrong).map(drop)))
             );
             assert!(
                 is_refused(cylinder(wrong, 1.0, 0.1).map(drop))
@@ -319,5 +286,7 @@ mod tests {
             );
         }
         assert_eq!(cylinder(1.0, 1.0, 1e-12), Err(ShapeError::Sides(1e-12)));
+        assert_eq!(ground([1.0, f64::INFINITY], 1.0), Err(ShapeError::HalfSpace("side")));
+        assert_eq!(ground([1.0; 2], f64::INFINITY), Err(ShapeError::HalfSpace("thickness")));
     }
 }
