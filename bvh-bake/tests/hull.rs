@@ -1,7 +1,7 @@
 //! Convex hulls, checked in exact arithmetic: each is closed, looks outwards and contains every point, also as a file holds it.
 
 use bvh_bake::mesh::Mesh;
-use bvh_bake::shapes::hull;
+use bvh_bake::shapes::convex_hull;
 use bvh_bake::{Options, ShapeError, to_bytes};
 use bvh_format::validate::validate;
 use cbvh_testkit::Random;
@@ -124,7 +124,7 @@ fn hard() -> Vec<(&'static str, Vec<[f64; 3]>)> {
 #[test]
 fn hulls_of_hard_points_are_closed_look_outwards_and_contain_all_points() {
     for (name, points) in hard() {
-        let mesh = hull(&points).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let mesh = convex_hull(&points).unwrap_or_else(|error| panic!("{name}: {error}"));
         check(name, &corners(&mesh), &points);
         let given: HashSet<_> = points.iter().map(|point| point.map(|x| (x + 0.0).to_bits())).collect();
         assert!(
@@ -147,12 +147,13 @@ fn a_hull_is_the_same_for_points_in_another_order() {
         if !name.contains("sphere") && !name.contains("far away") {
             continue;
         }
-        let vertices = |points: &[[f64; 3]]| -> usize { hull(points).unwrap().objects[0].positions.len() };
+        let vertices =
+            |points: &[[f64; 3]]| -> usize { convex_hull(points).unwrap().objects[0].positions.len() };
         let expected = vertices(&points);
         for last in (1..points.len()).rev() {
             points.swap(last, random.below(last + 1));
         }
-        check(name, &corners(&hull(&points).unwrap()), &points);
+        check(name, &corners(&convex_hull(&points).unwrap()), &points);
         if name.contains("sphere") {
             assert_eq!(vertices(&points), expected, "{name}");
         }
@@ -166,7 +167,7 @@ fn random_small_integers_have_hulls() {
     for _ in 0..3000 {
         let points: Vec<[f64; 3]> =
             (0..4 + random.below(12)).map(|_| [0; 3].map(|_: i32| random.below(4) as f64)).collect();
-        match hull(&points) {
+        match convex_hull(&points) {
             Ok(mesh) => check("small integers", &corners(&mesh), &points),
             Err(ShapeError::Flat { dimension, .. }) => {
                 flat += 1;
@@ -190,7 +191,7 @@ fn hulls_of_f64_points_are_exact_until_they_are_baked() {
             .map(|_| random.point().map(|x| scale * x))
             .map(|p| [0, 1, 2].map(|k| middle[k] + p[k]))
             .collect();
-        let Ok(mesh) = hull(&points) else {
+        let Ok(mesh) = convex_hull(&points) else {
             assert_eq!(scale, 1e-100, "nothing is left of numbers that no file can hold");
             continue;
         };
@@ -221,7 +222,7 @@ fn points_without_a_volume_are_refused() {
         (vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1e-300]], 2),
     ] {
         let expected = ShapeError::Flat { points: points.len(), dimension };
-        assert_eq!(hull(&points), Err(expected.clone()));
+        assert_eq!(convex_hull(&points), Err(expected.clone()));
         assert!(
             expected
                 .to_string()
@@ -231,6 +232,6 @@ fn points_without_a_volume_are_refused() {
     for wrong in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1.4e36] {
         let mut points = plane.clone();
         points[9][1] = wrong;
-        let Err(ShapeError::Point { number: 9, .. }) = hull(&points) else { panic!("{wrong}") };
+        let Err(ShapeError::Point { number: 9, .. }) = convex_hull(&points) else { panic!("{wrong}") };
     }
 }

@@ -71,7 +71,7 @@ impl Face {
 /// # Errors
 /// [`ShapeError::Point`] if a coordinate is not finite or beyond 2^120, and [`ShapeError::Flat`] if all points are in one plane,
 /// as fewer than four always are.
-pub fn hull(points: &[[f64; 3]]) -> Result<Mesh, ShapeError> {
+pub fn convex_hull(points: &[[f64; 3]]) -> Result<Mesh, ShapeError> {
     if let Some(number) = points.iter().position(|p| p.iter().any(|x| x.is_nan() || x.abs() > MAX_COORDINATE))
     {
         return Err(ShapeError::Point { number, found: points[number] });

@@ -10,7 +10,7 @@
 //! | cylinder, cone | [`cylinder`], [`cone`]: polyhedra around them | 0 | yes |
 //! | ground | [`ground`] | 0 | yes |
 //! | cloud of points | [`cloud`] | that of each point | |
-//! | convex hull of points | [`hull`] | 0 | yes |
+//! | convex hull of points | [`convex_hull`] | 0 | yes |
 //! | voxels, octree | [`voxels`], [`octree`] | 0 | yes |
 //!
 //! Each function places its shape at the origin of the mesh's frame, with lengths in mesh units, and looks outwards: the
@@ -20,7 +20,7 @@ mod cells;
 mod hull;
 
 pub use cells::{OctreeCell, octree, voxels};
-pub use hull::hull;
+pub use hull::convex_hull;
 
 use crate::error::ShapeError;
 use crate::input::mesh::Mesh;
