@@ -272,7 +272,7 @@ cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const
  *     a capsule         a segment, with a radius
  *     a rounded box     a box whose sides are shorter by two radii, solid, with a radius
  *     balls             a cloud, with the radius of each ball
- *     a solid           a box, ground, cylinder or cone, or voxels, solid
+ *     a solid           a box, ground, cylinder, cone, convex hull, voxels or an octree, solid
  *
  * Lengths are in mesh units. CBVH_INVALID_ARGUMENT for a length that is not finite and above 0. Points and sides are 3
  * numbers each, unless stated otherwise. CBVH_BAKE_FAILED if a coordinate is not finite or beyond 2^120, or if there
@@ -304,8 +304,18 @@ cbvh_status cbvh_bake_height_field(const double *heights, size_t columns, size_t
                                    cbvh_mesh *mesh);
 /* Bakes the surface of full cells of a grid, without the faces between two full cells. A cell is 3 numbers i, j, k, and
  * stands for the cube from (i, j, k) times `side` to (i + 1, j + 1, k + 1) times `side`. A cell that is given twice
- * counts once. The mesh can be solid unless cells touch in an edge or a corner only. */
+ * counts once. */
 cbvh_status cbvh_bake_voxels(const int32_t *cells, size_t count, double side, cbvh_mesh *mesh);
+/* Bakes the surface of full cells of an octree, such as the leaves of an OctoMap, without what two of them have in common.
+ * `side` is that of the finest cells. A cell is a corner in `cells`, 3 numbers i, j, k, and a size, and stands for the cube
+ * from (i, j, k) times `side` to (i + size, j + size, k + size) times `side`. A cell that is given twice, or that is part of
+ * another one, counts once. CBVH_INVALID_ARGUMENT for a size that is not a power of two, or a corner that is not at
+ * multiples of it. */
+cbvh_status cbvh_bake_octree(const int32_t *cells, const uint32_t *sizes, size_t count, double side, cbvh_mesh *mesh);
+/* Bakes the convex hull of points, decided exactly. Its vertices are some of the points. Each point is inside it or on it
+ * if all coordinates are floats, and otherwise at most as far outside as vertices are rounded. CBVH_INVALID_ARGUMENT if all
+ * points are in one plane, as fewer than 4 always are, and for a coordinate that is not finite or beyond 2^120. */
+cbvh_status cbvh_bake_convex_hull(const double *points, size_t count, cbvh_mesh *mesh);
 
 /* -------------------------------------------------------------------------------------------------------- queriers */
 

@@ -419,6 +419,21 @@ public:
         const std::int32_t *numbers = cells.empty() ? nullptr : cells[0].data();
         return made([&](cbvh_mesh *mesh) { return cbvh_bake_voxels(numbers, cells.size(), side, mesh); });
     }
+    /// The surface of full cells of an octree: corners and sizes in sides of the finest cells, see cbvh_bake_octree.
+    static Mesh octree(const std::vector<std::array<std::int32_t, 3>> &cells, const std::vector<std::uint32_t> &sizes,
+                       double side) {
+        detail::same_length(sizes.size(), cells.size(), "sizes: expected one for each cell, found another number");
+        const std::int32_t *numbers = cells.empty() ? nullptr : cells[0].data();
+        return made([&](cbvh_mesh *mesh) {
+            return cbvh_bake_octree(numbers, sizes.data(), cells.size(), side, mesh);
+        });
+    }
+    /// The convex hull of points: see cbvh_bake_convex_hull.
+    static Mesh convex_hull(const std::vector<Point> &points) {
+        return made([&](cbvh_mesh *mesh) {
+            return cbvh_bake_convex_hull(detail::numbers(points), points.size(), mesh);
+        });
+    }
     /// Bakes mesh files into a .cbvh file, unless it is up to date, and opens it.
     static Mesh bake_files(const std::vector<std::string> &inputs, const std::string &output,
                            const BakeOptions &options = {}) {

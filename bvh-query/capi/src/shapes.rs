@@ -8,7 +8,7 @@ use crate::output::One;
 use crate::status::Failure;
 use crate::types::MeshHandle;
 use bvh_bake::mesh::Mesh;
-use bvh_bake::shapes::{self, Circumscribed};
+use bvh_bake::shapes::{self, Circumscribed, OctreeCell};
 use bvh_bake::{Options, ShapeError};
 
 /// Reads the arguments of a core, bakes what `core` makes of them, and hands it out.
@@ -163,4 +163,33 @@ pub unsafe extern "C" fn cbvh_bake_voxels(
 ) -> i32 {
     // SAFETY: the header asks for it.
     unsafe { bake(mesh, || groups("cells", cells, count), |cells| shapes::voxels(&cells, side)) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_bake_octree(
+    cells: *const i32,
+    sizes: *const u32,
+    count: usize,
+    side: f64,
+    mesh: *mut MeshHandle,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    let read = || unsafe {
+        let corners: Vec<[i32; 3]> = groups("cells", cells, count)?;
+        let mut read = Vec::new();
+        each("sizes", sizes, count, &mut read, |size| Ok(*size))?;
+        Ok(corners.into_iter().zip(read).map(|(corner, size)| OctreeCell { corner, size }).collect())
+    };
+    // SAFETY: the header asks for it.
+    unsafe { bake(mesh, read, |cells: Vec<OctreeCell>| shapes::octree(&cells, side)) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_bake_convex_hull(
+    points: *const f64,
+    count: usize,
+    mesh: *mut MeshHandle,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    unsafe { bake(mesh, || groups("points", points, count), |points| shapes::convex_hull(&points)) }
 }

@@ -642,7 +642,10 @@ static void solids(void) {
     const cbvh_mesh point = ball(0), hollow = cube(1);
     const double cell[2] = {1, 2}, block[3] = {1, 1, 1}, plain[2] = {10, 4};
     const int32_t cells[12] = {0, 0, 0, 0, 0, -1, 0, 0, 0, -1, 0, 0};
-    cbvh_mesh all[6];
+    const int32_t parts[6] = {-2, 0, 0, 0, 0, 1};
+    const uint32_t sizes[2] = {2, 1};
+    const double points[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0.25, 0.25, 0.25};
+    cbvh_mesh all[8];
     double error_of_cylinder, error_of_cone;
     OK(cbvh_bake_box(block, &all[0]));
     OK(cbvh_bake_ground(plain, 0.75, &all[1]));
@@ -650,16 +653,19 @@ static void solids(void) {
     OK(cbvh_bake_cone(0.5, 1, 0.001, &error_of_cone, &all[3]));
     OK(cbvh_bake_voxels(cells, 4, 0.5, &all[4]));
     OK(cbvh_mesh_clone(hollow, &all[5]));
+    OK(cbvh_bake_octree(parts, sizes, 2, 0.5, &all[6]));
+    OK(cbvh_bake_convex_hull(points, 5, &all[7]));
     /* The polyhedra are larger, by as much as they say. */
     CHECK(error_of_cylinder > 0 && error_of_cylinder < 0.001001 && error_of_cone > 0 && error_of_cone < 0.001001);
     const double beside = gap(all[2], point, shift(0.4, 0.6, 0)), exact = sqrt(0.52) - 0.5;
     CHECK(beside < exact && beside >= exact - error_of_cylinder);
     /* Each with a point inside, one beside it, and how far away that is at least. */
-    const struct { double inside[3], outside[3], gap; } places[6] = {
+    const struct { double inside[3], outside[3], gap; } places[8] = {
         {{0.25, 0, 0}, {0, 2, 0}, 1.5},   {{4.5, 1, -0.5}, {0, 0, 1}, 1}, {{0.25, 0.25, 0}, {0, 0, 2.5}, 2},
         {{0, 0.25, 0.25}, {0, 0, -1}, 1}, {{-0.25, 0.125, 0.25}, {0.25, 0.25, 2}, 1.5}, {{0.125, 0, 0}, {1, 0, 0}, 0.5},
+        {{0.25, 0.25, 0.75}, {1, 0.25, 0.75}, 0.5}, {{0.125, 0.25, 0.125}, {0.25, 0.25, -2}, 2},
     };
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; k < 8; k++) {
         const cbvh_pose inside = shift(places[k].inside[0], places[k].inside[1], places[k].inside[2]);
         const cbvh_pose outside = shift(places[k].outside[0], places[k].outside[1], places[k].outside[2]);
         cbvh_pose back;

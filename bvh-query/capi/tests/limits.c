@@ -69,6 +69,7 @@ static void memory(void) {
     FAILS(cbvh_bake(numbers, many, NULL, 0, NULL, &made), CBVH_LIMIT, "vertices: expected ");
     FAILS(cbvh_bake_cloud(numbers, many, &made), CBVH_LIMIT, "points: expected ");
     FAILS(cbvh_bake_voxels((const int32_t *)(const void *)numbers, many, 1, &made), CBVH_LIMIT, "cells: expected ");
+    FAILS(cbvh_bake_convex_hull(numbers, many, &made), CBVH_LIMIT, "points: expected ");
     FAILS(cbvh_bake_height_field(numbers, many, 2, numbers, &made), CBVH_LIMIT, "heights: expected ");
     FAILS(cbvh_motions(querier, mesh, mesh, (const cbvh_path *)(const void *)numbers, many, NULL, &motion), CBVH_LIMIT,
           "paths: expected ");

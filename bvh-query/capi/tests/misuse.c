@@ -324,6 +324,15 @@ static void shapes(void) {
     FAILS(cbvh_bake_voxels(cells, 0, 1, &made), CBVH_BAKE_FAILED, "triangle");
     FAILS(cbvh_bake_voxels(NULL, 1, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected a pointer, found NULL");
     FAILS(cbvh_bake_voxels(cells, SIZE_MAX, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected at most");
+    const uint32_t sizes[2] = {3, 2};
+    const double flat[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    FAILS(cbvh_bake_octree(cells, sizes, 1, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected as size a power of two");
+    FAILS(cbvh_bake_octree(cells, NULL, 1, 1, &made), CBVH_INVALID_ARGUMENT, "sizes: expected a pointer, found NULL");
+    FAILS(cbvh_bake_octree(NULL, sizes, 1, 1, &made), CBVH_INVALID_ARGUMENT, "cells: expected a pointer, found NULL");
+    FAILS(cbvh_bake_octree(NULL, NULL, 0, 1, &made), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh_bake_convex_hull(flat, 3, &made), CBVH_INVALID_ARGUMENT, "points: expected four or more");
+    FAILS(cbvh_bake_convex_hull(NULL, 0, &made), CBVH_INVALID_ARGUMENT, "points: expected four or more");
+    FAILS(cbvh_bake_convex_hull(points, 2, &made), CBVH_INVALID_ARGUMENT, "points: expected finite coordinates");
     FAILS(cbvh_bake_box(NULL, &made), CBVH_INVALID_ARGUMENT, "sides: expected a pointer, found NULL");
     FAILS(cbvh_bake_ground(NULL, 1, &made), CBVH_INVALID_ARGUMENT, "sides: expected a pointer, found NULL");
     FAILS(cbvh_bake_cylinder(1, 1, 0.1, MISALIGNED(double), &made), CBVH_INVALID_ARGUMENT,
@@ -347,6 +356,8 @@ static void shapes(void) {
         CHECK(made.id == 0);
     }
     FAILS(cbvh_bake_cone(1, 1, 1e-12, NULL, &made), CBVH_INVALID_ARGUMENT, "most_error: expected an error for which");
+    const double endless[2] = {1, INFINITY};
+    FAILS(cbvh_bake_ground(endless, 1, &made), CBVH_INVALID_ARGUMENT, "a half-space cannot be baked; make a ground");
     const double box_beyond[3] = {1e300, 1, 1};
     FAILS(cbvh_bake_box(box_beyond, &made), CBVH_BAKE_FAILED, "2^120");
     /* Grids. */

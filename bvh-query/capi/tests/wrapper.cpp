@@ -327,7 +327,9 @@ void shapes() {
     const cbvh::Pose inside = cbvh::Pose::translation(0.125, 0.125, 0.25);
     const std::vector<cbvh::Mesh> cores{cbvh::Mesh::box({1, 1, 1}), cbvh::Mesh::cylinder(0.5, 1, 0.01, &around_cylinder),
                                         cbvh::Mesh::cone(0.5, 1, 0.01, &around_cone),
-                                        cbvh::Mesh::voxels({{0, 0, 0}}, 0.5)};
+                                        cbvh::Mesh::voxels({{0, 0, 0}}, 0.5),
+                                        cbvh::Mesh::octree({{0, 0, 0}, {-1, 0, 0}}, {2, 1}, 0.25),
+                                        cbvh::Mesh::convex_hull({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}})};
     for (const cbvh::Mesh &core : cores) {
         const cbvh::Mesh solid = core.solid(), copy = solid;
         CHECK(copy.is_solid() && querier.collide(copy, point, inside) && !querier.collide(core, point, inside));
@@ -342,6 +344,8 @@ void shapes() {
     FAILS(cbvh::Mesh::height_field({}, 0, {1, 2}), CBVH_INVALID_ARGUMENT, "heights: expected two or more rows");
     FAILS(cbvh::Mesh::cloud({}), CBVH_BAKE_FAILED, "triangle");
     FAILS(cbvh::Mesh::voxels({}, 1), CBVH_BAKE_FAILED, "triangle");
+    FAILS(cbvh::Mesh::octree({{0, 0, 0}}, {}, 1), CBVH_INVALID_ARGUMENT, "sizes: expected one for each cell");
+    FAILS(cbvh::Mesh::convex_hull({}), CBVH_INVALID_ARGUMENT, "points: expected four or more");
     FAILS(two.rounded(-1), CBVH_INVALID_ARGUMENT, "radius: expected a length from 0 to 2^118, found -1");
     cbvh::Scene scene;
     const cbvh::Instance a = scene.add(point, cbvh::Pose()), b = scene.add(two, away);
