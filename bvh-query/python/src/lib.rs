@@ -32,6 +32,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![bake::bake, bake::bake_files];
     functions![shapes::cloud_core, shapes::segment_core, shapes::block_core, shapes::ground_core];
     functions![shapes::cylinder_core, shapes::cone_core, shapes::height_field_core, shapes::voxels_core];
+    functions![shapes::octree_core, shapes::convex_hull_core];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![motions::motion, motions::is_free];
     functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];

@@ -5,7 +5,7 @@ use crate::asking::{detached, on_pool};
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
 use bvh_bake::mesh::Mesh as Triangles;
-use bvh_bake::shapes::{self, Circumscribed};
+use bvh_bake::shapes::{self, Circumscribed, OctreeCell};
 use bvh_bake::{Options, ShapeError, to_bytes};
 use bvh_query::Bvh;
 use numpy::PyReadonlyArray2;
@@ -81,4 +81,25 @@ pub(crate) fn height_field_core(
 pub(crate) fn voxels_core(py: Python<'_>, cells: PyReadonlyArray2<'_, i32>, side: f64) -> PyResult<Mesh> {
     let cells = cells.as_slice()?.as_chunks::<3>().0.to_vec();
     baked(py, shapes::voxels(&cells, side))
+}
+
+/// Cells of shape (N, 4): a corner and a size each.
+#[pyfunction]
+pub(crate) fn octree_core(py: Python<'_>, cells: PyReadonlyArray2<'_, i64>, side: f64) -> PyResult<Mesh> {
+    let rows = cells.as_slice()?.as_chunks::<4>().0;
+    // The Python code has checked that numbers are in range.
+    let cell = |&[i, j, k, size]: &[i64; 4]| OctreeCell {
+        corner: [i as i32, j as i32, k as i32],
+        size: size as u32,
+    };
+    let cells: Vec<OctreeCell> = rows.iter().map(cell).collect();
+    baked(py, shapes::octree(&cells, side))
+}
+
+/// Points of shape (N, 3).
+#[pyfunction]
+pub(crate) fn convex_hull_core(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Mesh> {
+    let points = rows(points, "points")?.rows;
+    let hull = detached(py, || shapes::convex_hull(&points));
+    baked(py, hull)
 }

@@ -164,6 +164,7 @@ class Manager(unittest.TestCase):
             (ValueError, "transform: expected a rotation", manager.add_object, "b", solid(), np.diag([2.0, 2, 2, 1])),
             (ValueError, "transform: row 4", manager.set_transform, "a", np.full((4, 4), np.nan)),
             (TypeError, "mesh: expected a cbvh.Mesh or an object with vertices and faces, found str", add, "b", "x"),
+            (TypeError, "make a cbvh.ground that reaches far enough", add, "b", type("Halfspace", (), {})()),
             (ValueError, "vertices: expected shape (V, 3)", manager.in_collision_single, flat),
             (TypeError, "other_manager: expected a cbvh.CollisionManager, found int", manager.in_collision_other, 3),
         ]
@@ -201,7 +202,7 @@ class Primitives(unittest.TestCase):
 
     def test_balls_and_capsules_are_exact(self):
         manager = cbvh.CollisionManager()
-        manager.add_object("ball", self.primitive("Sphere", radius=2.0, center=np.array([3.0, 4.0, 0.0])))
+        manager.add_object("ball", self.primitive("Sphere", radius=2.0, transform=shifts([3, 4, 0])[0]))
         capsule = self.primitive("Capsule", radius=1.0, height=2.0, transform=shifts([0, 0, 0.5])[0])
         manager.add_object("capsule", capsule)
         self.assertEqual(manager.min_distance_internal(), 2.0)

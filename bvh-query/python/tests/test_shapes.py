@@ -70,6 +70,9 @@ class Shapes(unittest.TestCase):
             cbvh.cylinder(0.5, 1),
             cbvh.cone(0.5, 1),
             cbvh.voxels([[0, 0, 0], [0, 0, 1]], 0.5).solid(),
+            cbvh.voxels(np.ones((2, 2, 2), bool), 0.25).solid(),
+            cbvh.octree([[0.5, 0.5, 0.5], [-0.25, 0.25, 0.25]], [1, 0.5]).solid(),
+            cbvh.convex_hull(cube()[0]),
             cbvh.bake(*cube()).solid(),
         ):
             self.assertTrue(solid.is_solid and solid.collide(ball, inside))
@@ -88,6 +91,35 @@ class Shapes(unittest.TestCase):
         self.assertAlmostEqual(
             rounded.distance(point, shifts([2, 2, 0])[0]).distance, np.hypot(1.5, 1.5) - 0.5, delta=1e-14
         )
+
+    def test_a_hull_has_the_support_of_its_points(self):
+        rng, probe = np.random.default_rng(8), cbvh.sphere(0.0)
+        points = rng.normal(size=(500, 3)).astype(np.float32).astype(float)
+        hull = cbvh.convex_hull(points)
+        self.assertTrue(np.all(hull.signed_distances(points) <= 0))
+        self.assertEqual({*map(tuple, hull.vertices)} - {*map(tuple, points)}, set())
+        for direction in rng.normal(size=(50, 3)):
+            direction /= np.linalg.norm(direction)
+            heights = [vertices @ direction for vertices in (points, hull.vertices)]
+            self.assertEqual(*[height.max() for height in heights])
+            self.assertTrue(hull.collide(probe, shifts(points[heights[0].argmax()])[0]))
+            self.assertGreater(hull.distance(probe, shifts((heights[0].max() + 1) * direction)[0]).distance, 0.999)
+
+    def test_cells_of_many_sizes_are_those_of_the_finest_grid(self):
+        rng = np.random.default_rng(9)
+        for _ in range(20):
+            sizes = 2 ** rng.integers(0, 4, 12)
+            corners = rng.integers(-8, 8, (12, 3)) // sizes[:, None] * sizes[:, None]
+            full = np.zeros((64, 64, 64), bool)
+            for corner, size in zip(corners, sizes):
+                full[tuple(slice(at + 32, at + 32 + size) for at in corner)] = True
+            middles = (corners + sizes[:, None] / 2) * 0.25
+            cells = cbvh.octree(middles.astype(np.float32), sizes * 0.25).solid()
+            fine = cbvh.voxels(np.argwhere(full) - 32, 0.25).solid()
+            self.assertLessEqual(cells.triangle_count, 2 * fine.triangle_count)
+            points = rng.uniform(-4, 6, (300, 3))
+            np.testing.assert_allclose(cells.signed_distances(points), fine.signed_distances(points), atol=1e-12)
+            np.testing.assert_array_equal(cells.sides(points), fine.sides(points))
 
     def test_points_and_rays_meet_rounded_shapes(self):
         ball = cbvh.sphere(2)
@@ -119,10 +151,27 @@ class Shapes(unittest.TestCase):
                 (ValueError, "most_error", lambda: cbvh.cone(1, 1, max_error=0)),
                 (ValueError, "heights", lambda: cbvh.height_field([1, 2], [1, 1])),
                 (ValueError, "cells", lambda: cbvh.voxels([[0.5, 0, 0]], 1)),
+                (ValueError, "cells", lambda: cbvh.voxels(np.ones((2, 2), bool), 1)),
+                (ValueError, "a half-space cannot be baked; make a ground", lambda: cbvh.ground([inf, 1])),
+                (TypeError, "cells", lambda: cbvh.octree([[0, 0, 0]])),
+                (ValueError, "cells", lambda: cbvh.octree([[0, 0, 0]], [1, 2])),
+                (ValueError, "finite sizes above 0", lambda: cbvh.octree([[0, 0, 0]], [inf])),
+                (ValueError, "off by 0.5", lambda: cbvh.octree([[0, 0, 0]], [1])),
+                (ValueError, "a power of two", lambda: cbvh.octree([[1.5] * 3, [0.5] * 3], [3, 1])),
+                (ValueError, "2^31", lambda: cbvh.octree([[3e9] * 3, [0.5] * 3], [2, 1])),
+                (ValueError, "found 3 in one plane", lambda: cbvh.convex_hull(np.eye(3))),
+                (ValueError, "found 9 at one place", lambda: cbvh.convex_hull(np.ones((9, 3)))),
+                (ValueError, "finite coordinates", lambda: cbvh.convex_hull([[0, 0, nan]])),
+                (ValueError, "points", lambda: cbvh.convex_hull([[0, 0]])),
                 (ValueError, "closed", lambda: open_mesh.solid()),
             ],
         )
-        for empty in (lambda: cbvh.cloud(np.zeros((0, 3))), lambda: cbvh.voxels(np.zeros((0, 3), int), 1.0)):
+        cells = np.zeros((0, 3), int)
+        for empty in (
+            lambda: cbvh.cloud(np.zeros((0, 3))),
+            lambda: cbvh.voxels(cells, 1.0),
+            lambda: cbvh.octree(cells, []),
+        ):
             with self.assertRaises(cbvh.BakeError):
                 empty()
         with self.assertRaises(cbvh.BakeError):

@@ -25,8 +25,8 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 arrays if each question may have any number of results. Lengths are in mesh units. Contact and insides are decided
 exactly. Touching is contact, and meshes are surfaces, unless they are made solid.
 
-**Shapes.** `sphere`, `capsule`, `box`, `cylinder`, `cone`, `cloud`, `voxels`, `height_field` and `ground` make meshes of simple
-shapes, and `Mesh.rounded` gives any mesh a radius.
+**Shapes.** `sphere`, `capsule`, `box`, `cylinder`, `cone`, `convex_hull`, `cloud`, `voxels`, `octree`, `height_field` and
+`ground` make meshes of simple shapes, and `Mesh.rounded` gives any mesh a radius.
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
 ``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about
@@ -61,7 +61,7 @@ from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
 from ._scene import Scene, _scene_of
-from ._shapes import box, capsule, cloud, cone, cylinder, ground, height_field, sphere, voxels
+from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
 from .manager import CollisionManager
 
 __all__ = [
@@ -93,10 +93,12 @@ __all__ = [
     "capsule",
     "cloud",
     "cone",
+    "convex_hull",
     "cylinder",
     "ground",
     "height_field",
     "nearest_pose",
+    "octree",
     "open",
     "pose",
     "relative",

@@ -41,6 +41,7 @@ __all__ = [
     "collide",
     "cone_core",
     "contacts",
+    "convex_hull_core",
     "copied_numbers",
     "cylinder_core",
     "distance",
@@ -52,6 +53,7 @@ __all__ = [
     "segment_hits",
     "motion",
     "nearest_poses",
+    "octree_core",
     "poses_of",
     "relation",
     "relative_poses",
@@ -217,3 +219,5 @@ def cylinder_core(radius: float, length: float, most_error: float) -> tuple[Mesh
 def cone_core(radius: float, height: float, most_error: float) -> tuple[Mesh, float]: ...
 def height_field_core(heights: _Floats, cell: list[float]) -> Mesh: ...
 def voxels_core(cells: NDArray[np.int32], side: float) -> Mesh: ...
+def octree_core(cells: NDArray[np.int64], side: float) -> Mesh: ...
+def convex_hull_core(points: ArrayLike) -> Mesh: ...

@@ -1,4 +1,4 @@
-"""Simple shapes: balls, capsules, boxes, cylinders, cones, grounds, height fields, clouds of points and voxels.
+"""Simple shapes: balls, capsules, boxes, cylinders, cones, hulls, grounds, height fields, clouds of points and voxels.
 
 Each is a `Mesh`, alone at the origin of its frame, and goes wherever a mesh goes. Round ones are a few triangles without area
 and a radius, which is exact; cylinders and cones are polyhedra around them, and say how much larger they are.
@@ -77,12 +77,63 @@ def cloud(points: ArrayLike, radius: float = 0.0) -> Mesh:
     return Mesh(_cbvh.cloud_core(points)).rounded(radius)
 
 
+def convex_hull(points: ArrayLike) -> Mesh:
+    """The solid convex hull of points of shape (N, 3), decided exactly. Its vertices are some of the points. Every point is
+    inside it or on it if the coordinates are float32 numbers, and otherwise at most as far outside as the bake rounds
+    vertices. Raises ValueError if all points are in one plane or if a coordinate is not finite."""
+    return Mesh(_cbvh.convex_hull_core(points)).solid()
+
+
 def voxels(cells: ArrayLike, side: float) -> Mesh:
     """The surface of full cells of a grid, without faces between two full cells. ``cells`` has shape (N, 3), int: cell
-    (i, j, k) is the cube from (i, j, k) times the side on. Use `Mesh.solid` if what is inside counts."""
+    (i, j, k) is the cube from (i, j, k) times the side on. Or it is an array of bool of shape (I, J, K), and those cells
+    are full where it is true. Use `Mesh.solid` if what is inside counts."""
     grid = np.asarray(cells)
+    if grid.ndim == 3 and grid.dtype == bool:
+        grid = np.argwhere(grid)
     if grid.ndim != 2 or grid.shape[1] != 3 or grid.dtype.kind not in "iu":
-        raise ValueError(f"cells: expected integers of shape (N, 3), found {grid.dtype} of shape {grid.shape}")
+        expected = "expected integers of shape (N, 3) or bool of shape (I, J, K)"
+        raise ValueError(f"cells: {expected}, found {grid.dtype} of shape {grid.shape}")
     if grid.size and (grid.min() < -(2**31) or grid.max() >= 2**31):
         raise ValueError("cells: expected numbers of 32 bits")
     return Mesh(_cbvh.voxels_core(np.ascontiguousarray(grid, np.int32), _length(side, "side")))
+
+
+def octree(cells: Any, sizes: ArrayLike | None = None) -> Mesh:
+    """The surface of full cells of an octree, without what two of them have in common.
+
+    ``cells`` is a tree of pyoctomap, whose occupied leaves are full, small and large ones. Or it has the middles of cells,
+    shape (N, 3), and ``sizes`` their sides, shape (N,). Sides are the least one times powers of two, and corners are at
+    multiples of the side, as in an octree whose middle is at the origin. Middles may be off by a tenth of the least side,
+    as float32 numbers are. Use `Mesh.solid` if what is inside counts."""
+    least = None
+    if hasattr(cells, "begin_leafs"):
+        if sizes is not None:
+            raise ValueError("sizes: expected None beside a tree, which has those of its leaves")
+        leaves = [(*leaf.getCoordinate(), leaf.getSize()) for leaf in cells.begin_leafs() if cells.isNodeOccupied(leaf)]
+        numbers, least = np.array(leaves, np.float64).reshape(-1, 4), float(cells.getResolution())
+        middles, sides = numbers[:, :3], numbers[:, 3]
+    elif sizes is None:
+        raise TypeError(f"cells: expected a tree of pyoctomap or middles with sizes, found {type(cells).__name__} alone")
+    else:
+        middles, sides = _cbvh.copied_numbers(cells, "cells"), _cbvh.copied_numbers(sizes, "sizes")
+    if middles.ndim != 2 or middles.shape[1] != 3 or sides.shape != middles.shape[:1]:
+        found = f"found {middles.shape} and {sides.shape}"
+        raise ValueError(f"cells: expected middles of shape (N, 3) and sizes of shape (N,), {found}")
+    if not (np.all(sides > 0) and np.all(np.isfinite(sides)) and np.all(np.isfinite(middles))):
+        raise ValueError("cells: expected finite middles and finite sizes above 0, found others")
+    if least is None:
+        least = float(sides.min()) if len(sides) else 1.0
+    # A size and the corner of each cell, in sides of the finest ones.
+    exact = np.column_stack([(middles - sides[:, None] / 2) / least, sides / least])
+    rows = np.round(exact)
+    off = np.abs(exact - rows).max(axis=1, initial=0.0)
+    if np.any(np.abs(rows) >= 2**31):
+        raise ValueError("cells: expected less than 2^31 of the least sides from the origin and as size, found more")
+    if np.any(off > 0.1):
+        number = int(np.argmax(off))
+        raise ValueError(
+            f"cells: expected corners at multiples of the least size, {least:g}, found cell {number} off by {off[number]:.2g}"
+            " of it; subtract the origin of the octree from the middles, and put the mesh there"
+        )
+    return Mesh(_cbvh.octree_core(np.ascontiguousarray(rows, np.int64), least))

@@ -4,8 +4,11 @@
 It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 
 - Meshes are surfaces, whether convex or not. A mesh that is inside another without touching it does not collide with
-  it.
-- Balls and capsules of ``trimesh.primitives`` are exact. They have one triangle, of which only the number 0 is in answers.
+  it, unless that is a primitive of trimesh, which is solid.
+- ``Sphere`` and ``Capsule`` of ``trimesh.primitives`` are exact, and have the one triangle 0. ``Box`` has the triangles of
+  trimesh. ``Cylinder`` is a polyhedron around it, 0.002 of the radius larger, and not one inside it. An ``Extrusion`` is a
+  mesh. Their transforms must be rigid. A primitive counts as it is when it is added or asked about.
+- A ``PointCloud`` is its points, and answers name their numbers. ``radius``, here and for any mesh, is added on all sides.
 - Contact is exact, and distances are 0 if meshes touch. There is no penetration depth and no normal: answers do not
   have the attributes ``depth`` and ``normal``, and no distance is negative.
 - Contacts are all pairs of triangles that touch, each once.
@@ -28,16 +31,18 @@ from numpy.typing import ArrayLike, NDArray
 from . import _cbvh
 from ._answers import Floats
 from ._baking import bake
-from ._mesh import Mesh
+from ._mesh import Mesh, _length
 from ._poses import relative
 from ._scene import Scene
-from ._shapes import sphere
+from ._shapes import cylinder, sphere
 
 EXTERNAL = "__external"
 """The name in answers of an object that is not in the manager, as in trimesh."""
 
 # The groups of a manager's own objects, and of those that they are asked about with.
 _OWN, _OTHERS = 1, 2
+# What other libraries call half-spaces.
+_HALF_SPACES = {"Halfspace", "HalfSpace", "Plane"}
 # How many baked meshes are kept that nothing else holds.
 _KEPT = 16
 
@@ -59,21 +64,46 @@ _recent: OrderedDict[bytes, _Geometry] = OrderedDict()
 _baking = threading.Lock()
 
 
-def _geometry(mesh: Any) -> _Geometry:
+def _geometry(mesh: Any, radius: float = 0.0) -> _Geometry:
     """A mesh as it is, or baked from its vertices and faces: each content once, as long as anybody holds it."""
+    geometry = _of_radius_0(mesh)
+    if _length(radius, "radius") == 0:
+        return geometry
+    return _Geometry(geometry.mesh.rounded(geometry.mesh.radius + radius), geometry.vertices, geometry.faces)
+
+
+def _of_radius_0(mesh: Any) -> _Geometry:
     if isinstance(mesh, Mesh):
         return _Geometry(mesh)
-    if (rounded := _rounded(mesh)) is not None:
-        return _Geometry(rounded)
+    kind, module, is_solid = type(mesh).__name__, type(mesh).__module__, False
     try:
-        vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
+        if module.startswith("trimesh.primitives") and kind != "Extrusion":
+            numbers, is_solid = mesh.primitive, True
+            pose = _cbvh.copied_numbers(numbers.transform, "transform of the mesh")
+            _cbvh.check_pose(pose, "transform of the mesh")
+            if kind == "Sphere":
+                return _Geometry(sphere(float(numbers.radius), pose[:3, 3]))
+            if kind == "Capsule":
+                axis, centre = pose[:3, 2] * numbers.height / 2, pose[:3, 3]
+                segment = Mesh(_cbvh.segment_core(list(centre - axis), list(centre + axis)))
+                return _Geometry(segment.rounded(float(numbers.radius)))
+            if kind == "Cylinder":
+                mesh = cylinder(float(numbers.radius), float(numbers.height))
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        if kind == "PointCloud" and module.startswith("trimesh."):
+            faces = np.repeat(np.arange(len(vertices))[:, None], 3, axis=1)
+        else:
+            faces = np.asarray(mesh.faces)
     except AttributeError:
         expected = "expected a cbvh.Mesh or an object with vertices and faces"
-        raise TypeError(f"mesh: {expected}, found {type(mesh).__name__}") from None
+        remedy = "; of a half-space, make a cbvh.ground that reaches far enough" if kind in _HALF_SPACES else ""
+        raise TypeError(f"mesh: {expected}, found {kind}{remedy}") from None
+    if kind == "Cylinder" and is_solid:
+        vertices = vertices @ pose[:3, :3].T + pose[:3, 3]
     if faces.ndim != 2 or vertices.ndim != 2 or faces.dtype.kind not in "iu":
         bake(vertices, faces)  # Its error names what is wrong.
     faces = np.asarray(faces, dtype=np.int64)
-    digest = hashlib.blake2b(repr((vertices.shape, faces.shape)).encode())
+    digest = hashlib.blake2b(repr((vertices.shape, faces.shape, is_solid)).encode())
     for array in (vertices, faces):
         digest.update(np.ascontiguousarray(array).data)
     key = digest.digest()
@@ -81,27 +111,14 @@ def _geometry(mesh: Any) -> _Geometry:
         geometry = _baked.get(key)
         if geometry is None:
             # Callers may change their arrays.
-            geometry = _Geometry(bake(vertices, faces), vertices.copy(), faces.copy())
+            baked = bake(vertices, faces)
+            geometry = _Geometry(baked.solid() if is_solid else baked, vertices.copy(), faces.copy())
             _baked[key] = geometry
         _recent[key] = geometry
         _recent.move_to_end(key)
         if len(_recent) > _KEPT:
             _recent.popitem(last=False)
     return geometry
-
-
-def _rounded(mesh: Any) -> Mesh | None:
-    """A ball or a capsule of trimesh as what it is, not as the faces that trimesh gives it."""
-    if not type(mesh).__module__.startswith("trimesh.primitives"):
-        return None
-    numbers, kind = mesh.primitive, type(mesh).__name__
-    if kind == "Sphere":
-        return sphere(float(numbers.radius), numbers.center)
-    if kind != "Capsule":
-        return None
-    axis, centre = numbers.transform[:3, 2] * numbers.height / 2, numbers.transform[:3, 3]
-    segment = Mesh(_cbvh.segment_core(list(centre - axis), list(centre + axis)))
-    return segment.rounded(float(numbers.radius))
 
 
 def _transform(transform: ArrayLike | None) -> Floats:
@@ -142,14 +159,15 @@ class ContactData:
     def point(self) -> Floats:
         """A point in the world that both triangles have, to within rounding, shape (3,).
 
-        It is computed at the first access. There is none for objects that were added as a `cbvh.Mesh`.
+        It is computed at the first access. There is none for balls, for capsules, and for a `cbvh.Mesh`.
         """
         if self._point is None:
             meshes, poses = [], []
             for _, geometry, triangle, pose in self._rows:
                 if geometry.vertices is None or geometry.faces is None:
-                    raise AttributeError("point: expected objects with vertices and faces, found a cbvh.Mesh")
-                meshes.append(bake(geometry.vertices[geometry.faces[triangle]], [[0, 1, 2]]))
+                    raise AttributeError("point: expected objects with vertices and faces, found a cbvh.Mesh, a ball or a capsule")
+                corners = bake(geometry.vertices[geometry.faces[triangle]], [[0, 1, 2]])
+                meshes.append(corners.rounded(geometry.mesh.radius))
                 poses.append(pose)
             found = meshes[0].distance(meshes[1], relative(*poses)).point_a
             self._point = poses[0][:3, :3] @ found + poses[0][:3, 3]
@@ -180,8 +198,8 @@ class DistanceData:
 class CollisionManager:
     """Named objects, and whether they collide or how far apart they are, as `trimesh.collision.CollisionManager` asks.
 
-    An object is a `Mesh`, or anything with ``vertices`` and ``faces``, such as a ``trimesh.Trimesh``. Each distinct
-    mesh is baked once. Transforms map body to world, shape (4, 4), and are rigid. The module `cbvh.manager` states what
+    An object is a `Mesh`, or anything with ``vertices`` and ``faces``, such as a ``trimesh.Trimesh``, or a ``PointCloud``
+    or a primitive of trimesh. Each distinct mesh is baked once. Transforms map body to world, shape (4, 4), and are rigid. The module `cbvh.manager` states what
     differs from trimesh.
     """
 
@@ -194,9 +212,12 @@ class CollisionManager:
         self._among_names: _Names = {}
         self._against_names: _Names = {}
 
-    def add_object(self, name: Hashable, mesh: Any, transform: ArrayLike | None = None) -> None:
-        """Adds an object. It replaces one of the same name. ``transform`` (body to world): None is the identity."""
-        geometry, pose = _geometry(mesh), _transform(transform)
+    def add_object(
+        self, name: Hashable, mesh: Any, transform: ArrayLike | None = None, *, radius: float = 0.0
+    ) -> None:
+        """Adds an object. It replaces one of the same name. ``transform`` (body to world): None is the identity.
+        ``radius``: how much it is larger on all sides, in mesh units; that of the balls for a cloud of points."""
+        geometry, pose = _geometry(mesh, radius), _transform(transform)
         hash(name)  # Raises TypeError where it cannot be a name.
         with self._lock:
             among = self._among.add(geometry.mesh, pose)
@@ -223,14 +244,20 @@ class CollisionManager:
             self._against.set_pose(against, pose)
 
     def in_collision_single(
-        self, mesh: Any, transform: ArrayLike | None = None, return_names: bool = False, return_data: bool = False
+        self,
+        mesh: Any,
+        transform: ArrayLike | None = None,
+        return_names: bool = False,
+        return_data: bool = False,
+        *,
+        radius: float = 0.0,
     ) -> Any:
         """Whether an object collides with any object of the manager.
 
         The answer is a bool. With ``return_names`` or ``return_data`` it is a tuple, which also has the set of names of
         the objects that it collides with, or a list of `ContactData`, in which the object is called ``"__external"``.
         """
-        others = [(EXTERNAL, _geometry(mesh), _transform(transform))]
+        others = [(EXTERNAL, _geometry(mesh, radius), _transform(transform))]
         found, pairs, data = self._collisions_with(others, return_names, return_data)
         return _asked(found, {own for own, _ in pairs}, data, return_names, return_data)
 
@@ -255,13 +282,19 @@ class CollisionManager:
         return _asked(found, pairs, data, return_names, return_data)
 
     def min_distance_single(
-        self, mesh: Any, transform: ArrayLike | None = None, return_name: bool = False, return_data: bool = False
+        self,
+        mesh: Any,
+        transform: ArrayLike | None = None,
+        return_name: bool = False,
+        return_data: bool = False,
+        *,
+        radius: float = 0.0,
     ) -> Any:
         """The least distance of an object from the manager's, in mesh units.
 
         With ``return_name``, the name of the closest follows, and with ``return_data`` a `DistanceData`.
         """
-        others = [(EXTERNAL, _geometry(mesh), _transform(transform))]
+        others = [(EXTERNAL, _geometry(mesh, radius), _transform(transform))]
         distance, names, data = self._distance_to(others)
         return _asked(distance, names and names[0], data, return_name, return_data)
 
