@@ -60,6 +60,12 @@ const PLY_FACES_FIRST: &str = "ply\nformat ascii 1.0\nelement face 2\nproperty l
     element vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
     3 0 1 2\n4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 1e3\n";
 
+const XYZ: &str = "# points\n0 0 0\n1,.5,1e-3 255\n1 .5 1e-3\n";
+const PCD: &str = "VERSION .7\nFIELDS x i y z\nSIZE 4 2 8 4\nTYPE F U F F\nWIDTH 3\nHEIGHT 1\nDATA ascii\n\
+    0 1 0 0\n1 2 .5 1e-3\n1 3 .5 1e-3\n";
+const PLY_POINTS: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+    property float z\nend_header\n0 0 0\n1 .5 1e-3\n1 .5 1e-3\n";
+
 fn binary_stl(triangles: u32) -> Vec<u8> {
     let mut bytes = vec![b'x'; 80];
     bytes.extend(triangles.to_le_bytes());
@@ -75,9 +81,16 @@ fn binary_stl(triangles: u32) -> Vec<u8> {
 #[test]
 fn good_files_bake_alike() {
     let folder = Folder::new();
-    for (name, text) in
-        [("a.obj", OBJ), ("a.stl", STL), ("a.ply", PLY), ("b.ply", PLY_FACES_FIRST), ("a", PLY)]
-    {
+    for (name, text) in [
+        ("a.obj", OBJ),
+        ("a.stl", STL),
+        ("a.ply", PLY),
+        ("b.ply", PLY_FACES_FIRST),
+        ("a", PLY),
+        ("a.xyz", XYZ),
+        ("a.pcd", PCD),
+        ("c.ply", PLY_POINTS),
+    ] {
         folder.compare(name, text.as_bytes()).unwrap();
         let crlf = text.replace('\r', "").replace('\n', "\r\n");
         let _ = folder.compare(name, crlf.as_bytes());
@@ -141,7 +154,10 @@ fn bad_files_are_told_alike() {
         ("a.ply", "ply\nformat ascii 1.0\nend_header\n"),
         ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9999999\nproperty float x\nend_header\n"),
         ("a.gltf", "{}"),
-        ("a.xyz", "0 0 0"),
+        ("a.xyz", "0 0 0\n0 nan 0"),
+        ("a.xyz", "#"),
+        ("a.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nDATA ascii\n1 2 3"),
+        ("a.off", "0 0 0"),
         ("a", "nothing known"),
     ];
     for (name, text) in cases {

@@ -145,11 +145,11 @@ fn invalid_input_is_3() {
     let write = |name: &str, text: &str| directory.write(name, text);
     write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n");
     write("empty.stl", "");
-    write("mesh.xyz", "what is this\n");
+    write("mesh.abc", "what is this\n");
     directory.cbvh("bake bad.obj -o o.cbvh").failed(3, &["bad.obj: line 3: expected", "found 3"]);
     directory.cbvh("bake cube.obj bad.obj -o o.cbvh").failed(3, &["bad.obj: line 3"]);
     directory.cbvh("bake empty.stl -o o.cbvh").failed(3, &["empty.stl"]);
-    directory.cbvh("bake mesh.xyz -o o.cbvh").failed(3, &["mesh.xyz", ".xyz"]);
+    directory.cbvh("bake mesh.abc -o o.cbvh").failed(3, &["mesh.abc", ".abc"]);
     directory.cbvh("validate cube.obj").failed(3, &["cube.obj: byte 0: R01"]);
     cbvh_in(directory, &["query", "bad.obj", "cube.obj", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"])
         .failed(3, &["bad.obj: line 3"]);
@@ -185,7 +185,7 @@ fn invalid_input_is_3() {
             .cbvh("query cube.obj cube.obj p.txt")
             .failed(3, &["p.txt: expected at least one line of 12 numbers", "found no pose"]);
     }
-    assert_eq!(names(directory), ["bad.obj", "cube.obj", "empty.stl", "mesh.xyz", "p.txt"]);
+    assert_eq!(names(directory), ["bad.obj", "cube.obj", "empty.stl", "mesh.abc", "p.txt"]);
 }
 
 #[test]

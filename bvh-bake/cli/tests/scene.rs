@@ -448,6 +448,7 @@ fn scenes_have_simple_shapes_and_margins() {
         ("sphere ball 1", "line 6: expected a name of its own, found a second shape \"ball\""),
         ("margin a 1", "line 6: expected an instance of an earlier line, found \"a\""),
         ("cloud more none.xyz 1", "none.xyz"),
+        ("halfspace floor 0 0 1 0", "a half-space; write a box"),
     ] {
         place.write("s.scene", format!("{shapes}{line}\ninstance a ball {}\n", at("0")));
         let ended = cbvh_in(&place, &["scene", "s.scene"]);

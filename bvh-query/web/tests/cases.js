@@ -302,7 +302,7 @@ export const cases = {
         );
         ok(/^robot\.stl: /.test(refused(() => cbvh.Mesh.bakeFile("robot.stl", new Uint8Array(90)))), "the file");
         ok(
-            /found content of no known format/.test(refused(() => cbvh.Mesh.bakeFile("robot.xyz", new Uint8Array(9)))),
+            /found content of no known format/.test(refused(() => cbvh.Mesh.bakeFile("robot.abc", new Uint8Array(9)))),
             "the format",
         );
         const outside = { asset: { version: "2.0" }, buffers: [{ byteLength: 36, uri: "beside.bin" }] };

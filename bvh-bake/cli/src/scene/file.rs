@@ -174,6 +174,10 @@ impl SceneText {
                 }
                 self.allowed.push(pair);
             }
+            ["halfspace" | "half-space" | "plane", ..] => {
+                let remedy = "write a box that reaches beyond everything it is asked about";
+                return Err(format!("expected a shape of finite size, found a half-space; {remedy}"));
+            }
             _ => {
                 return Err(format!(
                     "expected mesh NAME FILE, sphere NAME R, capsule NAME R LENGTH, box NAME X Y Z, cylinder NAME R LENGTH, \
