@@ -236,6 +236,8 @@ typedef struct cbvh_bake_options {
     const char *scratch;
     /* How far "quantized" may move a vertex, in mesh units; 0 for 1e-5 of the diagonal of the object's box. */
     double max_error;
+    /* The radius of the mesh in mesh units, as of cbvh_mesh_rounded, also in its file. */
+    double radius;
     /* The most memory that the process may use, in bytes; 0 for no limit. Files only. */
     uint64_t max_memory;
     /* The following fields are 0 or 1. */
@@ -251,6 +253,10 @@ typedef struct cbvh_bake_options {
     int32_t no_topology;
     /* Bakes even if the output is up to date. Files only. */
     int32_t force;
+    /* Makes the mesh solid, as cbvh_mesh_solid does, also in its file. */
+    int32_t solid;
+    /* Lets glTF files name buffers outside their own folders, which is otherwise refused. Files only. */
+    int32_t allow_outside;
 } cbvh_bake_options;
 
 /* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes
@@ -258,7 +264,7 @@ typedef struct cbvh_bake_options {
  * vertex that does not exist, a coordinate is not finite or beyond 2^120, or there are no faces. */
 cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_t *faces, size_t face_count,
                       const cbvh_bake_options *options, cbvh_mesh *mesh);
-/* Bakes mesh files (OBJ, STL, PLY, glTF) of any size into a .cbvh file, which is written completely or not at all. An
+/* Bakes mesh files (OBJ, STL, PLY, glTF) or points (XYZ, PCD, PLY) of any size into a .cbvh file, which is written completely or not at all. An
  * output that is up to date is not written again. `was_up_to_date` then gets 1, else 0; it may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);

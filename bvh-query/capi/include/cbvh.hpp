@@ -199,6 +199,9 @@ struct BakeOptions {
     bool turning_slabs = true;
     bool topology = true;
     bool force = false;
+    bool solid = false;
+    bool allow_outside = false;
+    double radius = 0;
 
     /// The texts stay those of this object.
     cbvh_bake_options raw() const {
@@ -219,6 +222,9 @@ struct BakeOptions {
         options.no_turning_slabs = !turning_slabs;
         options.no_topology = !topology;
         options.force = force;
+        options.solid = solid;
+        options.allow_outside = allow_outside;
+        options.radius = radius;
         return options;
     }
 };

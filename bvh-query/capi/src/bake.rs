@@ -19,6 +19,7 @@ struct Choices {
     scratch: Option<PathBuf>,
     max_memory: Option<u64>,
     force: bool,
+    allow_outside: bool,
 }
 
 /// Refuses a name that no choice has.
@@ -66,11 +67,15 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         .scene(flag("options.scene", given.scene)?)
         .ids(!flag("options.no_ids", given.no_ids)?)
         .turning_slabs(!flag("options.no_turning_slabs", given.no_turning_slabs)?)
-        .topology(!flag("options.no_topology", given.no_topology)?);
+        .topology(!flag("options.no_topology", given.no_topology)?)
+        .solid(flag("options.solid", given.solid)?)
+        .radius(given.radius);
     // SAFETY: as above.
     let scratch = optional(given.scratch, |folder| unsafe { path("options.scratch", folder) })?;
     let max_memory = Some(given.max_memory).filter(|&bytes| bytes > 0);
-    Ok(Choices { options, scratch, max_memory, force: flag("options.force", given.force)? })
+    let force = flag("options.force", given.force)?;
+    let allow_outside = flag("options.allow_outside", given.allow_outside)?;
+    Ok(Choices { options, scratch, max_memory, force, allow_outside })
 }
 
 /// Makes triangles and bakes them in memory.
@@ -104,6 +109,7 @@ pub unsafe extern "C" fn cbvh_bake(
             ("max_memory", choices.max_memory.is_some()),
             ("scratch", choices.scratch.is_some()),
             ("force", choices.force),
+            ("allow_outside", choices.allow_outside),
         ] {
             if is_set {
                 let name = format_args!("options.{name}");
@@ -137,7 +143,7 @@ pub unsafe extern "C" fn cbvh_bake_files(
         let outcome = cores::work(|| {
             let bake = FileBake::new(inputs, output).options(choices.options);
             let bake = bake.max_memory(choices.max_memory).scratch(choices.scratch).force(choices.force);
-            Ok(bake.run()?)
+            Ok(bake.allow_outside(choices.allow_outside).run()?)
         })?;
         if let Some(mut out) = up_to_date {
             out.set(i32::from(matches!(outcome, Outcome::UpToDate(_))));

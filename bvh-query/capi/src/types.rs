@@ -53,6 +53,7 @@ structures! {
         effort: *const c_char,
         scratch: *const c_char,
         max_error: f64,
+        radius: f64,
         max_memory: u64,
         split_objects: i32,
         scene: i32,
@@ -60,6 +61,8 @@ structures! {
         no_turning_slabs: i32,
         no_topology: i32,
         force: i32,
+        solid: i32,
+        allow_outside: i32,
     }
     RayRow { origin: [f64; 3], direction: [f64; 3], until: f64 }
     SegmentRow { from: [f64; 3], to: [f64; 3] }

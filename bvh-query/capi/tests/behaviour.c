@@ -774,6 +774,19 @@ static void margins(void) {
     OK(cbvh_scene_free(copy));
 }
 
+/* A radius and solidity that a file states are those of the mesh. */
+static void stated_radius(void) {
+    cbvh_mesh mesh;
+    const cbvh_bake_options options = {.size = sizeof options, .solid = 1, .radius = 0.25};
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &options, &mesh));
+    double radius = 0;
+    OK(cbvh_mesh_radius(mesh, &radius));
+    CHECK(radius == 0.25);
+    OK(cbvh_mesh_free(mesh));
+    const cbvh_bake_options wrong = {.size = sizeof wrong, .radius = -1};
+    CHECK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &wrong, &mesh) == CBVH_BAKE_FAILED);
+}
+
 /* Files: baked, opened in all ways, and a scene file, in the folder that the program is given. */
 static void files(const char *folder, const char *testdata) {
     char input[1000], output[1000];
@@ -862,6 +875,7 @@ int main(int count, char **arguments) {
     rounded();
     solids();
     margins();
+    stated_radius();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));
     puts("behaviour: as the header says");

@@ -22,6 +22,8 @@ pub(crate) struct BakeOptions {
     effort: Option<String>,
     ids: bool,
     topology: bool,
+    radius: f64,
+    solid: bool,
 }
 
 impl BakeOptions {
@@ -30,7 +32,12 @@ impl BakeOptions {
             let known = known.join(", ");
             PyValueError::new_err(format!("{name}: expected one of {known}, found {found:?}"))
         };
-        let mut options = Options::default().max_error(self.max_error).ids(self.ids).topology(self.topology);
+        let mut options = Options::default()
+            .max_error(self.max_error)
+            .ids(self.ids)
+            .topology(self.topology)
+            .radius(self.radius)
+            .solid(self.solid);
         if let Some(name) = &self.profile {
             let profile = Profile::from_name(name);
             let known = Profile::ALL.map(Profile::name);

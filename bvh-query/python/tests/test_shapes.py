@@ -1,7 +1,9 @@
 """Tests of simple shapes, radii and margins: closed formulas in numpy for balls, capsules and clouds."""
 
 import copy
+import os
 import pickle
+import tempfile
 import unittest
 
 import numpy as np
@@ -40,6 +42,27 @@ class Shapes(unittest.TestCase):
         self.assertTrue(cbvh.sphere(2).collide(cbvh.sphere(3), shifts([3, 4, 0])[0]))
         self.assertFalse(cbvh.sphere(2).collide(cbvh.sphere(3 - 2.0**-50), shifts([3, 4, 0])[0]))
         self.assertTrue(cbvh.sphere(1, centre=(3, 0, 0)).collide(cbvh.sphere(2), np.eye(4)))
+
+    def test_files_state_radii_and_solids(self):
+        cube = cbvh.box((2, 2, 2)).arrays()
+        baked = cbvh.bake(*cube, radius=0.25, solid=True)
+        self.assertEqual((baked.radius, baked.is_solid), (0.25, True))
+        self.assertEqual(baked.distance(cbvh.sphere(0.5), shifts([3, 0, 0])[0]).distance, 1.25)
+        bare = pickle.loads(pickle.dumps(baked.rounded(0)))
+        self.assertEqual((bare.radius, bare.is_solid), (0, True))
+        with tempfile.TemporaryDirectory() as folder:
+            points, output = os.path.join(folder, "dots.xyz"), os.path.join(folder, "dots.cbvh")
+            with open(points, "w") as file:
+                file.write("0 0 0\n3 0 0\n3 0 0\n")
+            dots = cbvh.bake_files(points, output, radius=0.5)
+            self.assertEqual((dots.triangle_count, dots.radius, cbvh.open(output).radius), (3, 0.5, 0.5))
+            with self.assertRaisesRegex(cbvh.BakeError, "closed surface"):
+                cbvh.bake([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], solid=True)
+        for wrong in (-1, np.nan, np.inf, 1e40):
+            with self.assertRaisesRegex(ValueError, "radius"):
+                cbvh.bake(*cube, radius=wrong)
+        with self.assertRaises(TypeError):
+            cbvh.bake(*cube, solid=1)
 
     def test_capsules_are_segments_with_a_radius(self):
         a, b = cbvh.capsule(0.3, 1.0), cbvh.capsule(0.2, 2.0)

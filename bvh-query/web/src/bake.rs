@@ -47,7 +47,9 @@ fn options(given: &JsValue) -> Answer<Options> {
         .effort(effort.unwrap_or_default())
         .max_error(max_error)
         .ids(flag("ids"))
-        .topology(flag("topology")))
+        .topology(flag("topology"))
+        .radius(get("radius").as_f64().unwrap_or(0.0))
+        .solid(get("solid").is_truthy()))
 }
 
 /// Bakes a mesh, and calls `onStage` with the name of each stage. An exception thrown there is thrown again after the bake.
@@ -92,7 +94,7 @@ pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mes
     let format = format.ok_or_else(|| {
         wrong(
             name,
-            "expected a mesh in a file named .obj, .stl, .ply or .glb, found content of no known format",
+            "expected a mesh in a file named .obj, .stl, .ply or .glb, or points in one named .xyz or .pcd, found content of no known format",
         )
     })?;
     let mesh = input::read_bytes(&bytes, format, path).map_err(refused)?;

@@ -322,6 +322,12 @@ export const cases = {
         const sizes = ["f32", "packed", "quantized"].map((triangles) => bake({ triangles }).byteLength);
         ok(sizes[0] >= sizes[1] && sizes[1] >= sizes[2], `smaller files, found ${sizes}`);
         bake({ profile: "dop14-u8", effort: "fast", ids: false, topology: false, triangles: "quantized", maxError: 0.01 });
+        const thick = bake({ radius: 0.25, solid: true });
+        equal([thick.radius, thick.isSolid], [0.25, true]);
+        equal(thick.distance(bake({}), cbvh.pose([3, 0, 0])).distance, 0.75);
+        ok(/2\^118/.test(refused(() => bake({ radius: -1 }))), "radii");
+        const dots = cbvh.Mesh.bakeFile("dots.xyz", new TextEncoder().encode("0 0 0\n3 0 0\n3 0 0\n"), { radius: 1 });
+        equal([dots.triangleCount, dots.radius], [3, 1]);
         const open = bake({ topology: false });
         ok(/bake it again with topology/.test(refused(() => open.sides([0, 0, 0]))), "what is missing");
         equal(cbvh.Mesh.bake(Float32Array.from(CUBE), Uint16Array.from(CUBE_FACES)).bytes(), bake({}).bytes());

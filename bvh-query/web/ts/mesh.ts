@@ -31,6 +31,10 @@ export interface BakeOptions {
     ids?: boolean;
     /** Whether the file states which objects are closed, which questions about the inside need. True by default. */
     topology?: boolean;
+    /** The radius of the mesh in mesh units, as of `rounded`, which the file then states. 0 by default. */
+    radius?: number;
+    /** Whether the mesh is solid, as by `solid`, which the file then states. False by default. */
+    solid?: boolean;
     /** A function that is called with the name of each stage when the stage begins. */
     onStage?: (stage: string) => void;
 }
@@ -69,6 +73,8 @@ function checked(options: BakeOptions): BakeOptions {
         ["effort", "string"],
         ["ids", "boolean"],
         ["topology", "boolean"],
+        ["radius", "number"],
+        ["solid", "boolean"],
         ["onStage", "function"],
     ];
     for (const [name, type] of types) {
@@ -144,7 +150,7 @@ export class Mesh extends Handle<raw.Mesh> {
      * Bakes the bytes of a mesh file. All its objects become one.
      *
      * @param name The name of the file. Its extension tells the format: .obj, .stl, .ply, .glb, or .gltf with all its
-     * buffers inside. With any other extension, the content tells the format.
+     * buffers inside; .xyz, .pcd, or .ply without faces for points. With any other extension, the content tells the format.
      */
     static bakeFile(name: string, file: Bytes, options: BakeOptions = {}): Mesh {
         const [title, array, chosen] = [text(name, "name"), bytes(file, "bytes"), checked(options)];

@@ -20,11 +20,13 @@ def _options(
     effort: str | None,
     ids: bool,
     topology: bool,
+    radius: float,
+    solid: bool,
 ) -> dict[str, Any]:
     for name, text in (("profile", profile), ("triangles", triangles), ("effort", effort)):
         if text is not None and not isinstance(text, str):
             raise TypeError(f"{name}: expected a str or None, found {type(text).__name__}")
-    for name, choice in (("ids", ids), ("topology", topology)):
+    for name, choice in (("ids", ids), ("topology", topology), ("solid", solid)):
         _bool(choice, name)
     if max_error is not None:
         if isinstance(max_error, (str, bytes)) or not hasattr(max_error, "__float__"):
@@ -34,6 +36,10 @@ def _options(
             raise ValueError(f'max_error: expected triangles="quantized" beside it, found {triangles!r}')
         if not 0 < max_error < np.inf:
             raise ValueError(f"max_error: expected a finite length above 0, found {max_error}")
+    if isinstance(radius, (str, bytes)) or not hasattr(radius, "__float__"):
+        raise TypeError(f"radius: expected a number, found {type(radius).__name__}")
+    if not 0 <= float(radius) <= 2.0**118:
+        raise ValueError(f"radius: expected a length from 0 to 2^118, found {radius}")
     return {
         "profile": profile,
         "triangles": triangles,
@@ -41,6 +47,8 @@ def _options(
         "effort": effort,
         "ids": bool(ids),
         "topology": bool(topology),
+        "radius": float(radius),
+        "solid": bool(solid),
     }
 
 
@@ -60,13 +68,16 @@ def bake(
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
+    radius: float = 0.0,
+    solid: bool = False,
 ) -> Mesh:
     """Bakes a mesh in memory.
 
     ``vertices`` have shape (V, 3), in any unit of length; ``faces`` have shape (F, 3), three numbers of vertices each.
     ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
     Without ``ids``, the baker numbers triangles in its own order. Without ``topology``, there are no answers about what
-    is inside. Baking takes about a microsecond per triangle. `Mesh.save` writes the result.
+    is inside. ``radius`` and ``solid`` are those of `Mesh.rounded` and `Mesh.solid`, and stay in the file. Baking takes
+    about a microsecond per triangle. `Mesh.save` writes the result.
 
     Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
     does not move. Others move by at most 2^-23 of the diagonal of the object's box, or by up to ``max_error`` with
@@ -85,7 +96,7 @@ def bake(
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
         found = f"{numbers.min()} to {numbers.max()}"
         raise ValueError(f"faces: expected numbers from 0 to {len(points) - 1}, found {found}")
-    options = _options(profile, triangles, max_error, effort, ids, topology)
+    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid)
     return Mesh(_cbvh.bake(points, np.require(numbers, np.uint32, ["C", "ALIGNED"]), options))
 
 
@@ -99,10 +110,12 @@ def bake_files(
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
+    radius: float = 0.0,
+    solid: bool = False,
     max_memory: int | None = None,
     force: bool = False,
 ) -> Mesh:
-    """Bakes mesh files (OBJ, STL, PLY, glTF) into a ``.cbvh`` file, and opens it.
+    """Bakes mesh files (OBJ, STL, PLY, glTF) or points (XYZ, PCD, PLY) into a ``.cbvh`` file, and opens it.
 
     If the file is up to date, nothing is done, unless ``force``. ``max_memory``: the most bytes of memory; the rest
     goes to scratch files, so a mesh may be larger than memory. The other options are those of `bake`. The environment
@@ -117,7 +130,7 @@ def bake_files(
     files = [os.fsdecode(file) for file in inputs]
     if not files:
         raise ValueError("inputs: expected at least one file, found none")
-    options = _options(profile, triangles, max_error, effort, ids, topology)
+    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid)
     if max_memory is not None:
         try:
             max_memory = operator.index(max_memory)

@@ -381,5 +381,6 @@ def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
 def _unpickle(data: bytes | str, object: int | None, radius: float, is_solid: bool) -> Mesh:
     mesh = open(data) if isinstance(data, str) else Mesh.from_bytes(data)
     mesh = mesh if object is None else mesh.object(object)
-    mesh = mesh.rounded(radius) if radius else mesh
+    # The file may state another radius.
+    mesh = mesh if mesh.radius == radius else mesh.rounded(radius)
     return mesh.solid() if is_solid else mesh
