@@ -589,3 +589,38 @@ fn files_state_radii_and_solids() {
     }
     assert!(inside > 50 && apart > 50, "{inside} {apart}");
 }
+
+/// Whether a point of a large cloud is inside a solid, against the side of each point.
+#[test]
+fn clouds_are_inside_solids_where_a_point_is() {
+    let mut random = Random::new(91);
+    for origin in [0.0, 1e6] {
+        let points: Vec<[f64; 3]> = (0..3000).map(|_| random.point().map(|c| origin + c)).collect();
+        let bake = |mesh: &bvh_bake::mesh::Mesh| {
+            Bvh::from_bytes(bvh_bake::to_bytes(mesh, &bvh_bake::Options::default()).unwrap().0).unwrap()
+        };
+        let cloud = bake(&bvh_bake::shapes::cloud(&points));
+        let block = bake(&bvh_bake::shapes::block([0.3, 0.2, 0.1]).unwrap());
+        let solid = block.all().solid().unwrap();
+        let (mut inside, mut outside) = (0, 0);
+        for querier in &mut queriers() {
+            for _ in 0..60 {
+                let pose = random_pose(&mut random, 1.2);
+                let place = [0, 1, 2].map(|k| pose.translation()[k] + origin);
+                let pose = Pose::nearest(*pose.rotation(), place).unwrap();
+                let is_in = |point: &[f64; 3], querier: &mut Querier| {
+                    querier.side(solid.at(&pose), *point).unwrap() != Side::Outside
+                };
+                let stored: Vec<[f64; 3]> = stored(&cloud).iter().map(|point| point.corners[0]).collect();
+                let expected = stored.iter().any(|point| is_in(point, querier));
+                assert_eq!(querier.collide(&cloud, solid, &pose).unwrap(), expected);
+                let found = querier.distance(&cloud, solid, &pose).unwrap();
+                assert_eq!(found.distance == 0.0, expected);
+                assert!(!expected || is_in(&found.point_a, querier));
+                inside += usize::from(expected);
+                outside += usize::from(!expected);
+            }
+        }
+        assert!(inside > 20 && outside > 20, "{inside} {outside}");
+    }
+}

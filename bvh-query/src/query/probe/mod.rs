@@ -5,6 +5,7 @@ pub(crate) mod batch;
 pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
+mod near;
 pub(crate) mod placed;
 pub(crate) mod point;
 pub(crate) mod ray;

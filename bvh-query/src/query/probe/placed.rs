@@ -97,6 +97,33 @@ impl IntoObject {
         (nearest, ascends == (row[nearest] > 0.0))
     }
 
+    /// Returns a box around the object's origin that contains another shape.
+    pub(super) fn bounds_of(&self, other: &PlacedShape<'_>) -> [[f64; 3]; 2] {
+        let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for object in other.shape.objects() {
+            let [low, high] = object.bounding_box();
+            let middle = [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) / 2.0);
+            let half = [0, 1, 2].map(|k| (high[k] - low[k]) / 2.0);
+            let placed = other.pose.map_or(middle, |pose| pose.place(middle));
+            let centre = self.point(placed);
+            // The columns of the rotation from the other shape to the object.
+            let axes = [0, 1, 2].map(|k| {
+                let mut axis = [0.0; 3];
+                axis[k] = 1.0;
+                self.direction(other.pose.map_or(axis, |pose| pose.rotation().map(|row| row[k])))
+            });
+            let size: f64 = half.iter().sum();
+            // Rotations are orthonormal to within 2^-20, and the rest is rounding.
+            let spare = size / (1 << 16) as f64
+                + 16.0 * self.error(placed.iter().map(|v| v.abs()).sum::<f64>() + size);
+            for k in 0..3 {
+                let reach = (0..3).map(|j| axes[j][k].abs() * half[j]).sum::<f64>() + spare;
+                (lo[k], hi[k]) = (lo[k].min(centre[k] - reach), hi[k].max(centre[k] + reach));
+            }
+        }
+        [lo, hi]
+    }
+
     /// Returns a bound on the error of points, and of placed vertices seen from the object, for probes whose coordinates have
     /// magnitudes of this sum.
     #[inline(always)]

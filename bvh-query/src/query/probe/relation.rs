@@ -8,7 +8,8 @@ use crate::pose::Pose;
 use crate::query::answers::{Relation, Side};
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::stored_at;
-use crate::query::probe::placed::PlacedShape;
+use crate::query::probe::near::near;
+use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::side::OpenObject;
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
@@ -111,6 +112,19 @@ impl Querier {
     ) -> Result<Option<[f64; 3]>, QueryError> {
         let bvh = mesh.shape.bvh();
         for (index, object) in mesh.shape.objects().iter().enumerate() {
+            let listed = match bvh.topology(mesh.shape.first() + index) {
+                Ok(topology) => Some(topology.components()).filter(|listed| listed.len() != 0),
+                Err(QueryError::NoTopology) => None,
+                Err(error) => return Err(error),
+            };
+            // Only a triangle in the container's box may be inside it.
+            let candidates = match listed {
+                Some(_) => Vec::new(),
+                None => {
+                    let bounds = IntoObject::new(mesh.pose.as_ref(), object).bounds_of(container);
+                    near(bvh, object, &bounds, &mut self.memory.budget)?
+                }
+            };
             let mut found = None;
             let mut ask = |place: TrianglePlace| -> Result<bool, QueryError> {
                 let corner = stored_at(bvh, object, place)?[0];
@@ -120,12 +134,7 @@ impl Querier {
                 }
                 Ok(found.is_some())
             };
-            let mut listed = match bvh.topology(mesh.shape.first() + index) {
-                Ok(topology) => Some(topology.components()).filter(|listed| listed.len() != 0),
-                Err(QueryError::NoTopology) => None,
-                Err(error) => return Err(error),
-            };
-            match &mut listed {
+            match listed {
                 Some(listed) => {
                     for place in listed {
                         if ask(bvh.triangle_place(object, place)?)? {
@@ -133,7 +142,13 @@ impl Querier {
                         }
                     }
                 }
-                None => each_triangle(bvh, object, ask)?,
+                None => {
+                    for place in candidates {
+                        if ask(place)? {
+                            break;
+                        }
+                    }
+                }
             }
             if found.is_some() {
                 return Ok(found);
