@@ -8,7 +8,7 @@ use bvh_query::{
 };
 use cbvh_testkit::exact::Length;
 use common::nearest::point_triangle;
-use common::shapes::{cube, outward, soup};
+use common::shapes::{cube, outward, plate, soup, sphere, torus};
 use common::{Random, Stored, Triangle, bake, baked, placed, queriers, random_pose, stored, translation};
 use std::cmp::Ordering;
 
@@ -203,6 +203,25 @@ fn meshes_with_a_radius_are_their_triangles_with_it() {
 }
 
 /// A radius of zero changes no bit of any answer.
+/// A question that ends early leaves nothing behind that contacts would report again, or look for in other files.
+#[test]
+fn contacts_do_not_depend_on_the_question_before() {
+    let [torus, plate, ball] = [torus(24, 12), plate(6), sphere(3)].map(|triangles| baked(&triangles));
+    let (rounded, pose) = (plate.all().rounded(0.25).unwrap(), translation(0.7, 1.0, 0.25));
+    let expected = Querier::new().unwrap().contacts(&ball, rounded, &pose).unwrap();
+    assert!(expected.len() > 100);
+    let mut querier = Querier::new().unwrap();
+    for other in [&plate, &torus] {
+        for near in [0.1, 0.2, 0.4] {
+            let at = translation(0.0, 1.0, 0.25);
+            assert!(querier.collide(&ball, other.all().rounded(near).unwrap(), &at).unwrap());
+            assert_eq!(querier.contacts(&ball, rounded, &pose).unwrap(), expected);
+            assert!(querier.within(&ball, other, &at, near).unwrap());
+            assert_eq!(querier.contacts(&ball, rounded, &pose).unwrap(), expected);
+        }
+    }
+}
+
 #[test]
 fn a_radius_of_zero_is_none() {
     let mut queriers = queriers();

@@ -95,6 +95,7 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
+        self.bounded.clear();
         self.packets.iter_mut().for_each(PlacedPackets::start);
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
         let budget = self.memory.budget;
