@@ -193,7 +193,7 @@ fn rounded_cores_touch_where_the_sum_of_radii_reaches() {
 fn meshes_with_a_radius_are_their_triangles_with_it() {
     let mut queriers = queriers();
     let mut random = Random::new(6);
-    let (a, b) = (baked(&soup(60, 1)), baked(&outward(common::shapes::sphere(2))));
+    let (a, b) = (baked(&soup(60, 1)), baked(&outward(sphere(2))));
     let mut tracker = Tracker::new();
     for _ in 0..cbvh_testkit::depth::rounds(12) {
         let pose = random_pose(&mut random, 2.5);
@@ -292,7 +292,7 @@ fn what_is_inside_a_solid_touches_it() {
     {
         assert_eq!(queriers[0].collide(solid, &point, &translation(x, y, z)).unwrap(), is_inside);
     }
-    let open = baked(&common::shapes::plate(2));
+    let open = baked(&plate(2));
     assert_eq!(open.all().solid().unwrap_err(), QueryError::NotClosed(0));
 }
 

@@ -1,8 +1,10 @@
 //! Motions of B in A's frame: the paths for questions about motions.
 
+mod attached;
 mod linear;
 mod path;
 mod relative;
 
+pub(crate) use attached::{AttachedPath, TogetherPath};
 pub use path::{Motion, PathError, Polyline, RigidPath};
 pub use relative::RelativePath;

@@ -432,8 +432,8 @@ pub(super) mod tests {
         [signed(state), signed(state), signed(state)]
     }
 
-    pub(in crate::motion) fn paths(state: &mut u64) -> Vec<Box<dyn RigidPath>> {
-        let mut paths: Vec<Box<dyn RigidPath>> = Vec::new();
+    pub(in crate::motion) fn paths(state: &mut u64) -> Vec<Box<dyn RigidPath + Sync>> {
+        let mut paths: Vec<Box<dyn RigidPath + Sync>> = Vec::new();
         for angle in [0.0, 1e-9, 0.1, 1.0, 3.0, 3.1] {
             let start = pose(vector(state), 3.0 * signed(state), vector(state).map(|v| 10.0 * v));
             let turned = pose(vector(state), angle, vector(state));

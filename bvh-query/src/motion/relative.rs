@@ -35,9 +35,9 @@ impl RigidPath for Pose {
 }
 
 /// More than the norm of the inverse of any pose's rotation.
-const MOST: f64 = 1.0 + 1.0 / (1 << 18) as f64;
+pub(super) const MOST: f64 = 1.0 + 1.0 / (1 << 18) as f64;
 /// More than the relative error of all arithmetic here.
-const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
+pub(super) const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Let M be the inverse of A's rotation R, w the way from A's origin to a point of B, in the world, and q = M w where the
 /// point is in A's frame. An index "lin" stands for what is linear in time between both ends, which are indexed 0 and 1; D

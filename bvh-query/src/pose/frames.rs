@@ -28,7 +28,22 @@ impl Pose {
     /// [`PoseError`] if the result is beyond a limit of [`Pose::new`]: two poses near the limit of 2^-20 may compose to one
     /// beyond it.
     pub fn then(&self, next: &Self) -> Result<Self, PoseError> {
-        Self::new(product(&next.rotation, &self.rotation), next.place(self.translation))
+        let then = self.then_of_attached(next);
+        Self::new(then.rotation, then.translation)
+    }
+
+    /// Returns [`Pose::then`] of the pose that is kept of an attached instance, whether or not the result is within the limits.
+    pub(crate) fn then_of_attached(&self, parent: &Self) -> Self {
+        Self::of_valid(product(&parent.rotation, &self.rotation), parent.place(self.translation))
+    }
+
+    /// Returns the pose to keep of an instance that is attached to a parent in this pose: the one in the parent's frame, with
+    /// the nearest orthonormal rotation. So an instance is as rigid as its parent, but for rounding, and chains of parents
+    /// do not add up what rotations are off by.
+    pub(crate) fn kept_of_attached(&self, child: &Self) -> Self {
+        let kept = Self::relative_of_instances(self, child);
+        // Both are poses of instances, for which there always is one.
+        Self::nearest(kept.rotation, kept.translation).unwrap_or(kept)
     }
 
     /// Returns the pose of B in A's frame, given the poses of both in the world: `Ra^-1 Rb` and `Ra^-1 (tb - ta)`.

@@ -79,9 +79,14 @@ impl BroadPhase {
         }
     }
 
+    /// Returns whether a question has to build a tree first.
+    pub(super) fn is_out_of_date(&self) -> bool {
+        self.is_stale || self.is_moving_stale || self.moving.has_grown()
+    }
+
     /// Builds the trees that are out of date. `items` lists them; places are below `places`.
     pub(super) fn refresh(&mut self, items: impl Iterator<Item = Item>, places: usize) {
-        if !self.is_stale && !self.is_moving_stale && !self.moving.has_grown() {
+        if !self.is_out_of_date() {
             return;
         }
         self.has_moved.resize(places, false);

@@ -54,6 +54,14 @@ pub enum InstanceError {
     /// A margin that is no length.
     #[error("margin: expected a length from 0 to 2^118, found {0}")]
     Margin(f64),
+    /// A parent that is the child itself or moves with it.
+    #[error("instance {child}: expected a parent that does not move with it, found {parent}")]
+    Cycle {
+        /// The instance to attach.
+        child: InstanceLabel,
+        /// What it was to be attached to.
+        parent: InstanceLabel,
+    },
     /// A pose with which a pair of instances may have no relative pose.
     #[error("instance {instance}: {source}")]
     Pose {

@@ -2,10 +2,12 @@
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
+use crate::query::motion::size_of;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
 use std::fmt;
+use std::sync::Arc;
 
 /// Identifies an instance of a scene. A scene never gives an identifier twice, so a removed instance cannot be mistaken
 /// for a later one. Identifiers are ordered by the places of their instances. In a pair of instances, the lower one is
@@ -44,7 +46,7 @@ impl fmt::Display for InstanceId {
 #[derive(Clone, Debug)]
 pub(super) struct Instance {
     pub(super) generation: u32,
-    pub(super) name: Option<String>,
+    pub(super) name: Option<Arc<str>>,
     pub(super) shape: SceneShape,
     /// What is added to the radius of the shape, in mesh units.
     pub(super) margin: f64,
@@ -58,6 +60,27 @@ pub(super) struct Instance {
 }
 
 impl Instance {
+    pub(super) fn new(
+        generation: u32,
+        name: Option<Arc<str>>,
+        shape: SceneShape,
+        world: Pose,
+        groups: Groups,
+    ) -> Self {
+        let size = size_of(shape.objects(), 0.0);
+        let (bounds, allowed) = (WorldBox::EMPTY, Vec::new());
+        let mut instance =
+            Self { generation, name, shape, margin: 0.0, size, world, bounds, groups, allowed };
+        instance.update_bounds();
+        instance
+    }
+
+    /// Replaces its shape. Its box is then out of date.
+    pub(super) fn set_shape(&mut self, shape: SceneShape) {
+        self.size = size_of(shape.objects(), 0.0);
+        self.shape = shape;
+    }
+
     /// Returns its identifier, given its place.
     pub(super) fn id(&self, place: u32) -> InstanceId {
         InstanceId { place, generation: self.generation }

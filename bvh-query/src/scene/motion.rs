@@ -3,17 +3,21 @@
 //! A pair has one path: that of B in the frame of A. A is the instance that stands still or, if both move, the lower
 //! one. Pairs whose boxes never come near each other are left out. To find these, the whole time is divided into
 //! slices: during a slice, an instance stays in the box around its places at both ends, except for the sagitta.
+//!
+//! What is attached to a moving instance moves as well, on the path of that one composed with the pose that is kept. Two
+//! instances that follow the same one stand still in each other's frame, which needs one interval instead of many.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::motion::{RelativePath, RigidPath};
+use crate::motion::{AttachedPath, RelativePath, RigidPath, TogetherPath};
 use crate::query::answers::Distance;
 use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
 use crate::query::querier::Querier;
+use crate::scene::contents::reach_of;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
-use crate::scene::{Scene, SceneError, reach_of};
+use crate::scene::{Scene, SceneError};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -79,9 +83,16 @@ impl Moving<'_> {
     }
 }
 
+/// The path of a moving instance.
+struct Way<'a> {
+    /// The place of the instance that the path was given for: its own, or that of one above it.
+    given: u32,
+    path: AttachedPath<'a>,
+}
+
 /// The paths in question, by the places of their instances.
 struct Ways<'a> {
-    paths: BTreeMap<u32, WorldPath<'a>>,
+    paths: BTreeMap<u32, Way<'a>>,
     options: &'a MotionOptions,
 }
 
@@ -91,13 +102,18 @@ impl Scene {
     /// whose groups meet and whose contact is not allowed. The present pose of a moving instance does not matter, and
     /// does not change.
     ///
+    /// Instances that are attached to a moving one ([`Scene::attach`]) move with it: at each time, they are where
+    /// [`Scene::set_pose`] would take them. If an instance has a path of its own, it moves on that path, whatever it is
+    /// attached to, and what is attached to it follows it.
+    ///
     /// The answer is certain at every moment. It combines the answers of [`Querier::motion`] about each pair along its
     /// [`RelativePath`] to the earliest hit, before which no pair is within the clearance. Each pair has its own
     /// default tolerance. If an instance is named twice, the last path counts. [`Scene::add`] must accept all poses of
     /// a path.
     ///
     /// Cost: that of [`Querier::motion`] for each pair whose boxes come near each other, until the earliest hit. If
-    /// both instances of a pair turn, more intervals are needed than if one stands still.
+    /// both instances of a pair turn, more intervals are needed than if one stands still, unless both follow the same
+    /// instance: then a pair takes one query about contact.
     ///
     /// # Errors
     /// [`SceneError::Refused`] for an identifier of no instance, and for a start or an end of a path that
@@ -181,11 +197,34 @@ impl Scene {
     ) -> Result<Ways<'a>, SceneError> {
         options.check()?;
         for &(id, path) in paths {
-            self.check_pose(id, &path.pose(0.0))?;
-            self.check_pose(id, &path.pose(1.0))?;
+            self.contents.check_pose(id, &path.pose(0.0))?;
+            self.contents.check_pose(id, &path.pose(1.0))?;
+        }
+        let way =
+            |(id, path): (InstanceId, _)| (id.place, Way { given: id.place, path: AttachedPath::new(path) });
+        let mut ways: BTreeMap<u32, Way<'_>> = paths.iter().copied().map(way).collect();
+        let mut open: Vec<u32> = ways.keys().copied().collect();
+        while let Some(place) = open.pop() {
+            for child in self.contents.attachments.children(place) {
+                let (Some(above), Some(attached)) = (ways.get(&place), self.contents.attachments.get(child))
+                else {
+                    continue;
+                };
+                // One that has a path of its own follows that one, and is in the list.
+                if ways.contains_key(&child) {
+                    continue;
+                }
+                let way = Way { given: above.given, path: above.path.of_child(attached.kept) };
+                for end in [0.0, 1.0] {
+                    let Some(id) = self.contents.id_at(child) else { continue };
+                    self.contents.check_pose(id, &way.path.pose(end))?;
+                }
+                ways.insert(child, way);
+                open.push(child);
+            }
         }
         self.start();
-        Ok(Ways { paths: paths.iter().map(|&(id, path)| (id.place, path)).collect(), options })
+        Ok(Ways { paths: ways, options })
     }
 
     /// Calls `visit` with the pairs that may come within the clearance, until `visit` breaks: in several calls if there
@@ -196,7 +235,7 @@ impl Scene {
         mut visit: impl FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError>,
     ) -> Result<(), SceneError> {
         let all = |slices: usize| -> Vec<Moving<'_>> {
-            ways.paths.iter().filter_map(|(&place, &path)| self.moving(place, path, slices)).collect()
+            ways.paths.iter().filter_map(|(&place, way)| self.moving(place, &way.path, slices)).collect()
         };
         let mut moving = all(1);
         let slices = moving.iter().map(Moving::slices_worthwhile).max().unwrap_or(1);
@@ -207,13 +246,16 @@ impl Scene {
         for (number, one) in moving.iter().enumerate() {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
             let mut near = Vec::new();
-            let limit = |other: &WorldBox| ways.limit_by_boxes(&whole, other) + self.reach_of_pairs();
+            let limit =
+                |other: &WorldBox| ways.limit_by_boxes(&whole, other) + self.contents.reach_of_pairs();
             self.charged(|budget| {
                 budget.charge((moving.len() - number) as u64)?;
-                self.broad.near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
+                self.contents
+                    .broad
+                    .near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
             })?;
             for place in near.into_iter().filter(|place| !ways.paths.contains_key(place)) {
-                let Some(other) = self.instances.get(place as usize).and_then(Option::as_ref) else {
+                let Some(other) = self.contents.at(place) else {
                     continue;
                 };
                 let still = vec![other.bounds; slices];
@@ -237,7 +279,7 @@ impl Scene {
 
     /// Returns a moving instance with its boxes.
     fn moving(&self, place: u32, path: WorldPath<'_>, slices: usize) -> Option<Moving<'_>> {
-        let instance = self.instances.get(place as usize)?.as_ref()?;
+        let instance = self.contents.at(place)?;
         let objects = instance.shape.objects();
         let radius = radius(objects);
         let time = |end: usize| end as f64 / slices as f64;
@@ -260,7 +302,7 @@ impl Scene {
         if !one.groups.meet(other.groups) || one.allows(b) {
             return None;
         }
-        let margin = self.margin_of_pair(a, b);
+        let margin = self.contents.margin_of_pair(a, b);
         let tolerance = tolerance(one.size_with(margin).max(other.size_with(0.0)), ways.options);
         let limit = (ways.options.clearance + tolerance + reach_of(margin)).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
@@ -289,12 +331,14 @@ impl Scene {
             pairs_asked += encounters.len() as u64;
             let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
                 let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
-                let path = RelativePath::new(ways.path(a, one), ways.path(b, other));
+                let relative = RelativePath::new(ways.path(a, one), ways.path(b, other));
+                let together = ways.together(a, b);
+                let path: &dyn RigidPath = together.as_ref().map_or(&relative, |together| together);
                 let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
                 let pair = ScenePair { a: one.id(a), b: other.id(b) };
-                let margin = one.margin + scene.margin_of_pair(a, b);
+                let margin = one.margin + scene.contents.margin_of_pair(a, b);
                 let (a, b) = (shape_a.shape().with_margin(margin), shape_b.shape().with_margin(other.margin));
-                scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, &path))
+                scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, path))
             });
             let found = found.map_err(|(number, source)| {
                 let Encounter { a, b, .. } = encounters[number];
@@ -316,9 +360,15 @@ impl Ways<'_> {
     /// Returns the path of an instance, which may be its pose.
     fn path<'a>(&'a self, place: u32, instance: &'a Instance) -> &'a dyn RigidPath {
         match self.paths.get(&place) {
-            Some(&path) => path,
+            Some(way) => &way.path,
             None => &instance.world,
         }
+    }
+
+    /// Returns the path of B in A's frame if both follow the same instance, or one follows the other.
+    fn together(&self, a: u32, b: u32) -> Option<TogetherPath<'_>> {
+        let (a, b) = (self.paths.get(&a)?, self.paths.get(&b)?);
+        (a.given == b.given).then_some(TogetherPath { a: &a.path, b: &b.path })
     }
 
     /// Returns how far apart the boxes of two instances may be for a question to matter. The diagonal of an object's own box

@@ -244,9 +244,9 @@ impl Asked<'_> {
         ) -> Result<ControlFlow<()>, QueryError>,
     ) -> Result<(), SceneError> {
         let Self { scene, querier } = self;
-        let mut order = scene.broad.by_key(&key);
-        while let Some((place, key)) = order.next(&scene.broad, || querier.charge_visit())? {
-            let Some(instance) = scene.instances.get(place as usize).and_then(Option::as_ref) else {
+        let mut order = scene.contents.broad.by_key(&key);
+        while let Some((place, key)) = order.next(&scene.contents.broad, || querier.charge_visit())? {
+            let Some(instance) = scene.contents.at(place) else {
                 continue;
             };
             let id = instance.id(place);
@@ -260,7 +260,7 @@ impl Asked<'_> {
                 Ok(ControlFlow::Continue(())) => {}
                 Ok(ControlFlow::Break(())) => break,
                 Err(source) => {
-                    return Err(SceneError::Instance { instance: scene.label(id), source });
+                    return Err(SceneError::Instance { instance: scene.contents.label(id), source });
                 }
             }
         }
@@ -268,7 +268,7 @@ impl Asked<'_> {
     }
 
     fn hit(&self, instance: u32, hit: RayHit) -> SceneRayHit {
-        let of = self.scene.instances.get(instance as usize).and_then(Option::as_ref);
+        let of = self.scene.contents.at(instance);
         let instance = of.map_or(InstanceId { place: instance, generation: 0 }, |of| of.id(instance));
         SceneRayHit { instance, hit }
     }

@@ -240,7 +240,7 @@ impl Scene {
         while let Some(mut near_pairs) = self.next_piece(&mut next, limit(&nearest))? {
             nearest_first(&mut near_pairs);
             for run in near_pairs.chunks(self.workers.threads()) {
-                if run[0].squared_gap > (limit(&nearest) + self.reach_of_pairs()).powi(2) {
+                if run[0].squared_gap > (limit(&nearest) + self.contents.reach_of_pairs()).powi(2) {
                     break;
                 }
                 self.improve(&mut nearest, run)?;
@@ -252,9 +252,9 @@ impl Scene {
 
     /// Returns the pair asked about whose boxes are nearest, unless finding it takes too much memory.
     fn nearest_boxes(&self) -> Result<Option<NearPair>, SceneError> {
-        let mut order = NearestFirst::new(&self.broad);
+        let mut order = NearestFirst::new(&self.contents.broad);
         self.charged(|budget| {
-            while let Some((x, y, squared_gap)) = order.next(&self.broad, budget)? {
+            while let Some((x, y, squared_gap)) = order.next(&self.contents.broad, budget)? {
                 if let Some(near_pair) = self.near_pair(x, y, squared_gap) {
                     return Ok(Some(near_pair));
                 }
@@ -410,11 +410,11 @@ impl Scene {
     /// there are too many for one piece. All pairs of a piece precede those of the next piece.
     fn next_piece(&self, next: &mut Next, limit: f64) -> Result<Option<Vec<NearPair>>, SceneError> {
         let mut near_pairs = Vec::new();
-        let limit = limit + self.reach_of_pairs();
-        let places = self.instances.len() as u32;
+        let limit = limit + self.contents.reach_of_pairs();
+        let places = self.contents.instances.len() as u32;
         self.charged(|budget| {
             if matches!(next, Next::All) {
-                let all = self.broad.pairs(limit, budget, |x, y, squared_gap| {
+                let all = self.contents.broad.pairs(limit, budget, |x, y, squared_gap| {
                     if near_pairs.len() == MAX_KNOWN_PAIRS {
                         return ControlFlow::Break(());
                     }
@@ -434,8 +434,8 @@ impl Scene {
             {
                 let a = *place;
                 *place += 1;
-                let Some(one) = &self.instances[a as usize] else { continue };
-                self.broad.near(
+                let Some(one) = self.contents.at(a) else { continue };
+                self.contents.broad.near(
                     &one.bounds,
                     one.groups,
                     |_| limit,
@@ -455,7 +455,7 @@ impl Scene {
     /// Returns a pair of places in order, unless it may touch.
     fn near_pair(&self, x: u32, y: u32, squared_gap: f64) -> Option<NearPair> {
         let (a, b) = (x.min(y), x.max(y));
-        let is_asked = self.instances.get(a as usize)?.as_ref().is_some_and(|instance| !instance.allows(b));
+        let is_asked = self.contents.at(a).is_some_and(|instance| !instance.allows(b));
         is_asked.then_some(NearPair { a, b, squared_gap })
     }
 
@@ -486,7 +486,7 @@ impl Scene {
             let pose = Pose::relative_of_instances(&a.world, &b.world);
             let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
-            let margins = (a.margin + scene.margin_of_pair(near_pair.a, near_pair.b), b.margin);
+            let margins = (a.margin + scene.contents.margin_of_pair(near_pair.a, near_pair.b), b.margin);
             let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
             let tracker = scene.trackers.get((near_pair.a, near_pair.b));
             let (a, b) = (a.shape().with_margin(margins.0), b.shape().with_margin(margins.1));
@@ -507,7 +507,7 @@ impl Scene {
 
     /// Names the pair whose question has no answer.
     pub(super) fn pair_error(&self, pair: ScenePair, source: QueryError) -> SceneError {
-        SceneError::Pair { a: self.label(pair.a), b: self.label(pair.b), source }
+        SceneError::Pair { a: self.contents.label(pair.a), b: self.contents.label(pair.b), source }
     }
 
     /// Returns both instances of a candidate.
@@ -517,7 +517,7 @@ impl Scene {
 
     /// Returns the instances in two places.
     pub(super) fn instances_at(&self, a: u32, b: u32) -> Option<(&Instance, &Instance)> {
-        let of = |place: u32| self.instances.get(place as usize)?.as_ref();
+        let of = |place: u32| self.contents.at(place);
         Some((of(a)?, of(b)?))
     }
 }

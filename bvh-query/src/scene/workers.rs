@@ -52,6 +52,13 @@ impl Workers {
         }
     }
 
+    /// Adopts settings, and keeps its queriers if they are of the same backend.
+    pub(super) fn adopt(&mut self, source: &Self) {
+        let idle =
+            if self.backend == source.backend { std::mem::take(&mut self.idle) } else { Mutex::default() };
+        *self = Self { idle, ..source.clone() };
+    }
+
     /// Returns the number of threads that questions use.
     pub(super) fn threads(&self) -> usize {
         #[cfg(feature = "parallel")]

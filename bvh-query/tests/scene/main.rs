@@ -2,6 +2,7 @@
 
 #![cfg(feature = "parallel")]
 
+mod attached;
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
@@ -9,6 +10,7 @@ mod margins;
 mod motions;
 mod probes;
 mod shared;
+mod snapshots;
 mod trackers;
 
 use bvh_query::{
