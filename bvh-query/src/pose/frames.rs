@@ -7,9 +7,12 @@
 //! the determinant's inverse, u from their product), entries of a product of two rotations within 4u. A translation is
 //! within 64u of the sum of the magnitudes that it is made of.
 
-use super::{Pose, PoseError};
+use super::{Pose, PoseError, departure};
 
 type Rotation = [[f64; 3]; 3];
+
+/// How far from orthonormal a rotation is kept, 2^-40: see `to_keep`.
+const MAX_KEPT_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
 impl Pose {
     /// Returns the inverse pose: `R^-1` and `-(R^-1 t)`, where `R^-1` is the adjugate over the determinant.
@@ -37,13 +40,20 @@ impl Pose {
         Self::of_valid(product(&parent.rotation, &self.rotation), parent.place(self.translation))
     }
 
-    /// Returns the pose to keep of an instance that is attached to a parent in this pose: the one in the parent's frame, with
-    /// the nearest orthonormal rotation. So an instance is as rigid as its parent, but for rounding, and chains of parents
-    /// do not add up what rotations are off by.
+    /// Returns the pose to keep of an instance that is attached to a parent in this pose: the one in the parent's frame.
     pub(crate) fn kept_of_attached(&self, child: &Self) -> Self {
-        let kept = Self::relative_of_instances(self, child);
-        // Both are poses of instances, for which there always is one.
-        Self::nearest(kept.rotation, kept.translation).unwrap_or(kept)
+        Self::relative_of_instances(self, child).to_keep()
+    }
+
+    /// Returns this pose with the nearest orthonormal rotation, unless it is within 2^-40 of orthonormal: more than products of
+    /// orthonormal ones lose. So an instance is as rigid as its parent, but for that, and chains of parents do not add up
+    /// what rotations are off by.
+    pub(crate) fn to_keep(self) -> Self {
+        if departure(&self.rotation, 1.0) <= MAX_KEPT_ERROR {
+            return self;
+        }
+        // Every pose is near enough to an orthonormal one.
+        Self::nearest(self.rotation, self.translation).unwrap_or(self)
     }
 
     /// Returns the pose of B in A's frame, given the poses of both in the world: `Ra^-1 Rb` and `Ra^-1 (tb - ta)`.

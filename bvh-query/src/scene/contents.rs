@@ -129,33 +129,50 @@ impl Contents {
     /// Returns where instances come to be that are moved to poses in the world, by their places, and all that are attached
     /// to them.
     pub(super) fn moves(&self, named: &BTreeMap<u32, Pose>) -> Result<BTreeMap<u32, Move>, InstanceError> {
-        let mut moves: BTreeMap<u32, Move> = BTreeMap::new();
+        let mut moves = BTreeMap::new();
         for &first in named.keys() {
-            if self.attachments.above(first).any(|place| named.contains_key(&place)) {
-                // It is reached from there.
-                continue;
-            }
-            let mut open = vec![first];
-            while let Some(place) = open.pop() {
-                let Some(instance) = self.at(place) else { continue };
-                let given = named.get(&place);
-                let (world, kept) = match self.attachments.get(place) {
-                    None => (*given.unwrap_or(&instance.world), None),
-                    Some(attached) => {
-                        let parent = match moves.get(&attached.parent) {
-                            Some(moved) => moved.world,
-                            None => self.at(attached.parent).map_or(Pose::IDENTITY, |parent| parent.world),
-                        };
-                        let kept = given.map_or(attached.kept, |world| parent.kept_of_attached(world));
-                        (kept.then_of_attached(&parent), Some(kept))
-                    }
-                };
-                self.check_pose(instance.id(place), &world)?;
-                moves.insert(place, Move { world, kept });
-                open.extend(self.attachments.children(place));
+            // What is attached to another one that is named is reached from there.
+            if !self.attachments.above(first).any(|place| named.contains_key(&place)) {
+                self.follow(first, named, &mut moves)?;
             }
         }
         Ok(moves)
+    }
+
+    /// Returns where an instance comes to be that was attached, and all that are attached to it.
+    pub(super) fn moves_of(&self, child: u32) -> Result<BTreeMap<u32, Move>, InstanceError> {
+        let mut moves = BTreeMap::new();
+        self.follow(child, &BTreeMap::new(), &mut moves)?;
+        Ok(moves)
+    }
+
+    /// Adds where an instance comes to be and all that are attached to it, parents before children.
+    fn follow(
+        &self,
+        first: u32,
+        named: &BTreeMap<u32, Pose>,
+        moves: &mut BTreeMap<u32, Move>,
+    ) -> Result<(), InstanceError> {
+        let mut open = vec![first];
+        while let Some(place) = open.pop() {
+            let Some(instance) = self.at(place) else { continue };
+            let given = named.get(&place);
+            let (world, kept) = match self.attachments.get(place) {
+                None => (*given.unwrap_or(&instance.world), None),
+                Some(attached) => {
+                    let parent = match moves.get(&attached.parent) {
+                        Some(moved) => moved.world,
+                        None => self.at(attached.parent).map_or(Pose::IDENTITY, |parent| parent.world),
+                    };
+                    let kept = given.map_or(attached.kept, |world| parent.kept_of_attached(world));
+                    (kept.then_of_attached(&parent), Some(kept))
+                }
+            };
+            self.check_pose(instance.id(place), &world)?;
+            moves.insert(place, Move { world, kept });
+            open.extend(self.attachments.children(place));
+        }
+        Ok(())
     }
 
     /// Moves instances.

@@ -347,8 +347,9 @@ impl Scene {
     /// The scene keeps the pose of the child in the parent's frame. From then on, the pose of the child in the world is
     /// always `kept.then(&parent)`, computed once from these two, so that nothing adds up over many moves, and equal
     /// poses of the parent give equal poses of the child, to the bit. This holds from the start: attaching moves the
-    /// child by the rounding of this formula. The kept rotation is orthonormal, as by [`Pose::nearest`]. So if rotations
-    /// were rounded to `f32`, the child also turns by about as much as they are off, at most some 2^-21 radians.
+    /// child by the rounding of this formula. The kept rotation is orthonormal to within 2^-40, if need be by
+    /// [`Pose::nearest`]. So if rotations were rounded to `f32`, the child also turns by about as much as they are off, at
+    /// most some 2^-21 radians.
     ///
     /// [`Scene::set_pose`] for the child changes the pose that is kept, and its pose in the world is that given, but for
     /// rounding. In a motion ([`Scene::motion`]), the child follows the path of its parent, unless it is given a path of
@@ -382,15 +383,35 @@ impl Scene {
     /// # }
     /// ```
     pub fn attach(&mut self, child: InstanceId, parent: InstanceId) -> Result<(), InstanceError> {
-        let (world, place) = (self.instance(child)?.world, self.place(parent)? as u32);
-        if self.contents.attachments.moves_with(place, child.place) {
+        let kept = self.instance(parent)?.world.kept_of_attached(&self.instance(child)?.world);
+        self.attach_at(child, parent, kept)
+    }
+
+    /// Attaches an instance to a parent, as [`Scene::attach`] does, at a pose in the parent's frame: the child moves there. A
+    /// rotation that is farther than 2^-40 from orthonormal is orthonormalised.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::attach`].
+    pub fn attach_at(
+        &mut self,
+        child: InstanceId,
+        parent: InstanceId,
+        kept: Pose,
+    ) -> Result<(), InstanceError> {
+        let (own, above) = (self.place(child)? as u32, self.place(parent)? as u32);
+        if self.contents.attachments.moves_with(above, own) {
             let (child, parent) = (self.contents.label(child), self.contents.label(parent));
             return Err(InstanceError::Cycle { child, parent });
         }
-        let before = self.contents_mut().attachments.attach(child.place, place, Pose::IDENTITY);
-        // Its pose replaces the one kept here.
-        self.set_pose(child, world)
-            .inspect_err(|_| self.contents_mut().attachments.put_back(child.place, before))
+        let before = self.contents_mut().attachments.attach(own, above, kept.to_keep());
+        match self.contents.moves_of(own) {
+            Ok(moves) => self.contents_mut().carry_out(moves),
+            Err(refused) => {
+                self.contents_mut().attachments.put_back(own, before);
+                return Err(refused);
+            }
+        }
+        Ok(())
     }
 
     /// Detaches an instance from its parent, if it has one. It stays where it is.
@@ -405,14 +426,14 @@ impl Scene {
         Ok(())
     }
 
-    /// Returns the instance that an instance is attached to, if it is.
+    /// Returns the instance that an instance is attached to, if it is, and its pose in the frame of that one.
     ///
     /// # Errors
     /// [`InstanceError::NoInstance`].
-    pub fn parent(&self, child: InstanceId) -> Result<Option<InstanceId>, InstanceError> {
+    pub fn parent(&self, child: InstanceId) -> Result<Option<(InstanceId, &Pose)>, InstanceError> {
         self.place(child)?;
         let attached = self.contents.attachments.get(child.place);
-        Ok(attached.and_then(|attached| self.contents.id_at(attached.parent)))
+        Ok(attached.and_then(|attached| Some((self.contents.id_at(attached.parent)?, &attached.kept))))
     }
 
     /// Updates what the next question would update first, and returns a clone: the scene as it is now. Questions about
