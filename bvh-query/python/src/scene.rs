@@ -1,8 +1,8 @@
 //! Scenes: placed meshes under numbers of their own, and questions about all of them.
 //!
-//! A number is given once and never again. The scene is locked while a question runs, without Python's lock, so that
-//! threads wait for each other there and nowhere else. Paths of Python code are asked about with a copy of the scene:
-//! they may then ask the scene themselves.
+//! A number is given once and never again. A question is about the scene as it is when the question begins: it takes a
+//! snapshot, and runs without any lock. The scene is locked only while it is changed or looked at, or a snapshot is taken,
+//! without Python's lock. So a thread that changes the scene neither waits for a question nor disturbs it.
 
 use crate::answers::{Answers, array, table};
 use crate::arguments::{self, pose_or_identity};
@@ -29,12 +29,12 @@ struct Entry {
     mesh: Arc<Py<PyAny>>,
 }
 
-/// A scene, and its numbers of instances.
+/// A scene, and its numbers of instances. A clone shares all of that until one changes.
 #[derive(Clone)]
 pub(crate) struct State {
     pub(crate) scene: bvh_query::Scene,
-    entries: HashMap<i64, Entry>,
-    numbers: HashMap<InstanceId, i64>,
+    entries: Arc<HashMap<i64, Entry>>,
+    numbers: Arc<HashMap<InstanceId, i64>>,
     next: i64,
     pub(crate) parallel: bool,
     tracking: bool,
@@ -44,8 +44,8 @@ impl State {
     fn new(scene: bvh_query::Scene) -> Self {
         Self {
             scene,
-            entries: HashMap::new(),
-            numbers: HashMap::new(),
+            entries: Arc::default(),
+            numbers: Arc::default(),
             next: 0,
             parallel: false,
             tracking: false,
@@ -54,10 +54,14 @@ impl State {
 
     fn enter(&mut self, number: Option<i64>, id: InstanceId, mesh: Py<PyAny>) -> i64 {
         let number = number.unwrap_or(self.next);
-        self.entries.insert(number, Entry { id, mesh: Arc::new(mesh) });
-        self.numbers.insert(id, number);
+        self.insert(number, Entry { id, mesh: Arc::new(mesh) });
         self.next = self.next.max(number.saturating_add(1));
         number
+    }
+
+    fn insert(&mut self, number: i64, entry: Entry) {
+        Arc::make_mut(&mut self.numbers).insert(entry.id, number);
+        Arc::make_mut(&mut self.entries).insert(number, entry);
     }
 
     fn entry(&self, number: i64, name: &str) -> PyResult<&Entry> {
@@ -99,6 +103,14 @@ impl State {
             SceneError::Refused(InstanceError::Pose { instance, source }) => {
                 value_error(&format!("instance {}", self.called(&instance)), source)
             }
+            SceneError::Refused(InstanceError::Cycle { child, parent }) => value_error(
+                "parent",
+                format!(
+                    "expected an instance that does not move with instance {}, found {}",
+                    self.called(&child),
+                    self.called(&parent)
+                ),
+            ),
             error => PyValueError::new_err(error.to_string()),
         }
     }
@@ -111,12 +123,26 @@ fn no_instance(name: &str, found: i64) -> PyErr {
 
 /// Many placed meshes.
 #[pyclass(frozen, module = "cbvh._cbvh")]
-pub(crate) struct Scene(Mutex<State>);
+pub(crate) struct Scene(Mutex<Shared>);
+
+/// A scene, and what earlier questions about it left.
+struct Shared {
+    state: State,
+    /// Scenes that ask no question now. They hold what they remember of earlier ones, and no instances.
+    idle: Vec<bvh_query::Scene>,
+    /// A scene without instances.
+    empty: bvh_query::Scene,
+}
 
 impl Scene {
-    /// Waits for the scene without Python's lock, and calls `work` with it, without Python's lock.
-    pub(crate) fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> T {
-        detached(py, || work(&mut locked(&self.0)))
+    fn of_state(state: State) -> PyResult<Self> {
+        let empty = bvh_query::Scene::new().map_err(backend_error)?;
+        Ok(Self(Mutex::new(Shared { state, idle: Vec::new(), empty })))
+    }
+
+    /// Waits for the scene without Python's lock, and calls `work` with it, without Python's lock. No question is asked there.
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> T {
+        detached(py, || work(&mut locked(&self.0).state))
     }
 
     /// Looks at an instance or changes it.
@@ -132,14 +158,52 @@ impl Scene {
         })
     }
 
-    /// Asks a question, and reads the answer while the scene is still as it was.
+    /// Changes two instances.
+    fn of_both<T: Send>(
+        &self,
+        py: Python<'_>,
+        [a, b]: [(i64, &str); 2],
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId, InstanceId) -> Result<T, InstanceError> + Send,
+    ) -> PyResult<T> {
+        self.with(py, |state| {
+            let (a, b) = (state.id(a.0, a.1)?, state.id(b.0, b.1)?);
+            work(&mut state.scene, a, b).map_err(|error| state.refused(error))
+        })
+    }
+
+    /// Calls `work` with the scene as it is now, without Python's lock: later changes do not affect it.
+    pub(crate) fn with_snapshot<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut State) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        detached(py, || {
+            let (mut own, empty) = {
+                let Shared { state, idle, empty } = &mut *locked(&self.0);
+                let snapshot = state.scene.snapshot();
+                let mut own = state.clone();
+                if let Some(remembers) = idle.pop() {
+                    own.scene = remembers;
+                    own.scene.clone_from(&snapshot);
+                }
+                (own, empty.clone())
+            };
+            // After an error, which is rare, what asked may be in the middle of a question, and is thrown away.
+            let answer = work(&mut own)?;
+            own.scene.clone_from(&empty);
+            locked(&self.0).idle.push(own.scene);
+            Ok(answer)
+        })
+    }
+
+    /// Asks a question, and reads the answer.
     pub(crate) fn ask<A: Send, T: Send>(
         &self,
         py: Python<'_>,
         ask: impl FnOnce(&mut bvh_query::Scene) -> Result<A, SceneError> + Send,
         read: impl FnOnce(&State, A) -> T + Send,
     ) -> PyResult<T> {
-        self.with(py, |state| {
+        self.with_snapshot(py, |state| {
             let answer =
                 if state.parallel { on_pool(|| ask(&mut state.scene))? } else { ask(&mut state.scene) };
             match answer {
@@ -155,7 +219,7 @@ impl Scene {
     #[new]
     fn new() -> PyResult<Self> {
         let scene = bvh_query::Scene::new().map_err(backend_error)?;
-        Ok(Self(Mutex::new(State::new(scene))))
+        Self::of_state(State::new(scene))
     }
 
     /// Opens a scene file. `mesh` makes what callers know of an object of the file.
@@ -187,12 +251,12 @@ impl Scene {
             };
             state.enter(None, id, mesh);
         }
-        Ok(Self(Mutex::new(state)))
+        Self::of_state(state)
     }
 
     /// A scene of the same instances, under the same numbers.
-    fn copy(&self, py: Python<'_>) -> Self {
-        Self(Mutex::new(self.with(py, |state| state.clone())))
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        Self::of_state(self.with(py, |state| state.clone()))
     }
 
     /// A scene of these instances alone, under the same numbers.
@@ -221,10 +285,9 @@ impl Scene {
                 only.scene.set_margin(added, margin).map_err(|error| state.refused(error))?;
                 let number = state.number(id);
                 let mesh = Arc::clone(&state.entry(number, "instances")?.mesh);
-                only.entries.insert(number, Entry { id: added, mesh });
-                only.numbers.insert(added, number);
+                only.insert(number, Entry { id: added, mesh });
             }
-            Ok(Self(Mutex::new(only)))
+            Self::of_state(only)
         })
     }
 
@@ -265,10 +328,51 @@ impl Scene {
         self.with(py, |state| {
             let id = state.id(number, "id")?;
             state.scene.remove(id).map_err(|error| state.refused(error))?;
-            state.numbers.remove(&id);
-            state.entries.remove(&number);
+            Arc::make_mut(&mut state.numbers).remove(&id);
+            Arc::make_mut(&mut state.entries).remove(&number);
             Ok(())
         })
+    }
+
+    /// Replaces the mesh of an instance by `mesh`, which callers know as `known`.
+    fn set_mesh(&self, py: Python<'_>, number: i64, mesh: &Mesh, known: Py<PyAny>) -> PyResult<()> {
+        let shape = SceneShape::from(mesh.shape().clone());
+        self.with(py, |state| {
+            let id = state.id(number, "id")?;
+            state.scene.set_shape(id, shape).map_err(|error| state.refused(error))?;
+            state.insert(number, Entry { id, mesh: Arc::new(known) });
+            Ok(())
+        })
+    }
+
+    /// Attaches an instance to a parent, where it is or at a pose of shape (4, 4) in the parent's frame.
+    fn attach(
+        &self,
+        py: Python<'_>,
+        child: i64,
+        parent: i64,
+        pose: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let pose = pose.map(|pose| arguments::pose(&pose, "pose")).transpose()?;
+        self.of_both(py, [(child, "child"), (parent, "parent")], |scene, child, parent| match pose {
+            Some(kept) => scene.attach_at(child, parent, kept),
+            None => scene.attach(child, parent),
+        })
+    }
+
+    fn detach(&self, py: Python<'_>, child: i64) -> PyResult<()> {
+        self.of(py, child, |scene, child| scene.detach(child))
+    }
+
+    /// The parent of an instance, and its pose in the parent's frame, shape (4, 4); or `None`.
+    fn parent<'py>(&self, py: Python<'py>, child: i64) -> PyResult<Option<(i64, Bound<'py, PyAny>)>> {
+        let found = self.with(py, |state| {
+            let id = state.id(child, "id")?;
+            let found = state.scene.parent(id).map_err(|error| state.refused(error))?;
+            Ok::<_, PyErr>(found.map(|(parent, kept)| (state.number(parent), *kept)))
+        })?;
+        let told = |(parent, kept)| Ok((parent, Answers { py, one: true }.poses(&[kept])?));
+        found.map(told).transpose()
     }
 
     /// Moves an instance to a pose of shape (4, 4).
@@ -306,11 +410,7 @@ impl Scene {
     }
 
     fn set_allowed(&self, py: Python<'_>, a: i64, b: i64, allowed: bool) -> PyResult<()> {
-        self.with(py, |state| {
-            let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
-            let allowed = state.scene.set_allowed(first, second, allowed);
-            allowed.map_err(|error| state.refused(error))
-        })
+        self.of_both(py, [(a, "a"), (b, "b")], |scene, a, b| scene.set_allowed(a, b, allowed))
     }
 
     /// The pairs that may touch, lower numbers first: the order of instances depends on which were removed before.
@@ -331,10 +431,7 @@ impl Scene {
     }
 
     fn set_pair_margin(&self, py: Python<'_>, a: i64, b: i64, margin: f64) -> PyResult<()> {
-        self.with(py, |state| {
-            let (first, second) = (state.id(a, "a")?, state.id(b, "b")?);
-            state.scene.set_pair_margin(first, second, margin).map_err(|error| state.refused(error))
-        })
+        self.of_both(py, [(a, "a"), (b, "b")], |scene, a, b| scene.set_pair_margin(a, b, margin))
     }
 
     /// The pairs with margins of their own, lower numbers first, and these.

@@ -2,7 +2,7 @@
 
 use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::arguments::number;
-use crate::asking::{detached, on_pool};
+use crate::asking::on_pool;
 use crate::motions::options;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State};
@@ -94,7 +94,7 @@ struct Ways {
 }
 
 impl Ways {
-    /// Asks a question about them. A path of Python code is called without the lock of the scene, on this thread alone.
+    /// Asks a question about them. A path of Python code is called on this thread alone.
     fn ask<A: Send, T: Send>(
         &self,
         py: Python<'_>,
@@ -103,12 +103,13 @@ impl Ways {
         + Sync,
         read: impl Fn(&State, A) -> T + Sync,
     ) -> PyResult<T> {
-        let run = |state: &mut State| -> PyResult<T> {
+        scene.with_snapshot(py, |state| {
             let ids = self.numbers.iter().map(|&number| state.id(number, "paths"));
             let ids = ids.collect::<PyResult<Vec<_>>>()?;
             let ways: Vec<_> = ids.into_iter().zip(self.paths.iter().map(AnyPath::path)).collect();
-            let parallel = state.parallel;
+            let parallel = state.parallel && !self.paths.iter().any(AnyPath::is_called);
             let scene = &mut state.scene;
+            scene.set_parallel(parallel);
             let answer = if parallel {
                 on_pool(|| ask(scene, &ways))?
             } else {
@@ -118,14 +119,7 @@ impl Ways {
                 Ok(answer) => Ok(read(state, answer)),
                 Err(error) => Err(state.refused(error)),
             }
-        };
-        if !self.paths.iter().any(AnyPath::is_called) {
-            return scene.with(py, run);
-        }
-        let mut own = scene.with(py, |state| state.clone());
-        own.parallel = false;
-        own.scene.set_parallel(false);
-        detached(py, || run(&mut own))
+        })
     }
 }
 

@@ -7,6 +7,7 @@ import multiprocessing
 import pathlib
 import pickle
 import tempfile
+import threading
 import unittest
 
 import numpy as np
@@ -305,6 +306,175 @@ class Ways(unittest.TestCase):
                 asked = [pool.submit(self.scene.is_free, {self.part: Own()}) for _ in range(8)]
                 asked += [pool.submit(self.scene.collide) for _ in range(8)]
                 self.assertFalse(any(future.result(60) for future in asked))
+
+
+class Attached(unittest.TestCase):
+    """Instances that move with others, and meshes that are swapped."""
+
+    def setUp(self):
+        self.cube = cbvh.bake(*cube())
+        self.scene = cbvh.Scene()
+        self.wall = self.scene.add(self.cube, shifts((3, 0, 0))[0])
+        self.gripper = self.scene.add(self.cube, shifts((0, 0, 0))[0], name="gripper")
+        self.part = self.scene.add(self.cube, shifts((0, 1.2, 0))[0], name="part")
+        self.label = self.scene.add(self.cube.rounded(0.1), shifts((0, 1.2, 2))[0], name="label")
+
+    def test_what_is_attached_follows_and_answers_are_those_of_its_poses(self):
+        scene, touching = self.scene, 0
+        scene.attach("part", "gripper")
+        scene.attach(self.label, self.part)
+        self.assertEqual([scene.parent(number) for number in scene], [None, None, self.gripper, self.part])
+        kept = [scene.pose(self.part), np.linalg.inv(scene.pose(self.part)) @ scene.pose(self.label)]
+        for pose in random_poses(12, 40, 2.0):
+            scene.set_pose("gripper", pose)
+            np.testing.assert_allclose(scene.pose("part"), pose @ kept[0], atol=1e-14)
+            np.testing.assert_allclose(scene.pose("label"), pose @ kept[0] @ kept[1], atol=1e-14)
+            by_hand = cbvh.Scene()
+            for number in scene:
+                by_hand.add(scene.mesh(number), scene.pose(number))
+            contacts = scene.contacts(), by_hand.contacts()
+            for one, other in zip(*contacts):
+                np.testing.assert_array_equal(one, other)
+            touching += len(contacts[0].triangles)
+            self.assertEqual(str(scene.distance()), str(by_hand.distance()))
+            for one, other in zip(scene.first_hits([0, 0, 9], [0, 0, -1]).hit, by_hand.first_hits([0, 0, 9], [0, 0, -1]).hit):
+                np.testing.assert_array_equal(one, other)
+        self.assertGreater(touching, 10)
+        # The pose of a child changes what is kept; without its parent, it stays.
+        scene.set_poses(["part", "gripper"], shifts((0, 5, 0), (0, 4, 0)))
+        scene.set_pose("gripper", np.eye(4))
+        np.testing.assert_array_equal(scene.pose("part"), shifts((0, 1, 0))[0])
+        scene.detach("part")
+        scene.remove("gripper")
+        self.assertIs(scene.parent("part"), None)
+        np.testing.assert_array_equal(scene.pose("part"), shifts((0, 1, 0))[0])
+        self.assertEqual(scene.parent("label"), self.part)
+
+    def test_a_motion_takes_along_what_is_attached(self):
+        scene, way = self.scene, {"gripper": cbvh.Motion.between(*shifts((0, 3, 0), (8, 3, 0)))}
+        self.assertIs(scene.is_free(way), True)
+        scene.set_pose("part", shifts((0, -3, 0))[0])
+        scene.attach("part", "gripper")
+        hit = scene.motion(way)
+        # At 8 t = 2 the part, which is 3 below, touches the wall.
+        self.assertIs(hit.kind, MotionKind.HIT)
+        self.assertTrue(hit.free_until <= 0.25 <= hit.at < 0.25 + 1e-6)
+        self.assertEqual((hit.a, hit.b), (self.wall, self.part))
+        way["part"] = cbvh.Motion.between(*shifts((0, -2, 0), (0, -3, 0)))
+        self.assertIs(scene.is_free(way), True)
+
+    def test_wrong_parents_are_refused(self):
+        scene = self.scene
+        scene.attach("part", "gripper")
+        scene.attach("label", "part")
+        expected = 'parent: expected an instance that does not move with instance "gripper", found "{}"'
+        for parent in ("gripper", "part", "label"):
+            with self.assertRaisesRegex(ValueError, expected.format(parent)):
+                scene.attach("gripper", parent)
+        check_errors(self, [
+            (KeyError, "child: expected an instance of the scene, found 'nobody'", scene.attach, "nobody", "part"),
+            (KeyError, "parent: expected an instance of the scene, found 77; was it removed?", scene.attach, "part", 77),
+            (KeyError, "id: expected an instance of the scene, found 77; was it removed?", scene.detach, 77),
+            (KeyError, "id: expected an instance of the scene, found 77; was it removed?", scene.parent, 77),
+            (KeyError, "id: expected an instance of the scene, found 77; was it removed?", scene.set_mesh, 77, self.cube),
+            (TypeError, "mesh: expected a cbvh.Mesh, found int", scene.set_mesh, "part", 5),
+        ])
+        scene.set_pose("part", shifts((2.0**117, 0, 0))[0])
+        before = scene.poses()
+        with self.assertRaisesRegex(ValueError, 'instance "part": expected a translation'):
+            scene.set_pose("gripper", shifts((2.0**118, 0, 0))[0])
+        np.testing.assert_array_equal(scene.poses(), before)
+
+    def test_copies_and_pickles_keep_what_is_attached(self):
+        scene = self.scene
+        for number, pose in zip(scene, random_poses(13, 4, 2.0)):
+            scene.set_pose(number, pose)
+        scene.attach("part", "gripper")
+        scene.attach("label", "part")
+        turned = random_poses(14, 1, 2.0)[0]
+        for other in (scene.copy(), pickle.loads(pickle.dumps(scene))):
+            np.testing.assert_array_equal(other.poses(), scene.poses())
+            moved = scene.copy()
+            moved.set_pose("gripper", turned)
+            other.set_pose("gripper", turned)
+            np.testing.assert_array_equal(other.poses(), moved.poses())
+            self.assertFalse(np.array_equal(other.pose("label"), scene.pose("label")))
+
+    def test_a_swapped_mesh_keeps_the_rest(self):
+        scene, cloud = self.scene, cbvh.bake(*cube(4.0))
+        self.assertEqual(scene.pairs_in_contact().tolist(), [])
+        scene.set_margin("part", 0.05)
+        scene.set_allowed("part", "gripper")
+        scene.attach("part", "gripper")
+        scene.set_mesh("part", cloud)
+        self.assertIs(scene.mesh("part"), cloud)
+        self.assertEqual((scene.margin("part"), scene.parent("part"), scene.find("part")), (0.05, self.gripper, self.part))
+        self.assertEqual(scene.pairs_in_contact().tolist(), [[self.part, self.label]])
+        scene.set_mesh("part", self.cube)
+        self.assertEqual(scene.pairs_in_contact().tolist(), [])
+
+    def test_changes_do_not_wait_for_a_question_nor_disturb_it(self):
+        scene, outer = self.scene, self
+        begun, changed = threading.Event(), threading.Event()
+
+        class Waits:
+            def pose(self, t):
+                begun.set()
+                outer.assertTrue(changed.wait(60), "a change waits for the question")
+                return shifts((8 * t, 0, 0))[0]
+
+            def sagitta(self, radius, t0, t1):
+                return 1e-12
+
+        for self.scene.parallel in (False, True):
+            begun.clear(), changed.clear()
+            with concurrent.futures.ThreadPoolExecutor(1) as pool:
+                asked = pool.submit(scene.motion, {"gripper": Waits()})
+                self.assertTrue(begun.wait(60))
+                # The wall of the question stays where it was, whatever happens to it.
+                scene.set_pose(self.wall, shifts((30, 0, 0))[0])
+                scene.set_mesh(self.wall, cbvh.bake(*cube(0.1)))
+                scene.set_margin(self.wall, 0.2)
+                self.assertEqual(scene.collide(), False)
+                moved = scene.copy()
+                scene.remove(self.wall)
+                changed.set()
+                hit = asked.result(60)
+            self.assertEqual((hit.kind, hit.a, hit.b), (MotionKind.HIT, self.wall, self.gripper))
+            self.assertTrue(hit.free_until <= 0.25 <= hit.at < 0.25 + 1e-6)
+            self.assertNotIn(self.wall, scene)
+            self.assertEqual(moved.margin(self.wall), 0.2)
+            self.wall = scene.add(self.cube, shifts((3, 0, 0))[0])
+
+    def test_each_answer_is_that_of_one_scene_while_another_thread_swaps_meshes(self):
+        scene, meshes = self.scene, (self.cube, cbvh.bake(*cube(4.0)))
+        for offset in range(12):
+            scene.add(self.cube, shifts((1.5 * offset, 1.5, 0.3))[0])
+        scene.tracking = True
+        asked = scene.contacts, scene.distance, lambda: scene.first_hits([3, 0, 9], [0, 0, -1]), scene.pairs_in_contact
+        answers = [[str(ask()) for ask in asked] for mesh in meshes if scene.set_mesh(self.wall, mesh) is None]
+        for one, other in zip(*answers):
+            self.assertNotEqual(one, other)
+        over, seen = threading.Event(), [set() for _ in asked]
+
+        def ask(number):
+            for _ in range(100_000):
+                found = str(asked[number]())
+                self.assertIn(found, (answers[0][number], answers[1][number]))
+                seen[number].add(found)
+                if over.is_set():
+                    return
+
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            asking = [pool.submit(ask, number) for number in range(4)]
+            for step in range(100_000):
+                scene.set_mesh(self.wall, meshes[step % 2])
+                if all(len(found) == 2 for found in seen) or any(future.done() for future in asking):
+                    break
+            over.set()
+            for future in asking:
+                future.result(60)
+        self.assertEqual([len(found) for found in seen], [2] * 4)
 
 
 class Misuse(unittest.TestCase):

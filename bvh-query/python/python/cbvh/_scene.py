@@ -54,9 +54,13 @@ class Scene:
     contact is not allowed. Answers are in the order of the pairs, and each is that of `Mesh` for the pose of B in A's
     frame, to the bit.
 
-    **Threads** may share a scene: a question waits until the previous one is answered, and other threads of Python run
-    meanwhile. To ask at the same time, give each thread a `copy`, which shares the meshes and has the same numbers.
-    Pickling keeps instances, numbers, names, poses, groups and allowed pairs. Each mesh is pickled once, as by itself.
+    **Threads** may share a scene. A question is about the scene as it is when the question begins. Other threads run
+    meanwhile: they may ask, or change poses, margins and meshes, and nobody waits for a question. The first change
+    during a question copies the tables of the scene (2 us for 60 instances, 0.3 ms for 10,000), and no mesh. Changes that
+    belong together can be seen one by one, except those of `set_poses`: to ask about all or none of them, make them in a
+    `copy`, and let other threads ask that one. A copy takes a microsecond.
+    Pickling keeps instances, numbers, names, poses, groups, margins, attachments and allowed pairs. Each mesh is pickled
+    once, as by itself.
     An instance that is added later may have another place in the order than in the scene that was pickled.
 
     >>> import cbvh, numpy as np
@@ -110,7 +114,8 @@ class Scene:
             (number, scene.mesh(number), scene.name(number), scene.groups(number), poses[place], scene.margin(number))
             for place, number in enumerate(scene)
         ]
-        pairs = (scene.allowed(), scene._scene.pair_margins())
+        parents = [(number, found) for number in scene if (found := scene._scene.parent(number)) is not None]
+        pairs = (scene.allowed(), scene._scene.pair_margins(), parents)
         return (_scene_of, (rows, pairs, scene._scene.next(), scene._scene.switches()))
 
     def __repr__(self) -> str:
@@ -139,16 +144,46 @@ class Scene:
         return self._scene.add(mesh._mesh, mesh, pose, name, groups, None)
 
     def remove(self, id: int | str) -> None:
-        """Removes an instance, and its permissions to touch others."""
+        """Removes an instance, and its permissions to touch others. What is attached to it stays where it is."""
         self._scene.remove(self._number(id, "id"))
 
+    def set_mesh(self, id: int | str, mesh: Mesh) -> None:
+        """Replaces the mesh of an instance, such as a cloud of points that a camera sees again and again. Everything else
+        stays: its number, name, pose, groups, margins, permissions and attachments."""
+        if not isinstance(mesh, Mesh):
+            raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
+        self._scene.set_mesh(self._number(id, "id"), mesh._mesh, mesh)
+
+    def attach(self, child: int | str, parent: int | str) -> None:
+        """Attaches an instance to a parent, with which it moves from then on: a part to the gripper that holds it.
+
+        If the child was attached to another parent, it no longer is. The scene keeps the pose of the child in the
+        parent's frame. The pose in the world is always that of the parent times the one that is kept, so that nothing
+        adds up over many moves. `set_pose` of the child changes what is kept. In a `motion`, the child follows the path
+        of its parent, unless it has a path of its own. Permissions to touch do not change: a gripper usually touches
+        what it holds, so allow this pair (`set_allowed`), and forbid it again after `detach`. ValueError if the parent is
+        the child itself or moves with it.
+        """
+        self._scene.attach(self._number(child, "child"), self._number(parent, "parent"), None)
+
+    def detach(self, child: int | str) -> None:
+        """Detaches an instance from its parent, if it has one. It stays where it is."""
+        self._scene.detach(self._number(child, "child"))
+
+    def parent(self, child: int | str) -> int | None:
+        """The number of the instance that an instance is attached to, or None."""
+        found = self._scene.parent(self._number(child, "child"))
+        return None if found is None else found[0]
+
     def set_pose(self, id: int | str, pose: ArrayLike) -> None:
-        """Moves an instance. ``pose`` (body to world) has shape (4, 4), and must be rigid to within 2^-23."""
+        """Moves an instance, and those that are attached to it. ``pose`` (body to world) has shape (4, 4), and must be
+        rigid to within 2^-23. If one that follows has no valid pose there, nothing moves."""
         self._scene.set_pose(self._number(id, "id"), pose)
 
     def set_poses(self, ids: ArrayLike, poses: ArrayLike) -> None:
         """Moves many instances: ``ids`` (numbers or names) of shape (N,), ``poses`` (body to world) of shape (N, 4, 4).
-        If an instance is given twice, the last pose counts. If an argument is wrong, no instance moves."""
+        If an instance is given twice, the last pose counts; otherwise the order does not matter. Those that are attached
+        to one of them and not given follow. If an argument is wrong, no instance moves."""
         self._scene.set_poses(self._ids(ids), poses)
 
     def set_groups(self, id: int | str, *, member: int | None = None, meets: int | None = None) -> None:
@@ -413,7 +448,7 @@ class Scene:
         ``paths`` maps the number or name of each moving instance to a `Motion`, a `Polyline` or a path of your own
         (body to world). The question is about all pairs with at least one moving instance. ``clearance`` and
         ``tolerance`` are those of `Mesh.motion`. The present pose of a moving instance does not matter, and does not
-        change.
+        change. What is attached to a moving instance moves with it, unless it has a path of its own.
         """
         numbers, ways = self._ways(paths)
         kind, until, at, found = _cbvh.scene_motion(self._scene, numbers, ways, clearance, tolerance)
@@ -453,7 +488,7 @@ def _nearest(found: tuple[int, int, tuple[Any, ...]] | None) -> SceneDistance | 
 
 def _scene_of(
     rows: list[tuple[int, Mesh, str | None, tuple[int, int], Floats, float]],
-    pairs: tuple[NDArray[np.int64], list[tuple[int, int, float]]],
+    pairs: tuple[NDArray[np.int64], list[tuple[int, int, float]], list[tuple[int, tuple[int, Floats]]]],
     next: int,
     switches: tuple[bool, bool],
 ) -> Scene:
@@ -462,11 +497,13 @@ def _scene_of(
     for number, mesh, name, groups, pose, margin in rows:
         scene._scene.add(mesh._mesh, mesh, pose, name, list(groups), number)
         scene.set_margin(number, margin)
-    allowed, margins = pairs
+    allowed, margins, parents = pairs
     for a, b in allowed.tolist():
         scene.set_allowed(a, b)
     for a, b, margin in margins:
         scene.set_pair_margin(a, b, margin)
+    for child, (parent, kept) in parents:
+        scene._scene.attach(child, parent, kept)
     scene._scene.skip_to(next)
     scene._scene.set_switches(*switches)
     return scene
