@@ -1,10 +1,12 @@
-//! Attached instances: with which parent each one moves, and where it is in the parent's frame.
+//! Attached instances: with which parent each one moves, and where they come to be when some are moved.
 //!
 //! The pose of an attached instance in the world is always that which is kept, then that of its parent. A pose is
 //! therefore rounded once for each parent above it, however often they move.
 
 use crate::pose::Pose;
-use std::collections::{BTreeMap, BTreeSet};
+use crate::scene::InstanceError;
+use crate::scene::contents::Contents;
+use crate::scene::instance::Instance;
 
 /// What an instance is attached to.
 #[derive(Clone, Copy, Debug)]
@@ -15,32 +17,46 @@ pub(super) struct Attached {
     pub(super) kept: Pose,
 }
 
-/// All attachments, by the places of instances. They have no cycle.
-#[derive(Clone, Default, Debug)]
-pub(super) struct Attachments {
-    of: BTreeMap<u32, Attached>,
-    /// Each parent with each of its children.
-    children: BTreeSet<(u32, u32)>,
+/// Where an instance comes to be, and the pose that is kept if it is attached.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Move {
+    place: u32,
+    world: Pose,
+    kept: Option<Pose>,
 }
 
-impl Attachments {
-    pub(super) fn is_empty(&self) -> bool {
-        self.of.is_empty()
+/// Stands for no number in a `Table`.
+const NONE: u32 = u32::MAX;
+
+/// Numbers of places, such as that of the pose that each is given.
+pub(super) struct Table(Vec<u32>);
+
+impl Table {
+    pub(super) fn new(places: usize) -> Self {
+        Self(vec![NONE; places])
     }
 
+    pub(super) fn set(&mut self, place: u32, number: usize) {
+        if let Some(held) = self.0.get_mut(place as usize) {
+            *held = number as u32;
+        }
+    }
+
+    pub(super) fn get(&self, place: u32) -> Option<usize> {
+        self.0.get(place as usize).filter(|&&number| number != NONE).map(|&number| number as usize)
+    }
+}
+
+impl Contents {
     /// Returns what an instance is attached to.
-    pub(super) fn get(&self, child: u32) -> Option<&Attached> {
-        self.of.get(&child)
-    }
-
-    /// Returns what is attached to an instance.
-    pub(super) fn children(&self, parent: u32) -> impl Iterator<Item = u32> {
-        self.children.range((parent, 0)..=(parent, u32::MAX)).map(|&(_, child)| child)
+    pub(super) fn attached(&self, child: u32) -> Option<&Attached> {
+        self.at(child)?.attached.as_deref()
     }
 
     /// Returns the parent of an instance, the parent of that, and so on.
-    pub(super) fn above(&self, child: u32) -> impl Iterator<Item = u32> {
-        std::iter::successors(self.get(child), |attached| self.get(attached.parent))
+    fn above(&self, child: u32) -> impl Iterator<Item = u32> {
+        let attached = self.attached(child);
+        std::iter::successors(attached, |attached| self.attached(attached.parent))
             .map(|attached| attached.parent)
     }
 
@@ -49,42 +65,88 @@ impl Attachments {
         place == other || self.above(place).any(|above| above == other)
     }
 
-    /// Attaches an instance to one that does not move with it. Returns what it was attached to.
-    pub(super) fn attach(&mut self, child: u32, parent: u32, kept: Pose) -> Option<Attached> {
-        let before = self.detach(child);
-        self.children.insert((parent, child));
-        self.of.insert(child, Attached { parent, kept });
+    /// Attaches an instance to one that does not move with it, or to none. Returns what it was attached to.
+    pub(super) fn attach(&mut self, child: u32, to: Option<Attached>) -> Option<Attached> {
+        let before = self.attached(child).copied();
+        if let Some(parent) = before.and_then(|before| self.at_mut(before.parent)) {
+            parent.children.retain(|&place| place != child);
+        }
+        if let Some(parent) = to.and_then(|to| self.at_mut(to.parent)) {
+            parent.children.push(child);
+        }
+        if let Some(instance) = self.at_mut(child) {
+            instance.attached = to.map(Box::new);
+        }
         before
     }
 
-    /// Detaches an instance. Returns what it was attached to.
-    pub(super) fn detach(&mut self, child: u32) -> Option<Attached> {
-        let before = self.of.remove(&child)?;
-        self.children.remove(&(before.parent, child));
-        Some(before)
+    /// Returns whether instances can be moved one by one: none is attached to any of them or is attached itself.
+    pub(super) fn move_alone(&self, mut places: impl Iterator<Item = u32>) -> bool {
+        let alone = |instance: &Instance| instance.attached.is_none() && instance.children.is_empty();
+        places.all(|place| self.at(place).is_none_or(alone))
     }
 
-    /// Undoes an attachment, given what the instance was attached to before.
-    pub(super) fn put_back(&mut self, child: u32, before: Option<Attached>) {
-        self.detach(child);
-        if let Some(Attached { parent, kept }) = before {
-            self.attach(child, parent, kept);
+    /// Returns where instances come to be that are moved to poses in the world, and all that are attached to them. Of two poses
+    /// for one, the last counts.
+    pub(super) fn moves(&self, given: &[(u32, Pose)]) -> Result<Vec<Move>, InstanceError> {
+        let mut numbers = Table::new(self.instances.len());
+        for (number, (place, _)) in given.iter().enumerate() {
+            numbers.set(*place, number);
         }
-    }
-
-    /// Replaces the pose that is kept of an attached instance.
-    pub(super) fn keep(&mut self, child: u32, kept: Pose) {
-        if let Some(attached) = self.of.get_mut(&child) {
-            attached.kept = kept;
+        let mut moves = Vec::new();
+        for (number, &(first, _)) in given.iter().enumerate() {
+            // What is attached to another one that is given a pose is reached from there.
+            let is_reached = self.above(first).any(|place| numbers.get(place).is_some());
+            if numbers.get(first) == Some(number) && !is_reached {
+                self.follow(first, given, &numbers, &mut moves)?;
+            }
         }
+        Ok(moves)
     }
 
-    /// Forgets an instance. Its children are no longer attached.
-    pub(super) fn remove(&mut self, place: u32) {
-        self.detach(place);
-        let children: Vec<u32> = self.children(place).collect();
-        for child in children {
-            self.detach(child);
+    /// Returns where an instance comes to be that was attached, and all that are attached to it.
+    pub(super) fn moves_of(&self, child: u32) -> Result<Vec<Move>, InstanceError> {
+        let mut moves = Vec::new();
+        self.follow(child, &[], &Table::new(0), &mut moves)?;
+        Ok(moves)
+    }
+
+    /// Adds where an instance comes to be and all that are attached to it.
+    fn follow(
+        &self,
+        first: u32,
+        given: &[(u32, Pose)],
+        numbers: &Table,
+        moves: &mut Vec<Move>,
+    ) -> Result<(), InstanceError> {
+        let above = self.attached(first).and_then(|attached| self.at(attached.parent));
+        let mut open = vec![(first, above.map_or(Pose::IDENTITY, |parent| parent.world))];
+        while let Some((place, parent)) = open.pop() {
+            let Some(instance) = self.at(place) else { continue };
+            let given = numbers.get(place).map(|number| given[number].1);
+            let (world, kept) = match &instance.attached {
+                None => (given.unwrap_or(instance.world), None),
+                Some(attached) => {
+                    let kept = given.map_or(attached.kept, |world| parent.kept_of_attached(&world));
+                    (kept.then_of_attached(&parent), Some(kept))
+                }
+            };
+            self.check_pose(instance.id(place), &world)?;
+            moves.push(Move { place, world, kept });
+            open.extend(instance.children.iter().map(|&child| (child, world)));
+        }
+        Ok(())
+    }
+
+    /// Moves instances.
+    pub(super) fn carry_out(&mut self, moves: Vec<Move>) {
+        for Move { place, world, kept } in moves {
+            self.change(place, |instance| {
+                instance.world = world;
+                if let Some((attached, kept)) = instance.attached.as_mut().zip(kept) {
+                    attached.kept = kept;
+                }
+            });
         }
     }
 }

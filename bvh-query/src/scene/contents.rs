@@ -3,13 +3,12 @@
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
-use crate::scene::attachments::Attachments;
 use crate::scene::broad_phase::BroadPhase;
 use crate::scene::groups::Groups;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::{InstanceError, InstanceLabel, WorldPoseError};
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 #[derive(Clone, Debug, Default)]
@@ -24,15 +23,7 @@ pub(super) struct Contents {
     pub(super) pair_margins: HashMap<(u32, u32), f64>,
     /// The largest of them.
     widest_pair_margin: f64,
-    pub(super) attachments: Attachments,
     pub(super) broad: BroadPhase,
-}
-
-/// Where an instance comes to be, and the pose that is kept if it is attached.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Move {
-    world: Pose,
-    kept: Option<Pose>,
 }
 
 impl Contents {
@@ -44,6 +35,11 @@ impl Contents {
     /// Returns the instance in a place, if there is one.
     pub(super) fn at(&self, place: u32) -> Option<&Instance> {
         self.instances.get(place as usize)?.as_ref()
+    }
+
+    /// Returns the instance in a place, if there is one, to change it.
+    pub(super) fn at_mut(&mut self, place: u32) -> Option<&mut Instance> {
+        self.instances.get_mut(place as usize)?.as_mut()
     }
 
     /// Returns the identifier of the instance in a place, if there is one.
@@ -99,9 +95,15 @@ impl Contents {
 
     /// Removes an instance, and what is said of it and others.
     pub(super) fn remove(&mut self, place: u32) {
+        self.attach(place, None);
         let Some(instance) = self.instances[place as usize].take() else { return };
+        for child in instance.children {
+            if let Some(child) = self.at_mut(child) {
+                child.attached = None;
+            }
+        }
         for other in instance.allowed {
-            if let Some(other) = &mut self.instances[other as usize] {
+            if let Some(other) = self.at_mut(other) {
                 other.allowed.retain(|&allowed| allowed != place);
             }
         }
@@ -109,7 +111,6 @@ impl Contents {
             Arc::make_mut(&mut self.names).remove(&name);
         }
         self.pair_margins.retain(|&(a, b), _| a != place && b != place);
-        self.attachments.remove(place);
         // After 2^32 instances in one place, the place is given up.
         if let Some(next) = instance.generation.checked_add(1) {
             self.free.push((place, next));
@@ -126,65 +127,6 @@ impl Contents {
         }
     }
 
-    /// Returns where instances come to be that are moved to poses in the world, by their places, and all that are attached
-    /// to them.
-    pub(super) fn moves(&self, named: &BTreeMap<u32, Pose>) -> Result<BTreeMap<u32, Move>, InstanceError> {
-        let mut moves = BTreeMap::new();
-        for &first in named.keys() {
-            // What is attached to another one that is named is reached from there.
-            if !self.attachments.above(first).any(|place| named.contains_key(&place)) {
-                self.follow(first, named, &mut moves)?;
-            }
-        }
-        Ok(moves)
-    }
-
-    /// Returns where an instance comes to be that was attached, and all that are attached to it.
-    pub(super) fn moves_of(&self, child: u32) -> Result<BTreeMap<u32, Move>, InstanceError> {
-        let mut moves = BTreeMap::new();
-        self.follow(child, &BTreeMap::new(), &mut moves)?;
-        Ok(moves)
-    }
-
-    /// Adds where an instance comes to be and all that are attached to it, parents before children.
-    fn follow(
-        &self,
-        first: u32,
-        named: &BTreeMap<u32, Pose>,
-        moves: &mut BTreeMap<u32, Move>,
-    ) -> Result<(), InstanceError> {
-        let mut open = vec![first];
-        while let Some(place) = open.pop() {
-            let Some(instance) = self.at(place) else { continue };
-            let given = named.get(&place);
-            let (world, kept) = match self.attachments.get(place) {
-                None => (*given.unwrap_or(&instance.world), None),
-                Some(attached) => {
-                    let parent = match moves.get(&attached.parent) {
-                        Some(moved) => moved.world,
-                        None => self.at(attached.parent).map_or(Pose::IDENTITY, |parent| parent.world),
-                    };
-                    let kept = given.map_or(attached.kept, |world| parent.kept_of_attached(world));
-                    (kept.then_of_attached(&parent), Some(kept))
-                }
-            };
-            self.check_pose(instance.id(place), &world)?;
-            moves.insert(place, Move { world, kept });
-            open.extend(self.attachments.children(place));
-        }
-        Ok(())
-    }
-
-    /// Moves instances.
-    pub(super) fn carry_out(&mut self, moves: BTreeMap<u32, Move>) {
-        for (place, Move { world, kept }) in moves {
-            self.change(place, |instance| instance.world = world);
-            if let Some(kept) = kept {
-                self.attachments.keep(place, kept);
-            }
-        }
-    }
-
     pub(super) fn set_groups(&mut self, place: u32, groups: Groups) {
         if let Some(instance) = &mut self.instances[place as usize] {
             instance.groups = groups;
@@ -194,7 +136,7 @@ impl Contents {
 
     pub(super) fn set_allowed(&mut self, a: u32, b: u32, allowed: bool) {
         for (own, other) in [(a, b), (b, a)] {
-            let Some(instance) = &mut self.instances[own as usize] else { continue };
+            let Some(instance) = self.at_mut(own) else { continue };
             match (instance.allowed.binary_search(&other), allowed) {
                 (Err(at), true) => instance.allowed.insert(at, other),
                 (Ok(at), false) => {

@@ -3,6 +3,7 @@
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
 use crate::query::motion::size_of;
+use crate::scene::attachments::Attached;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
@@ -57,6 +58,9 @@ pub(super) struct Instance {
     pub(super) groups: Groups,
     /// The places of the instances that it may touch, in ascending order.
     pub(super) allowed: Vec<u32>,
+    pub(super) attached: Option<Box<Attached>>,
+    /// The places of the instances that are attached to it.
+    pub(super) children: Vec<u32>,
 }
 
 impl Instance {
@@ -68,9 +72,21 @@ impl Instance {
         groups: Groups,
     ) -> Self {
         let size = size_of(shape.objects(), 0.0);
-        let (bounds, allowed) = (WorldBox::EMPTY, Vec::new());
-        let mut instance =
-            Self { generation, name, shape, margin: 0.0, size, world, bounds, groups, allowed };
+        let (bounds, allowed, children) = (WorldBox::EMPTY, Vec::new(), Vec::new());
+        let (margin, attached) = (0.0, None);
+        let mut instance = Self {
+            generation,
+            name,
+            shape,
+            margin,
+            size,
+            world,
+            bounds,
+            groups,
+            allowed,
+            attached,
+            children,
+        };
         instance.update_bounds();
         instance
     }

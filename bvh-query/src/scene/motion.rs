@@ -13,12 +13,12 @@ use crate::motion::{AttachedPath, RelativePath, RigidPath, TogetherPath};
 use crate::query::answers::Distance;
 use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
 use crate::query::querier::Querier;
+use crate::scene::attachments::Table;
 use crate::scene::contents::reach_of;
 use crate::scene::instance::{Instance, InstanceId};
 use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
 use crate::scene::{Scene, SceneError};
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -66,6 +66,9 @@ struct Encounter {
     b: u32,
 }
 
+/// Called with pairs to ask about, until it breaks. Through a reference, because each copy of the search takes 5 KB.
+type Visit<'a> = dyn FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError> + 'a;
+
 /// A moving instance, and where it is during each slice.
 struct Moving<'a> {
     place: u32,
@@ -85,14 +88,16 @@ impl Moving<'_> {
 
 /// The path of a moving instance.
 struct Way<'a> {
+    place: u32,
     /// The place of the instance that the path was given for: its own, or that of one above it.
     given: u32,
     path: AttachedPath<'a>,
 }
 
-/// The paths in question, by the places of their instances.
+/// The paths in question, and their numbers by the places of their instances.
 struct Ways<'a> {
-    paths: BTreeMap<u32, Way<'a>>,
+    ways: Vec<Way<'a>>,
+    numbers: Table,
     options: &'a MotionOptions,
 }
 
@@ -200,42 +205,45 @@ impl Scene {
             self.contents.check_pose(id, &path.pose(0.0))?;
             self.contents.check_pose(id, &path.pose(1.0))?;
         }
-        let way =
-            |(id, path): (InstanceId, _)| (id.place, Way { given: id.place, path: AttachedPath::new(path) });
-        let mut ways: BTreeMap<u32, Way<'_>> = paths.iter().copied().map(way).collect();
-        let mut open: Vec<u32> = ways.keys().copied().collect();
-        while let Some(place) = open.pop() {
-            for child in self.contents.attachments.children(place) {
-                let (Some(above), Some(attached)) = (ways.get(&place), self.contents.attachments.get(child))
+        let mut numbers = Table::new(self.contents.instances.len());
+        let mut ways: Vec<Way<'_>> = Vec::new();
+        for &(id, path) in paths {
+            let way = Way { place: id.place, given: id.place, path: AttachedPath::new(path) };
+            match numbers.get(id.place) {
+                Some(number) => ways[number] = way,
+                None => {
+                    numbers.set(id.place, ways.len());
+                    ways.push(way);
+                }
+            }
+        }
+        // What is attached follows, unless it has a path of its own. The list grows on the way.
+        let mut next = 0;
+        while let Some(&Way { place, given, .. }) = ways.get(next) {
+            for &child in self.contents.at(place).iter().flat_map(|instance| &instance.children) {
+                let (Some(attached), Some(id)) = (self.contents.attached(child), self.contents.id_at(child))
                 else {
                     continue;
                 };
-                // One that has a path of its own follows that one, and is in the list.
-                if ways.contains_key(&child) {
-                    continue;
+                if numbers.get(child).is_none() {
+                    let path = ways[next].path.of_child(attached.kept);
+                    self.contents.check_pose(id, &path.pose(0.0))?;
+                    self.contents.check_pose(id, &path.pose(1.0))?;
+                    numbers.set(child, ways.len());
+                    ways.push(Way { place: child, given, path });
                 }
-                let way = Way { given: above.given, path: above.path.of_child(attached.kept) };
-                for end in [0.0, 1.0] {
-                    let Some(id) = self.contents.id_at(child) else { continue };
-                    self.contents.check_pose(id, &way.path.pose(end))?;
-                }
-                ways.insert(child, way);
-                open.push(child);
             }
+            next += 1;
         }
         self.start();
-        Ok(Ways { paths: ways, options })
+        Ok(Ways { ways, numbers, options })
     }
 
     /// Calls `visit` with the pairs that may come within the clearance, until `visit` breaks: in several calls if there
     /// are many. The pairs of a call are in the order in which their boxes come near each other.
-    fn each_piece_of_encounters(
-        &self,
-        ways: &Ways<'_>,
-        mut visit: impl FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError>,
-    ) -> Result<(), SceneError> {
+    fn each_piece_of_encounters(&self, ways: &Ways<'_>, visit: &mut Visit<'_>) -> Result<(), SceneError> {
         let all = |slices: usize| -> Vec<Moving<'_>> {
-            ways.paths.iter().filter_map(|(&place, way)| self.moving(place, &way.path, slices)).collect()
+            ways.ways.iter().filter_map(|way| self.moving(way.place, &way.path, slices)).collect()
         };
         let mut moving = all(1);
         let slices = moving.iter().map(Moving::slices_worthwhile).max().unwrap_or(1);
@@ -254,7 +262,7 @@ impl Scene {
                     .broad
                     .near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
             })?;
-            for place in near.into_iter().filter(|place| !ways.paths.contains_key(place)) {
+            for place in near.into_iter().filter(|place| ways.of(*place).is_none()) {
                 let Some(other) = self.contents.at(place) else {
                     continue;
                 };
@@ -263,7 +271,8 @@ impl Scene {
                 encounters.extend(self.encounter(pair, ways));
             }
             for other in &moving[number + 1..] {
-                let pair = [one, other].map(|of| (of.place, of.instance, of.slices.as_slice()));
+                let (a, b) = if one.place < other.place { (one, other) } else { (other, one) };
+                let pair = [a, b].map(|of| (of.place, of.instance, of.slices.as_slice()));
                 encounters.extend(self.encounter(pair, ways));
             }
             if encounters.len() >= MAX_KNOWN_PAIRS || number + 1 == moving.len() {
@@ -327,7 +336,7 @@ impl Scene {
     ) -> Result<(), SceneError> {
         let (mut stats, mut pairs_asked) = (self.stats, 0);
         let scene = &*self;
-        let asked = scene.each_piece_of_encounters(ways, |encounters| {
+        let asked = scene.each_piece_of_encounters(ways, &mut |encounters| {
             pairs_asked += encounters.len() as u64;
             let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
                 let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
@@ -356,10 +365,15 @@ impl Scene {
     }
 }
 
-impl Ways<'_> {
+impl<'a> Ways<'a> {
+    /// Returns the path of an instance, if it moves.
+    fn of(&self, place: u32) -> Option<&Way<'a>> {
+        self.numbers.get(place).map(|number| &self.ways[number])
+    }
+
     /// Returns the path of an instance, which may be its pose.
-    fn path<'a>(&'a self, place: u32, instance: &'a Instance) -> &'a dyn RigidPath {
-        match self.paths.get(&place) {
+    fn path<'b>(&'b self, place: u32, instance: &'b Instance) -> &'b dyn RigidPath {
+        match self.of(place) {
             Some(way) => &way.path,
             None => &instance.world,
         }
@@ -367,7 +381,7 @@ impl Ways<'_> {
 
     /// Returns the path of B in A's frame if both follow the same instance, or one follows the other.
     fn together(&self, a: u32, b: u32) -> Option<TogetherPath<'_>> {
-        let (a, b) = (self.paths.get(&a)?, self.paths.get(&b)?);
+        let (a, b) = (self.of(a)?, self.of(b)?);
         (a.given == b.given).then_some(TogetherPath { a: &a.path, b: &b.path })
     }
 
