@@ -29,12 +29,11 @@
  * and never followed. A copy of the structure is the same handle, and must be freed only once. Handles that are not
  * freed live as long as the process. Use no handles in a child after fork() without exec().
  *
- * Threads. Functions may be called on any thread. Many threads may use a mesh or a path at the same time. Only one
- * thread at a time may use a querier, a tracker or a scene; a second one gets CBVH_BUSY. Make one querier for each
- * thread. While no thread uses or changes a scene, many threads may clone it or call cbvh_scene_find, _instances,
- * _instance_name, _instance_pose, _instance_mesh, _instance_margin, _pair_margin or _stats. A mesh or a path may be
- * freed while other threads use it: it lives until their questions end. cbvh_querier_set_parallel and
- * cbvh_scene_set_parallel let one question use all cores. The number of threads is that of the environment variable
+ * Threads. Functions may be called on any thread. Many threads may use a mesh, a path or a scene at the same time. Only
+ * one thread at a time may use a querier or a tracker; a second one gets CBVH_BUSY. Make one querier for each thread. A
+ * question is about a scene as it is when the question begins. Other threads may change the scene meanwhile, and nobody
+ * waits for a question. A mesh, a path or a scene may be freed while other threads use it: it lives until their
+ * questions end. cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all cores. The number of threads is that of the environment variable
  * RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
@@ -82,7 +81,7 @@ enum {
     CBVH_INVALID_ARGUMENT = 1,
     /* A handle is 0, was freed, has another kind, or is not from this library. */
     CBVH_INVALID_HANDLE = 2,
-    /* Another thread, or a function that called this one, uses the querier, tracker or scene. */
+    /* Another thread, or a function that called this one, uses the querier or tracker. */
     CBVH_BUSY = 3,
     /* There is no object or instance of that number or name. */
     CBVH_NOT_FOUND = 4,
@@ -492,7 +491,7 @@ typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
 /* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
  * several threads at the same time if the querier or scene is parallel. They must not leave by an exception or longjmp.
- * They may call this library, but with the querier or scene in use they get CBVH_BUSY. A question that they ask on a
+ * They may call this library, but with the querier in use they get CBVH_BUSY. A question that they ask on a
  * thread of the library uses that thread only. `release` is called with `user` when the path is no longer used: once,
  * on any thread, when the handle is freed and questions about it have ended. It may be NULL. It must not throw an
  * exception and must not call this library. After a failure it is not called. */
@@ -668,7 +667,10 @@ cbvh_status cbvh_segment_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_p
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
  * Many placed meshes, and questions over all pairs that may meet. In a pair, A is the instance in the lower place, and
- * answers are in A's frame. One thread at a time may use a scene; clone it for others. */
+ * answers are in A's frame. Threads may ask about a scene while others change it: each question is about the scene as it
+ * is when the question begins. The first change during a question copies the tables of the scene (2 us for 60 instances,
+ * 0.3 ms for 10,000), and no mesh. A question may see one of two calls that change the scene and not the other: clone
+ * the scene, which takes a microsecond, to change or to ask a copy that nobody else has. */
 
 /* Makes an empty scene. */
 cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
@@ -696,10 +698,25 @@ cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
  * mesh may be freed afterwards. */
 cbvh_status cbvh_scene_add(cbvh_scene scene, cbvh_mesh mesh, const cbvh_pose *world, const char *name,
                            cbvh_instance *instance);
-/* Removes an instance. This scene never gives its number again. CBVH_NOT_FOUND if the scene has no such instance. An
+/* Removes an instance. What is attached to it stays where it is. This scene never gives its number again. CBVH_NOT_FOUND if the scene has no such instance. An
  * instance of another scene is not recognised as such. */
 cbvh_status cbvh_scene_remove(cbvh_scene scene, cbvh_instance instance);
-/* Moves many instances, or none if it fails. If an instance is given twice, the last pose counts. */
+/* Replaces the mesh of an instance, such as a cloud of points that a camera sees again and again. Everything else stays:
+ * its number, name, pose, groups, margins, permissions and attachments. The handle of the mesh may be freed afterwards. */
+cbvh_status cbvh_scene_set_mesh(cbvh_scene scene, cbvh_instance instance, cbvh_mesh mesh);
+/* Attaches an instance to a parent, with which it moves from then on: a part to the gripper that holds it. If it was
+ * attached to another parent, it no longer is. The scene keeps the pose of the child in the parent's frame. The pose in
+ * the world is always that of the parent times the one that is kept, so that nothing adds up over many moves. To set the
+ * pose of the child changes what is kept. On a motion, the child follows the path of its parent, unless it has a path of
+ * its own. Permissions to touch do not change: a gripper usually touches what it holds, so allow this pair, and forbid
+ * it again when it is detached. CBVH_INVALID_ARGUMENT if the parent is the child itself or moves with it. */
+cbvh_status cbvh_scene_attach(cbvh_scene scene, cbvh_instance child, cbvh_instance parent);
+/* Detaches an instance from its parent, if it has one. It stays where it is. */
+cbvh_status cbvh_scene_detach(cbvh_scene scene, cbvh_instance child);
+/* Writes what an instance is attached to. CBVH_NOT_FOUND if it is not attached. */
+cbvh_status cbvh_scene_parent(cbvh_scene scene, cbvh_instance child, cbvh_instance *parent);
+/* Moves many instances, and those that are attached to them, or none if it fails. If an instance is given twice, the
+ * last pose counts; otherwise the order does not matter. */
 cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds,
                                  size_t count);
 /* Sets the groups that an instance is in and those that it meets, one bit per group. Questions are about two instances
@@ -728,7 +745,7 @@ cbvh_status cbvh_scene_instance_mesh(cbvh_scene scene, cbvh_instance instance, c
 cbvh_status cbvh_scene_instance_margin(cbvh_scene scene, cbvh_instance instance, double *margin);
 /* Writes the margin that a pair of instances has besides those of both, in either order. */
 cbvh_status cbvh_scene_pair_margin(cbvh_scene scene, cbvh_instance a, cbvh_instance b, double *margin);
-/* Writes how much work the last question took, over all its pairs. */
+/* Writes how much work the question took that ended last, over all its pairs. */
 cbvh_status cbvh_scene_stats(cbvh_scene scene, cbvh_stats *stats);
 
 /* A pair of instances. */
@@ -776,7 +793,8 @@ cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, 
 
 /* Answers whether some instances can move freely at the same time along paths in the world, while the others stand
  * still. The answer is the earliest hit of all pairs with at least one moving instance. The present poses of moving
- * instances do not matter, and do not change. CBVH_INVALID_ARGUMENT if an instance is given twice. */
+ * instances do not matter, and do not change. What is attached to a moving instance moves with it, unless it has a path
+ * of its own. CBVH_INVALID_ARGUMENT if an instance is given twice. */
 cbvh_status cbvh_scene_motion(cbvh_scene scene, const cbvh_instance *instances, const cbvh_path *paths, size_t count,
                               const cbvh_motion_options *options, cbvh_motion_answer *answer);
 /* Answers whether all these paths are certainly free, which takes less time. */

@@ -1,7 +1,7 @@
 // cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. This header wraps cbvh.h,
 // which documents the questions: shapes, units, costs and threads.
 //
-// Meshes and paths may be shared by threads; make a Querier and a Scene for each thread. Objects that were moved from
+// Meshes and paths may be shared by threads; make a Querier for each thread. A Scene may be asked while others change it. Objects that were moved from
 // hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
@@ -14,6 +14,7 @@
 #include "cbvh.h"
 
 #include <algorithm>
+#include <atomic>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -271,25 +272,41 @@ template <class Ask> std::vector<bool> choices(std::size_t count, Ask ask) {
 /// The number of entries to make room for before the length of a list is known.
 inline constexpr std::size_t few = 64;
 
-/// Asks for a list, and once more if the list is longer than there is room for. That takes twice the time, so there is
-/// room for as many elements as the last list had.
-template <class Element, class Ask> std::vector<Element> list(std::size_t &room, Ask ask) {
-    std::vector<Element> found(room);
+/// How long the last list was. Threads may share it.
+class Room {
+public:
+    Room() = default;
+    Room(const Room &other) noexcept : length_(other.length()) {}
+    Room &operator=(const Room &other) noexcept {
+        set(other.length());
+        return *this;
+    }
+    std::size_t length() const noexcept { return length_.load(std::memory_order_relaxed); }
+    void set(std::size_t length) noexcept { length_.store(length, std::memory_order_relaxed); }
+
+private:
+    std::atomic<std::size_t> length_{few};
+};
+
+/// Asks for a list, and again if the list is longer than there is room for, which a scene may come to have meanwhile. That
+/// takes twice the time, so there is room for as many elements as the last list had.
+template <class Element, class Ask> std::vector<Element> list(Room &room, Ask ask) {
+    std::vector<Element> found(room.length());
     std::size_t count = 0;
     cbvh_status status = ask(found.data(), found.size(), &count);
-    if (status == CBVH_BUFFER_TOO_SMALL) {
+    while (status == CBVH_BUFFER_TOO_SMALL) {
         found.resize(count);
         status = ask(found.data(), found.size(), &count);
     }
     check(status);
     found.resize(count);
-    room = std::max(count, few);
+    room.set(std::max(count, few));
     return found;
 }
 
 /// The same of a list that takes no time.
 template <class Element, class Ask> std::vector<Element> list(Ask ask) {
-    std::size_t room = few;
+    Room room;
     return list<Element>(room, ask);
 }
 
@@ -298,7 +315,7 @@ template <class Ask> std::string text(Ask ask) {
     std::string found(64, '\0');
     std::size_t length = 0;
     cbvh_status status = ask(&found[0], found.size(), &length);
-    if (status == CBVH_BUFFER_TOO_SMALL) {
+    while (status == CBVH_BUFFER_TOO_SMALL) {
         found.resize(length + 1);
         status = ask(&found[0], found.size(), &length);
     }
@@ -323,7 +340,7 @@ std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const
 
 /// Lists of many questions.
 template <class Element, class Ask>
-std::vector<std::vector<Element>> lists(std::size_t &room, std::size_t questions, Ask ask) {
+std::vector<std::vector<Element>> lists(Room &room, std::size_t questions, Ask ask) {
     std::vector<std::size_t> counts(questions);
     const auto all = list<Element>(room, [&](Element *elements, std::size_t capacity, std::size_t *count) {
         return ask(counts.data(), elements, capacity, count);
@@ -860,7 +877,7 @@ private:
         }
         return handles;
     }
-    std::size_t room_ = detail::few;
+    detail::Room room_;
     Owned handle_;
 };
 
@@ -911,9 +928,9 @@ private:
     Owned handle_;
 };
 
-/// Many placed meshes. Make one for each thread; copies share the meshes. If a list of pairs, contacts or hits is
-/// longer than 64 and than the last list, the library asks for it twice, because the first time only counts its
-/// elements.
+/// Many placed meshes. Threads may ask while others change it: each question is about the scene as it is when the
+/// question begins. Copies share the meshes. If a list of pairs, contacts or hits is longer than 64 and than the last
+/// list, the library asks for it twice, because the first time only counts its elements.
 class Scene {
 public:
     explicit Scene(cbvh_backend backend = CBVH_BACKEND_BEST)
@@ -953,6 +970,22 @@ public:
         return instance;
     }
     void remove(Instance instance) { check(cbvh_scene_remove(raw(), instance)); }
+    /// Replaces the mesh of an instance. Everything else stays.
+    void set_mesh(Instance instance, const Mesh &mesh) { check(cbvh_scene_set_mesh(raw(), instance, mesh.raw())); }
+    /// Lets an instance move with a parent, as a part with its gripper: see cbvh_scene_attach.
+    void attach(Instance child, Instance parent) { check(cbvh_scene_attach(raw(), child, parent)); }
+    void detach(Instance child) { check(cbvh_scene_detach(raw(), child)); }
+    /// What an instance is attached to, if it is.
+    std::optional<Instance> parent(Instance child) const {
+        Instance parent{0};
+        const cbvh_status status = cbvh_scene_parent(raw(), child, &parent);
+        // The scene may lack the instance itself.
+        if (status == CBVH_NOT_FOUND && std::string(cbvh_last_message()).rfind("child: ", 0) == 0) {
+            return std::nullopt;
+        }
+        check(status);
+        return parent;
+    }
     void set_pose(Instance instance, const Pose &world) { check(cbvh_scene_set_poses(raw(), &instance, &world, 1)); }
     /// Moves many instances, or none if it throws.
     void set_poses(const std::vector<std::pair<Instance, Pose>> &poses) {
@@ -1166,7 +1199,7 @@ private:
         }
         check(ask(instances.data(), paths.data(), &raw_options));
     }
-    std::size_t room_ = detail::few;
+    detail::Room room_;
     Owned handle_;
 };
 

@@ -87,7 +87,7 @@ impl SceneQuestion {
         all: impl FnOnce(&mut Scene, &[P]) -> Result<Vec<T>, SceneError>,
         row: impl Fn(T) -> R,
     ) -> i32 {
-        scene::with(self.0, |scene| {
+        scene::ask(self.0, |scene| {
             let mut probes = Probes::default();
             let probes = read(&mut probes)?;
             // SAFETY: the caller vouches for it.
@@ -213,7 +213,7 @@ pub unsafe extern "C" fn cbvh_scene_all_hits(
     capacity: usize,
     count: *mut usize,
 ) -> i32 {
-    scene::with(scene, |scene| {
+    scene::ask(scene, |scene| {
         let mut probes = Probes::default();
         // SAFETY: the header asks for it.
         let (rays, lists) = unsafe {

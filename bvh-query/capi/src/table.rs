@@ -10,7 +10,7 @@
 use crate::status::{Failure, Status};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError, RwLock, TryLockError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
 /// What a handle stands for, by the highest byte of its number.
 #[derive(Clone, Copy)]
@@ -113,12 +113,12 @@ impl<T: Clone> Table<T> {
     }
 }
 
-/// A value that one thread at a time may change or free, and that many may look at together. `None` once it is freed.
-pub(crate) struct Exclusive<V>(Arc<RwLock<Option<V>>>);
+/// A value that one thread at a time may use or free. `None` once it is freed.
+pub(crate) struct Exclusive<V>(Arc<Mutex<Option<V>>>);
 
 impl<V> Exclusive<V> {
     pub(crate) fn new(value: V) -> Self {
-        Self(Arc::new(RwLock::new(Some(value))))
+        Self(Arc::new(Mutex::new(Some(value))))
     }
 }
 
@@ -137,20 +137,8 @@ impl<V> Table<Exclusive<V>> {
         act: impl FnOnce(&mut V) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
         let slot = self.share(name, handle)?;
-        let mut value = slot.0.try_write().map_err(|error| self.refuse(name, error))?;
+        let mut value = slot.0.try_lock().map_err(|error| self.refuse(name, error))?;
         act(value.as_mut().ok_or_else(|| self.stale(name, handle))?)
-    }
-
-    /// Looks at the value of a handle, which nobody may change or free meanwhile.
-    pub(crate) fn see<R>(
-        &self,
-        name: &str,
-        handle: u64,
-        act: impl FnOnce(&V) -> Result<R, Failure>,
-    ) -> Result<R, Failure> {
-        let slot = self.share(name, handle)?;
-        let value = slot.0.try_read().map_err(|error| self.refuse(name, error))?;
-        act(value.as_ref().ok_or_else(|| self.stale(name, handle))?)
     }
 
     /// Frees a handle that nobody uses, unless it is 0.
@@ -159,7 +147,7 @@ impl<V> Table<Exclusive<V>> {
             return Ok(());
         }
         let slot = self.share(name, handle)?;
-        let value = match slot.0.try_write() {
+        let value = match slot.0.try_lock() {
             Ok(mut value) => value.take(),
             Err(TryLockError::Poisoned(value)) => value.into_inner().take(),
             Err(error) => return Err(self.refuse(name, error)),
@@ -238,22 +226,14 @@ mod tests {
         let held = table.hold("querier", handle, |value| {
             *value += 1;
             assert!(is_busy(table.hold("querier", handle, |_| Ok(()))));
-            assert!(is_busy(table.see("querier", handle, |_| Ok(()))));
             assert!(is_busy(table.free_unused("querier", handle)));
             Ok(*value)
         });
         assert_eq!(held.unwrap(), 2);
-        // Many may look at it together, but not while one changes it.
-        let seen = table.see("querier", handle, |value| {
-            assert!(is_busy(table.hold("querier", handle, |_| Ok(()))));
-            assert!(is_busy(table.free_unused("querier", handle)));
-            table.see("querier", handle, |again| Ok([*value, *again]))
-        });
-        assert_eq!(seen.unwrap(), [2, 2]);
         // A thread that found the value before it was freed, and locks it only then.
         let slot = table.share("querier", handle).unwrap();
         table.free_unused("querier", handle).unwrap();
-        assert!(slot.0.try_read().unwrap().is_none());
+        assert!(slot.0.try_lock().unwrap().is_none());
         for refused in [table.hold("querier", handle, |_| Ok(())), table.free_unused("querier", handle)] {
             assert!(refused.unwrap_err().message.ends_with("one of a querier that was freed"));
         }
@@ -261,19 +241,19 @@ mod tests {
 
     #[test]
     fn after_a_panic_a_handle_can_only_be_freed() {
-        let table = Table::new(Kind::Scene);
+        let table = Table::new(Kind::Tracker);
         let handle = table.insert(Exclusive::new(1));
         let panicked = std::thread::scope(|scope| {
             let use_it = || {
-                table.hold("scene", handle, |_| -> Result<(), _> { std::panic::resume_unwind(Box::new(())) })
+                table
+                    .hold("tracker", handle, |_| -> Result<(), _> { std::panic::resume_unwind(Box::new(())) })
             };
             scope.spawn(use_it).join()
         });
         assert!(panicked.is_err());
-        assert_eq!(table.hold("scene", handle, |_| Ok(())).unwrap_err().status, Status::Internal);
-        assert_eq!(table.see("scene", handle, |_| Ok(())).unwrap_err().status, Status::Internal);
-        assert!(table.free_unused("scene", handle).is_ok());
+        assert_eq!(table.hold("tracker", handle, |_| Ok(())).unwrap_err().status, Status::Internal);
+        assert!(table.free_unused("tracker", handle).is_ok());
         let next = table.insert(Exclusive::new(2));
-        assert!(table.hold("scene", next, |_| Ok(())).is_ok());
+        assert!(table.hold("tracker", next, |_| Ok(())).is_ok());
     }
 }

@@ -787,6 +787,86 @@ static void stated_radius(void) {
     CHECK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &wrong, &mesh) == CBVH_BAKE_FAILED);
 }
 
+/* Attached instances follow their parents, in poses and on motions, and a mesh that is swapped keeps the rest. */
+static void attached(void) {
+    const cbvh_mesh one = cube(1), large = cube(6);
+    cbvh_scene scene, copy;
+    cbvh_instance wall, gripper, part, label, found;
+    const cbvh_pose at_wall = shift(3, 0, 0), at_gripper = shift(0, 3, 0), at_part = shift(0, 0, 0), at_label = shift(0, 0, 5);
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_add(scene, one, &at_wall, NULL, &wall));
+    OK(cbvh_scene_add(scene, one, &at_gripper, NULL, &gripper));
+    OK(cbvh_scene_add(scene, one, &at_part, NULL, &part));
+    OK(cbvh_scene_add(scene, one, &at_label, NULL, &label));
+    FAILS(cbvh_scene_parent(scene, part, &found), CBVH_NOT_FOUND, "child: expected an attached instance, found");
+    cbvh_path path;
+    const cbvh_pose at_end = shift(8, 3, 0);
+    bool answer;
+    OK(cbvh_path_between(&at_gripper, &at_end, &path));
+    OK(cbvh_scene_is_free(scene, &gripper, &path, 1, NULL, &answer));
+    CHECK(answer);
+    OK(cbvh_scene_attach(scene, part, gripper));
+    OK(cbvh_scene_attach(scene, label, part));
+    OK(cbvh_scene_parent(scene, label, &found));
+    CHECK(found.id == part.id);
+    cbvh_motion_answer motion;
+    OK(cbvh_scene_motion(scene, &gripper, &path, 1, NULL, &motion));
+    /* At 8 t = 2 the part touches the wall. */
+    CHECK(motion.outcome == CBVH_HIT && motion.instance_a.id == wall.id && motion.instance_b.id == part.id);
+    CHECK(motion.free_until <= 0.25 && motion.at >= 0.25 && motion.at < 0.25 + 1e-6);
+    FAILS(cbvh_scene_attach(scene, gripper, label), CBVH_INVALID_ARGUMENT,
+          "instance 1: expected a parent that does not move with it, found 3");
+    FAILS(cbvh_scene_attach(scene, part, part), CBVH_INVALID_ARGUMENT, "instance 2: expected a parent");
+    const cbvh_pose turned = random_pose(&(random_source){9}, 2);
+    cbvh_pose world[2];
+    const cbvh_instance both[2] = {gripper, part};
+    OK(cbvh_scene_clone(scene, &copy));
+    OK(cbvh_scene_set_poses(scene, &gripper, &turned, 1));
+    for (int k = 0; k < 2; k++) {
+        const cbvh_pose kept = shift(0, -3, k == 0 ? 0 : 5);
+        cbvh_pose expected;
+        OK(cbvh_pose_then(&kept, &turned, &expected));
+        OK(cbvh_scene_instance_pose(scene, k == 0 ? part : label, &world[0]));
+        for (int n = 0; n < 12; n++) {
+            CHECK(fabs(world[0].rows[n] - expected.rows[n]) < 1e-14);
+        }
+    }
+    OK(cbvh_scene_instance_pose(copy, part, &world[0]));
+    CHECK(memcmp(&world[0], &at_part, sizeof at_part) == 0);
+    /* Each where it is put, in any order; and none, if one that follows would be too far away. */
+    const cbvh_pose places[2] = {shift(0, 9, 0), shift(0, 8, 0)}, far_away = shift(0x1p118, 0, 0);
+    OK(cbvh_scene_set_poses(scene, both, places, 2));
+    OK(cbvh_scene_instance_pose(scene, part, &world[1]));
+    CHECK(memcmp(&world[1], &places[1], sizeof *world) == 0);
+    const cbvh_pose near_far = shift(0x1p117, 0, 0);
+    OK(cbvh_scene_set_poses(scene, &part, &near_far, 1));
+    FAILS(cbvh_scene_set_poses(scene, &gripper, &far_away, 1), CBVH_INVALID_ARGUMENT, "instance 2: expected a translation");
+    OK(cbvh_scene_instance_pose(scene, gripper, &world[0]));
+    CHECK(memcmp(&world[0], &places[0], sizeof *world) == 0);
+    OK(cbvh_scene_detach(scene, part));
+    OK(cbvh_scene_detach(scene, part));
+    OK(cbvh_scene_remove(scene, gripper));
+    FAILS(cbvh_scene_detach(scene, gripper), CBVH_NOT_FOUND, "was it removed?");
+    FAILS(cbvh_scene_attach(scene, part, gripper), CBVH_NOT_FOUND, "was it removed?");
+    /* Another mesh in the same place. */
+    OK(cbvh_scene_set_margin(copy, wall, 0.25));
+    OK(cbvh_scene_collide(copy, &answer));
+    CHECK(!answer);
+    OK(cbvh_scene_set_mesh(copy, wall, large));
+    OK(cbvh_scene_collide(copy, &answer));
+    CHECK(answer);
+    double margin;
+    OK(cbvh_scene_instance_margin(copy, wall, &margin));
+    CHECK(margin == 0.25);
+    FAILS(cbvh_scene_set_mesh(copy, gripper, (cbvh_mesh){0}), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_scene_set_mesh(scene, gripper, one), CBVH_NOT_FOUND, "was it removed?");
+    OK(cbvh_path_free(path));
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_scene_free(copy));
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(large));
+}
+
 /* Files: baked, opened in all ways, and a scene file, in the folder that the program is given. */
 static void files(const char *folder, const char *testdata) {
     char input[1000], output[1000];
@@ -876,6 +956,7 @@ int main(int count, char **arguments) {
     solids();
     margins();
     stated_radius();
+    attached();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));
     puts("behaviour: as the header says");

@@ -307,6 +307,14 @@ static void shapes(void) {
     FAILS(cbvh_scene_set_pair_margin(scene, instance, none, 1), CBVH_NOT_FOUND, "instance");
     FAILS(cbvh_scene_instance_margin(scene, none, &number), CBVH_NOT_FOUND, "instance");
     FAILS(cbvh_scene_pair_margin(scene, none, instance, &number), CBVH_NOT_FOUND, "instance");
+    cbvh_instance parent;
+    FAILS(cbvh_scene_attach(scene, none, instance), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_attach(scene, instance, none), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_detach(scene, none), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_parent(scene, none, &parent), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_parent(scene, instance, NULL), CBVH_INVALID_ARGUMENT, "parent: expected a pointer, found NULL");
+    FAILS(cbvh_scene_set_mesh(scene, none, mesh), CBVH_NOT_FOUND, "instance");
+    FAILS(cbvh_scene_set_mesh(scene, instance, no_mesh), CBVH_INVALID_HANDLE, "mesh: ");
     FAILS(cbvh_scene_instance_margin(scene, instance, NULL), CBVH_INVALID_ARGUMENT, "margin: expected a pointer");
     FAILS(cbvh_scene_pair_margin(scene, instance, instance, NULL), CBVH_INVALID_ARGUMENT, "margin: expected a pointer");
     /* Points and cells: none, too many, not there, not finite. */

@@ -145,7 +145,7 @@ int main(void) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(77)) {
+        switch (below(81)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -223,6 +223,10 @@ int main(void) {
         case 73: status = cbvh_scene_collide(s, out); break;
         case 74: status = cbvh_bake_octree(in, in, n, x, (cbvh_mesh *)&made); break;
         case 75: status = cbvh_bake_convex_hull(in, n, (cbvh_mesh *)&made); break;
+        case 76: status = cbvh_scene_attach(s, i, instance); break;
+        case 77: status = cbvh_scene_detach(s, i); break;
+        case 78: status = cbvh_scene_parent(s, i, out); break;
+        case 79: status = cbvh_scene_set_mesh(s, i, a); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;

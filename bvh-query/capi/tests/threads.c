@@ -1,5 +1,6 @@
-/* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh and a
- * path may be freed while others use them; many look at a scene; functions of paths ask by themselves. */
+/* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh, a path
+ * and a scene may be freed while others use them; many look at a scene; functions of paths ask by themselves; a scene is
+ * changed while others ask, and each answer is that of one scene. */
 #include "support.h"
 #include <pthread.h>
 
@@ -173,6 +174,62 @@ static void lookers(void) {
     OK(cbvh_scene_free(scene));
 }
 
+/* Threads that ask while another one swaps the mesh of an instance back and forth. */
+static cbvh_scene swapped;
+static cbvh_scene_contact both[2][400];
+static size_t counts_of[2];
+static int is_over, seen[2];
+
+static void *ask_swapped(void *unused) {
+    static const cbvh_scene_contact nothing;
+    while (!__atomic_load_n(&is_over, __ATOMIC_RELAXED)) {
+        cbvh_scene_contact found[400];
+        size_t count;
+        memset(found, 0, sizeof found);
+        OK(cbvh_scene_contacts(swapped, found, 400, &count));
+        const int which = count != counts_of[0];
+        CHECK(count == counts_of[which] && memcmp(found, both[which], count * sizeof nothing) == 0);
+        __atomic_fetch_add(&seen[which], 1, __ATOMIC_RELAXED);
+    }
+    return unused;
+}
+
+static void swaps(void) {
+    const cbvh_mesh meshes[2] = {cube(1), cube(4)};
+    pthread_t threads[THREADS];
+    cbvh_instance one, other;
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &swapped));
+    OK(cbvh_scene_set_tracking(swapped, 1));
+    for (int k = 0; k < 8; k++) {
+        const cbvh_pose place = shift(0.75 * k, 0.3, 0.1);
+        OK(cbvh_scene_add(swapped, mesh, &place, NULL, &other));
+    }
+    const cbvh_pose here = CBVH_IDENTITY;
+    OK(cbvh_scene_add(swapped, mesh, &here, "swapped", &one));
+    for (int k = 1; k >= 0; k--) {
+        OK(cbvh_scene_set_mesh(swapped, one, meshes[k]));
+        OK(cbvh_scene_contacts(swapped, both[k], 400, &counts_of[k]));
+    }
+    CHECK(counts_of[0] != counts_of[1] && counts_of[0] > 0);
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_create(&threads[k], NULL, ask_swapped, NULL) == 0);
+    }
+    for (int k = 0; k < 1000000; k++) {
+        OK(cbvh_scene_set_mesh(swapped, one, meshes[k % 2]));
+        if (__atomic_load_n(&seen[0], __ATOMIC_RELAXED) > 20 && __atomic_load_n(&seen[1], __ATOMIC_RELAXED) > 20) {
+            break;
+        }
+    }
+    __atomic_store_n(&is_over, 1, __ATOMIC_RELAXED);
+    for (int k = 0; k < THREADS; k++) {
+        CHECK(pthread_join(threads[k], NULL) == 0);
+    }
+    CHECK(seen[0] > 20 && seen[1] > 20);
+    OK(cbvh_scene_free(swapped));
+    OK(cbvh_mesh_free(meshes[0]));
+    OK(cbvh_mesh_free(meshes[1]));
+}
+
 int main(void) {
     /* More threads than cores, so that some wait for others. */
     CHECK(setenv("RAYON_NUM_THREADS", "8", 1) == 0);
@@ -199,6 +256,7 @@ int main(void) {
 
     callbacks_that_ask();
     lookers();
+    swaps();
 
     CHECK(pthread_barrier_init(&barrier, NULL, 2) == 0);
     OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, NULL, &path));
@@ -228,14 +286,21 @@ int main(void) {
     OK(cbvh_scene_add(scene, mesh, &there, NULL, &instances[1]));
     CHECK(pthread_create(&threads[0], NULL, hold_scene, &instances[1]) == 0);
     pthread_barrier_wait(&barrier);
-    FAILS(cbvh_scene_collide(scene, &answer), CBVH_BUSY, "scene: ");
-    FAILS(cbvh_scene_free(scene), CBVH_BUSY, "scene: ");
+    /* Others ask and change the scene meanwhile, and free it: the question is about the scene as it was. */
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(!answer);
+    const cbvh_pose in_the_way = shift(3.5, 0, 0);
+    OK(cbvh_scene_set_poses(scene, &instances[0], &in_the_way, 1));
+    OK(cbvh_scene_collide(scene, &answer));
+    CHECK(answer);
+    OK(cbvh_scene_remove(scene, instances[1]));
+    OK(cbvh_scene_free(scene));
     pthread_barrier_wait(&barrier);
     CHECK(pthread_join(threads[0], NULL) == 0);
-    OK(cbvh_scene_free(scene));
+    FAILS(cbvh_scene_collide(scene, &answer), CBVH_INVALID_HANDLE, "scene: ");
     OK(cbvh_path_free(path));
     OK(cbvh_querier_free(querier));
     OK(cbvh_mesh_free(mesh));
-    puts("threads: the same bits, and no querier or scene for two");
+    puts("threads: the same bits, and no querier for two");
     return 0;
 }

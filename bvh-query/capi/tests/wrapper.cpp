@@ -188,7 +188,7 @@ void lists() {
         CHECK(hits[0].size() == 100 && hits[1].empty());
     }
     // A question that was asked twice is asked once the next time.
-    std::size_t room = cbvh::detail::few;
+    cbvh::detail::Room room;
     int asked = 0;
     for (const std::size_t length : {100U, 100U, 3U, 100U}) {
         const auto list = cbvh::detail::list<int>(room, [&](int *, std::size_t capacity, std::size_t *count) {
@@ -356,6 +356,17 @@ void shapes() {
     CHECK(copy.margin(a) == 1 && copy.pair_margin(b, a) == 2 && copy.mesh(b).radius() == 2 && scene.collide());
     scene.set_pair_margin(b, a, 1.5);
     CHECK(!scene.collide());
+    CHECK(!scene.parent(b).has_value());
+    scene.attach(b, a);
+    CHECK(scene.parent(b)->id == a.id);
+    scene.set_pose(a, cbvh::Pose::translation(0, 0, 7));
+    const cbvh::Pose there = scene.pose(b);
+    CHECK(there.rows[11] == away.rows[11] + 7 && there.rows[3] == away.rows[3]);
+    FAILS(scene.attach(a, b), CBVH_INVALID_ARGUMENT, "expected a parent that does not move with it");
+    FAILS(scene.parent(cbvh::Instance{99}), CBVH_NOT_FOUND, "instance");
+    scene.detach(b);
+    scene.set_mesh(b, point);
+    CHECK(scene.mesh(b).radius() == 0 && copy.mesh(b).radius() == 2);
     FAILS(scene.set_margin(b, std::numeric_limits<double>::quiet_NaN()), CBVH_INVALID_ARGUMENT, "margin: ");
 }
 

@@ -68,6 +68,14 @@ impl Scene {
             SceneError::Refused(InstanceError::Pose { instance, source }) => {
                 wrong(&format!("instance {}", self.called(&instance)), source)
             }
+            SceneError::Refused(InstanceError::Cycle { child, parent }) => {
+                let found = format!(
+                    "expected one that does not move with {}, found {}",
+                    self.called(&child),
+                    self.called(&parent)
+                );
+                wrong("parent", found)
+            }
             error => refused(error),
         }
     }
@@ -133,6 +141,28 @@ impl Scene {
         self.numbers.remove(&id);
         self.ids.remove(&number);
         Ok(())
+    }
+
+    /// Replaces the mesh of an instance.
+    #[wasm_bindgen(js_name = setMesh)]
+    pub fn set_mesh(&mut self, number: u32, mesh: &Mesh) -> Answer<()> {
+        let id = self.id(number, "id")?;
+        self.scene.set_shape(id, mesh.shape.clone()).map_err(|error| self.refused(error))
+    }
+
+    pub fn attach(&mut self, child: u32, parent: u32) -> Answer<()> {
+        let (child, parent) = (self.id(child, "child")?, self.id(parent, "parent")?);
+        self.scene.attach(child, parent).map_err(|error| self.refused(error))
+    }
+
+    pub fn detach(&mut self, child: u32) -> Answer<()> {
+        let id = self.id(child, "child")?;
+        self.scene.detach(id).map_err(|error| self.refused(error))
+    }
+
+    pub fn parent(&self, child: u32) -> Answer<Option<u32>> {
+        let found = self.scene.parent(self.id(child, "child")?).map_err(|error| self.refused(error))?;
+        Ok(found.map(|(parent, _)| self.number(parent)))
     }
 
     /// Moves as many instances as there are poses, or none.

@@ -269,6 +269,44 @@ export const cases = {
         ok(/closed/.test(refused(() => cbvh.Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]).solid())), "open");
     },
 
+    "instances follow what they are attached to, and meshes are swapped": (cbvh) => {
+        const [cube, scene] = [cubeOf(cbvh), new cbvh.Scene()];
+        scene.add(cube, at(3, 0, 0), { name: "wall" });
+        scene.add(cube, at(0, 3, 0), { name: "gripper" });
+        scene.add(cube, null, { name: "part" });
+        const way = cbvh.Motion.between(at(0, 3, 0), at(8, 3, 0));
+        equal([scene.parent("part"), scene.isFree(new Map([["gripper", way]]))], [undefined, true]);
+        scene.attach("part", "gripper");
+        equal(scene.parent("part"), 1);
+        const hit = scene.motion(new Map([["gripper", way]]));
+        equal([hit.kind, hit.pair.a, hit.pair.b], [cbvh.MotionKind.HIT, 0, 2]);
+        ok(/part|gripper/.test(refused(() => scene.attach("gripper", "part"))), "a cycle");
+        ok(/itself|not move/.test(refused(() => scene.attach("part", "part"))), "itself");
+        const source = random(6);
+        for (let round = 0; round < 20; round++) {
+            scene.setPose("gripper", somewhere(cbvh, source, 3));
+            const byHand = new cbvh.Scene();
+            const poses = scene.poses();
+            for (let k = 0; k < 3; k++) {
+                byHand.add(cube, poses.slice(12 * k, 12 * k + 12));
+            }
+            equal([...scene.contacts().triangles], [...byHand.contacts().triangles]);
+            equal(scene.distance(), byHand.distance());
+            byHand.free();
+        }
+        scene.setPose("gripper", at(0, 9, 0));
+        ok([...scene.poses(["part"])].every((x, k) => Math.abs(x - at(0, 6, 0)[k]) < 1e-14), "it follows");
+        scene.detach("part");
+        scene.remove("gripper");
+        scene.setPose("part", at(-1, 3, 0));
+        scene.setMargin("wall", 0.25);
+        equal([scene.collide(), scene.parent("part")], [false, undefined]);
+        scene.setMesh("wall", cbvh.Mesh.bake(CUBE.map((x) => 4 * x), CUBE_FACES));
+        equal([scene.collide(), scene.margin("wall"), scene.mesh("wall").triangleCount], [true, 0.25, 12]);
+        ok(/mesh/.test(refused(() => scene.setMesh("wall", 5))), "no mesh");
+        ok(/removed/.test(refused(() => scene.attach("wall", 1))), "no parent");
+    },
+
     "poses come of quaternions, rounded matrices and pairs of poses": (cbvh) => {
         equal(cbvh.pose([1, 2, 3, 4, 5, 6]), [...at(1, 2, 3), ...at(4, 5, 6)]);
         equal(cbvh.pose([1, 2, 3], [0, 0, 1, 0]), [-1, 0, 0, 1, 0, -1, 0, 2, 0, 0, 1, 3]);

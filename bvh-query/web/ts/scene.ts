@@ -105,18 +105,51 @@ export class Scene extends Handle<raw.Scene> {
         return this.#call((scene) => scene.add(added, at, called, ...groups));
     }
 
-    /** Removes an instance, and forgets which of its contacts were allowed. */
+    /** Replaces the mesh of an instance, such as a cloud of points that a camera sees again and again. All else stays. */
+    setMesh(id: Instance, mesh: Mesh): void {
+        const number = this.#number(id, "id");
+        const next = instance(mesh, Mesh, "Mesh", "mesh")._raw("mesh");
+        this.#call((scene) => scene.setMesh(number, next));
+    }
+
+    /**
+     * Attaches an instance to a parent, with which it moves from then on: a part to the gripper that holds it.
+     *
+     * The scene keeps the pose of the child in the parent's frame, from which the pose in the world is computed each time
+     * that the parent moves, so that nothing adds up. `setPose` of the child changes what is kept. In a motion, the child
+     * follows the path of its parent, unless it has a path of its own. A gripper usually touches what it holds: allow this
+     * pair with `setAllowed`. The parent must not be the child itself or move with it.
+     */
+    attach(child: Instance, parent: Instance): void {
+        const [first, second] = [this.#number(child, "child"), this.#number(parent, "parent")];
+        this.#call((scene) => scene.attach(first, second));
+    }
+
+    /** Detaches an instance from its parent, if it has one. It stays where it is. */
+    detach(child: Instance): void {
+        const number = this.#number(child, "child");
+        this.#call((scene) => scene.detach(number));
+    }
+
+    /** Returns what an instance is attached to, or `undefined`. */
+    parent(child: Instance): number | undefined {
+        const number = this.#number(child, "child");
+        return this.#call((scene) => scene.parent(number));
+    }
+
+    /** Removes an instance, and forgets which of its contacts were allowed. What is attached to it stays where it is. */
     remove(id: Instance): void {
         const number = this.#number(id, "id");
         this.#call((scene) => scene.remove(number));
     }
 
-    /** Moves an instance. */
+    /** Moves an instance, and those that are attached to it. */
     setPose(id: Instance, pose: Numbers): void {
         this.setPoses([id], onePose(pose));
     }
 
-    /** Moves N instances. If an instance is given twice, the last pose counts. If an argument is wrong, none moves. */
+    /** Moves N instances, and those that are attached to them and not given. If an instance is given twice, the last pose
+     * counts. If an argument is wrong, none moves. */
     setPoses(ids: readonly Instance[] | Integers, poses: Numbers): void {
         const [numbers, array] = [this.#numbers(ids, "ids"), floats(poses, "poses")];
         this.#call((scene) => scene.setPoses(numbers, array));

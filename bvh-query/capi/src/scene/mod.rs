@@ -1,4 +1,7 @@
 //! Scenes: many placed meshes.
+//!
+//! A question is about the scene as it is when the question begins: it takes a snapshot, and runs without any lock. So threads
+//! may ask while others change the scene, and nobody waits for a question. No function of the caller is called with the lock.
 
 mod questions;
 
@@ -10,53 +13,95 @@ use crate::mesh::check_regular;
 use crate::output::{self, List, One};
 use crate::poses;
 use crate::status::{Failure, Status};
-use crate::table::{Exclusive, Kind, Table};
+use crate::table::{Kind, Table};
 use crate::types::{self, Instance, MeshHandle, PoseRows, SceneHandle, StatsRow};
-use bvh_query::{Bvh, Groups, InstanceId, Scene};
+use bvh_query::{Bvh, Groups, InstanceId, QueryStats, Scene, SceneShape};
 use std::ffi::c_char;
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// All scenes that are open.
-static SCENES: Table<Exclusive<Asked>> = Table::new(Kind::Scene);
+static SCENES: Table<Arc<Mutex<Asked>>> = Table::new(Kind::Scene);
 
 /// What the handle of a scene stands for.
-#[derive(Clone)]
 struct Asked {
     scene: Scene,
     /// Whether questions may use all cores, where they are not asked by a function of the caller.
     parallel: bool,
+    /// How much work the question that ended last took, and how many pairs it was about.
+    stats: (QueryStats, u64),
+    /// Scenes that ask no question now. They hold what they remember of earlier ones, and no instances.
+    idle: Vec<Scene>,
+    /// A scene without instances, of the same backend.
+    empty: Scene,
 }
 
-/// Makes a scene, and hands it out.
+/// Makes a scene and another one of the same backend without instances, and hands the first out.
 ///
 /// # Safety
 /// As for `hand_out`.
-unsafe fn make(scene: *mut SceneHandle, make: impl FnOnce() -> Result<Scene, Failure>) -> i32 {
-    let made = || Ok(Exclusive::new(Asked { scene: make()?, parallel: false }));
+unsafe fn make(scene: *mut SceneHandle, make: impl FnOnce() -> Result<[Scene; 2], Failure>) -> i32 {
+    let made = || {
+        let [scene, empty] = make()?;
+        let (parallel, stats, idle) = (false, Default::default(), Vec::new());
+        Ok(Arc::new(Mutex::new(Asked { scene, parallel, stats, idle, empty })))
+    };
     // SAFETY: the caller vouches for it.
     unsafe { hand_out(("scene", scene), &SCENES, made) }
 }
 
-/// Does something with a scene that nobody uses.
-pub(crate) fn with(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
-    entry(|| change(scene, act))
+/// Locks a scene for a moment.
+fn locked(shared: &Mutex<Asked>) -> Result<MutexGuard<'_, Asked>, Failure> {
+    let ended = "scene: a defect of cbvh ended its last use; free it, and make another one";
+    shared.lock().map_err(|_| Failure::new(Status::Internal, ended.to_owned()))
 }
 
-fn change<R>(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<R, Failure>) -> Result<R, Failure> {
-    SCENES.hold("scene", scene.id, |asked| {
-        asked.scene.set_parallel(asked.parallel && cores::may_use_all());
-        act(&mut asked.scene)
+/// Looks at a scene or changes it.
+fn with<R>(scene: SceneHandle, act: impl FnOnce(&mut Asked) -> Result<R, Failure>) -> Result<R, Failure> {
+    let shared = SCENES.share("scene", scene.id)?;
+    let mut asked = locked(&shared)?;
+    act(&mut asked)
+}
+
+/// Looks at a scene or changes it. What `act` returns is dropped without the lock.
+fn see<R>(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<R, Failure>) -> i32 {
+    entry(|| with(scene, |asked| act(&mut asked.scene)).map(drop))
+}
+
+/// Asks a question about a scene as it is now.
+pub(crate) fn ask(scene: SceneHandle, ask: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
+    entry(|| {
+        let shared = SCENES.share("scene", scene.id)?;
+        let (mut own, empty) = {
+            let asked = &mut *locked(&shared)?;
+            let snapshot = asked.scene.snapshot();
+            let mut own = asked.idle.pop().unwrap_or_else(|| snapshot.clone());
+            own.clone_from(&snapshot);
+            own.set_parallel(asked.parallel && cores::may_use_all());
+            (own, asked.empty.clone())
+        };
+        let answer = ask(&mut own);
+        let stats = (own.stats(), own.pairs_asked());
+        own.clone_from(&empty);
+        let mut asked = locked(&shared)?;
+        asked.stats = stats;
+        asked.idle.push(own);
+        answer
     })
-}
-
-/// Looks at a scene that nobody changes: many threads may do it at the same time.
-fn see(scene: SceneHandle, act: impl FnOnce(&Scene) -> Result<(), Failure>) -> i32 {
-    entry(|| SCENES.see("scene", scene.id, |asked| act(&asked.scene)))
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_new(backend: i32, scene: *mut SceneHandle) -> i32 {
     // SAFETY: the header asks for it.
-    unsafe { make(scene, || Ok(Scene::with_backend(types::backend("backend", backend)?))) }
+    unsafe {
+        make(scene, || {
+            let empty = Scene::with_backend(types::backend("backend", backend)?);
+            Ok([empty.clone(), empty])
+        })
+    }
+}
+
+fn of_file(bvh: Bvh) -> Result<[Scene; 2], Failure> {
+    Ok([Scene::of_file(bvh)?, Scene::new()?])
 }
 
 #[unsafe(no_mangle)]
@@ -66,8 +111,7 @@ pub unsafe extern "C" fn cbvh_scene_open(path: *const c_char, scene: *mut SceneH
         make(scene, || {
             let file = input::path("path", path)?;
             check_regular(&file)?;
-            Scene::of_file(Bvh::map(&file)?)
-                .map_err(|error| Failure::from(error).at(file.display().to_string()))
+            of_file(Bvh::map(&file)?).map_err(|error| error.at(file.display().to_string()))
         })
     }
 }
@@ -76,7 +120,7 @@ pub unsafe extern "C" fn cbvh_scene_open(path: *const c_char, scene: *mut SceneH
 pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneHandle) -> i32 {
     let made = || {
         let bvh = MESHES.share("mesh", mesh.id)?.bvh().clone();
-        Scene::of_file(bvh).map_err(|error| Failure::from(error).at("mesh"))
+        of_file(bvh).map_err(|error| error.at("mesh"))
     };
     // SAFETY: the header asks for it.
     unsafe { make(scene, made) }
@@ -84,20 +128,26 @@ pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneH
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_clone(scene: SceneHandle, other: *mut SceneHandle) -> i32 {
-    let copy = || SCENES.see("scene", scene.id, |asked| Ok(Exclusive::new(asked.clone())));
+    let copy = || {
+        with(scene, |asked| {
+            let (scene, empty) = (asked.scene.clone(), asked.empty.clone());
+            let (parallel, stats, idle) = (asked.parallel, asked.stats, Vec::new());
+            Ok(Arc::new(Mutex::new(Asked { scene, parallel, stats, idle, empty })))
+        })
+    };
     // SAFETY: the header asks for it.
     unsafe { hand_out(("other", other), &SCENES, copy) }
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_free(scene: SceneHandle) -> i32 {
-    entry(|| SCENES.free_unused("scene", scene.id))
+    entry(|| SCENES.free("scene", scene.id))
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> i32 {
     entry(|| {
-        SCENES.hold("scene", scene.id, |asked| {
+        with(scene, |asked| {
             asked.parallel = flag("parallel", parallel)?;
             Ok(())
         })
@@ -106,7 +156,7 @@ pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> 
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_tracking(scene: SceneHandle, tracking: i32) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         scene.set_tracking(flag("tracking", tracking)?);
         Ok(())
     })
@@ -114,7 +164,7 @@ pub extern "C" fn cbvh_scene_set_tracking(scene: SceneHandle, tracking: i32) -> 
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_budget(scene: SceneHandle, visits: u64) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         scene.set_budget(visits);
         Ok(())
     })
@@ -135,12 +185,14 @@ pub unsafe extern "C" fn cbvh_scene_add(
             (out, poses::read("world", world), optional(name, |name| Ok(text("name", name)?.to_owned())))
         };
         out.iter_mut().for_each(|out| out.set(Instance { id: 0 }));
-        let id = change(scene, |scene| {
-            let shape = MESHES.share("mesh", mesh.id)?;
-            let (world, name) = (world?, name?);
+        // The scene is checked before the mesh, and the mesh is let go without the lock if it is refused.
+        SCENES.share("scene", scene.id)?;
+        let shape = MESHES.share("mesh", mesh.id)?;
+        let (world, name) = (world?, name?);
+        let id = with(scene, |asked| {
             Ok(match name {
-                Some(name) => scene.add_named(&name, shape, world)?,
-                None => scene.add(shape, world)?,
+                Some(name) => asked.scene.add_named(&name, shape.clone(), world)?,
+                None => asked.scene.add(shape.clone(), world)?,
             })
         })?;
         out.iter_mut().for_each(|out| out.set(id.into()));
@@ -150,7 +202,59 @@ pub unsafe extern "C" fn cbvh_scene_add(
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_remove(scene: SceneHandle, instance: Instance) -> i32 {
-    with(scene, |scene| Ok(scene.remove(instance.into())?))
+    see(scene, |scene| {
+        let held = held(scene, instance)?;
+        scene.remove(instance.into())?;
+        Ok(held)
+    })
+}
+
+/// Returns what an instance holds, to be let go without the lock.
+fn held(scene: &Scene, instance: Instance) -> Result<SceneShape, Failure> {
+    Ok(scene.shape(instance.into())?.clone())
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_set_mesh(scene: SceneHandle, instance: Instance, mesh: MeshHandle) -> i32 {
+    entry(|| {
+        SCENES.share("scene", scene.id)?;
+        let shape = MESHES.share("mesh", mesh.id)?;
+        let held = with(scene, |asked| {
+            let held = held(&asked.scene, instance)?;
+            asked.scene.set_shape(instance.into(), shape.clone())?;
+            Ok(held)
+        })?;
+        drop(held);
+        Ok(())
+    })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_attach(scene: SceneHandle, child: Instance, parent: Instance) -> i32 {
+    see(scene, |scene| Ok(scene.attach(child.into(), parent.into())?))
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_scene_detach(scene: SceneHandle, child: Instance) -> i32 {
+    see(scene, |scene| Ok(scene.detach(child.into())?))
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_scene_parent(
+    scene: SceneHandle,
+    child: Instance,
+    parent: *mut Instance,
+) -> i32 {
+    see(scene, |scene| {
+        // SAFETY: the header asks for it.
+        let mut out = unsafe { One::new("parent", parent)? };
+        let found = scene.parent(child.into())?.ok_or_else(|| {
+            let found = format!("child: expected an attached instance, found {}", child.id);
+            Failure::new(Status::NotFound, found)
+        })?;
+        out.set(found.0.into());
+        Ok(())
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -160,7 +264,7 @@ pub unsafe extern "C" fn cbvh_scene_set_poses(
     worlds: *const PoseRows,
     count: usize,
 ) -> i32 {
-    with(scene, |scene| {
+    see(scene, |scene| {
         let mut to = Vec::new();
         // SAFETY: the header asks for it.
         let instances = unsafe {
@@ -180,17 +284,17 @@ pub extern "C" fn cbvh_scene_set_groups(
     member: u32,
     meets: u32,
 ) -> i32 {
-    with(scene, |scene| Ok(scene.set_groups(instance.into(), Groups { member, meets })?))
+    see(scene, |scene| Ok(scene.set_groups(instance.into(), Groups { member, meets })?))
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_allowed(scene: SceneHandle, a: Instance, b: Instance, allowed: i32) -> i32 {
-    with(scene, |scene| Ok(scene.set_allowed(a.into(), b.into(), flag("allowed", allowed)?)?))
+    see(scene, |scene| Ok(scene.set_allowed(a.into(), b.into(), flag("allowed", allowed)?)?))
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_margin(scene: SceneHandle, instance: Instance, margin: f64) -> i32 {
-    with(scene, |scene| Ok(scene.set_margin(instance.into(), margin)?))
+    see(scene, |scene| Ok(scene.set_margin(instance.into(), margin)?))
 }
 
 #[unsafe(no_mangle)]
@@ -200,7 +304,7 @@ pub extern "C" fn cbvh_scene_set_pair_margin(
     b: Instance,
     margin: f64,
 ) -> i32 {
-    with(scene, |scene| Ok(scene.set_pair_margin(a.into(), b.into(), margin)?))
+    see(scene, |scene| Ok(scene.set_pair_margin(a.into(), b.into(), margin)?))
 }
 
 #[unsafe(no_mangle)]
@@ -266,7 +370,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     instance: Instance,
     mesh: *mut MeshHandle,
 ) -> i32 {
-    let found = || SCENES.see("scene", scene.id, |asked| Ok(asked.scene.shape(instance.into())?.opened()?));
+    let found = || Ok(with(scene, |asked| held(&asked.scene, instance))?.opened()?);
     // SAFETY: the header asks for it.
     unsafe { hand_out(("mesh", mesh), &MESHES, found) }
 }
@@ -295,7 +399,8 @@ pub unsafe extern "C" fn cbvh_scene_pair_margin(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_stats(scene: SceneHandle, stats: *mut StatsRow) -> i32 {
     // SAFETY: the header asks for it.
-    see(scene, |scene| unsafe {
-        write("stats", stats, || Ok(StatsRow::new(scene.stats(), scene.pairs_asked())))
-    })
+    let out = |asked: &mut Asked| unsafe {
+        write("stats", stats, || Ok(StatsRow::new(asked.stats.0, asked.stats.1)))
+    };
+    entry(|| with(scene, out))
 }

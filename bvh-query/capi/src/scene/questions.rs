@@ -1,6 +1,6 @@
 //! Questions about all pairs of a scene, in poses and on ways.
 
-use super::with;
+use super::ask as ask_scene;
 use crate::entry::write;
 use crate::input::{array, options, reserve};
 use crate::output::{List, One};
@@ -22,7 +22,7 @@ unsafe fn one<T: Into<R>, R: Copy>(
     ask: impl FnOnce(&mut Scene) -> Result<T, SceneError>,
 ) -> i32 {
     // SAFETY: the caller vouches for it.
-    with(scene, |scene| unsafe { write("answer", answer, || Ok(ask(scene)?.into())) })
+    ask_scene(scene, |scene| unsafe { write("answer", answer, || Ok(ask(scene)?.into())) })
 }
 
 #[unsafe(no_mangle)]
@@ -52,7 +52,7 @@ unsafe fn list<T: Into<R>, R: Copy>(
     (name, rows, capacity, count): (&'static str, *mut R, usize, *mut usize),
     ask: impl FnOnce(&mut Scene) -> Result<Vec<T>, SceneError>,
 ) -> i32 {
-    with(scene, |scene| {
+    ask_scene(scene, |scene| {
         // SAFETY: the caller vouches for it.
         let mut list = unsafe { List::new(name, rows, capacity, count) }?;
         list.add(ask(scene)?);
@@ -112,7 +112,7 @@ unsafe fn on_ways<T: Into<R>, R: Copy>(
         &MotionOptions,
     ) -> Result<T, SceneError>,
 ) -> i32 {
-    with(scene, |scene| {
+    ask_scene(scene, |scene| {
         // SAFETY: the caller vouches for it.
         let (instances, paths, options, mut out) = unsafe {
             (
