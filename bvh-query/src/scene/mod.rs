@@ -33,7 +33,6 @@ use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::answers::QueryStats;
-use attachments::Attached;
 use contents::{Contents, check_world};
 use instance::Instance;
 use std::sync::Arc;
@@ -346,102 +345,6 @@ impl Scene {
             self.contents_mut().carry_out(moves);
         }
         Ok(())
-    }
-
-    /// Attaches an instance to a parent, with which it moves from then on: a part to the gripper that holds it. If it was
-    /// attached to another parent, it no longer is. What is attached to it moves with it.
-    ///
-    /// The scene keeps the pose of the child in the parent's frame. From then on, the pose of the child in the world is
-    /// always `kept.then(&parent)`, computed once from these two, so that nothing adds up over many moves, and equal
-    /// poses of the parent give equal poses of the child, to the bit. This holds from the start: attaching moves the
-    /// child by the rounding of this formula. The kept rotation is orthonormal to within 2^-40, if need be by
-    /// [`Pose::nearest`]. So if rotations were rounded to `f32`, the child also turns by about as much as they are off, at
-    /// most some 2^-21 radians.
-    ///
-    /// [`Scene::set_pose`] for the child changes the pose that is kept, and its pose in the world is that given, but for
-    /// rounding. In a motion ([`Scene::motion`]), the child follows the path of its parent, unless it is given a path of
-    /// its own. Permissions to touch do not change. A gripper usually touches what it holds, so allow this pair with
-    /// [`Scene::set_allowed`], and forbid it again after [`Scene::detach`].
-    ///
-    /// Cost: some 0.12 us for each instance that moves.
-    ///
-    /// # Errors
-    /// [`InstanceError::NoInstance`]; [`InstanceError::Cycle`] if the parent is the child itself or moves with it; and
-    /// [`InstanceError::Pose`] if the child, within rounding, or one that follows it has no valid pose. Then nothing has
-    /// changed.
-    ///
-    /// ```
-    /// use bvh_query::{Bvh, Pose, Scene};
-    ///
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
-    /// # let bvh = Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?.0)?;
-    /// let at = |height: f64| Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, height]);
-    /// let mut scene = Scene::new()?;
-    /// let gripper = scene.add(bvh.clone(), at(2.0)?)?;
-    /// let part = scene.add(bvh, at(1.5)?)?;
-    /// scene.attach(part, gripper)?;
-    /// scene.set_allowed(part, gripper, true)?;
-    /// scene.set_pose(gripper, at(7.0)?)?;
-    /// assert_eq!(scene.pose(part)?.translation(), [0.0, 0.0, 6.5]);
-    /// scene.detach(part)?;
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn attach(&mut self, child: InstanceId, parent: InstanceId) -> Result<(), InstanceError> {
-        let kept = self.instance(parent)?.world.kept_of_attached(&self.instance(child)?.world);
-        self.attach_at(child, parent, kept)
-    }
-
-    /// Attaches an instance to a parent, as [`Scene::attach`] does, at a pose in the parent's frame: the child moves there. A
-    /// rotation that is farther than 2^-40 from orthonormal is orthonormalised.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::attach`].
-    pub fn attach_at(
-        &mut self,
-        child: InstanceId,
-        parent: InstanceId,
-        kept: Pose,
-    ) -> Result<(), InstanceError> {
-        let (own, above) = (self.place(child)? as u32, self.place(parent)? as u32);
-        if self.contents.moves_with(above, own) {
-            let (child, parent) = (self.contents.label(child), self.contents.label(parent));
-            return Err(InstanceError::Cycle { child, parent });
-        }
-        let to = Attached { parent: above, kept: kept.to_keep() };
-        let before = self.contents_mut().attach(own, Some(to));
-        match self.contents.moves_of(own) {
-            Ok(moves) => self.contents_mut().carry_out(moves),
-            Err(refused) => {
-                self.contents_mut().attach(own, before);
-                return Err(refused);
-            }
-        }
-        Ok(())
-    }
-
-    /// Detaches an instance from its parent, if it has one. It stays where it is.
-    ///
-    /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn detach(&mut self, child: InstanceId) -> Result<(), InstanceError> {
-        self.place(child)?;
-        if self.contents.attached(child.place).is_some() {
-            self.contents_mut().attach(child.place, None);
-        }
-        Ok(())
-    }
-
-    /// Returns the instance that an instance is attached to, if it is, and its pose in the frame of that one.
-    ///
-    /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn parent(&self, child: InstanceId) -> Result<Option<(InstanceId, &Pose)>, InstanceError> {
-        self.place(child)?;
-        let attached = self.contents.attached(child.place);
-        Ok(attached.and_then(|attached| Some((self.contents.id_at(attached.parent)?, &attached.kept))))
     }
 
     /// Updates what the next question would update first, and returns a clone: the scene as it is now. Questions about

@@ -29,9 +29,9 @@ exactly. Touching is contact, and meshes are surfaces, unless they are made soli
 `ground` make meshes of simple shapes, and `Mesh.rounded` gives any mesh a radius.
 
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
-``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. Questions about
-one `Scene` wait for each other, and a path of your own is called on the thread of its question. Arrays are copied
-before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
+``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. A question is
+about a `Scene` as it is when the question begins, and a path of your own is called on the thread of its question. Arrays
+are copied before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
 enables the lock when it imports this module.
 
 Errors are exceptions: ``ValueError`` for invalid arguments, ``TypeError`` for arguments of a wrong type, ``KeyError``
