@@ -176,17 +176,17 @@ static void lookers(void) {
 
 /* Threads that ask while another one swaps the mesh of an instance back and forth. */
 static cbvh_scene swapped;
-static cbvh_scene_contact both[2][400];
+static cbvh_scene_contact both[2][500];
 static size_t counts_of[2];
 static int is_over, seen[2];
 
 static void *ask_swapped(void *unused) {
     static const cbvh_scene_contact nothing;
     while (!__atomic_load_n(&is_over, __ATOMIC_RELAXED)) {
-        cbvh_scene_contact found[400];
+        cbvh_scene_contact found[500];
         size_t count;
         memset(found, 0, sizeof found);
-        OK(cbvh_scene_contacts(swapped, found, 400, &count));
+        OK(cbvh_scene_contacts(swapped, found, 500, &count));
         const int which = count != counts_of[0];
         CHECK(count == counts_of[which] && memcmp(found, both[which], count * sizeof nothing) == 0);
         __atomic_fetch_add(&seen[which], 1, __ATOMIC_RELAXED);
@@ -208,7 +208,7 @@ static void swaps(void) {
     OK(cbvh_scene_add(swapped, mesh, &here, "swapped", &one));
     for (int k = 1; k >= 0; k--) {
         OK(cbvh_scene_set_mesh(swapped, one, meshes[k]));
-        OK(cbvh_scene_contacts(swapped, both[k], 400, &counts_of[k]));
+        OK(cbvh_scene_contacts(swapped, both[k], 500, &counts_of[k]));
     }
     CHECK(counts_of[0] != counts_of[1] && counts_of[0] > 0);
     for (int k = 0; k < THREADS; k++) {
