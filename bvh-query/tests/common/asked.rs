@@ -30,7 +30,8 @@ pub(crate) struct Answers {
 pub(crate) const MAX_CONTACTS: usize = 20_000;
 
 impl Answers {
-    /// Returns an error that refuses a file, if there is one. That a file does not state what is closed is no refusal.
+    /// Returns an error that refuses a file, if there is one. That a file does not state what is closed is no refusal, and nor is
+    /// that a question has no answer for a radius.
     pub(crate) fn refusal(&self) -> Option<&QueryError> {
         let errors = [
             self.collide.as_ref().err(),
@@ -43,7 +44,10 @@ impl Answers {
             self.hits.as_ref().err(),
             self.segment.as_ref().err(),
         ];
-        errors.into_iter().flatten().find(|error| **error != QueryError::NoTopology)
+        errors
+            .into_iter()
+            .flatten()
+            .find(|error| !matches!(error, QueryError::NoTopology | QueryError::Rounded))
     }
 
     /// Returns whether any answer was refused.
@@ -105,7 +109,7 @@ pub(crate) fn ask(querier: &mut Querier, bytes: &[u8], good: &Bvh, pose: &Pose) 
 /// Returns the valid files to damage: the golden ones, and one of several pages.
 pub(crate) fn victims() -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata");
-    let golden = ["plain", "everything", "profiles"].map(|name| format!("ok-{name}.cbvh"));
+    let golden = ["plain", "everything", "profiles", "points"].map(|name| format!("ok-{name}.cbvh"));
     let mut files: Vec<_> =
         golden.into_iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect();
     for profile in [Profile::Dop26U4, Profile::Dop6F16, Profile::Dop14F32] {
