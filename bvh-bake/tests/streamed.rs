@@ -129,7 +129,7 @@ fn long_files_bake_alike() {
 #[test]
 fn bad_files_are_told_alike() {
     let folder = Folder::new();
-    let cases: [(&str, &str); 26] = [
+    let cases: [(&str, &str); 29] = [
         ("a.obj", ""),
         ("a.obj", "v 0 0 0\n"),
         ("a.obj", "v 0 0\nf 1 1 1"),
