@@ -53,7 +53,7 @@ fn options(given: &JsValue) -> Answer<Options> {
 }
 
 /// Bakes a mesh, and calls `onStage` with the name of each stage. An exception thrown there is thrown again after the bake.
-fn bake_mesh(mesh: &Triangles, given: &JsValue) -> Result<Mesh, JsValue> {
+pub(crate) fn bake_mesh(mesh: &Triangles, given: &JsValue) -> Result<Mesh, JsValue> {
     let options = options(given)?;
     let told = Reflect::get(given, &"onStage".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
     let mut thrown = Ok(());

@@ -16,3 +16,4 @@ mod poses;
 mod probes;
 mod scene;
 mod scene_questions;
+mod shapes;

@@ -244,6 +244,17 @@ export const cases = {
         equal([...two.sides([2, 0, 0, 1, 1, 1, 3, 0, 0])], [cbvh.Side.ON, cbvh.Side.INSIDE, cbvh.Side.OUTSIDE]);
         equal(two.anyHits([-5, 0, 0, -5, 2, 0, -5, 2.5, 0], [1, 0, 0, 1, 0, 0, 1, 0, 0]), [1, 1, 0]);
         ok(/all_hits/.test(refused(() => two.allHits([-5, 0, 0], [1, 0, 0]))), "why not");
+        const pipe = cbvh.cylinder(1, 4);
+        ok(Math.abs(pipe.distance(cbvh.sphere(0.5), at(3, 0, 0)).distance - 1.5) < 0.003, "a cylinder");
+        equal([pipe.isSolid, pipe.collide(cbvh.sphere(0.1), at(0.2, 0, 1))], [true, true]);
+        ok(cbvh.cylinder(1, 4, 0.1).triangleCount < pipe.triangleCount, "a coarser cylinder");
+        ok(Math.abs(cbvh.cone(1, 2).distance(cbvh.sphere(0.5), at(0, 0, 4)).distance - 1.5) < 1e-6, "a cone");
+        equal(cbvh.ground().distance(cbvh.sphere(0.5), at(40, -30, 2)).distance, 1.5);
+        equal([...cbvh.ground([2, 4], 3).bounds], [-1, -2, -3, 1, 2, 0]);
+        equal(cbvh.heightField([0, 0, 0, 0, 0, 1], 3, [1, 2]).triangleCount, 4);
+        ok(/most_error/.test(refused(() => cbvh.cylinder(1, 1, 1e-12))), "errors");
+        ok(/columns/.test(refused(() => cbvh.heightField([0, 0, 0, 0], 1.5, [1, 1]))), "columns");
+        ok(/sides/.test(refused(() => cbvh.ground([1, Infinity]))), "endless grounds");
         const box = cbvh.box([2, 2, 2], 0.25);
         ok(box.isSolid && box.collide(cbvh.sphere(0), at(0.5, 0, 0)), "what is inside a solid");
         ok(!cubeOf(cbvh).collide(cbvh.sphere(0), at(0.5, 0, 0)), "what is inside a surface");

@@ -28,4 +28,4 @@ export { Motion } from "./motion.js";
 export { IDENTITY, nearestPose, pose, relative } from "./poses.js";
 export type { Instance, InstanceOptions } from "./scene.js";
 export { Scene } from "./scene.js";
-export { box, capsule, cloud, sphere } from "./shapes.js";
+export { box, capsule, cloud, cone, cylinder, ground, heightField, sphere } from "./shapes.js";

@@ -146,6 +146,11 @@ export class Mesh extends Handle<raw.Mesh> {
         return new Mesh(call(() => raw.bake(points, corners, chosen)));
     }
 
+    /** @internal Bakes a shape of the library, from its numbers and a list of further ones. */
+    static bakeShape(kind: string, numbers: number[], list: Float64Array = new Float64Array()): Mesh {
+        return new Mesh(call(() => raw.bakeShape(kind, Float64Array.from(numbers), list)));
+    }
+
     /**
      * Bakes the bytes of a mesh file. All its objects become one.
      *
