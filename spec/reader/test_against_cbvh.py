@@ -234,12 +234,12 @@ class AgainstCbvh(unittest.TestCase):
             self.assertEqual(facts["closed"], bool(topology.closed) if topology else None)
             for field in (
                 *("input_triangles", "triangles", "degenerate", "duplicates", "treelets", "packets", "first_page"),
-                *("pages", "max_vertex_rounding", "max_quantization_error"),
+                *("pages", "max_vertex_rounding", "max_quantization_error", "radius", "solid"),
             ):
                 self.assertEqual(facts[field], getattr(one, field), field)
         instances = [
-            {field: getattr(one, field) for field in ("number", "name", "object", "member", "meets")}
-            | {"rotation": one.rows(), "translation": one.translation.tolist()}
+            {field: getattr(one, field) for field in ("number", "name", "object", "member", "meets", "margin")}
+            | {"solid": bool(one.solid), "rotation": one.rows(), "translation": one.translation.tolist()}
             for one in file.instances
         ]
         self.assertEqual(dumped["instances"], instances)
