@@ -73,6 +73,7 @@ pub mod page;
 pub mod profile;
 pub mod quantize;
 pub mod realign;
+pub mod restate;
 mod rule;
 pub mod slabs;
 pub mod source;

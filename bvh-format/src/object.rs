@@ -17,7 +17,7 @@ pub const F16_EXPONENTS: std::ops::RangeInclusive<i32> = -125..=112;
 /// The largest radius of a shape and the largest margin of an instance: 2^118 mesh units.
 pub const MAX_RADIUS: f64 = (1u128 << 118) as f64;
 /// The number of bytes before the first record.
-const TABLE_HEAD: usize = 16;
+pub(crate) const TABLE_HEAD: usize = 16;
 
 /// The record of an object as stored. Lengths are in mesh units, and coordinates are relative to `origin`.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]

@@ -643,3 +643,30 @@ fn clouds_are_inside_solids_where_a_point_is() {
         assert!(inside > 20 && outside > 20, "{inside} {outside}");
     }
 }
+
+/// The bytes of a rounded shape are those of a bake with that radius.
+#[test]
+fn bytes_state_the_radius_and_the_solidity() {
+    let bake = |options: bvh_bake::Options| {
+        let mut mesh = bvh_bake::shapes::block([1.0, 2.0, 3.0]).unwrap();
+        mesh.objects.extend(bvh_bake::shapes::block([2.0; 3]).unwrap().objects);
+        mesh.objects[1].triangle_ids = (12..24).collect();
+        bvh_bake::to_bytes(&mesh, &options.split_objects(true)).unwrap().0
+    };
+    let plain = bvh_query::OwnedShape::from(Bvh::from_bytes(bake(bvh_bake::Options::default())).unwrap());
+    assert!(matches!(plain.bytes(), std::borrow::Cow::Borrowed(_)));
+    let rounded = plain.clone().rounded(0.25).unwrap();
+    assert_eq!(rounded.bytes(), bake(bvh_bake::Options::default().radius(0.25)));
+    let solid = rounded.solid().unwrap();
+    assert_eq!(solid.bytes(), bake(bvh_bake::Options::default().radius(0.25).solid(true)));
+    let again = bvh_query::OwnedShape::from(Bvh::from_bytes(solid.bytes().into_owned()).unwrap());
+    assert_eq!((again.shape().radius(), again.shape().is_solid()), (0.25, true));
+    assert_eq!(again.rounded(0.0).unwrap().bytes(), bake(bvh_bake::Options::default().solid(true)));
+    // A file with an open object has no solids, though one of its objects may be one.
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-topology.cbvh");
+    let mixed = Bvh::read(folder).unwrap();
+    let one = bvh_query::OwnedShape::object(mixed, 0).unwrap().rounded(0.5).unwrap().solid().unwrap();
+    let saved = Bvh::from_bytes(one.bytes().into_owned()).unwrap();
+    saved.validate().unwrap();
+    assert_eq!((saved.all().radius(), saved.all().is_solid()), (0.5, false));
+}

@@ -199,9 +199,10 @@ cbvh_status cbvh_mesh_triangle_count(cbvh_mesh mesh, uint64_t *count);
  * triangles are stored once. */
 cbvh_status cbvh_mesh_duplicates(cbvh_mesh mesh, uint32_t triangle, uint32_t *triangles, size_t capacity,
                                  size_t *count);
-/* Writes the bytes of the file that a mesh is in, and how many there are. Neither a radius nor solidity is in them. */
+/* Writes the bytes of the file that a mesh is in, and how many there are. They state the mesh's radius, and that it is solid
+ * if all objects of the file are closed. */
 cbvh_status cbvh_mesh_bytes(cbvh_mesh mesh, void *buffer, size_t capacity, size_t *size);
-/* Writes a mesh to a file, completely or not at all: it writes another file, which then replaces the first. Anything
+/* Writes these bytes to a file, completely or not at all: it writes another file, which then replaces the first. Anything
  * under this name is replaced, also a symbolic link. */
 cbvh_status cbvh_mesh_save(cbvh_mesh mesh, const char *path);
 /* Checks the whole file of a mesh, which is read once. CBVH_DAMAGED, with the first rule that the file breaks. */

@@ -578,7 +578,7 @@ static void rounded(void) {
     OK(cbvh_mesh_bytes(two, bytes, sizeof bytes, &size));
     OK(cbvh_mesh_from_bytes(bytes, size, &again));
     OK(cbvh_mesh_radius(again, &radius));
-    CHECK(radius == 0);
+    CHECK(radius == 2);
     OK(cbvh_mesh_free(again));
     /* Points on all sides of a ball, and rays through it, past it and along it. */
     const double points[9] = {1, 0, 0, 2, 0, 0, 5, 0, 0};
@@ -774,14 +774,24 @@ static void margins(void) {
     OK(cbvh_scene_free(copy));
 }
 
-/* A radius and solidity that a file states are those of the mesh. */
-static void stated_radius(void) {
+/* A radius and solidity that a file states are those of the mesh, and are saved. */
+static void stated_radius(const char *folder) {
     cbvh_mesh mesh;
     const cbvh_bake_options options = {.size = sizeof options, .solid = 1, .radius = 0.25};
     OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &options, &mesh));
     double radius = 0;
     OK(cbvh_mesh_radius(mesh, &radius));
     CHECK(radius == 0.25);
+    char output[1000];
+    snprintf(output, sizeof output, "%s/rounded.cbvh", folder);
+    cbvh_mesh rounded, opened;
+    OK(cbvh_mesh_rounded(mesh, 0.5, &rounded));
+    OK(cbvh_mesh_save(rounded, output));
+    OK(cbvh_mesh_open(output, CBVH_READ, &opened));
+    OK(cbvh_mesh_radius(opened, &radius));
+    CHECK(radius == 0.5);
+    OK(cbvh_mesh_free(opened));
+    OK(cbvh_mesh_free(rounded));
     OK(cbvh_mesh_free(mesh));
     const cbvh_bake_options wrong = {.size = sizeof wrong, .radius = -1};
     CHECK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &wrong, &mesh) == CBVH_BAKE_FAILED);
@@ -955,7 +965,7 @@ int main(int count, char **arguments) {
     rounded();
     solids();
     margins();
-    stated_radius();
+    stated_radius(arguments[1]);
     attached();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));

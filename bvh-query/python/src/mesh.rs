@@ -128,12 +128,12 @@ impl Mesh {
 
     /// The bytes of the file.
     fn bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, self.shape.bvh().bytes())
+        PyBytes::new(py, &self.shape.bytes())
     }
 
     /// Writes the bytes to a file that appears complete or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        detached(py, || write_atomically(&path, self.shape.bvh().bytes())).map_err(bake_error)
+        detached(py, || write_atomically(&path, &self.shape.bytes())).map_err(bake_error)
     }
 
     /// The number of bytes of the file.

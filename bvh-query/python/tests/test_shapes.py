@@ -56,6 +56,9 @@ class Shapes(unittest.TestCase):
                 file.write("0 0 0\n3 0 0\n3 0 0\n")
             dots = cbvh.bake_files(points, output, radius=0.5)
             self.assertEqual((dots.triangle_count, dots.radius, cbvh.open(output).radius), (3, 0.5, 0.5))
+            cbvh.box((2, 2, 2), rounding=0.5).save(output)
+            self.assertEqual((cbvh.open(output).radius, cbvh.open(output).is_solid), (0.5, True))
+            self.assertEqual(cbvh.Mesh.from_bytes(cbvh.sphere(2).tobytes()).radius, 2)
             with self.assertRaisesRegex(cbvh.BakeError, "closed surface"):
                 cbvh.bake([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], solid=True)
         for wrong in (-1, np.nan, np.inf, 1e40):

@@ -3,6 +3,8 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::shape::{Shape, check_radius, rounding};
+use bvh_format::restate::with_rounding;
+use std::borrow::Cow;
 
 /// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all
 /// objects of a file, a [`Bvh`] is enough. Cloning it copies a pointer. A reference to it converts into a shape, so
@@ -73,6 +75,19 @@ impl OwnedShape {
     /// Returns the shape with a radius and solidity that were checked.
     pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
         Self { radius, is_solid, ..self }
+    }
+
+    /// Returns the bytes of a file that states the radius and the solidity of this shape: the file that it is in, or a copy of
+    /// it that states others for all of its objects. They are solid only if all of them are closed.
+    ///
+    /// Cost: nothing, or that of copying the file.
+    pub fn bytes(&self) -> Cow<'_, [u8]> {
+        let bytes = self.bvh.bytes();
+        let is_solid = self.is_solid && self.bvh.all().solid().is_ok();
+        if rounding(self.bvh.objects()) == (self.radius, is_solid) {
+            return Cow::Borrowed(bytes);
+        }
+        Cow::Owned(with_rounding(bytes, self.bvh.layout(), self.radius, is_solid))
     }
 
     /// Returns the file that the shape is in.

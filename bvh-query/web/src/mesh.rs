@@ -27,7 +27,7 @@ impl Mesh {
 
     /// Copies the bytes of the file.
     pub fn bytes(&self) -> Uint8Array {
-        Uint8Array::from(self.shape.bvh().bytes())
+        Uint8Array::from(&self.shape.bytes()[..])
     }
 
     /// The number of bytes of the file.

@@ -162,7 +162,7 @@ export class Mesh extends Handle<raw.Mesh> {
         return new Mesh(call(() => raw.bakeFile(title, array, chosen)));
     }
 
-    /** Returns a copy of the bytes of the file, to save them. */
+    /** Returns a copy of the bytes of the file, to save them. They state the radius of this mesh, and that it is solid. */
     bytes(): Uint8Array {
         return this.#call((mesh) => mesh.bytes());
     }

@@ -180,7 +180,8 @@ class Mesh:
         return self._mesh.bytes()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the file. A file of that name is replaced when all is written."""
+        """Writes the file, with the radius and the solidity of this mesh. A file of that name is replaced when all is
+        written."""
         self._mesh.save(os.fsdecode(path))
 
     def collide(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
