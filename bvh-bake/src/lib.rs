@@ -69,6 +69,7 @@ pub use bake::files::{FileBake, Outcome, least_memory};
 pub use bake::report::{BakeReport, FileSummary};
 pub use bake::{to_bytes, to_bytes_with};
 pub use bvh_format::leaf::TriangleEncoding;
+pub use bvh_format::object::MAX_RADIUS;
 pub use bvh_format::profile::Profile;
 pub use bvh_format::source::Source;
 pub use bvh_format::{FormatError, Layout};

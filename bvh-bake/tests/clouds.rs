@@ -51,6 +51,17 @@ fn every_point_is_stored_in_every_layout() {
     }
 }
 
+/// More points than a brick holds.
+#[test]
+fn large_clouds_have_several_bricks() {
+    let points = points((1 << 18) + 5000, 8);
+    let cloud = shapes::cloud(&points);
+    let (bytes, report) = to_bytes(&cloud, &Options::default()).unwrap();
+    assert_eq!((report.file.triangles, report.file.duplicates), (points.len() as u64, 0));
+    verify(&bytes, &cloud).unwrap();
+    assert_eq!(bytes, to_bytes(&cloud, &Options::default().effort(bvh_bake::Effort::Fast)).unwrap().0);
+}
+
 /// A cloud has no boundary. Up to 64 points are listed as components, and more are not.
 #[test]
 fn clouds_are_closed() {

@@ -1,9 +1,10 @@
 //! Leaf packets of up to four triangles in lane order, and the block of all packets of a page.
 //!
-//! A block has one of two forms. `F32` holds plain lanes, 144 bytes per packet: corner by corner, axis by axis, four
+//! A block has one of three forms. `F32` holds plain lanes, 144 bytes per packet: corner by corner, axis by axis, four
 //! lanes. `Packed` holds each distinct vertex of the page once, and states for each packet which vertices its corners
-//! are, unless all of them are points: see [`PackedHead`]. `Quantized` has the same form, after the baker has moved the vertices to a grid. Lanes
-//! beyond a packet's triangles repeat its last triangle. A block fills whole lines of 64 bytes.
+//! are; if all packets hold points, it holds their vertices and states nothing: see [`PackedHead`]. `Quantized` has the same
+//! forms as `Packed`, after the baker has moved the vertices to a grid. Lanes beyond a packet's triangles repeat its last
+//! triangle. A block fills whole lines of 64 bytes.
 
 mod encode;
 mod packed;

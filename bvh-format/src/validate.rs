@@ -13,6 +13,7 @@ use crate::decode::decode_page;
 use crate::error::{FormatError, ensure, require};
 use crate::header::SectionKind;
 use crate::ids::decode_id;
+use crate::instances::Instance;
 use crate::layout::{ContentHasher, Layout, PairsInOrder};
 use crate::leaf::{PackedHead, Packet, TriangleEncoding, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
@@ -129,16 +130,30 @@ pub fn check_sections<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result
     duplicates.map_or(Ok(()), |section| pairs.check(section))?;
     let instances = layout.read_instances(source)?;
     let topology = layout.check_topology(source)?;
-    let is_closed = |object: usize| topology.get(object).is_some_and(|topology| topology.closed);
-    let mut solids =
-        (0..).zip(&layout.objects).filter(|(_, object)| object.is_solid()).map(|(number, _)| number);
-    let mut placed =
-        instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
-    let open =
-        solids.find(|&object| !is_closed(object)).or_else(|| placed.find(|&object| !is_closed(object)));
-    let found =
-        || ("a closed object".to_owned(), format!("object {}, which is not", open.unwrap_or_default()));
-    Ok(ensure(open.is_none(), Rule::SolidClosed, layout.sections[0].range.start as u64, found)?)
+    check_solids(layout, &instances, &topology)?;
+    Ok(())
+}
+
+/// Checks that each object that is solid, or of which an instance is, is closed (rule 51).
+fn check_solids(
+    layout: &Layout,
+    instances: &[Instance],
+    topology: &[ObjectTopology],
+) -> Result<(), FormatError> {
+    let objects = layout.objects.iter().enumerate();
+    let solid = objects.filter(|(_, object)| object.is_solid()).map(|(number, _)| number);
+    let placed = instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
+    let is_closed = |number: usize| topology.get(number).is_some_and(|topology| topology.closed);
+    let open = solid.chain(placed).find(|&number| !is_closed(number));
+    open.map_or(Ok(()), |number| {
+        let at = layout.sections.first().map_or(0, |section| section.range.start as u64);
+        Err(FormatError::new(
+            Rule::SolidClosed,
+            at,
+            "a closed object",
+            format!("object {number}, which is not"),
+        ))
+    })
 }
 
 fn check_object<S: Source + ?Sized>(

@@ -17,6 +17,9 @@ const MAX_FIELDS: usize = 1 << 10;
 /// The most bytes to which LZF expands one.
 const MAX_EXPANSION: u64 = 88;
 
+/// The fields that a point needs.
+const AXES: [&[u8]; 3] = [b"x", b"y", b"z"];
+
 /// The type of a number: its letter in a header, and its bytes.
 #[derive(Clone, Copy, PartialEq, Default)]
 struct Kind {
@@ -47,6 +50,13 @@ struct Field {
     kind: Kind,
     /// How many numbers it has.
     count: usize,
+}
+
+impl Field {
+    /// Returns the bytes that it has in a point.
+    fn bytes(&self) -> usize {
+        self.kind.bytes * self.count
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -144,11 +154,10 @@ impl Header {
                         Some(b"binary_compressed") => Data::Compressed,
                         _ => return Err(invalid("DATA ascii, binary or binary_compressed")),
                     };
-                    let is_number = |field: &&Field| field.count == 1 && field.kind.number(&[0; 8]).is_some();
-                    let has = |axis: &[u8]| {
-                        fields.iter().filter(|field| field.name == axis).any(|field| is_number(&field))
-                    };
-                    if ![&b"x"[..], b"y", b"z"].into_iter().all(has) {
+                    let is_number = |field: &Field| field.count == 1 && field.kind.number(&[0; 8]).is_some();
+                    let has =
+                        |axis: &[u8]| fields.iter().find(|field| field.name == axis).is_some_and(is_number);
+                    if !AXES.into_iter().all(has) {
                         return Err(invalid(
                             "FIELDS x y z, each of one number of a known SIZE and TYPE, above DATA",
                         ));
@@ -167,33 +176,21 @@ impl Header {
 
     /// Returns the bytes of a point.
     fn point_bytes(&self) -> usize {
-        self.fields.iter().map(|field| field.kind.bytes * field.count).sum()
+        self.fields.iter().map(Field::bytes).sum()
     }
 
-    /// Returns the three coordinates' types, each with its first byte in a point.
-    fn axes(&self) -> [(Kind, usize); 3] {
-        [&b"x"[..], b"y", b"z"].map(|axis| {
-            let mut at = 0;
-            for field in &self.fields {
-                if field.name == axis {
-                    return (field.kind, at);
-                }
-                at += field.kind.bytes * field.count;
-            }
-            (Kind::default(), 0)
+    /// Returns for each coordinate the sum of a size over all fields before its own, and its type.
+    fn axes(&self, size: fn(&Field) -> usize) -> [(Kind, usize); 3] {
+        AXES.map(|axis| {
+            // The header has been checked: the field is there.
+            let own = self.fields.iter().position(|field| field.name == axis).unwrap_or_default();
+            (self.fields[own].kind, self.fields[..own].iter().map(size).sum())
         })
     }
 
     fn read_text<R: Read>(&self, words: &mut Words<R>, faces: &mut IndexedFaces) -> Result<(), Halt> {
-        let mut first = 0;
-        let places = self.fields.iter().map(|field| {
-            first += field.count;
-            first - field.count
-        });
-        let places: Vec<usize> = places.collect();
-        let axes =
-            [&b"x"[..], b"y", b"z"].map(|axis| self.fields.iter().position(|field| field.name == axis));
-        let axes = axes.map(|field| places[field.unwrap_or_default()]);
+        let count = self.fields.iter().map(|field| field.count).sum::<usize>();
+        let axes = self.axes(|field| field.count);
         for _ in 0..self.points {
             let Some((line, _)) = words.line() else {
                 let expected = format!("{} points", self.points);
@@ -204,10 +201,10 @@ impl Header {
                 )
                 .into());
             };
-            let numbers: Vec<&[u8]> = words_of(&line).take(first + 1).collect();
-            let [x, y, z] = axes.map(|place| numbers.get(place).and_then(|word| number(word)));
-            let (Some(x), Some(y), Some(z), true) = (x, y, z, numbers.len() == first) else {
-                let expected = format!("a point: {first} numbers, as FIELDS and COUNT state");
+            let numbers: Vec<&[u8]> = words_of(&line).take(count + 1).collect();
+            let [x, y, z] = axes.map(|(_, place)| numbers.get(place).and_then(|word| number(word)));
+            let (Some(x), Some(y), Some(z), true) = (x, y, z, numbers.len() == count) else {
+                let expected = format!("a point: {count} numbers, as FIELDS and COUNT state");
                 return Err(Fault::new(words.place(), expected, excerpt(&line)).into());
             };
             add(faces, [x, y, z], words.place())?;
@@ -216,7 +213,7 @@ impl Header {
     }
 
     fn read_binary<R: Read>(&self, reader: &mut ByteReader<R>, faces: &mut IndexedFaces) -> Result<(), Halt> {
-        let (bytes, axes) = (self.point_bytes(), self.axes());
+        let (bytes, axes) = (self.point_bytes(), self.axes(Field::bytes));
         self.expect_room(reader, reader.bytes_left() / bytes as u64)?;
         for _ in 0..self.points {
             let place = Place::Byte(reader.position());
@@ -253,7 +250,7 @@ impl Header {
         let data = data.ok_or_else(|| Fault::new(place, format!("LZF data of {whole} bytes"), "others"))?;
         let points = self.points as usize;
         // The values of a field follow each other.
-        let axes = self.axes().map(|(kind, at)| (kind, at * points));
+        let axes = self.axes(Field::bytes).map(|(kind, at)| (kind, at * points));
         for number in 0..points {
             let value = |(kind, at): (Kind, usize)| kind.number(data.get(at + number * kind.bytes..)?);
             let [x, y, z] = axes.map(value);
@@ -280,7 +277,8 @@ impl Header {
 /// A byte below 32 states how many bytes follow as they are, less one. Any other starts a copy of earlier bytes: three bits
 /// for its length, of which 7 stands for the next byte and 7, less two; five bits and a byte for the distance, less one.
 fn expand(packed: &[u8], length: usize) -> Option<Vec<u8>> {
-    let mut whole = Vec::with_capacity(length);
+    // Room is made for what the data hold, not for what they state.
+    let mut whole = Vec::new();
     let mut bytes = packed.iter();
     while let Some(&control) = bytes.next() {
         let control = usize::from(control);

@@ -1,7 +1,8 @@
 //! Reads PLY: text, or binary of either byte order, with any elements and properties in any order.
 //!
 //! The reader needs `x`, `y` and `z` of the element `vertex` and the list `vertex_indices` (or `vertex_index`) of the
-//! element `face`. Without an element `face`, vertices are points, and become triangles whose corners are equal. It reads and drops the rest. All numbers are read as f64, which represents numbers of every type
+//! element `face`. It reads and drops the rest. In a file without lists and without an element `face`, vertices are points,
+//! which become triangles whose corners are equal. All numbers are read as f64, which represents numbers of every type
 //! exactly. Text is read word by word, wherever its lines end. Bytes after the last element are ignored.
 
 use super::byte_reader::{ByteReader, Words};

@@ -177,6 +177,7 @@ fn pcd_headers_are_checked() {
         ("SIZE 2 4 8 4 4", "SIZE 2 4 8 4", "line 4: expected SIZE"),
         ("SIZE 2 4 8 4 4", "SIZE 2 4 3 4 4", "line 4: expected SIZE"),
         ("SIZE 2 4 8 4 4", "SIZE 2 4 8 4 1", "line 11: expected FIELDS x y z"),
+        ("FIELDS spare x y rgb z", "FIELDS x x y rgb z", "line 11: expected FIELDS x y z"),
         ("TYPE U F F U F", "TYPE U F F U X", "line 5: expected TYPE"),
         ("TYPE U F F U F", "TYPE U F F U F F", "line 5: expected TYPE"),
         ("COUNT 2 1 1 1 1", "COUNT 2 1 1 1 2", "line 11: expected FIELDS x y z"),

@@ -23,8 +23,8 @@ pub(crate) const RECORD_SLOTS: usize = 6;
 /// Slots by lane and corner.
 pub(crate) type Places = [[u8; 3]; PACKET];
 
-/// The patterns in ascending order, and behind them that of four points, which no record states. The hexadecimal digits are the slots of corners 0, 1 and 2 of lane 0, then of lane 1,
-/// and so on.
+/// The patterns in ascending order, and behind them that of four points, which no record states. The hexadecimal digits
+/// are the slots of corners 0, 1 and 2 of lane 0, then of lane 1, and so on.
 const TABLE: [u64; PATTERNS + 1] = [
     0x012_012_012_012,
     0x012_013_024_034,

@@ -8,7 +8,9 @@ use crate::output::One;
 use crate::status::Failure;
 use crate::types::{BakeChoices, MeshHandle};
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
+use bvh_bake::{
+    BakeError, Effort, FileBake, MAX_RADIUS, Options, Outcome, Profile, TriangleEncoding, to_bytes,
+};
 use bvh_query::{Bvh, OwnedShape};
 use std::ffi::c_char;
 use std::path::PathBuf;
@@ -55,6 +57,9 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         && !(found.is_finite() && found > 0.0)
     {
         return Err(Failure::argument("options.max_error", "0 or a finite length above 0", found));
+    }
+    if !(0.0..=MAX_RADIUS).contains(&given.radius) {
+        return Err(Failure::argument("options.radius", "a length from 0 to 2^118", given.radius));
     }
     let options = Options::default()
         .profile(named("profile", profile, &Profile::ALL.map(Profile::name), Profile::from_name)?)

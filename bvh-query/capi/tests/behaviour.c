@@ -793,8 +793,6 @@ static void stated_radius(const char *folder) {
     OK(cbvh_mesh_free(opened));
     OK(cbvh_mesh_free(rounded));
     OK(cbvh_mesh_free(mesh));
-    const cbvh_bake_options wrong = {.size = sizeof wrong, .radius = -1};
-    CHECK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &wrong, &mesh) == CBVH_BAKE_FAILED);
 }
 
 /* Attached instances follow their parents, in poses and on motions, and a mesh that is swapped keeps the rest. */

@@ -251,6 +251,9 @@ static void bakes(void) {
     OPTION(effort, "low", "options.effort: expected NULL or one of fast, default");
     OPTION(effort, "\xFF", "options.effort: expected text in UTF-8");
     OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");
+    OPTION(radius, -1, "options.radius: expected a length from 0 to 2^118, found -1");
+    OPTION(radius, NAN, "options.radius: expected");
+    OPTION(radius, INFINITY, "options.radius: expected");
     OPTION(no_ids, 2, "options.no_ids: expected 0 or 1, found 2");
     OPTION(solid, -1, "options.solid: expected 0 or 1, found -1");
     OPTION(scene, 1, "options.scene: expected nothing");

@@ -87,7 +87,8 @@ impl OwnedShape {
         if rounding(self.bvh.objects()) == (self.radius, is_solid) {
             return Cow::Borrowed(bytes);
         }
-        Cow::Owned(with_rounding(bytes, self.bvh.layout(), self.radius, is_solid))
+        // The file has been read, and the radius has been checked.
+        with_rounding(bytes, self.radius, is_solid).map_or(Cow::Borrowed(bytes), Cow::Owned)
     }
 
     /// Returns the file that the shape is in.

@@ -33,8 +33,8 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use std::thread;
 
-/// The shares of OBJ text, of PLY bytes and of the bytes of points in the work of reading, in parts of [`WHOLE`]. The rest is spent on their
-/// corners.
+/// The shares of OBJ text, of PLY bytes and of the bytes of points in the work of reading, in parts of [`WHOLE`]. The rest
+/// is spent on their corners.
 const OBJ_TEXT: u64 = 10;
 const PLY_BYTES: u64 = 10;
 const POINT_BYTES: u64 = 12;

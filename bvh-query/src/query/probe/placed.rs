@@ -113,7 +113,7 @@ impl IntoObject {
                 self.direction(other.pose.map_or(axis, |pose| pose.rotation().map(|row| row[k])))
             });
             let size: f64 = half.iter().sum();
-            // Rotations are orthonormal to within 2^-20, and the rest is rounding.
+            // For roundings: see the numerics in the specification.
             let spare = size / (1 << 16) as f64
                 + 16.0 * self.error(placed.iter().map(|v| v.abs()).sum::<f64>() + size);
             for k in 0..3 {

@@ -1,6 +1,9 @@
-//! Compares answers about rounded and solid shapes with their definition, in exact arithmetic over all pairs of triangles.
+//! Compares answers about rounded shapes with their definition, in exact arithmetic over all pairs of triangles.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod files;
+mod solids;
 
 use bvh_query::{
     Bvh, Contact, Distance, Motion, MotionAnswer, MotionOptions, Pose, Querier, QueryError, Ray, Relation,
@@ -9,7 +12,7 @@ use bvh_query::{
 use cbvh_testkit::exact::Length;
 use common::nearest::point_triangle;
 use common::shapes::{cube, outward, plate, soup, sphere, torus};
-use common::{Random, Stored, Triangle, bake, baked, placed, queriers, random_pose, stored, translation};
+use common::{Random, Stored, Triangle, baked, placed, queriers, random_pose, stored, translation};
 use std::cmp::Ordering;
 
 /// How far off a witness may be.
@@ -202,7 +205,6 @@ fn meshes_with_a_radius_are_their_triangles_with_it() {
     }
 }
 
-/// A radius of zero changes no bit of any answer.
 /// A question that ends early leaves nothing behind that contacts would report again, or look for in other files.
 #[test]
 fn contacts_do_not_depend_on_the_question_before() {
@@ -222,6 +224,7 @@ fn contacts_do_not_depend_on_the_question_before() {
     }
 }
 
+/// A radius of zero changes no bit of any answer.
 #[test]
 fn a_radius_of_zero_is_none() {
     let mut queriers = queriers();
@@ -253,47 +256,6 @@ fn wrong_radii_are_refused() {
         assert!(querier.within(a, b, &translation(1e30, 0.0, 0.0), f64::MAX).unwrap());
         assert!(querier.collide(a, b, &translation(1e30, 0.0, 0.0)).unwrap());
     }
-}
-
-/// What is inside a solid cube touches it, whatever moves, and from either side.
-#[test]
-fn what_is_inside_a_solid_touches_it() {
-    let mut queriers = queriers();
-    let cube = baked(&outward(cube()));
-    let solid = cube.all().solid().unwrap();
-    let part = [[0.125, 0.0, 0.0], [0.25, 0.0, 0.0], [0.125, 0.125, 0.0]];
-    for core in [vec![[part[0]; 3]], vec![[part[0], part[1], part[1]]], vec![part], vec![part, [[9.0; 3]; 3]]]
-    {
-        let small = baked(&core);
-        for querier in &mut queriers {
-            for (pose, is_inside) in [
-                (translation(0.0, 0.0, 0.0), true),
-                (translation(0.5, -0.5, 0.0), true),
-                (translation(2.0, 0.0, 0.0), false),
-            ] {
-                let identity = translation(-pose.translation()[0], -pose.translation()[1], 0.0);
-                assert!(!querier.collide(&cube, &small, &pose).unwrap());
-                assert_eq!(querier.collide(solid, &small, &pose).unwrap(), is_inside);
-                assert_eq!(querier.collide(&small, solid, &identity).unwrap(), is_inside);
-                assert_eq!(Tracker::new().collide(querier, solid, &small, &pose).unwrap(), is_inside);
-                let answer = querier.distance(solid, &small, &pose).unwrap();
-                assert_eq!(answer.distance == 0.0, is_inside);
-                assert_eq!((answer.point_a == answer.point_b, answer.upper == 0.0), (is_inside, is_inside));
-                assert_eq!(querier.within(solid, &small, &pose, 0.0625).unwrap(), is_inside);
-            }
-        }
-    }
-    // Cells that have only an edge or a corner in common are solid, too.
-    let cells = bvh_bake::shapes::voxels(&[[0, 0, 0], [1, 1, 0], [2, 2, 1]], 1.0).unwrap();
-    let cells = bake(&cells, &bvh_bake::Options::default());
-    let (solid, point) = (cells.all().solid().unwrap(), baked(&[[[0.5, 0.5, 0.5]; 3]]));
-    for (x, y, z, is_inside) in
-        [(0.0, 0.0, 0.0, true), (1.0, 1.0, 0.0, true), (2.0, 2.0, 1.0, true), (1.0, 0.0, 0.0, false)]
-    {
-        assert_eq!(queriers[0].collide(solid, &point, &translation(x, y, z)).unwrap(), is_inside);
-    }
-    let open = baked(&plate(2));
-    assert_eq!(open.all().solid().unwrap_err(), QueryError::NotClosed(0));
 }
 
 /// A ball on a line meets another where their centres are as far apart as the radii add up to.
@@ -331,38 +293,6 @@ fn balls_hit_each_other_on_time() {
             }
             let is_free = querier.is_free(a, b, &path, &MotionOptions::new()).unwrap();
             assert_eq!(is_free, answer == MotionAnswer::Free);
-            answers.push(answer);
-        }
-        assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
-    }
-}
-
-/// A point passes a face at one moment only, which no tested pose need hit; what is inside afterwards is a hit.
-#[test]
-fn a_point_that_goes_into_a_solid_hits_it() {
-    let mut queriers = queriers();
-    let (cube, point) = (baked(&outward(cube())), baked(&[[[0.0; 3]; 3]]));
-    let solid = cube.all().solid().unwrap();
-    let options = MotionOptions::new();
-    for (from, to) in [
-        ([3.1, 0.1, 0.2], [0.1, 0.2, 0.1]),
-        ([3.3, 0.3, 0.1], [-2.9, 0.1, -0.3]),
-        ([0.1, 0.1, 0.1], [0.3, 0.2, 0.1]),
-        ([0.1, 0.1, 0.1], [5.3, 0.2, 0.1]),
-    ] {
-        let pose = |at: [f64; 3]| translation(at[0], at[1], at[2]);
-        let path = Motion::between(&pose(from), &pose(to)).unwrap();
-        let expected = if from[0] > 1.0 { (1.0 - from[0]) / (to[0] - from[0]) } else { 0.0 };
-        let mut answers = Vec::new();
-        for querier in &mut queriers {
-            let answer = querier.motion(solid, &point, &path, &options).unwrap();
-            let MotionAnswer::Hit { free_until, touching_at, nearest } = answer else { panic!("{answer:?}") };
-            assert!(
-                free_until <= expected && expected <= touching_at && touching_at - free_until < 1e-5,
-                "{answer:?}"
-            );
-            assert_eq!(nearest.distance, 0.0);
-            assert!(!querier.is_free(solid, &point, &path, &options).unwrap());
             answers.push(answer);
         }
         assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
@@ -568,105 +498,4 @@ fn bounds_of_hits_hold_for_slivers() {
         assert!(hit.lower <= hit.t && hit.t <= hit.upper, "{hit:?}");
     }
     assert!(hits > 100, "{hits}");
-}
-
-/// A file that states a radius and solidity gives the answers of a shape that is rounded and made solid after it was opened.
-#[test]
-fn files_state_radii_and_solids() {
-    let mut random = Random::new(77);
-    let (block, cloud) =
-        (bvh_bake::shapes::block([2.0; 3]).unwrap(), bvh_bake::shapes::cloud(&[[0.5, 0.25, 0.0]; 3]));
-    let bake = |mesh, options: &bvh_bake::Options| {
-        Bvh::from_bytes(bvh_bake::to_bytes(mesh, options).unwrap().0).unwrap()
-    };
-    let options = bvh_bake::Options::default;
-    let stated = [bake(&block, &options().radius(0.25).solid(true)), bake(&cloud, &options().radius(0.5))];
-    let plain = [bake(&block, &options()), bake(&cloud, &options())];
-    let made = [plain[0].all().rounded(0.25).unwrap().solid().unwrap(), plain[1].all().rounded(0.5).unwrap()];
-    for (shape, made) in stated.iter().zip(&made) {
-        for shape in
-            [shape.all(), shape.object(0).unwrap(), bvh_query::OwnedShape::from(shape.clone()).shape()]
-        {
-            assert_eq!((shape.radius(), shape.is_solid()), (made.radius(), made.is_solid()));
-        }
-    }
-    let (mut inside, mut apart) = (0, 0);
-    for querier in &mut queriers() {
-        for _ in 0..200 {
-            let pose = random_pose(&mut random, 2.5);
-            let found = querier.distance(&stated[0], &stated[1], &pose).unwrap();
-            assert_eq!(found, querier.distance(made[0], made[1], &pose).unwrap());
-            let touches = querier.collide(&stated[0], &stated[1], &pose).unwrap();
-            assert_eq!(touches, found.distance == 0.0);
-            inside += usize::from(touches);
-            apart += usize::from(!touches);
-            // A radius that the caller gives replaces that of the file.
-            let bare = stated[1].all().rounded(0.0).unwrap();
-            let expected = querier.collide(made[0], &plain[1], &pose).unwrap();
-            assert_eq!(querier.collide(&stated[0], bare, &pose).unwrap(), expected);
-        }
-    }
-    assert!(inside > 50 && apart > 50, "{inside} {apart}");
-}
-
-/// Whether a point of a large cloud is inside a solid, against the side of each point.
-#[test]
-fn clouds_are_inside_solids_where_a_point_is() {
-    let mut random = Random::new(91);
-    for origin in [0.0, 1e6] {
-        let points: Vec<[f64; 3]> = (0..3000).map(|_| random.point().map(|c| origin + c)).collect();
-        let bake = |mesh: &bvh_bake::mesh::Mesh| {
-            Bvh::from_bytes(bvh_bake::to_bytes(mesh, &bvh_bake::Options::default()).unwrap().0).unwrap()
-        };
-        let cloud = bake(&bvh_bake::shapes::cloud(&points));
-        let block = bake(&bvh_bake::shapes::block([0.3, 0.2, 0.1]).unwrap());
-        let solid = block.all().solid().unwrap();
-        let (mut inside, mut outside) = (0, 0);
-        for querier in &mut queriers() {
-            for _ in 0..60 {
-                let pose = random_pose(&mut random, 1.2);
-                let place = [0, 1, 2].map(|k| pose.translation()[k] + origin);
-                let pose = Pose::nearest(*pose.rotation(), place).unwrap();
-                let is_in = |point: &[f64; 3], querier: &mut Querier| {
-                    querier.side(solid.at(&pose), *point).unwrap() != Side::Outside
-                };
-                let stored: Vec<[f64; 3]> = stored(&cloud).iter().map(|point| point.corners[0]).collect();
-                let expected = stored.iter().any(|point| is_in(point, querier));
-                assert_eq!(querier.collide(&cloud, solid, &pose).unwrap(), expected);
-                let found = querier.distance(&cloud, solid, &pose).unwrap();
-                assert_eq!(found.distance == 0.0, expected);
-                assert!(!expected || is_in(&found.point_a, querier));
-                inside += usize::from(expected);
-                outside += usize::from(!expected);
-            }
-        }
-        assert!(inside > 20 && outside > 20, "{inside} {outside}");
-    }
-}
-
-/// The bytes of a rounded shape are those of a bake with that radius.
-#[test]
-fn bytes_state_the_radius_and_the_solidity() {
-    let bake = |options: bvh_bake::Options| {
-        let mut mesh = bvh_bake::shapes::block([1.0, 2.0, 3.0]).unwrap();
-        mesh.objects.extend(bvh_bake::shapes::block([2.0; 3]).unwrap().objects);
-        mesh.objects[1].triangle_ids = (12..24).collect();
-        bvh_bake::to_bytes(&mesh, &options.split_objects(true)).unwrap().0
-    };
-    let plain = bvh_query::OwnedShape::from(Bvh::from_bytes(bake(bvh_bake::Options::default())).unwrap());
-    assert!(matches!(plain.bytes(), std::borrow::Cow::Borrowed(_)));
-    let rounded = plain.clone().rounded(0.25).unwrap();
-    assert_eq!(rounded.bytes(), bake(bvh_bake::Options::default().radius(0.25)));
-    let solid = rounded.solid().unwrap();
-    assert_eq!(solid.bytes(), bake(bvh_bake::Options::default().radius(0.25).solid(true)));
-    let again = bvh_query::OwnedShape::from(Bvh::from_bytes(solid.bytes().into_owned()).unwrap());
-    assert_eq!((again.shape().radius(), again.shape().is_solid()), (0.25, true));
-    assert_eq!(again.rounded(0.0).unwrap().bytes(), bake(bvh_bake::Options::default().solid(true)));
-    // A file with an open object has no solids, though one of its objects may be one.
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-topology.cbvh");
-    let mixed = Bvh::read(folder).unwrap();
-    let one = bvh_query::OwnedShape::object(mixed, 0).unwrap().rounded(0.5).unwrap().solid().unwrap();
-    let saved = Bvh::from_bytes(one.bytes().into_owned()).unwrap();
-    saved.validate().unwrap();
-    assert_eq!((saved.all().radius(), saved.all().is_solid()), (0.5, false));
 }
