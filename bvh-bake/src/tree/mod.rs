@@ -23,6 +23,7 @@ use crate::progress::{Stage, Step, Tally, WHOLE};
 use crate::storage::Stream;
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
+use crate::threads::prelude::*;
 use crate::triangles::{Kept, Triangle};
 pub(crate) use binary::Tree;
 pub(crate) use boxes::Aabb;
@@ -44,6 +45,9 @@ const TREES_WEIGHT: u64 = 9;
 pub(crate) fn is_one_brick(triangles: u64) -> bool {
     triangles <= MAX_BRICK_TRIANGLES as u64
 }
+
+/// The least number of references that a thread makes at a time.
+const REFERENCES_PER_TASK: usize = 1 << 13;
 
 /// The most children of a treelet in any profile.
 pub(crate) const MAX_CHILDREN: usize = 8;
@@ -249,10 +253,12 @@ impl Builder {
 
     /// Builds the tree by splits, before any subtree is moved.
     fn split_tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
-        let references =
-            triangles.iter().zip(0..).map(|(triangle, number)| Reference::new(number, &triangle.corners));
-        let mut references: Vec<Reference> = references.collect();
-        let mut scratch = vec![Reference::NONE; references.len()];
+        let reference =
+            |(number, triangle): (usize, &Triangle)| Reference::new(number as u32, &triangle.corners);
+        // On all threads: for a cloud, whose other steps are short, this is a fifth of the bake.
+        let references = triangles.par_iter().with_min_len(REFERENCES_PER_TASK).enumerate().map(reference);
+        let (mut references, mut scratch): (Vec<Reference>, _) =
+            threads::join(|| references.collect(), || vec![Reference::NONE; triangles.len()]);
         self.brick(&mut references, &mut scratch)
     }
 }
