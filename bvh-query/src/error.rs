@@ -58,9 +58,9 @@ pub enum QueryError {
         "all_hits: expected a shape without a radius, found one with; ask for the first hit, or for the core"
     )]
     Rounded,
-    /// A shape was to be solid, and this object of its file is not closed.
+    /// The question is about the inside of a shape, and this object of its file is not closed.
     #[error(
-        "expected closed objects of a solid shape, found object {0} with a boundary or with triangles that face both ways; repair the mesh, or ask about its surface"
+        "expected closed objects, found object {0} with a boundary or with triangles that face both ways; repair the mesh, or ask about its surface"
     )]
     NotClosed(usize),
 }
@@ -75,7 +75,7 @@ pub enum NumberError {
     /// A coordinate of a point.
     #[error("point: expected finite coordinates of at most 2^120, found {0}")]
     Point(f64),
-    /// The largest component of a ray's direction.
+    /// The largest component of a direction.
     #[error(
         "direction: expected numbers the largest of which is from 2^-500 to 2^500 in magnitude, found {0}"
     )]
@@ -104,6 +104,12 @@ pub enum NumberError {
     /// The tolerance of a motion.
     #[error("tolerance: expected a finite length above 0, found {0}")]
     Tolerance(f64),
+    /// The tolerance of a depth.
+    #[error("tolerance: expected a finite depth of at least 0, found {0}")]
+    DepthTolerance(f64),
+    /// The gap between the bounds of a depth at which a search ends.
+    #[error("relative_gap: expected a finite part above 0, found {0}")]
+    RelativeGap(f64),
     /// A tolerance, given or by default, that the poses of a path do not resolve.
     #[error(
         "tolerance: expected more than B moves in 2^-45 of the time, and than its poses are rounded by, found {0}"

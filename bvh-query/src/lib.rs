@@ -97,6 +97,7 @@ pub use query::answers::{
 };
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
+pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation};
 pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;

@@ -3,10 +3,13 @@
 use crate::asking::files::{self, read_all, read_poses, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
-use crate::console::{Failure, Record, counted, record};
+use crate::console::{Failure, Record, counted, record, significant};
 use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
-use bvh_query::{Contact, Distance, DistanceOptions, Pose, Querier, QueryError, Relation, Shape};
+use bvh_query::{
+    Contact, Distance, DistanceOptions, Penetration, PenetrationOptions, Pose, Querier, QueryError, Relation,
+    Shape,
+};
 use clap::{Args, ValueEnum};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -84,6 +87,8 @@ enum Mode {
     Within,
     /// Do they touch and, if not, is one inside the other?
     Relation,
+    /// How deep do they overlap, and which translation of B ends that?
+    Penetration,
 }
 
 /// Answers the question about pose files or about one pose.
@@ -134,6 +139,8 @@ enum Answer {
     Distance(Distance),
     /// How they lie.
     Relation(Relation),
+    /// How deep they overlap; none if a mesh is not closed.
+    Penetration(Option<Penetration>),
 }
 
 impl Question {
@@ -175,6 +182,10 @@ impl Question {
             Mode::Distance => Answer::Distance(querier.distance_with(a, b, pose, &self.errors)?),
             Mode::Within => Answer::Within(querier.within(a, b, pose, self.within)?),
             Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
+            Mode::Penetration => match querier.penetration(a, b, pose, &PenetrationOptions::default()) {
+                Err(QueryError::NotClosed(_)) => Answer::Penetration(None),
+                answer => Answer::Penetration(Some(answer?)),
+            },
         })
     }
 
@@ -201,6 +212,14 @@ impl Question {
             }
             Answer::Distance(distance) => mesh::describe([mesh_a, mesh_b], distance),
             Answer::Relation(relation) => format!("{}\n", in_words(*relation)),
+            Answer::Penetration(None) => "undefined, because a mesh is not closed\n".to_owned(),
+            Answer::Penetration(Some(of)) => {
+                let [x, y, z] = of.translation;
+                format!(
+                    "depth from {:?} to {:?}\nmoving B by {x:?} {y:?} {z:?} makes the insides disjoint\n",
+                    of.lower, of.upper
+                )
+            }
         }
     }
 }
@@ -221,6 +240,17 @@ impl asking::Answer for Answer {
             Self::Contacts(count, _) => *count as f64,
             Self::Distance(of) => of.distance,
             Self::Relation(relation) => f64::from(*relation as u8),
+            Self::Penetration(depth) => depth.map_or(0.0, |of| of.lower),
+        }
+    }
+
+    fn line(&self) -> String {
+        match self {
+            Self::Penetration(None) => ["nan"; 5].join(" "),
+            Self::Penetration(Some(Penetration { lower, upper, translation: [x, y, z], .. })) => {
+                [lower, upper, x, y, z].map(|number| significant(*number)).join(" ")
+            }
+            _ => significant(self.value()),
         }
     }
 
@@ -239,6 +269,10 @@ impl asking::Answer for Answer {
             }
             Self::Distance(distance) => asking::distance_json(distance),
             Self::Relation(relation) => record! { relation: *relation as u8 },
+            Self::Penetration(None) => record! { penetration: None::<f64> },
+            Self::Penetration(Some(of)) => record! {
+                lower: of.lower, upper: of.upper, translation: of.translation, point: of.point, radii: of.radii,
+            },
         }
     }
 
@@ -249,6 +283,13 @@ impl asking::Answer for Answer {
             Self::Contacts(count, _) => hasher.update(&count.to_le_bytes()),
             Self::Distance(of) => hasher.update(&of.distance.to_bits().to_le_bytes()),
             Self::Relation(relation) => hasher.update(&[*relation as u8]),
+            Self::Penetration(depth) => {
+                let numbers = depth.map_or([f64::NAN; 5], |of| {
+                    let [x, y, z] = of.translation;
+                    [of.lower, of.upper, x, y, z]
+                });
+                numbers.iter().for_each(|number| hasher.update(&number.to_bits().to_le_bytes()));
+            }
         }
     }
 }

@@ -702,7 +702,7 @@ static void solids(void) {
     CHECK(triangles == 4 && gap(mesh, point, shift(0, 2, 3)) == 2 && gap(mesh, point, shift(4, 0, 0)) == 2);
     cbvh_mesh solid = {7};
     FAILS(cbvh_mesh_solid(mesh, &solid), CBVH_INVALID_ARGUMENT,
-          "expected closed objects of a solid shape, found object 0");
+          "expected closed objects, found object 0");
     CHECK(solid.id == 0);
     OK(cbvh_mesh_free(mesh));
     OK(cbvh_mesh_free(hollow));

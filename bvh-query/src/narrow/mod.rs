@@ -22,6 +22,7 @@ mod intersect;
 mod point;
 mod ray;
 mod rounded;
+mod stretch;
 mod winding;
 mod within;
 
@@ -30,6 +31,7 @@ pub(crate) use intersect::{segment_intersects, triangles_intersect};
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
 pub(crate) use rounded::rounded_crossing;
+pub(crate) use stretch::{Way, stretch};
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 

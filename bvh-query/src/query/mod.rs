@@ -6,6 +6,7 @@ pub(crate) mod batch;
 mod bounding_volumes;
 mod collide;
 mod contacts;
+pub(crate) mod depth;
 pub(crate) mod displacement;
 mod distance;
 mod exact;

@@ -3,7 +3,7 @@
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{Alignment, Prepare, form_error};
 use crate::traverse::placement::{ObjectPair, Placement};
-use bvh_format::kdop::DirectionSet;
+use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::realign::{Form, upper_form};
 use bvh_format::slabs::{Group, NodeSlabs, row};
 
@@ -14,6 +14,9 @@ pub(crate) enum Measure {
     Overlap,
     /// It is a lower bound of the distance, in mesh units.
     Distance,
+    /// Nodes that are apart are left out. Of the others, it is a lower bound of the negated way along a direction on which B
+    /// leaves A, in mesh units: those that stay in contact longest have the least bound.
+    Leaving,
 }
 
 /// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
@@ -41,6 +44,39 @@ impl Reach {
     }
 }
 
+/// How far B moves along a direction until its slabs leave those of A.
+#[derive(Clone, Copy, Default)]
+struct Ways {
+    /// By slab: the way for each unit that B's lower end is below A's upper end, where B moves up, and else 0.
+    up: [f32; 13],
+    /// The way for each unit that A's lower end is below B's upper end, where B moves down, and else 0.
+    down: [f32; 13],
+    /// Minus infinity where B moves neither up nor down, and else 0.
+    never: [f32; 13],
+}
+
+impl Ways {
+    /// The least part of a direction along a slab, 2^-60, which counts. Along others B never leaves.
+    const LEAST_RATE: f64 = 1.0 / (1u64 << 60) as f64;
+
+    /// Ways are rounded up, by more than f32 rounds when they are applied.
+    fn along(direction: [f64; 3]) -> Self {
+        let mut ways = Self::default();
+        for (slab, [x, y, z]) in FACTORS.into_iter().enumerate() {
+            let rate = direction[0] * x + direction[1] * y + direction[2] * z;
+            let way = ((1.0 + 1.0 / (1 << 20) as f64) / rate.abs()) as f32;
+            if rate > Self::LEAST_RATE {
+                ways.up[slab] = way;
+            } else if rate < -Self::LEAST_RATE {
+                ways.down[slab] = way;
+            } else {
+                ways.never[slab] = f32::NEG_INFINITY;
+            }
+        }
+        ways
+    }
+}
+
 /// A direction in A's frame along which one more pair of slab ends is compared.
 #[derive(Clone, Copy)]
 pub(crate) struct Witness {
@@ -61,6 +97,8 @@ pub(crate) struct NodeFilter {
     /// A along B's directions, prepared once that pays.
     inverse: Alignment,
     looks_along_b: bool,
+    /// For `Measure::Leaving`.
+    ways: Ways,
     placement: Placement,
     set_a: DirectionSet,
     set_b: DirectionSet,
@@ -76,6 +114,7 @@ impl Default for NodeFilter {
             end: Alignment::NONE,
             inverse: Alignment::NONE,
             looks_along_b: false,
+            ways: Ways::default(),
             placement: Placement::NONE,
             set_a: DirectionSet::Dop6,
             set_b: DirectionSet::Dop6,
@@ -106,6 +145,11 @@ impl NodeFilter {
     #[inline(always)]
     pub(crate) fn prepare_end<I: Isa>(&mut self, isa: I, end: &Placement) {
         self.end.prepare(isa, end, self.set_b, self.reach_b.ends);
+    }
+
+    /// Prepares `leaving` for a B that moves along a direction of about unit length.
+    pub(crate) fn prepare_ways(&mut self, direction: [f64; 3]) {
+        self.ways = Ways::along(direction);
     }
 
     /// Adopts a new witness direction.
@@ -217,7 +261,7 @@ impl NodeFilter {
         bounds: &mut [f32; 16],
     ) -> u16 {
         let gaps = gaps_along(isa, measure, self.set_b, (aligned_a, group_b));
-        if measure == Measure::Overlap {
+        if measure != Measure::Distance {
             return I::V::bits(gaps.le(isa.splat(limit)));
         }
         // Seen from A, B's directions are longer or shorter by at most 2^-19, all together: so far a rotation
@@ -225,6 +269,27 @@ impl NodeFilter {
         let gaps = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32)).max(isa.load(bounds));
         isa.store(gaps, bounds);
         I::V::bits(gaps.le(isa.splat(limit)))
+    }
+}
+
+impl NodeFilter {
+    /// Replaces the bounds of pairs that overlap by those of `Measure::Leaving`, along A's directions.
+    #[inline(always)]
+    pub(crate) fn leaving<I: Isa>(
+        &self,
+        isa: I,
+        ends: (&Group, &Group),
+        limit: f32,
+        bounds: &mut [f32; 16],
+    ) -> u16 {
+        let mut leaving = isa.splat(f32::NEG_INFINITY);
+        for slab in 0..self.set_a.slabs() {
+            let (up, down) = gaps_of_ends(isa, ends, slab);
+            let way = down.mul_add(isa.splat(self.ways.down[slab]), isa.splat(self.ways.never[slab]));
+            leaving = leaving.max_of_numbers(up.mul_add(isa.splat(self.ways.up[slab]), way));
+        }
+        isa.store(leaving, bounds);
+        I::V::bits(leaving.le(isa.splat(limit)))
     }
 }
 
@@ -252,11 +317,18 @@ fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
 
 /// Returns the signed gap of each of 16 pairs, four nodes of A and four of B, along one direction of both groups.
 #[inline(always)]
-fn gap<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> I::V {
+fn gap<I: Isa>(isa: I, ends: (&Group, &Group), slab: usize) -> I::V {
+    let (up, down) = gaps_of_ends(isa, ends, slab);
+    down.max_of_numbers(up)
+}
+
+/// Returns how far B is above A, and below it.
+#[inline(always)]
+fn gaps_of_ends<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> (I::V, I::V) {
     let (rows_a, rows_b) = (group_a.rows(), group_b.rows());
     let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
     let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
-    lo_a.sub(hi_b).max_of_numbers(lo_b.sub(hi_a))
+    (lo_b.sub(hi_a), lo_a.sub(hi_b))
 }
 
 /// Returns the gap of each of 16 pairs, four nodes of A and four of B, along the directions of a set, which the groups of both
@@ -281,7 +353,7 @@ pub(crate) fn gaps_along<I: Isa>(
 fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Group)) -> I::V {
     // Three maxima side by side, so that none waits for the one before.
     let [mut x, mut y, mut z] = [gap(isa, ends, 0), gap(isa, ends, 1), gap(isa, ends, 2)];
-    if measure == Measure::Overlap {
+    if measure != Measure::Distance {
         for slab in 3..SLABS {
             let gap = gap(isa, ends, slab);
             match slab % 3 {

@@ -200,7 +200,7 @@ impl SlabFilter {
         let distance = cosine.neg_mul_add(middle_a, dot::<I>(u_b_in_a, to_b)).add(middle_b);
         let radius = rest::<I>(u_b_in_a, cosine, u_a, half_a, share.mul_add(width_a, width_b));
         let gap = gap.max(radius.neg_mul_add(outward, distance.abs())).sub(slack);
-        if measure == Measure::Overlap {
+        if measure != Measure::Distance {
             return I::V::bits(gap.le(isa.splat(limit)));
         }
         // Along the line between the centres, at first not normalised. Where squares might underflow or overflow it has no say.

@@ -62,6 +62,11 @@ pub(crate) trait Visitor {
     /// Returns the limit: pairs with a larger bound are not visited.
     fn limit(&self) -> f32;
 
+    /// Returns the direction along which B moves, of about unit length, for `Measure::Leaving`.
+    fn direction(&self) -> [f64; 3] {
+        [0.0; 3]
+    }
+
     /// Returns a direction in A's frame, at most 1 long, along which A and B are likely apart.
     fn witness(&self) -> Option<[f32; 3]> {
         None
@@ -143,6 +148,9 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
     memory.start(isa, &pair, W::SWEEPS)?;
+    if W::MEASURE == Measure::Leaving {
+        memory.node_filter.prepare_ways(visitor.direction());
+    }
     let order = visitor.order();
     let phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
     let mut walk =
@@ -392,7 +400,13 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             return Ok(false);
         }
         let PairMemory { node_filter, nodes_a, nodes_b, large_leaves, .. } = &mut *self.memory;
-        large_leaves.are_beyond(&self.pair, (nodes_a, nodes_b), node_filter.reaches(), entry, self.limit)
+        large_leaves.are_beyond(
+            &self.pair,
+            (nodes_a, nodes_b),
+            node_filter.reaches(),
+            entry,
+            gap_limit::<W>(self.limit),
+        )
     }
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
@@ -435,7 +449,8 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     /// Tests all pairs of children and keeps those within the limit.
     #[inline(always)]
     fn push_children<I: Isa>(&mut self, isa: I, sides: &Sides) {
-        let (measure, limit, phase, order) = (W::MEASURE, self.limit, self.phase, self.order);
+        let (measure, phase, order) = (W::MEASURE, self.phase, self.order);
+        let (limit, leaving_limit) = (gap_limit::<W>(self.limit), self.limit);
         let witness = &self.witness;
         let PairMemory {
             node_filter,
@@ -486,6 +501,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     let groups = (&to[part_a & 1], &side_b.groups[part_b & 1]);
                     mask &= node_filter.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
+                if measure == Measure::Leaving && mask != 0 {
+                    let groups = (&side_a.groups[part_a & 1], &aligned_b[part_b & 1]);
+                    mask &= node_filter.leaving(isa, groups, leaving_limit, &mut tested.bounds);
+                }
                 if phase == Phase::DepthFirst {
                     let leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
                     leaf_pairs.append(isa, tested, mask & leaves);
@@ -509,6 +528,12 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             stack.keep_nearest(first_new);
         }
     }
+}
+
+/// Returns how far apart nodes may be.
+#[inline(always)]
+fn gap_limit<W: Visitor>(limit: f32) -> f32 {
+    if W::MEASURE == Measure::Leaving { 0.0 } else { limit }
 }
 
 /// Spreads a mask of four children of A to the lanes of their rows.

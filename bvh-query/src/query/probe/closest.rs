@@ -96,7 +96,7 @@ impl Querier {
     }
 
     /// Returns the closest point of a core to one that has been checked, as has `within`.
-    pub(super) fn closest_of_core(
+    pub(crate) fn closest_of_core(
         &mut self,
         placed: &PlacedShape<'_>,
         point: &Point,
@@ -129,7 +129,7 @@ pub(crate) fn check_within(within: f64) -> Result<(), QueryError> {
 
 /// Whether a triangle that is exactly as far away as the limit counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum IsWithin {
+pub(crate) enum IsWithin {
     Closed,
     Open,
 }

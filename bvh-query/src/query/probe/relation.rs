@@ -44,8 +44,17 @@ impl Querier {
         b: impl Into<Shape<'b>>,
         pose: &Pose,
     ) -> Result<Relation, QueryError> {
-        let (a, b) = (a.into(), b.into());
         self.start();
+        self.relation_of(a.into(), b.into(), pose)
+    }
+
+    /// Returns the relation of two shapes, as a part of a larger question.
+    pub(crate) fn relation_of(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<Relation, QueryError> {
         if self.cores_within(a, b, pose, sum_of_radii(a, b))? {
             return Ok(Relation::Touching);
         }

@@ -1,0 +1,147 @@
+//! What stays in contact the longest when B moves along a direction.
+
+use crate::error::QueryError;
+use crate::file::place::LeafPacket;
+use crate::isa::Isa;
+use crate::leaf::placed_packet::PlacedPackets;
+use crate::leaf::queue::TrianglePair;
+use crate::narrow::{Point, Triangle, Way, stretch};
+use crate::query::answers::QueryStats;
+use crate::query::bounding_volumes::surely_apart;
+use crate::query::collide::{Candidates, ContactVisitor};
+use crate::query::depth::line::Line;
+use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
+use crate::query::querier::Querier;
+use crate::traverse::align::round_up;
+use crate::traverse::node_filter::Measure;
+use crate::traverse::walk::{Order, Visitor};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+
+/// How far B moves from a place on a line until the last of the triangles that touch there has left.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaving {
+    /// Some pair of triangles certainly crosses from the place on until this far; 0 if none does.
+    pub(super) crosses_until: f64,
+    /// All pairs that are in contact at the place have left after this; none if nothing touches there.
+    pub(super) touches_until: Option<f64>,
+    /// The unit normal through which the last pair leaves.
+    pub(super) normal: Point,
+    /// The last pair, where it is at the place.
+    pub(super) last: [Triangle; 2],
+}
+
+impl Leaving {
+    /// Counts a pair of triangles in contact. The result does not depend on the order of pairs.
+    fn count(&mut self, (until, crosses_until): (f64, f64), normal: Point, pair: [Triangle; 2]) {
+        self.crosses_until = self.crosses_until.max(crosses_until);
+        let is_later = match self.touches_until {
+            Some(latest) => until > latest || until == latest && normal < self.normal,
+            None => true,
+        };
+        if is_later {
+            (self.touches_until, self.normal, self.last) = (Some(until), normal, pair);
+        }
+    }
+}
+
+impl Querier {
+    /// Returns what stays in contact the longest, from a place of B on a line on.
+    pub(super) fn leaving(&mut self, line: &Line<'_>, at: f64) -> Result<Leaving, QueryError> {
+        let found = Cell::new(Leaving {
+            crosses_until: 0.0,
+            touches_until: None,
+            normal: line.direction,
+            last: [[[0.0; 3]; 3]; 2],
+        });
+        let pose = line.pose_at(at);
+        each_pair(line.a, line.b, &pose, |placed| {
+            self.leaving_of(placed, line, &found).map(|()| None::<()>)
+        })?;
+        Ok(found.get())
+    }
+
+    fn leaving_of(
+        &mut self,
+        placed: &PlacedPair<'_>,
+        line: &Line<'_>,
+        found: &Cell<Leaving>,
+    ) -> Result<(), QueryError> {
+        self.memory.budget.visit()?;
+        if surely_apart(&placed.pair) {
+            return Ok(());
+        }
+        self.queue.clear();
+        self.packets.iter_mut().for_each(PlacedPackets::start);
+        let way = Way { direction: line.direction, length: line.length, error: line.error };
+        let visit = &mut |pair: TrianglePair| {
+            let a = placed.triangle_a(pair.a, pair.lane_a)?;
+            let b = placed.triangle_b(pair.b, pair.lane_b)?;
+            let stretch = stretch(&a, &b, &way);
+            let crosses = stretch.inner[0] < 0.0 && stretch.inner[1] > 0.0;
+            let mut leaving = found.get();
+            let crosses_until = if crosses { stretch.inner[1] } else { 0.0 };
+            leaving.count((stretch.outer[1].max(0.0), crosses_until), stretch.normal, [a, b]);
+            found.set(leaving);
+            Ok(ControlFlow::Continue(()))
+        };
+        let candidates = Candidates {
+            placed,
+            queue: &mut self.queue,
+            drain_at: FIRST_DRAIN,
+            stats: QueryStats::default(),
+            recent: Default::default(),
+            visit,
+            found: None,
+        };
+        let contacts = ContactVisitor { packets: &mut self.packets, order: Order::Nearest, candidates };
+        let mut visitor = LeavingVisitor { contacts, direction: line.direction, found };
+        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
+        let tests = self.backend.run(task)?;
+        let stats = visitor.contacts.candidates.stats;
+        self.stats.add(tests, stats);
+        Ok(())
+    }
+}
+
+/// The number of candidates that are decided first, so that a limit is known soon.
+const FIRST_DRAIN: usize = 4;
+
+/// Visits pairs of triangles in contact that may stay longer than those that were found.
+struct LeavingVisitor<'a> {
+    contacts: ContactVisitor<'a>,
+    direction: Point,
+    found: &'a Cell<Leaving>,
+}
+
+impl Visitor for LeavingVisitor<'_> {
+    const MEASURE: Measure = Measure::Leaving;
+
+    fn order(&self) -> Order {
+        self.contacts.order()
+    }
+
+    fn direction(&self) -> Point {
+        self.direction
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        round_up(-self.found.get().crosses_until)
+    }
+
+    #[inline(always)]
+    fn leaves<I: Isa>(
+        &mut self,
+        isa: I,
+        leaves: (LeafPacket, LeafPacket),
+        at_once: bool,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        self.contacts.leaves(isa, leaves, at_once)
+    }
+
+    #[inline(always)]
+    fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
+        self.contacts.finish(isa)
+    }
+}

@@ -1,0 +1,246 @@
+//! The straight ways on which B leaves A.
+//!
+//! ```text
+//! at := what is known to be covered; while at < limit:
+//!     if pairs of triangles certainly cross at `at`: go on to where the last of them has left
+//!     else if the meshes are apart a few roundings after the last contact at `at`: that place is free
+//!     else if a point there is inside both: go on by its depth in A plus its depth in B
+//!     else go on to where the last contact has left; from here on, nothing is covered
+//! ```
+//!
+//! Stretches of crossings and of common points follow each other without a gap, so interiors meet on all of the way that is
+//! covered. The free place is free because exact arithmetic says so of the pose there, and of nothing else.
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
+use crate::pose::Pose;
+use crate::query::answers::{Distance, Relation};
+use crate::query::depth::leaving::Leaving;
+use crate::query::options::DistanceOptions;
+use crate::query::querier::Querier;
+use crate::query::rounded::sum_of_radii;
+use crate::query::search::Search;
+use crate::traverse::placement::POSE_ERROR;
+
+/// Two shapes, and the line that B moves on.
+#[derive(Clone, Copy)]
+pub(super) struct Line<'a> {
+    pub(super) a: Shape<'a>,
+    pub(super) b: Shape<'a>,
+    pub(super) pose: &'a Pose,
+    /// Of unit length, to within roundings.
+    pub(super) direction: Point,
+    /// More than B has to move until its box is beyond A's.
+    pub(super) length: f64,
+    /// The sum of the radii.
+    pub(super) radii: f64,
+    /// A bound on the error of placed coordinates.
+    pub(super) error: f64,
+}
+
+/// Where a way comes free.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Free {
+    /// Interiors meet at all shorter moves.
+    pub(super) covered: f64,
+    /// Interiors are disjoint at this move.
+    pub(super) at: f64,
+    /// The contact that was the last to leave, if one was met.
+    pub(super) last: Option<LastContact>,
+}
+
+/// The contact that was the last to leave on a way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LastContact {
+    /// The unit normal of the facet through which the way left it.
+    pub(super) normal: Point,
+    /// Where the triangles met last, in A's frame.
+    pub(super) point: Point,
+    /// The triangles of A and of B, with B not moved.
+    pub(super) triangles: [Triangle; 2],
+}
+
+/// The steps beyond the last contact at which a place is tried, in errors of a coordinate.
+const STEPS: [f64; 4] = [0.0, 1.0, 8.0, 64.0];
+
+/// The number of points that are tried to find one that is inside both shapes.
+const COMMON_POINTS: u32 = 64;
+
+/// The part of a way by which a common point has to bring it on.
+const LEAST_PART: f64 = 1e-7;
+
+impl<'a> Line<'a> {
+    pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {
+        let radii = sum_of_radii(a, b);
+        let (mut size, mut magnitude) = (radii, 0.0);
+        for shape in [a, b] {
+            let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            for object in shape.objects() {
+                let [low, high] = object.bounding_box();
+                for k in 0..3 {
+                    (lo[k], hi[k]) = (lo[k].min(low[k]), hi[k].max(high[k]));
+                    magnitude += low[k].abs() + high[k].abs();
+                }
+            }
+            size += (0..3).map(|k| hi[k] - lo[k]).sum::<f64>();
+        }
+        magnitude += pose.translation().iter().map(|t| t.abs()).sum::<f64>();
+        let error = POSE_ERROR * (magnitude + size);
+        Self { a, b, pose, direction: [0.0; 3], length: 2.0 * size, radii, error }
+    }
+
+    pub(super) fn along(self, direction: Point) -> Self {
+        Self { direction, ..self }
+    }
+
+    /// Returns the translation of B at a place.
+    pub(super) fn translation_at(&self, at: f64) -> Point {
+        self.direction.map(|d| at * d)
+    }
+
+    /// Returns the last of the contacts that were found at a place.
+    fn last_contact(&self, at: f64, leaving: &Leaving) -> Option<LastContact> {
+        let until = leaving.touches_until?;
+        let [a, b] = leaving.last;
+        let moved = |by: f64| b.map(|corner| [0, 1, 2].map(|k| corner[k] + by * self.direction[k]));
+        let point = triangle_distance(&a, &moved(until)).point_a;
+        Some(LastContact { normal: leaving.normal, point, triangles: [a, moved(-at)] })
+    }
+
+    /// Returns the pose of B at a place.
+    pub(super) fn pose_at(&self, at: f64) -> Pose {
+        moved(self.pose, self.translation_at(at))
+    }
+}
+
+/// Returns a pose with B moved.
+pub(super) fn moved(pose: &Pose, translation: Point) -> Pose {
+    let from = pose.translation();
+    Pose::of_valid(*pose.rotation(), [0, 1, 2].map(|k| from[k] + translation[k]))
+}
+
+/// Where two cores are that do not touch.
+struct Gap {
+    distance: f64,
+    point_a: Point,
+    point_b: Point,
+    /// From A to B.
+    normal: Point,
+}
+
+impl Gap {
+    /// Returns how far B moves until the gap is as wide as the radii need it, if it widens as it begins to.
+    fn way_out(&self, line: &Line<'_>) -> f64 {
+        let rate = dot(self.normal, line.direction).max(LEAST_PART);
+        (line.radii - self.distance).max(0.0) / rate + 16.0 * line.error
+    }
+
+    fn contact(&self, line: &Line<'_>, at: f64) -> LastContact {
+        let back = line.translation_at(-at);
+        let point_b = [0, 1, 2].map(|k| self.point_b[k] + back[k]);
+        LastContact { normal: self.normal, point: self.point_a, triangles: [[self.point_a; 3], [point_b; 3]] }
+    }
+}
+
+impl Querier {
+    /// Returns the first place on a line where interiors are certainly disjoint, if it is before `limit`. Interiors are known
+    /// to meet at all moves shorter than `covered`.
+    pub(super) fn free_on(
+        &mut self,
+        line: &Line<'_>,
+        covered: f64,
+        limit: f64,
+    ) -> Result<Option<Free>, QueryError> {
+        let (mut at, mut covered, mut is_covered, mut stuck) = (covered, covered, true, 1.0);
+        let (mut last, mut rounded) = (None, None);
+        while at < limit && at <= line.length {
+            let leaving = self.leaving(line, at)?;
+            if leaving.touches_until.is_some() {
+                last = Some((at, leaving));
+            }
+            if leaving.crosses_until > line.error {
+                at += leaving.crosses_until;
+                if is_covered {
+                    covered = at;
+                }
+                continue;
+            }
+            if line.radii > 0.0
+                && let Some(gap) = self.gap_of_cores(line, at)?
+            {
+                last = None;
+                rounded = Some(gap.contact(line, at));
+                let place = at + gap.way_out(line);
+                if place < limit && self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart
+                {
+                    return Ok(Some(Free { covered, at: place, last: rounded }));
+                }
+                let common = line.radii - gap.distance - 4.0 * line.error;
+                if common > LEAST_PART * line.length {
+                    at += common;
+                    if is_covered {
+                        covered = at;
+                    }
+                    continue;
+                }
+            }
+            let until = at + leaving.touches_until.unwrap_or(0.0);
+            for step in STEPS {
+                let place = until + step * stuck * line.error;
+                if place >= limit {
+                    return Ok(None);
+                }
+                if self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart {
+                    let last = last.and_then(|(at, leaving)| line.last_contact(at, &leaving)).or(rounded);
+                    return Ok(Some(Free { covered, at: place, last }));
+                }
+            }
+            let common = self.common_point(line, at)?;
+            if common > LEAST_PART * line.length {
+                at += common;
+                if is_covered {
+                    covered = at;
+                }
+                stuck = 1.0;
+            } else {
+                is_covered = false;
+                at = until + STEPS[STEPS.len() - 1] * stuck * line.error;
+                stuck *= 4.0;
+            }
+        }
+        Ok(None)
+    }
+
+    /// Returns where the cores are at a place, unless they touch.
+    fn gap_of_cores(&mut self, line: &Line<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
+        let mut search = Search::between_shapes(DistanceOptions::default(), 0.0);
+        let Some(best) = self.nearest(line.a, line.b, &line.pose_at(at), &mut search)? else {
+            return Ok(None);
+        };
+        let Distance { distance, upper, point_a, point_b, .. } = best.distance(search.proved());
+        if distance <= line.error {
+            return Ok(None);
+        }
+        let normal = subtract(point_b, point_a).map(|x| x / distance);
+        Ok(Some(Gap { distance: upper, point_a, point_b, normal }))
+    }
+
+    /// Returns how far B moves at least, from a place on, until a point that is inside both shapes there is inside both no
+    /// more; 0 if no such point is found.
+    fn common_point(&mut self, line: &Line<'_>, at: f64) -> Result<f64, QueryError> {
+        let pose = line.pose_at(at);
+        let (a, b) = (line.a.into(), line.b.at(&pose));
+        let mut best = 0.0f64;
+        for (mesh, container) in [(&b, &a), (&a, &b)] {
+            if let Some(point) = self.first_inside(mesh, container)? {
+                best = best.max(self.depths(&a, &b, &point)?.common() - line.error);
+            }
+        }
+        if best > LEAST_PART * line.length {
+            return Ok(best);
+        }
+        let balls = self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
+        Ok(best.max(balls.lower()))
+    }
+}
