@@ -110,6 +110,9 @@ pub enum NumberError {
     /// The gap between the bounds of a depth at which a search ends.
     #[error("relative_gap: expected a finite part above 0, found {0}")]
     RelativeGap(f64),
+    /// The tolerance with which contacts are joined into patches.
+    #[error("tolerance: expected a finite length of at least 0, found {0}")]
+    PatchTolerance(f64),
     /// A tolerance, given or by default, that the poses of a path do not resolve.
     #[error(
         "tolerance: expected more than B moves in 2^-45 of the time, and than its poses are rounded by, found {0}"

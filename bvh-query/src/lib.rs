@@ -7,6 +7,8 @@
 //! |---|---|---|
 //! | do they touch? | [`Querier::collide`] | `bool`, exact |
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
+//! | where do they meet? | [`Querier::contact_regions`] | points, segments, polygons and normals, with certified errors |
+//! | how do they push each other? | [`Querier::patches`] | connected contacts: centre, normal, length, area, depth (estimated) |
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
@@ -101,11 +103,13 @@ pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation}
 pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
+pub use query::patches::{Patch, PatchOptions, Patches};
 #[cfg(feature = "parallel")]
 pub use query::probe::batch::ProbeBatch;
 pub use query::probe::placed::PlacedShape;
 pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
+pub use query::regions::{ContactRegion, ContactRegions, RegionKind};
 pub use query::tracker::Tracker;
 pub use scene::{
     Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClosestPoint, SceneContact, SceneDistance,

@@ -31,3 +31,11 @@ pub(super) fn cross(p: &Vector, q: &Vector) -> Vector {
     let component = |i: usize, j: usize| &p[i] * &q[j] - &p[j] * &q[i];
     [component(1, 2), component(2, 0), component(0, 1)]
 }
+
+/// Returns the quotient of two positive integers, to within one unit in the last place.
+pub(super) fn quotient(numerator: &BigInt, denominator: &BigInt) -> f64 {
+    // A quotient of 62 to 64 bits, rounded down, and then to the nearest f64.
+    let shift = 63 + denominator.bits() as i64 - numerator.bits() as i64;
+    let quotient = (numerator << shift.max(0)) / (denominator << (-shift).max(0));
+    libm::ldexp(quotient.iter_u64_digits().next().unwrap_or(0) as f64, -shift as i32)
+}

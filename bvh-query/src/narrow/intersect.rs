@@ -79,27 +79,46 @@ pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
 }
 
 /// Returns, for each corner of `points`, a number with the exact sign of its height over the plane of `plane`.
+#[inline(always)]
+pub(super) fn heights<const POINTS: usize>(plane: &Triangle, points: &[Point; POINTS]) -> [f64; POINTS] {
+    let of_plane = Plane::new(plane);
+    points.map(|point| {
+        let (height, error) = of_plane.height(point);
+        if height.abs() > error { height } else { volume(plane[0], plane[1], plane[2], point) }
+    })
+}
+
+/// The plane of a triangle: a corner, the normal, and the normal with all terms positive.
 ///
 /// The filter is stage A of Shewchuk's `orient3d` (Adaptive Precision Floating-Point Arithmetic and Fast
-/// Robust Geometric Predicates, 1997, section 4.3), but the three points share the minors of the plane. It computes
+/// Robust Geometric Predicates, 1997, section 4.3), but all points share the minors of the plane. It computes
 /// the same differences, products and sums in the same order, with one vertex of the plane in the place of his
 /// point `d`, so it has the same error bound.
-#[inline(always)]
-fn heights<const POINTS: usize>(plane: &Triangle, points: &[Point; POINTS]) -> [f64; POINTS] {
-    /// The bound of the filter's error, as a fraction of the permanent.
-    const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
-    let u = subtract(plane[1], plane[0]);
-    let v = subtract(plane[2], plane[0]);
-    let normal = cross(u, v);
-    let (u, v) = (u.map(f64::abs), v.map(f64::abs));
-    let magnitude = [u[1] * v[2] + u[2] * v[1], u[2] * v[0] + u[0] * v[2], u[0] * v[1] + u[1] * v[0]];
-    let height = |point: Point| {
-        let w = subtract(point, plane[0]);
-        let height = dot(w, normal);
-        let permanent = dot(w.map(f64::abs), magnitude);
-        if height.abs() > BOUND * permanent { height } else { volume(plane[0], plane[1], plane[2], point) }
-    };
-    points.map(height)
+pub(super) struct Plane {
+    corner: Point,
+    normal: Point,
+    magnitude: Point,
+}
+
+impl Plane {
+    #[inline(always)]
+    pub(super) fn new(triangle: &Triangle) -> Self {
+        let u = subtract(triangle[1], triangle[0]);
+        let v = subtract(triangle[2], triangle[0]);
+        let normal = cross(u, v);
+        let (u, v) = (u.map(f64::abs), v.map(f64::abs));
+        let magnitude = [u[1] * v[2] + u[2] * v[1], u[2] * v[0] + u[0] * v[2], u[0] * v[1] + u[1] * v[0]];
+        Self { corner: triangle[0], normal, magnitude }
+    }
+
+    /// Returns the height of a point, times twice the triangle's area, and a bound of its error.
+    #[inline(always)]
+    pub(super) fn height(&self, point: Point) -> (f64, f64) {
+        /// The bound of the filter's error, as a fraction of the permanent.
+        const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
+        let w = subtract(point, self.corner);
+        (dot(w, self.normal), BOUND * dot(w.map(f64::abs), self.magnitude))
+    }
 }
 
 #[inline(always)]
@@ -133,33 +152,53 @@ fn lone_corner(sides: [f64; 3]) -> (usize, bool) {
 }
 
 /// Decides the case of two planes that cross in a line which both triangles reach: each cuts an interval out of it.
-///
-/// The corners are renumbered as Guigue and Devillers do: the lone corner is the first, and on the positive side of
-/// the other triangle's plane. Then the line, directed along the cross product of the normals, enters `a` through
-/// the edge from 0 to 1 and leaves it through the edge from 0 to 2, and the same holds for `b`. Each end of an
-/// interval is the only point that its edge's line has in common with the other plane. Two such points on the line
-/// are equal exactly if the two edges are coplanar, and their order is the sign of the edges' volume.
 fn intervals_overlap(a: &Triangle, sides_a: [f64; 3], b: &Triangle, sides_b: [f64; 3]) -> bool {
-    let (first_a, positive_a) = lone_corner(sides_a);
-    let (first_b, positive_b) = lone_corner(sides_b);
-    let renumber = |triangle: &Triangle, first: usize, flip: bool| {
-        let (second, third) = if flip { (first + 2, first + 1) } else { (first + 1, first + 2) };
-        [triangle[first], triangle[second % 3], triangle[third % 3]]
-    };
-    // Flipping a triangle reverses its normal, and so moves the other's lone corner to the positive side.
-    let a = renumber(a, first_a, !positive_b);
-    let b = renumber(b, first_b, !positive_a);
+    let Aligned { a, b, .. } = Aligned::new(a, sides_a, b, sides_b);
     volume(a[0], a[1], b[0], b[1]) <= 0.0 && volume(a[0], a[2], b[2], b[0]) <= 0.0
 }
 
+/// Two triangles whose planes cross in a line which both reach, with corners renumbered as Guigue and Devillers do: the
+/// lone corner is the first, and on the positive side of the other triangle's plane.
+///
+/// Then the line, directed along the cross product of A's normal and B's, enters `a` through the edge from 0 to 2 and
+/// leaves it through the edge from 0 to 1. It enters `b` through the edge from 0 to 1 and leaves it through the edge from 0
+/// to 2. Each end of an interval is the only point that its edge's line has in common with the other plane. An edge of `a`
+/// and an edge of `b`, both from the lone corners, meet the line in the same point exactly if they are coplanar. Otherwise
+/// the volume of their corners is negative if that of `b` comes first.
+pub(super) struct Aligned {
+    pub(super) a: Triangle,
+    pub(super) b: Triangle,
+    /// Whether the numbering reverses one of the two normals, and so the direction of the line.
+    pub(super) is_reversed: bool,
+}
+
+impl Aligned {
+    /// `sides` are heights over the other triangle's plane.
+    #[inline(always)]
+    pub(super) fn new(a: &Triangle, sides_a: [f64; 3], b: &Triangle, sides_b: [f64; 3]) -> Self {
+        let (first_a, positive_a) = lone_corner(sides_a);
+        let (first_b, positive_b) = lone_corner(sides_b);
+        let renumber = |triangle: &Triangle, first: usize, flip: bool| {
+            let (second, third) = if flip { (first + 2, first + 1) } else { (first + 1, first + 2) };
+            [triangle[first], triangle[second % 3], triangle[third % 3]]
+        };
+        // Flipping a triangle reverses its normal, and so moves the other's lone corner to the positive side.
+        Self {
+            a: renumber(a, first_a, !positive_b),
+            b: renumber(b, first_b, !positive_a),
+            is_reversed: positive_a != positive_b,
+        }
+    }
+}
+
 /// The corners of a triangle's convex hull: three corners, or the two ends of a segment, or one point.
-struct Hull {
-    corners: Triangle,
-    count: usize,
+pub(super) struct Hull {
+    pub(super) corners: Triangle,
+    pub(super) count: usize,
 }
 
 impl Hull {
-    fn new(triangle: &Triangle) -> Self {
+    pub(super) fn new(triangle: &Triangle) -> Self {
         let [p, q, r] = *triangle;
         if !are_collinear(p, q, r) {
             return Self { corners: *triangle, count: 3 };
@@ -172,12 +211,12 @@ impl Hull {
         Self { corners: [first, last, last], count }
     }
 
-    fn corners(&self) -> &[Point] {
+    pub(super) fn corners(&self) -> &[Point] {
         &self.corners[..self.count]
     }
 
     /// Returns the end of the last edge; for a point, the point itself.
-    fn last(&self) -> Point {
+    pub(super) fn last(&self) -> Point {
         self.corners[self.count - 1]
     }
 }
@@ -255,11 +294,11 @@ fn has_separating_edge(a: &[Point], b: &[Point], axis: usize) -> bool {
 }
 
 /// Returns an axis along which the triangle projects to one with area; the triangle must have area itself.
-fn area_axis(triangle: &Triangle) -> usize {
+pub(super) fn area_axis(triangle: &Triangle) -> usize {
     (0..2).find(|axis| area(*axis, triangle[0], triangle[1], triangle[2]) != 0.0).unwrap_or(2)
 }
 
-fn are_collinear(p: Point, q: Point, r: Point) -> bool {
+pub(super) fn are_collinear(p: Point, q: Point, r: Point) -> bool {
     (0..3).all(|axis| area(axis, p, q, r) == 0.0)
 }
 
@@ -269,7 +308,7 @@ pub(super) fn area(axis: usize, p: Point, q: Point, r: Point) -> f64 {
     robust::orient2d(project(p), project(q), project(r))
 }
 
-fn lexicographic(p: Point, q: Point) -> Ordering {
+pub(super) fn lexicographic(p: Point, q: Point) -> Ordering {
     // The partial order treats -0 and 0 as equal; coordinates are never NaN.
     p.partial_cmp(&q).unwrap_or(Ordering::Equal)
 }

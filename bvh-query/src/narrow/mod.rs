@@ -21,6 +21,7 @@ mod integers;
 mod intersect;
 mod point;
 mod ray;
+mod region;
 mod rounded;
 mod stretch;
 mod winding;
@@ -30,6 +31,7 @@ pub(crate) use distance::{Closest, triangle_distance, triangle_distance_apart};
 pub(crate) use intersect::{segment_intersects, triangles_intersect};
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
+pub(crate) use region::{MAX_POINTS, common_region, unit, unit_normal};
 pub(crate) use rounded::rounded_crossing;
 pub(crate) use stretch::{Way, stretch};
 pub(crate) use winding::{AxisRay, Passing};
@@ -45,7 +47,7 @@ pub(crate) type Point = [f64; 3];
 pub(crate) type Triangle = [Point; 3];
 
 /// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
-const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
+pub(crate) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 #[inline(always)]
 pub(crate) fn subtract(p: Point, q: Point) -> Point {

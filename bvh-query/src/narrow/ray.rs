@@ -18,7 +18,9 @@
 //! Origin and corners keep the precondition of [`narrow`](super). The largest component of the direction is in [1, 2), and
 //! all are multiples of 2^-266: then nothing under- or overflows.
 
-use super::integers::{Vector, cross as cross_exactly, dot as dot_exactly, exponent, integer, minus};
+use super::integers::{
+    Vector, cross as cross_exactly, dot as dot_exactly, exponent, integer, minus, quotient,
+};
 use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
 use num_bigint::{BigInt, Sign};
 use std::cmp::Ordering;
@@ -324,12 +326,7 @@ impl Quotient {
         if self.numerator == BigInt::ZERO {
             return Crossing { t: 0.0, lower: 0.0, upper: 0.0, feature };
         }
-        // A quotient of 62 to 64 bits, rounded down, and then to the nearest f64: within one unit in its last place.
-        let shift = 63 + self.denominator.bits() as i64 - self.numerator.bits() as i64;
-        let numerator = &self.numerator << shift.max(0);
-        let denominator = &self.denominator << (-shift).max(0);
-        let quotient = numerator / denominator;
-        let t = libm::ldexp(quotient.iter_u64_digits().next().unwrap_or(0) as f64, -shift as i32);
+        let t = quotient(&self.numerator, &self.denominator);
         let lower = if t > f64::MIN_POSITIVE { t.next_down() } else { 0.0 };
         let t = t.max(f64::MIN_POSITIVE);
         Crossing { t, lower, upper: t.next_up(), feature }

@@ -22,6 +22,9 @@ use bvh_format::page::MAX_PACKETS_PER_PAGE;
 use bvh_format::{FormatError, Rule};
 use std::ops::ControlFlow;
 
+/// What is done with a contact and the pair of stored triangles that it is about.
+pub(super) type Report<'a> = &'a mut dyn FnMut(Contact, TrianglePair) -> ControlFlow<()>;
+
 impl Querier {
     /// Returns all pairs of triangles in contact, in ascending order.
     ///
@@ -61,17 +64,28 @@ impl Querier {
         mut visit: impl FnMut(Contact) -> ControlFlow<()>,
     ) -> Result<u64, QueryError> {
         self.start();
-        let (a, b) = (a.into(), b.into());
+        self.visit_places(a.into(), b.into(), pose, &mut |contact, _| visit(contact))
+    }
+
+    /// Calls `visit` for each contact, with the places of its triangles; duplicates have those of the triangles that replace
+    /// them.
+    pub(super) fn visit_places(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        visit: Report<'_>,
+    ) -> Result<u64, QueryError> {
         let most = max_triangles(a).saturating_mul(max_triangles(b));
         let (within, mut calls, mut too_many) = (sum_of_radii(a, b), 0, false);
         each_pair(a, b, pose, |placed| {
-            let found = self.contacts_of(placed, within, &mut |contact| {
+            let found = self.contacts_of(placed, within, &mut |contact, pair| {
                 too_many = calls == most;
                 if too_many {
                     return ControlFlow::Break(());
                 }
                 calls += 1;
-                visit(contact)
+                visit(contact, pair)
             })?;
             Ok(found.map(|_| ()))
         })?;
@@ -82,7 +96,7 @@ impl Querier {
         &mut self,
         placed: &PlacedPair<'_>,
         within: f64,
-        visit: &mut dyn FnMut(Contact) -> ControlFlow<()>,
+        visit: Report<'_>,
     ) -> Result<Option<TrianglePair>, QueryError> {
         self.memory.budget.visit()?;
         let apart = if within == 0.0 {
@@ -100,12 +114,12 @@ impl Querier {
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
         let budget = self.memory.budget;
         let mut contacts = 0;
-        let mut count = |contact| {
+        let mut count = |contact, pair| {
             if contacts == budget.left() {
                 return Err(budget.error());
             }
             contacts += 1;
-            Ok(visit(contact))
+            Ok(visit(contact, pair))
         };
         let visit = &mut |candidate| report(placed, candidate, &mut count);
         let (pair, memory, packets, queue) =
@@ -168,14 +182,14 @@ fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
 fn report(
     placed: &PlacedPair<'_>,
     candidate: TrianglePair,
-    visit: &mut dyn FnMut(Contact) -> Result<ControlFlow<()>, QueryError>,
+    visit: &mut dyn FnMut(Contact, TrianglePair) -> Result<ControlFlow<()>, QueryError>,
 ) -> Result<ControlFlow<TrianglePair>, QueryError> {
     let pair = &placed.pair;
     let (id_a, id_b) = ids(placed, &candidate)?;
     for triangle_a in std::iter::once(id_a).chain(pair.bvh_a.duplicates_of(id_a)?) {
         for triangle_b in std::iter::once(id_b).chain(pair.bvh_b.duplicates_of(id_b)?) {
             let (object_a, object_b) = placed.numbers;
-            if visit(Contact { object_a, triangle_a, object_b, triangle_b })?.is_break() {
+            if visit(Contact { object_a, triangle_a, object_b, triangle_b }, candidate)?.is_break() {
                 return Ok(ControlFlow::Break(candidate));
             }
         }

@@ -119,6 +119,6 @@ impl Querier {
 }
 
 /// Returns the point at a share of the way from one point to another.
-fn between(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
+pub(super) fn between(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
     [0, 1, 2].map(|k| from[k] + share * (to[k] - from[k]))
 }

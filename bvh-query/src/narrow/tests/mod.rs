@@ -4,4 +4,5 @@ mod distance;
 mod generate;
 mod intersect;
 mod many;
+mod region;
 mod within;

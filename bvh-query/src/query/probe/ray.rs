@@ -205,6 +205,13 @@ impl First {
         all.min_by(|x, y| order(x).partial_cmp(&order(y)).unwrap_or(Ordering::Equal))
             .map(|best| self.ray.hit(best))
     }
+
+    /// Returns the parameter of the first hit if the ray leaves the triangle on the side that its normal points to.
+    pub(crate) fn way_out(&self) -> Option<f64> {
+        let best = self.best.as_ref()?;
+        let is_out = narrow::dot(self.ray.ray.direction, narrow::unit_normal(&best.triangle)) > 0.0;
+        is_out.then_some(best.crossing.t * self.ray.unit)
+    }
 }
 
 impl LineQuestion for First {
