@@ -1,7 +1,7 @@
 //! Numbers that mean nothing are refused by every question, with an error that names what was found and what is expected.
 
 use bvh_bake::mesh::Mesh;
-use bvh_query::{Bvh, DistanceOptions, Pose, Querier, QueryError, Tracker};
+use bvh_query::{Bvh, DistanceOptions, PatchOptions, Pose, Querier, QueryError, Tracker};
 
 const MEANINGLESS: [f64; 5] = [f64::NAN, -1.0, -f64::MIN_POSITIVE, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -79,4 +79,18 @@ fn bytes_may_have_any_owner() {
         assert_eq!(querier.collide(&owner.unwrap(), &mesh, &Pose::IDENTITY), Ok(true));
     }
     assert_eq!(std::sync::Arc::strong_count(&shared), 1, "a closed file gives its bytes back");
+}
+
+#[test]
+fn tolerances_of_patches_are_finite_and_at_least_0() {
+    let (mesh, pose) = (triangle(), Pose::IDENTITY);
+    let mut querier = Querier::new().unwrap();
+    for number in MEANINGLESS {
+        let options = PatchOptions::new().tolerance(number);
+        check_refused(querier.patches(&mesh, &mesh, &pose, &options), "tolerance", number);
+    }
+    for number in [0.0, -0.0, f64::MIN_POSITIVE, f64::MAX] {
+        let options = PatchOptions::new().tolerance(number);
+        assert_eq!(querier.patches(&mesh, &mesh, &pose, &options).unwrap().patches.len(), 1);
+    }
 }

@@ -8,8 +8,8 @@ use bvh_bake::Options;
 use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use bvh_query::{
-    Batch, Bvh, DistanceOptions, Motion, MotionOptions, OwnedShape, Pose, ProbeBatch, Querier, QueryError,
-    Ray, Relation, RigidPath, Scene, Side, Tracker,
+    Batch, Bvh, DistanceOptions, Motion, MotionOptions, OwnedShape, PatchOptions, Pose, ProbeBatch, Querier,
+    QueryError, Ray, Relation, RigidPath, Scene, Side, Tracker,
 };
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -58,9 +58,11 @@ fn each_pair_question(
     batch.set_budget(budget);
     let batch = &batch;
     let loose = &DistanceOptions::default();
-    let asks: [(&str, AskPair<'_>); 20] = [
+    let asks: [(&str, AskPair<'_>); 22] = [
         ("collide", &|q| text(q.collide(a, b, pose))),
         ("contacts", &|q| text(q.contacts(a, b, pose))),
+        ("contact_regions", &|q| text(q.contact_regions(a, b, pose, 100))),
+        ("patches", &|q| text(q.patches(a, b, pose, &PatchOptions::new()))),
         ("distance", &|q| text(q.distance(a, b, pose))),
         ("distance_with", &|q| text(q.distance_with(a, b, pose, loose))),
         ("within", &|q| text(q.within(a, b, pose, 5.0))),

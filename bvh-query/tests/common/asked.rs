@@ -6,7 +6,8 @@ use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
-    Bvh, ClosestPoint, Contact, Distance, Pose, Querier, QueryError, Ray, RayHit, Relation, Side,
+    Bvh, ClosestPoint, Contact, Distance, PatchOptions, Patches, Pose, Querier, QueryError, Ray, RayHit,
+    Relation, Side,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,6 +17,8 @@ use std::path::Path;
 pub(crate) struct Answers {
     pub(crate) collide: Result<bool, QueryError>,
     pub(crate) contacts: Result<Vec<Contact>, QueryError>,
+    /// None if there are too many contacts.
+    pub(crate) patches: Option<Result<Patches, QueryError>>,
     pub(crate) distance: Result<Distance, QueryError>,
     pub(crate) within: Result<bool, QueryError>,
     pub(crate) relation: Result<Relation, QueryError>,
@@ -36,6 +39,7 @@ impl Answers {
         let errors = [
             self.collide.as_ref().err(),
             self.contacts.as_ref().err(),
+            self.patches.as_ref().and_then(|patches| patches.as_ref().err()),
             self.distance.as_ref().err(),
             self.within.as_ref().err(),
             self.relation.as_ref().err(),
@@ -60,7 +64,11 @@ impl Answers {
         fn holds<T: PartialEq>(one: &Result<T, QueryError>, other: &Result<T, QueryError>) -> bool {
             one.is_err() || one == other
         }
-        holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
+        let patches_hold = match (&self.patches, &other.patches) {
+            (Some(one), Some(whole)) => holds(one, whole),
+            _ => self.patches.is_none() == other.patches.is_none() || self.contacts.is_err(),
+        };
+        patches_hold && holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
             && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
@@ -86,6 +94,8 @@ impl Answers {
         let limit = distance.as_ref().map_or(0.25, |answer| answer.distance);
         Self {
             collide: querier.collide(a, b, pose),
+            patches: (contacts.len() < MAX_CONTACTS)
+                .then(|| querier.patches(a, b, pose, &PatchOptions::new().max_contacts(500))),
             contacts: visited.map(|_| contacts),
             within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),
             distance,
