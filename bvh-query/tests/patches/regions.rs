@@ -128,3 +128,35 @@ fn exchanging_the_meshes_gives_the_same_points() {
         assert_eq!(sorted(swapped), sorted(region));
     }
 }
+
+/// The point of two rounded triangles is at most the radius, and the error, from either core.
+#[test]
+fn points_of_rounded_triangles_are_within_both() {
+    let mut random = Random::new(23);
+    let (a, b) = (baked(&dirty(&soup(25, 11), 12)), baked(&dirty(&soup(25, 13), 14)));
+    let (of_a, of_b) = (corners(&a), corners(&b));
+    let (mut apart, mut crossing) = (0, 0);
+    for radii in [[0.2, 0.1], [0.0, 0.15], [0.25, 0.0]] {
+        let pose = random_pose(&mut random, 0.5);
+        let shapes = [a.all().rounded(radii[0]).unwrap(), b.all().rounded(radii[1]).unwrap()];
+        let answer = querier().contact_regions(shapes[0], shapes[1], &pose, usize::MAX).unwrap();
+        for region in &answer.regions {
+            let Contact { object_a, triangle_a, object_b, triangle_b } = region.contact;
+            let (t, u) = (of_a[&(object_a, triangle_a)], placed(&[of_b[&(object_b, triangle_b)]], &pose)[0]);
+            let cores = Length::between(&t, &u);
+            assert!(cores.is(radii[0] + radii[1] - region.overlap, 1e-12), "{region:?}");
+            if cores.compare(0.0).is_eq() {
+                crossing += 1;
+                continue;
+            }
+            apart += 1;
+            assert_eq!((region.kind, region.points().len()), (RegionKind::Point, 1));
+            assert!(region.error < 1e-13, "{region:?}");
+            for (core, radius) in [(&t, radii[0]), (&u, radii[1])] {
+                let off = Length::between(&[region.points()[0]; 3], core);
+                assert!(off.compare(radius + region.error).is_le(), "{region:?} {core:?} {radius}");
+            }
+        }
+    }
+    assert!(apart > 200 && crossing > 20, "{apart} {crossing}");
+}

@@ -41,6 +41,17 @@ struct Placed {
     number: usize,
 }
 
+impl Placed {
+    fn new(point: [f64; 3], error: f64, number: usize) -> Self {
+        let height = dot(DIRECTION, point) - height_error(point);
+        Self { height, point, error, number }
+    }
+}
+
+fn height_error(point: [f64; 3]) -> f64 {
+    HEIGHT_ERROR * point.iter().map(|x| x.abs()).sum::<f64>()
+}
+
 impl Vertices {
     pub(super) fn new(
         regions: &[ContactRegion],
@@ -51,10 +62,7 @@ impl Vertices {
         for region in regions {
             starts.push(points.len());
             for point in region.points() {
-                let magnitude: f64 = point.iter().map(|x| x.abs()).sum();
-                let error = region.error + tolerance / 2.0;
-                let (height, number) = (dot(DIRECTION, *point) - HEIGHT_ERROR * magnitude, points.len());
-                points.push(Placed { height, point: *point, error, number });
+                points.push(Placed::new(*point, region.error + tolerance / 2.0, points.len()));
             }
         }
         starts.push(points.len());
@@ -116,9 +124,8 @@ fn join_points(mut points: Vec<Placed>, sets: &mut Sets, budget: &mut Budget) ->
     let widest = points.iter().fold(0.0_f64, |most, point| most.max(point.error));
     let mut compared = 0;
     for (i, p) in points.iter().enumerate() {
-        let magnitude: f64 = p.point.iter().map(|x| x.abs()).sum();
         let reach = p.error + widest;
-        let limit = p.height + (reach + 2.0 * HEIGHT_ERROR * magnitude) * (1.0 + f64::EPSILON);
+        let limit = p.height + (reach + 2.0 * height_error(p.point)) * (1.0 + f64::EPSILON);
         for q in points[i + 1..].iter().take_while(|q| q.height <= limit) {
             compared += 1;
             if compared % COMPARISONS_PER_VISIT == 0 {
@@ -165,5 +172,48 @@ impl Sets {
     /// Returns the least number of each number's set.
     fn firsts(mut self) -> Vec<usize> {
         (0..self.0.len()).map(|number| self.first(number)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cbvh_testkit::Random;
+
+    /// Joins by comparing all points.
+    fn of_all_pairs(points: &[Placed]) -> Vec<usize> {
+        let mut sets = Sets::new(points.len());
+        for p in points {
+            for q in points {
+                if is_within(subtract(p.point, q.point), p.error + q.error) {
+                    sets.join(p.number, q.number);
+                }
+            }
+        }
+        sets.firsts()
+    }
+
+    #[test]
+    fn points_are_joined_as_all_pairs_say() {
+        let mut random = Random::new(6);
+        let mut joined = 0;
+        for round in 0..200 {
+            // Far from the origin, the points are as near as roundings are large.
+            let (far, scale) = [(0.0, 1.0), (1e9, 1e-6), (0.0, 1e-300), (1e30, 1e14)][round % 4];
+            let mut points = Vec::new();
+            for number in 0..60 {
+                let p = random.point().map(|x| far + scale * (4.0 * x).round() / 4.0);
+                let nudge = [0.0, f64::EPSILON * far, scale * 1e-3][random.below(3)];
+                let point = [p[0] + nudge, p[1], p[2] - nudge];
+                let error = scale * [0.0, 1e-4, 0.01, 0.12][random.below(4)];
+                points.push(Placed::new(point, error, number));
+            }
+            let expected = of_all_pairs(&points);
+            let mut sets = Sets::new(points.len());
+            join_points(points, &mut sets, &mut Budget::new(u64::MAX)).unwrap();
+            joined += expected.iter().enumerate().filter(|(i, first)| i != *first).count();
+            assert_eq!(sets.firsts(), expected);
+        }
+        assert!(joined > 1000 && joined < 11_000, "{joined}");
     }
 }

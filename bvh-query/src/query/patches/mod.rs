@@ -120,8 +120,8 @@ impl Querier {
     /// these lines, which is all of the patch where its deepest point is a vertex or below the centre; it is an estimate. For
     /// rounded shapes the depth is the largest `overlap`.
     ///
-    /// The answer has the same bits on all backends. Cost: that of `contact_regions` and some 150 bytes more for each contact
-    /// while it runs, some 0.2 us for each contact, and up to ten rays for each patch, some 10 us. These count as visits
+    /// The answer has the same bits on all backends. Cost: that of `contact_regions`, some 0.3 us more for each contact,
+    /// up to ten rays for each patch, some 10 us, and while it runs some 1 KiB for each contact. These count as visits
     /// ([`Querier::set_budget`]), as do comparisons of points that are almost alike.
     ///
     /// # Errors
