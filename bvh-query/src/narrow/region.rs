@@ -324,7 +324,7 @@ pub(crate) fn unit_normal(triangle: &Triangle) -> Point {
 /// Returns a vector at length 1, or zero if it has no direction.
 pub(crate) fn unit(v: Point) -> Point {
     let size = v.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
-    if !(size >= f64::MIN_POSITIVE && size <= f64::MAX) {
+    if !(f64::MIN_POSITIVE..=f64::MAX).contains(&size) {
         return [0.0; 3];
     }
     let scaled = times(reciprocal_exponent(size), v);
