@@ -9,6 +9,7 @@
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
 //! | where do they meet? | [`Querier::contact_regions`] | points, segments, polygons and normals, with certified errors |
 //! | how do they push each other? | [`Querier::patches`] | connected contacts: centre, normal, length, area, depth (estimated) |
+//! | which triangles of one mesh meet where they should not? | [`Querier::self_contacts`], [`Querier::visit_self_contacts`] | pairs of triangle ids, exact |
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
@@ -95,7 +96,7 @@ pub use isa::{Backend, BackendError};
 pub use motion::{Motion, PathError, Polyline, RelativePath, RigidPath};
 pub use pose::{Pose, PoseError};
 pub use query::answers::{
-    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, Side, SignedDistance,
+    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, SelfContact, SelfContactKind, Side, SignedDistance,
 };
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;

@@ -12,3 +12,4 @@ pub(crate) mod math;
 pub(crate) mod placed_packet;
 pub(crate) mod point;
 pub(crate) mod queue;
+pub(crate) mod self_packet;

@@ -24,6 +24,7 @@ mod ray;
 mod region;
 mod rounded;
 mod stretch;
+mod self_contact;
 mod winding;
 mod within;
 
@@ -34,6 +35,8 @@ pub(crate) use ray::{Crossing, Ray};
 pub(crate) use region::{MAX_POINTS, common_region, unit, unit_normal};
 pub(crate) use rounded::rounded_crossing;
 pub(crate) use stretch::{Way, stretch};
+pub use self_contact::SelfContactKind;
+pub(crate) use self_contact::self_contact;
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 

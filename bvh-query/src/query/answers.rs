@@ -1,5 +1,7 @@
 //! The types of answers.
 
+pub use crate::narrow::SelfContactKind;
+
 /// A pair of triangles in contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Contact {
@@ -11,6 +13,22 @@ pub struct Contact {
     pub object_b: u32,
     /// The triangle of B.
     pub triangle_b: u32,
+}
+
+/// Two triangles of one mesh that meet where they should not: see [`Querier::self_contacts`](crate::Querier::self_contacts).
+/// The object and the triangle of A are before those of B.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SelfContact {
+    /// The number that the object of the first triangle has in the file.
+    pub object_a: u32,
+    /// The first triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle_a: u32,
+    /// The number that the object of the second triangle has in the file.
+    pub object_b: u32,
+    /// The second triangle.
+    pub triangle_b: u32,
+    /// How they meet.
+    pub kind: SelfContactKind,
 }
 
 /// The least distance of two shapes. For shapes with radii, `triangle_a` and `triangle_b` are those of the cores, and the points

@@ -156,7 +156,7 @@ impl Querier {
 /// Returns an upper bound of the triangles of a side, duplicates included, whatever its file states: what its pages have
 /// room for. In a forged file any number of triangles may have the id that all duplicates belong to, so that the
 /// number of their pairs would have no bound.
-fn max_triangles(side: Shape<'_>) -> u64 {
+pub(super) fn max_triangles(side: Shape<'_>) -> u64 {
     let (layout, bytes) = (side.bvh().layout(), side.bvh().bytes());
     let pages = match side.objects() {
         [object] => object.record().pages.get(),
@@ -171,7 +171,7 @@ const MAX_TRIANGLES_PER_PAGE: u64 = (MAX_PACKETS_PER_PAGE * PACKET) as u64;
 
 /// Returns the rule that is broken where there are more contacts than pairs of triangles.
 #[cold]
-fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
+pub(super) fn ids_repeat(a: Shape<'_>, b: Shape<'_>) -> QueryError {
     let sections = [a, b].map(|side| &side.bvh().layout().sections);
     let duplicates = sections.into_iter().flatten().find(|section| section.kind == SectionKind::Duplicates);
     let at = duplicates.map_or(0, |section| section.range.start as u64);

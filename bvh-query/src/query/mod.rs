@@ -19,4 +19,5 @@ pub(crate) mod querier;
 pub(crate) mod regions;
 pub(crate) mod rounded;
 mod search;
+mod self_contacts;
 pub(crate) mod tracker;

@@ -9,6 +9,7 @@ pub(crate) mod line_filter;
 pub(crate) mod node_cache;
 pub(crate) mod node_filter;
 pub(crate) mod pending;
+pub(crate) mod packet_tree;
 mod per_node;
 pub(crate) mod placement;
 pub(crate) mod point_filter;

@@ -1,0 +1,207 @@
+//! Leaf packets of one mesh that meet others of it, and which of 16 pairs of their triangles certainly do not meet, or only
+//! in the hull of their common corners.
+//!
+//! Two tests decide nearly all pairs of neighbours. If all corners of B that A lacks are certainly on one side of A's plane,
+//! B meets this plane in the hull of the common corners alone. If the triangles have one common corner, and each has the
+//! other two certainly on both sides of the other's plane, then the signs tell whether they have another point in common, as
+//! `narrow::self_contact` explains.
+//!
+//! Error. The corners of one object are exact: `f32` values times a power of two that makes the object about 1 in size, unless
+//! a product underflows, which is noticed. Let u = 2^-24, E the largest component of a triangle's edges from its first
+//! corner, and D that of the difference between this corner and another point. Each edge and each difference is rounded once.
+//! A component of the normal is at most 2 E^2 and is off by less than 8.1u E^2. The height sums three products of such a
+//! component and one of the difference, with four roundings each, so it is off by less than 3 D (8.1u E^2 + 8.1u E^2), which
+//! is below 50u D E^2. What underflows is less than 2^-120 in all, as D is at most about 2.
+
+use crate::isa::{Isa, Lanes};
+use crate::leaf::frame::scale_of;
+use crate::leaf::math::{Corners, U, Vec3, cross, dot, largest, max3, min3, sub};
+use crate::leaf::local::{repeat, tile};
+use crate::leaf::placed_packet::load4;
+use crate::traverse::packet_tree::{BEFORE, Boxes};
+use bvh_format::leaf::{PACKET, Packet};
+use bvh_format::object::Object;
+
+/// A bound of all underflows of a height together: 2^-120, in cubes of the unit.
+const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
+
+/// Four triangles, and what the tests need of them.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(crate) struct SelfPacket {
+    /// The boxes of its triangles, around the origin of the shape. They are one monotone function of the exact coordinates,
+    /// so that what overlaps exactly overlaps here.
+    pub(crate) boxes: Boxes,
+    /// Around the origin of the object: `[corner][axis]`.
+    corners: [[[f32; 4]; 3]; 3],
+    /// Perpendicular to each face, not normalised.
+    normal: [[f32; 4]; 3],
+    /// The error of a height, as a fraction of the distance from the first corner.
+    error: [f32; 4],
+    /// The place of the object in the shape.
+    object: u32,
+    /// Whether the corners are exact.
+    is_exact: bool,
+}
+
+/// The frame in which the packets of an object are compared.
+#[derive(Clone, Copy)]
+pub(crate) struct SelfFrame {
+    /// The place of the object in the shape.
+    object: u32,
+    origin: [f64; 3],
+    origin_of_shape: [f64; 3],
+    /// Units of the frame in a mesh unit, a power of two.
+    scale: f32,
+}
+
+impl SelfFrame {
+    pub(crate) fn new(place: u32, object: &Object, origin_of_shape: [f64; 3]) -> Self {
+        let record = object.record();
+        let sides = [0, 1, 2].map(|i| f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()));
+        let scale = scale_of(sides.into_iter().fold(0.0, f64::max)) as f32;
+        Self { object: place, origin: object.origin(), origin_of_shape, scale }
+    }
+}
+
+impl SelfPacket {
+    pub(crate) const NONE: Self = Self {
+        boxes: Boxes::EMPTY,
+        corners: [[[0.0; 4]; 3]; 3],
+        normal: [[0.0; 4]; 3],
+        error: [0.0; 4],
+        object: 0,
+        is_exact: false,
+    };
+
+    /// Makes this a packet of an object.
+    #[inline(always)]
+    pub(crate) fn place<I: Isa>(&mut self, isa: I, frame: &SelfFrame, packet: &Packet, triangles: u8) {
+        self.enclose(isa, frame, packet, triangles);
+        let (scale, back) = (isa.splat4(frame.scale), isa.splat4(1.0 / frame.scale));
+        let mut lost = isa.splat4(0.0);
+        for corner in 0..3 {
+            for axis in 0..3 {
+                let stored = isa.load4(&packet.corners[corner][axis]);
+                let scaled = stored.mul(scale);
+                lost = lost.max(scaled.mul(back).sub(stored).abs());
+                isa.store4(scaled, &mut self.corners[corner][axis]);
+            }
+        }
+        self.is_exact = I::H::bits(lost.le(isa.splat4(0.0))) & 0xf == 0xf;
+        self.object = frame.object;
+        let [p, q, r] = [0, 1, 2].map(|corner| load4(isa, &self.corners[corner]));
+        let (edge_1, edge_2) = (sub(q, p), sub(r, p));
+        let normal = cross(edge_1, edge_2);
+        for axis in 0..3 {
+            isa.store4(normal[axis], &mut self.normal[axis]);
+        }
+        let edge = largest(edge_1).max(largest(edge_2));
+        isa.store4(edge.mul(edge).mul(isa.splat4(50.0 * U)), &mut self.error);
+    }
+
+    /// Computes the boxes.
+    #[inline(always)]
+    pub(crate) fn enclose<I: Isa>(&mut self, isa: I, frame: &SelfFrame, packet: &Packet, triangles: u8) {
+        for axis in 0..3 {
+            let corners = &packet.corners;
+            let of: Vec3<I::H> = [
+                isa.load4(&corners[0][axis]),
+                isa.load4(&corners[1][axis]),
+                isa.load4(&corners[2][axis]),
+            ];
+            let (lo, hi) = (&mut self.boxes.lo[axis], &mut self.boxes.hi[axis]);
+            isa.store4(min3(of), lo);
+            isa.store4(max3(of), hi);
+            let (origin, from) = (frame.origin[axis], frame.origin_of_shape[axis]);
+            if origin != from {
+                for end in lo.iter_mut().chain(hi.iter_mut()) {
+                    *end = ((origin + f64::from(*end)) - from) as f32;
+                }
+            }
+            for place in usize::from(triangles)..PACKET {
+                (lo[place], hi[place]) = (f32::INFINITY, f32::NEG_INFINITY);
+            }
+        }
+    }
+
+    /// Returns a bit for each pair of triangles that may be in contact, each pair once: bit `4 * a + b`.
+    #[inline(always)]
+    pub(crate) fn undecided<I: Isa>(&self, isa: I, other: &Self, is_same: bool) -> u16 {
+        let overlapping = self.boxes.overlapping(isa, &other.boxes) & if is_same { BEFORE } else { u16::MAX };
+        if overlapping == 0 || self.object != other.object || !self.is_exact || !other.is_exact {
+            return overlapping;
+        }
+        overlapping & !apart(isa, self, other)
+    }
+}
+
+/// The lanes in which a corner of one triangle is certainly above or below the plane of the other, and those in which it is
+/// one of the other's corners.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    above: u16,
+    below: u16,
+    common: u16,
+}
+
+/// The pairs that certainly do not meet beyond the hull of their common corners.
+#[inline(always)]
+fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> u16 {
+    let corners_a: Corners<I::V> =
+        [repeat(isa, &a.corners[0]), repeat(isa, &a.corners[1]), repeat(isa, &a.corners[2])];
+    let corners_b: Corners<I::V> =
+        [tile(isa, &b.corners[0]), tile(isa, &b.corners[1]), tile(isa, &b.corners[2])];
+    let (normal_a, error_a) = (repeat(isa, &a.normal), isa.repeat(&a.error));
+    let (normal_b, error_b) = (tile(isa, &b.normal), isa.tile(&b.error));
+    let (mut of_a, mut of_b) = ([Side::default(); 3], [Side::default(); 3]);
+    let (mut once, mut twice) = (0, 0);
+    for i in 0..3 {
+        for j in 0..3 {
+            let between = sub(corners_b[j], corners_a[i]);
+            let distance = largest(between);
+            let equal = I::V::bits(distance.le(isa.splat(0.0)));
+            of_a[i].common |= equal;
+            of_b[j].common |= equal;
+            twice |= once & equal;
+            once |= equal;
+            if i == 0 {
+                (of_b[j].above, of_b[j].below) = sides(isa, dot(between, normal_a), distance, error_a);
+            }
+            if j == 0 {
+                // The difference points from A to B.
+                (of_a[i].below, of_a[i].above) = sides(isa, dot(between, normal_b), distance, error_b);
+            }
+        }
+    }
+    on_one_side(&of_a) | on_one_side(&of_b) | (once & !twice & turned_away(&of_a, &of_b))
+}
+
+/// Returns the lanes of heights that are certainly above 0, and of those certainly below.
+#[inline(always)]
+fn sides<I: Isa>(isa: I, height: I::V, distance: I::V, error: I::V) -> (u16, u16) {
+    let error = error.mul_add(distance, isa.splat(UNDERFLOW));
+    let below_error = isa.splat(0.0).sub(error);
+    (I::V::bits(error.lt(height)), I::V::bits(height.lt(below_error)))
+}
+
+/// The lanes in which all corners but the common ones are on one side, and there is one.
+#[inline(always)]
+fn on_one_side([p, q, r]: &[Side; 3]) -> u16 {
+    let above = (p.above | p.common) & (q.above | q.common) & (r.above | r.common);
+    let below = (p.below | p.common) & (q.below | q.common) & (r.below | r.common);
+    (above | below) & !(p.common & q.common & r.common)
+}
+
+/// The lanes in which, if only one corner is common, the edges opposite to it do not cross as seen from it.
+#[inline(always)]
+fn turned_away(a: &[Side; 3], b: &[Side; 3]) -> u16 {
+    let (mut certain, mut first_a, mut second_b) = (u16::MAX, 0, 0);
+    for i in 0..3 {
+        certain &= a[i].above | a[i].below | a[i].common;
+        certain &= b[i].above | b[i].below | b[i].common;
+        first_a |= a[i].common & a[(i + 1) % 3].above;
+        second_b |= b[i].common & b[(i + 2) % 3].above;
+    }
+    certain & (first_a ^ second_b)
+}
