@@ -1,21 +1,29 @@
 //! Leaf packets of one mesh that meet others of it, and which of 16 pairs of their triangles certainly do not meet, or only
 //! in the hull of their common corners.
 //!
-//! Two tests decide nearly all pairs of neighbours. If all corners of B that A lacks are certainly on one side of A's plane,
-//! B meets this plane in the hull of the common corners alone. If the triangles have one common corner, and each has the
-//! other two certainly on both sides of the other's plane, then the signs tell whether they have another point in common, as
-//! `narrow::self_contact` explains.
+//! Three tests decide nearly all pairs of neighbours:
+//!
+//! - If all corners of B that A lacks are certainly on one side of A's plane, B meets this plane in the hull of the common
+//!   corners alone.
+//! - If the triangles have one common corner, and each has the other two certainly on both sides of the other's plane, then
+//!   the signs tell whether they have another point in common, as `narrow::self_contact` explains.
+//! - The plane through an edge of A, perpendicular to A, meets A in this edge alone. If all corners of B that are not ends of
+//!   the edge are certainly beyond it, the triangles meet in the hull of the common ends alone. This decides neighbours in
+//!   one plane.
 //!
 //! Error. The corners of one object are exact: `f32` values times a power of two that makes the object about 1 in size, unless
 //! a product underflows, which is noticed. Let u = 2^-24, E the largest component of a triangle's edges from its first
-//! corner, and D that of the difference between this corner and another point. Each edge and each difference is rounded once.
-//! A component of the normal is at most 2 E^2 and is off by less than 8.1u E^2. The height sums three products of such a
-//! component and one of the difference, with four roundings each, so it is off by less than 3 D (8.1u E^2 + 8.1u E^2), which
-//! is below 50u D E^2. What underflows is less than 2^-120 in all, as D is at most about 2.
+//! corner, and D that of the difference between a corner and another point. Each edge and each difference is rounded once. A
+//! component of the face's normal is at most 2 E^2 and is off by less than 8.1u E^2. The height sums three products of such a
+//! component and one of the difference, with four roundings each, so it is off by less than 3 D (8.1 + 8.1) u E^2, which is
+//! below 50u D E^2. The normal of an edge, at most 2 E long, is at most 8 E^3 and is off by less than
+//! (2 (16.2 + 4 + 4) + 8) u E^3, so that the height beyond it is off by less than 3 D (56.4 + 32) u E^3, which is below
+//! 270u D E^3. What underflows is less than 2^-120 in all, as D and E are at most about 2.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::frame::scale_of;
-use crate::leaf::math::{Corners, U, Vec3, cross, dot, largest, max3, min3, sub};
+use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest, max3, min3, sub};
+use crate::narrow::Triangle;
 use crate::leaf::local::{repeat, tile};
 use crate::leaf::placed_packet::load4;
 use crate::traverse::packet_tree::{BEFORE, Boxes};
@@ -36,8 +44,8 @@ pub(crate) struct SelfPacket {
     corners: [[[f32; 4]; 3]; 3],
     /// Perpendicular to each face, not normalised.
     normal: [[f32; 4]; 3],
-    /// The error of a height, as a fraction of the distance from the first corner.
-    error: [f32; 4],
+    /// The largest magnitude of a component of the edges from the first corner.
+    edge: [f32; 4],
     /// The place of the object in the shape.
     object: u32,
     /// Whether the corners are exact.
@@ -69,7 +77,7 @@ impl SelfPacket {
         boxes: Boxes::EMPTY,
         corners: [[[0.0; 4]; 3]; 3],
         normal: [[0.0; 4]; 3],
-        error: [0.0; 4],
+        edge: [0.0; 4],
         object: 0,
         is_exact: false,
     };
@@ -96,8 +104,40 @@ impl SelfPacket {
         for axis in 0..3 {
             isa.store4(normal[axis], &mut self.normal[axis]);
         }
-        let edge = largest(edge_1).max(largest(edge_2));
-        isa.store4(edge.mul(edge).mul(isa.splat4(50.0 * U)), &mut self.error);
+        isa.store4(largest(edge_1).max(largest(edge_2)), &mut self.edge);
+    }
+
+    /// Returns a triangle around the origin of its object, in a unit of its own.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: u8) -> Triangle {
+        let mut triangle = [[0.0; 3]; 3];
+        for corner in 0..3 {
+            for axis in 0..3 {
+                triangle[corner][axis] = f64::from(self.corners[corner][axis][usize::from(lane & 3)]);
+            }
+        }
+        triangle
+    }
+
+    /// Returns whether the triangles of both packets are in one unit and around one origin, exactly.
+    #[inline(always)]
+    pub(crate) fn is_comparable(&self, other: &Self) -> bool {
+        self.object == other.object && self.is_exact && other.is_exact
+    }
+
+    /// The normals of the edges from each corner to the next, in the plane of the face, outward.
+    #[inline(always)]
+    fn edge_normals<I: Isa>(&self, isa: I) -> [[[f32; 4]; 3]; 3] {
+        let corners = [0, 1, 2].map(|corner| load4(isa, &self.corners[corner]));
+        let (edges, normal) = (edges(&corners), load4(isa, &self.normal));
+        let mut normals = [[[0.0; 4]; 3]; 3];
+        for (edge, to) in edges.iter().zip(&mut normals) {
+            let outward = cross(*edge, normal);
+            for axis in 0..3 {
+                isa.store4(outward[axis], &mut to[axis]);
+            }
+        }
+        normals
     }
 
     /// Computes the boxes.
@@ -129,10 +169,12 @@ impl SelfPacket {
     #[inline(always)]
     pub(crate) fn undecided<I: Isa>(&self, isa: I, other: &Self, is_same: bool) -> u16 {
         let overlapping = self.boxes.overlapping(isa, &other.boxes) & if is_same { BEFORE } else { u16::MAX };
-        if overlapping == 0 || self.object != other.object || !self.is_exact || !other.is_exact {
+        if overlapping == 0 || !self.is_comparable(other) {
             return overlapping;
         }
-        overlapping & !apart(isa, self, other)
+        let (apart, common) = apart(isa, self, other);
+        let undecided = overlapping & !apart;
+        if undecided == 0 { 0 } else { undecided & !beside(isa, self, other, &common) }
     }
 }
 
@@ -145,22 +187,35 @@ struct Side {
     common: u16,
 }
 
-/// The pairs that certainly do not meet beyond the hull of their common corners.
+/// The lanes in which two corners are the same: `[corner of A][corner of B]`.
+type Common = [[u16; 3]; 3];
+
+/// The corners of both packets, as 16 lanes each.
 #[inline(always)]
-fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> u16 {
-    let corners_a: Corners<I::V> =
-        [repeat(isa, &a.corners[0]), repeat(isa, &a.corners[1]), repeat(isa, &a.corners[2])];
-    let corners_b: Corners<I::V> =
-        [tile(isa, &b.corners[0]), tile(isa, &b.corners[1]), tile(isa, &b.corners[2])];
-    let (normal_a, error_a) = (repeat(isa, &a.normal), isa.repeat(&a.error));
-    let (normal_b, error_b) = (tile(isa, &b.normal), isa.tile(&b.error));
+fn lanes<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (Corners<I::V>, Corners<I::V>) {
+    let (a, b) = (&a.corners, &b.corners);
+    (
+        [repeat(isa, &a[0]), repeat(isa, &a[1]), repeat(isa, &a[2])],
+        [tile(isa, &b[0]), tile(isa, &b[1]), tile(isa, &b[2])],
+    )
+}
+
+/// The pairs that certainly do not meet beyond the hull of their common corners, by the planes of their faces.
+#[inline(always)]
+fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (u16, Common) {
+    let (corners_a, corners_b) = lanes(isa, a, b);
+    let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
+    let factor = isa.splat(50.0 * U);
+    let (error_a, error_b) = (edge_a.mul(edge_a).mul(factor), edge_b.mul(edge_b).mul(factor));
+    let (normal_a, normal_b) = (repeat(isa, &a.normal), tile(isa, &b.normal));
     let (mut of_a, mut of_b) = ([Side::default(); 3], [Side::default(); 3]);
-    let (mut once, mut twice) = (0, 0);
+    let (mut common, mut once, mut twice) = ([[0; 3]; 3], 0, 0);
     for i in 0..3 {
         for j in 0..3 {
             let between = sub(corners_b[j], corners_a[i]);
             let distance = largest(between);
             let equal = I::V::bits(distance.le(isa.splat(0.0)));
+            common[i][j] = equal;
             of_a[i].common |= equal;
             of_b[j].common |= equal;
             twice |= once & equal;
@@ -174,7 +229,38 @@ fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> u16 {
             }
         }
     }
-    on_one_side(&of_a) | on_one_side(&of_b) | (once & !twice & turned_away(&of_a, &of_b))
+    let crossed = once & !twice & turned_away(&of_a, &of_b);
+    (on_one_side(&of_a) | on_one_side(&of_b) | crossed, common)
+}
+
+/// The pairs that certainly do not meet beyond the hull of their common corners, by planes through their edges.
+#[inline(always)]
+fn beside<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket, common: &Common) -> u16 {
+    let (corners_a, corners_b) = lanes(isa, a, b);
+    let (normals_a, normals_b) = (a.edge_normals(isa), b.edge_normals(isa));
+    let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
+    let factor = isa.splat(270.0 * U);
+    let error_a = edge_a.mul(edge_a).mul(edge_a.mul(factor));
+    let error_b = edge_b.mul(edge_b).mul(edge_b.mul(factor));
+    let (mut beside_a, mut beside_b) = ([u16::MAX; 3], [u16::MAX; 3]);
+    for i in 0..3 {
+        for j in 0..3 {
+            let between = sub(corners_b[j], corners_a[i]);
+            let distance = largest(between);
+            let (above, _) = sides(isa, dot(between, repeat(isa, &normals_a[i])), distance, error_a);
+            beside_a[i] &= above | common[i][j] | common[(i + 1) % 3][j];
+            // The difference points from A to B.
+            let (_, above) = sides(isa, dot(between, tile(isa, &normals_b[j])), distance, error_b);
+            beside_b[j] &= above | common[i][j] | common[i][(j + 1) % 3];
+        }
+    }
+    // A triangle without any corner of its own may be a duplicate.
+    let own = |of: fn(&Common, usize) -> u16| !(of(common, 0) & of(common, 1) & of(common, 2));
+    let own_a = own(|common, i| common[i][0] | common[i][1] | common[i][2]);
+    let own_b = own(|common, j| common[0][j] | common[1][j] | common[2][j]);
+    let beside_a = (beside_a[0] | beside_a[1] | beside_a[2]) & own_b;
+    let beside_b = (beside_b[0] | beside_b[1] | beside_b[2]) & own_a;
+    beside_a | beside_b
 }
 
 /// Returns the lanes of heights that are certainly above 0, and of those certainly below.

@@ -73,9 +73,42 @@ pub(crate) fn segment_intersects(triangle: &Triangle, p: Point, q: Point) -> boo
 /// Returns a number with the exact sign of the volume spanned by `p, q, r, s`: positive if `p, q, r` turn
 /// counterclockwise as seen from `s`.
 pub(super) fn volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
+    let [height] = heights(&[p, q, r], &[s]);
+    height
+}
+
+/// Returns what [`volume`] does, where a filter cannot decide.
+#[cold]
+fn exact_volume(p: Point, q: Point, r: Point, s: Point) -> f64 {
+    if let Some(volume) = integer_volume([p, q, r, s]) {
+        return volume;
+    }
     let coordinate = |p: Point| Coord3D { x: p[0], y: p[1], z: p[2] };
     // `robust` returns a positive number for a point below the plane.
     -robust::orient3d(coordinate(p), coordinate(q), coordinate(r), coordinate(s))
+}
+
+/// Returns the sign of a volume if the coordinates are integers below 2^40 in magnitude, in some power of two. Those of
+/// neighbouring triangles in `f32` are, unless some are very near 0, and this takes a quarter of the time of expansions.
+///
+/// A difference is then below 2^41, a minor below 2^83, and the volume below 2^126.
+fn integer_volume(points: [Point; 4]) -> Option<f64> {
+    const BITS: i64 = 40;
+    let largest = points.iter().flatten().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    // The exponent of the power of two that makes the largest one at least 2^39, in the bits of an `f64`.
+    let exponent = 2 * 1023 + BITS - 1 - (largest.to_bits() >> 52) as i64;
+    let scale = (1..2047).contains(&exponent).then(|| f64::from_bits((exponent as u64) << 52))?;
+    let scaled = points.map(|point| point.map(|x| x * scale));
+    let integers = scaled.map(|point| point.map(|x| x as i64));
+    if integers.map(|point| point.map(|x| x as f64)) != scaled {
+        return None;
+    }
+    let [p, q, r, s] = integers;
+    let minus = |x: [i64; 3]| [0, 1, 2].map(|axis| i128::from(x[axis] - p[axis]));
+    let (u, v, w) = (minus(q), minus(r), minus(s));
+    let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
+    let volume = w[0] * minor(1, 2) + w[1] * minor(2, 0) + w[2] * minor(0, 1);
+    Some(volume.signum() as f64)
 }
 
 /// Returns, for each corner of `points`, a number with the exact sign of its height over the plane of `plane`.
@@ -84,7 +117,7 @@ pub(super) fn heights<const POINTS: usize>(plane: &Triangle, points: &[Point; PO
     let of_plane = Plane::new(plane);
     points.map(|point| {
         let (height, error) = of_plane.height(point);
-        if height.abs() > error { height } else { volume(plane[0], plane[1], plane[2], point) }
+        if height.abs() > error { height } else { exact_volume(plane[0], plane[1], plane[2], point) }
     })
 }
 

@@ -134,6 +134,9 @@ fn meet_beyond_corner(a: &Triangle, b: &Triangle) -> bool {
     if are_on_one_side(sides_b) {
         return false;
     }
+    if sides_b == [0.0; 2] {
+        return meet_beyond_corner_in_special_position(a, b, true);
+    }
     let sides_a = heights(b, &[a[1], a[2]]);
     if are_on_one_side(sides_a) {
         return false;
@@ -141,7 +144,7 @@ fn meet_beyond_corner(a: &Triangle, b: &Triangle) -> bool {
     if sides_a.iter().chain(&sides_b).all(|side| *side != 0.0) {
         return (sides_a[0] > 0.0) == (sides_b[1] > 0.0);
     }
-    meet_beyond_corner_in_special_position(a, b, (sides_a, sides_b) == ([0.0; 2], [0.0; 2]))
+    meet_beyond_corner_in_special_position(a, b, false)
 }
 
 #[inline(always)]
@@ -149,19 +152,22 @@ fn are_on_one_side(sides: [f64; 2]) -> bool {
     (sides[0] > 0.0 && sides[1] > 0.0) || (sides[0] < 0.0 && sides[1] < 0.0)
 }
 
+/// Decides the case that a corner of one triangle is in the plane of the other: if `is_in_plane`, all corners of B are in A's.
 #[cold]
-fn meet_beyond_corner_in_special_position(a: &Triangle, b: &Triangle, is_flat: bool) -> bool {
+fn meet_beyond_corner_in_special_position(a: &Triangle, b: &Triangle, is_in_plane: bool) -> bool {
     let [[p, r, s], [_, t, u]] = [*a, *b];
     let (has_area_a, has_area_b) = (!are_collinear(p, r, s), !are_collinear(p, t, u));
-    if is_flat && has_area_a && has_area_b {
+    if is_in_plane && has_area_a && has_area_b {
         return sectors_meet(area_axis(a), p, [r, s], [t, u]);
     }
     // A triangle without area is one or two segments from the corner.
-    let parts = |[p, r, s]: Triangle, has_area| if has_area { vec![[p, r, s]] } else { vec![[p, r, r], [p, s, s]] };
-    let parts_b = parts(*b, has_area_b);
-    parts(*a, has_area_a).iter().any(|a| {
-        parts_b.iter().any(|b| segment_intersects(b, a[1], a[2]) || segment_intersects(a, b[1], b[2]))
-    })
+    let (segments_a, segments_b) = ([[p, r, r], [p, s, s]], [[p, t, t], [p, u, u]]);
+    let parts_a = if has_area_a { std::slice::from_ref(a) } else { &segments_a };
+    let parts_b = if has_area_b { std::slice::from_ref(b) } else { &segments_b };
+    let meet = |a: &Triangle, b: &Triangle| {
+        segment_intersects(b, a[1], a[2]) || segment_intersects(a, b[1], b[2])
+    };
+    parts_a.iter().any(|a| parts_b.iter().any(|b| meet(a, b)))
 }
 
 /// Returns whether two sectors of a plane with one apex, each between two points and less than half a turn, have a ray in

@@ -4,7 +4,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::{Isa, Task};
-use crate::narrow::{Closest, Point, Triangle, triangle_distance};
+use crate::narrow::{Closest, Triangle, triangle_distance};
 use crate::pose::Pose;
 use crate::query::placed_pair::PlacedPair;
 use bvh_format::leaf::PACKET;
@@ -52,24 +52,9 @@ impl RecentTriangles {
 
 /// Returns a triangle in the frame of its own file: origin plus stored offset, a sum that is exact.
 pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
-    Ok(from_origin(&around_origin(bvh, object, leaf, lane)?, object.origin()))
-}
-
-/// Returns a triangle around the origin of its object.
-#[inline(always)]
-pub(super) fn around_origin(
-    bvh: &Bvh,
-    object: &Object,
-    leaf: LeafPacket,
-    lane: u8,
-) -> Result<Triangle, QueryError> {
-    Ok(bvh.triangle(object, leaf, lane & 3)?.map(|corner| corner.map(f64::from)))
-}
-
-/// Returns a triangle around an origin in the frame of its own file.
-#[inline(always)]
-pub(super) fn from_origin(triangle: &Triangle, origin: Point) -> Triangle {
-    triangle.map(|corner| [0, 1, 2].map(|axis| origin[axis] + corner[axis]))
+    let corners = bvh.triangle(object, leaf, lane & 3)?;
+    let origin = object.origin();
+    Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
 }
 
 /// Returns the triangle at a place, in the frame of its own file.

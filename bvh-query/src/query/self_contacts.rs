@@ -5,10 +5,10 @@ use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
 use crate::leaf::self_packet::{SelfFrame, SelfPacket};
-use crate::narrow::{SelfContactKind, self_contact};
+use crate::narrow::{SelfContactKind, Triangle, self_contact};
 use crate::query::answers::{QueryStats, SelfContact};
 use crate::query::contacts::{ids_repeat, max_triangles};
-use crate::query::exact::{RecentTriangles, around_origin, from_origin};
+use crate::query::exact::{RecentTriangles, stored};
 use crate::query::querier::Querier;
 use crate::traverse::budget::Budget;
 use crate::traverse::packet_tree::{PacketTree, PacketVisitor};
@@ -69,17 +69,11 @@ impl Querier {
             return Ok(reports.calls);
         }
         let visit: Visit<'_> = &mut |places, kind, budget| reports.pair(tree, places, kind, budget);
-        let mut visitor = SelfVisitor {
-            shape,
-            frames,
-            tree,
-            kept: Default::default(),
-            recent: Default::default(),
-            stats: QueryStats::default(),
-            visit,
-        };
+        let (recent, stats) = (Default::default(), QueryStats::default());
+        let exact = ExactPairs { shape, tree, recent, stats, visit };
+        let mut visitor = SelfVisitor { frames, kept: Default::default(), exact };
         self.backend.run(VisitPairs { tree, budget, visitor: &mut visitor })?;
-        self.stats = visitor.stats;
+        self.stats = visitor.exact.stats;
         Ok(reports.calls)
     }
 }
@@ -147,14 +141,10 @@ type Visit<'a> = &'a mut dyn FnMut(
 
 /// Decides which triangles of two packets are in contact.
 struct SelfVisitor<'a> {
-    shape: Shape<'a>,
     frames: &'a [SelfFrame],
-    tree: &'a PacketTree,
     /// Of both sides of a pair.
     kept: [KeptPackets; 2],
-    recent: [RecentTriangles; 2],
-    stats: QueryStats,
-    visit: Visit<'a>,
+    exact: ExactPairs<'a>,
 }
 
 /// Packets kept for each side of a pair: 96 KiB for both, so that they stay in the second-level cache.
@@ -221,15 +211,22 @@ impl PacketVisitor for SelfVisitor<'_> {
         (a, b): (u32, u32),
         budget: &mut Budget,
     ) -> Result<ControlFlow<()>, QueryError> {
-        self.stats.packet_tests += 1;
-        let Self { shape, frames, tree, kept: [kept_a, kept_b], .. } = self;
-        let of = |number| PlacePacket { shape: *shape, frames, tree, number };
+        let Self { frames, kept: [kept_a, kept_b], exact } = self;
+        exact.stats.packet_tests += 1;
+        let of = |number| PlacePacket { shape: exact.shape, frames, tree: exact.tree, number };
         let (packet_a, packet_b) = (kept_a.get(isa, of(a))?, kept_b.get(isa, of(b))?);
         let mut mask = packet_a.undecided(isa, packet_b, a == b);
+        let are_comparable = packet_a.is_comparable(packet_b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
-            if self.decide([(a, lane / 4), (b, lane % 4)], budget)?.is_break() {
+            let places = [(a, lane / 4), (b, lane % 4)];
+            let flow = if are_comparable {
+                exact.decide(places, &packet_a.triangle(lane / 4), &packet_b.triangle(lane % 4), budget)?
+            } else {
+                exact.decide_stored(places, budget)?
+            };
+            if flow.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
@@ -237,32 +234,49 @@ impl PacketVisitor for SelfVisitor<'_> {
     }
 }
 
-impl SelfVisitor<'_> {
-    /// Decides a pair of triangles exactly.
+/// Decides pairs of triangles exactly.
+struct ExactPairs<'a> {
+    shape: Shape<'a>,
+    tree: &'a PacketTree,
+    /// Of both sides of a pair.
+    recent: [RecentTriangles; 2],
+    stats: QueryStats,
+    visit: Visit<'a>,
+}
+
+impl ExactPairs<'_> {
+    /// Decides a pair of triangles in one frame.
     #[inline(never)]
     fn decide(
         &mut self,
         places: [(u32, u8); 2],
+        a: &Triangle,
+        b: &Triangle,
         budget: &mut Budget,
     ) -> Result<ControlFlow<()>, QueryError> {
         self.stats.exact_tests += 1;
-        let [recent_a, recent_b] = &mut self.recent;
+        match self_contact(a, b) {
+            Some(kind) => (self.visit)(places, kind, budget),
+            None => Ok(ControlFlow::Continue(())),
+        }
+    }
+
+    /// Decides a pair of triangles in the frame of the file, such as those of two objects.
+    #[inline(never)]
+    fn decide_stored(
+        &mut self,
+        places: [(u32, u8); 2],
+        budget: &mut Budget,
+    ) -> Result<ControlFlow<()>, QueryError> {
         let (shape, tree) = (self.shape, self.tree);
         let place = |recent: &mut RecentTriangles, (packet, lane): (u32, u8)| {
             let (object, leaf) = tree.packets()[packet as usize];
             let object = &shape.objects()[object as usize];
-            let corners = recent.get_or_place(leaf, lane, || around_origin(shape.bvh(), object, leaf, lane))?;
-            Ok::<_, QueryError>((object.origin(), *corners))
+            recent.get_or_place(leaf, lane, || stored(shape.bvh(), object, leaf, lane)).copied()
         };
-        let ((origin_a, mut a), (origin_b, mut b)) = (place(recent_a, places[0])?, place(recent_b, places[1])?);
-        // Around one origin, differences of corners have few bits, and signs of determinants take less time.
-        if origin_a != origin_b {
-            (a, b) = (from_origin(&a, origin_a), from_origin(&b, origin_b));
-        }
-        match self_contact(&a, &b) {
-            Some(kind) => (self.visit)(places, kind, budget),
-            None => Ok(ControlFlow::Continue(())),
-        }
+        let [recent_a, recent_b] = &mut self.recent;
+        let (a, b) = (place(recent_a, places[0])?, place(recent_b, places[1])?);
+        self.decide(places, &a, &b, budget)
     }
 }
 
