@@ -96,7 +96,8 @@ pub use isa::{Backend, BackendError};
 pub use motion::{Motion, PathError, Polyline, RelativePath, RigidPath};
 pub use pose::{Pose, PoseError};
 pub use query::answers::{
-    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, SelfContact, SelfContactKind, Side, SignedDistance,
+    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, SelfContact, SelfContactKind, Side,
+    SignedDistance,
 };
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;

@@ -113,6 +113,14 @@ fn contacts_without_number_are_refused() {
     assert!(refused, "{asked:?} after {calls} calls");
     let most = 4 * MAX_PACKETS_PER_PAGE as u64 + 2999;
     assert_eq!(calls, most * most);
+    calls = 0;
+    let asked = querier.visit_self_contacts(&forged, |_| {
+        calls += 1;
+        ControlFlow::Continue(())
+    });
+    let refused = matches!(&asked, Err(QueryError::Damaged(error)) if error.rule == Rule::DuplicateIds);
+    assert!(refused, "{asked:?} after {calls} calls");
+    assert_eq!(calls, most * most / 2);
 }
 
 /// The memory for opening and checking depends on the bytes that are there, not on the numbers that they state.

@@ -1,21 +1,33 @@
 //! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh from which it was baked.
 
 use crate::console::{self, Failure, Record, counted, hex, length, names, record};
-use crate::options::size;
+use crate::options::{size, whole};
 use crate::process;
 use bvh_bake::{FileError, StoredFile, VerifyError, VerifyOptions, validate_in_parallel, verify_files};
 use bvh_format::FormatError;
 use bvh_format::header::version_name;
 use bvh_format::source::Source;
+use bvh_query::{Querier, ReadAhead, SelfContact, SelfContactKind, Shape};
 use clap::Args;
-use std::path::PathBuf;
+use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 const VALIDATE_HELP: &str = "\
 Example:
   cbvh validate rock.cbvh --json
+  cbvh validate rock.cbvh --self-contacts --limit 5
 
 An invalid file exits with code 3. With --json, the object then has the fields rule, rule_text, offset, expected and \
 found.
+
+--self-contacts also finds all pairs of triangles that meet where they should not. Two triangles may meet in the corners \
+and the edge that they have in common, and nowhere else. The kinds are crossing (no common corner), at_corner (one), \
+folded (they overlap on the same side of a common edge) and duplicate (the same corners). The answer is exact, and is no \
+error: the exit code is 0. With --json, the object has the field self_contacts: an object with the numbers of all pairs and \
+of each kind (count, crossing, at_corner, folded, duplicate) and with the first pairs (pairs: objects with kind, object_a, \
+triangle_a, object_b and triangle_b). A file without ids has lost its exact duplicates, and numbers triangles by place. In \
+a scene, each object is asked by itself.
 
 The file is read piece by piece, in about 10 MiB of memory whatever its size. --max-memory SIZE keeps the process \
 within SIZE; a SIZE that is too small exits with code 4.";
@@ -29,6 +41,12 @@ pub(crate) struct ValidateArguments {
     /// Stay within this much memory, such as 64MiB
     #[arg(long, value_name = "SIZE", value_parser = size, allow_negative_numbers = true)]
     max_memory: Option<u64>,
+    /// Find all pairs of triangles that meet where they should not; this maps the file
+    #[arg(long, conflicts_with = "max_memory")]
+    self_contacts: bool,
+    /// How many of these pairs to list, the first ones by object and triangle
+    #[arg(long, value_name = "N", default_value = "10", value_parser = whole::<usize>, requires = "self_contacts", allow_negative_numbers = true)]
+    limit: usize,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -56,8 +74,9 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
     let (objects, pages) = (layout.objects.len() as u64, u64::from(layout.page_count()));
     let triangles = records().map(|record| record.triangles.get()).sum::<u64>();
     let (version, content) = (version_name(layout.version), hex(layout.content_checksum));
+    let found = arguments.self_contacts.then(|| SelfContacts::find(path, arguments.limit)).transpose()?;
     if arguments.json {
-        return console::json(&record! {
+        let record = record! {
             file: file,
             valid: true,
             format_version: version,
@@ -68,14 +87,99 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
             file_bytes: file_bytes,
             content_xxh3: content,
             peak_rss_bytes: process::peak_bytes(),
-        });
+        };
+        return console::json(&record.with(found.map(|found| record! { self_contacts: found.json() })));
     }
     console::text(&format!(
-        "{file}: valid, format {version}, {}, {}, {}, content {content}\n",
+        "{file}: valid, format {version}, {}, {}, {}, content {content}\n{}",
         counted(objects, "object"),
         counted(pages, "page"),
-        counted(triangles, "triangle")
+        counted(triangles, "triangle"),
+        found.map_or_else(String::new, |found| found.text(&file))
     ))
+}
+
+/// The pairs of triangles of a file that meet where they should not.
+#[derive(Default)]
+struct SelfContacts {
+    /// By kind.
+    counts: [u64; SelfContactKind::ALL.len()],
+    /// The first ones, as many as are to be listed.
+    first: BinaryHeap<SelfContact>,
+    has_objects: bool,
+}
+
+impl SelfContacts {
+    fn find(path: &Path, limit: usize) -> Result<Self, Failure> {
+        let bvh = process::map(path, ReadAhead::Usual)?;
+        let mut querier = Querier::new().map_err(Failure::usage)?;
+        let mut found = Self { has_objects: bvh.objects().len() > 1, ..Self::default() };
+        // The objects of a scene have frames of their own.
+        let shapes: Vec<Shape<'_>> = match bvh.layout().has_instances() {
+            true => (0..bvh.objects().len()).filter_map(|number| bvh.object(number)).collect(),
+            false => vec![bvh.all()],
+        };
+        for shape in shapes {
+            let asked = querier.visit_self_contacts(shape, |contact| {
+                found.add(contact, limit);
+                ControlFlow::Continue(())
+            });
+            asked.map_err(|error| Failure::invalid(path, error))?;
+        }
+        Ok(found)
+    }
+
+    fn add(&mut self, contact: SelfContact, limit: usize) {
+        self.counts[contact.kind as usize] += 1;
+        if self.first.len() < limit {
+            self.first.push(contact);
+        } else if let Some(mut last) = self.first.peek_mut()
+            && contact < *last
+        {
+            *last = contact;
+        }
+    }
+
+    fn json(self) -> Record {
+        let [crossing, at_corner, folded, duplicate] = self.counts;
+        let pairs: Vec<Record> = self.first.into_sorted_vec().iter().map(pair_json).collect();
+        record! {
+            count: self.counts.iter().sum::<u64>(),
+            crossing: crossing,
+            at_corner: at_corner,
+            folded: folded,
+            duplicate: duplicate,
+            pairs: pairs,
+        }
+    }
+
+    fn text(self, file: &str) -> String {
+        let count = counted(self.counts.iter().sum(), "pair");
+        let kinds =
+            SelfContactKind::ALL.map(|kind| format!("{} {}", self.counts[kind as usize], kind.name()));
+        let mut text =
+            format!("{file}: {count} of triangles meet where they should not: {}\n", kinds.join(", "));
+        for pair in self.first.into_sorted_vec() {
+            let SelfContact { object_a, triangle_a, object_b, triangle_b, kind } = pair;
+            let name = |object: u32, triangle: u32| match self.has_objects {
+                true => format!("triangle {triangle} of object {object}"),
+                false => format!("triangle {triangle}"),
+            };
+            let (a, b) = (name(object_a, triangle_a), name(object_b, triangle_b));
+            text.push_str(&format!("  {a} and {b}: {}\n", kind.name()));
+        }
+        text
+    }
+}
+
+fn pair_json(pair: &SelfContact) -> Record {
+    record! {
+        kind: pair.kind.name(),
+        object_a: pair.object_a,
+        triangle_a: pair.triangle_a,
+        object_b: pair.object_b,
+        triangle_b: pair.triangle_b,
+    }
 }
 
 /// Returns the rule that a file breaks, and where.

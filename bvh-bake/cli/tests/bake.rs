@@ -280,6 +280,34 @@ fn damage_is_told_by_rule() {
 }
 
 #[test]
+fn triangles_that_meet_where_they_should_not_are_listed() {
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.cbvh("bake cube.obj -o c.cbvh").done();
+    let said = directory.cbvh("validate c.cbvh --self-contacts").done().out;
+    let none = "c.cbvh: 0 pairs of triangles meet where they should not: 0 crossing, 0 at_corner, 0 folded, 0 duplicate\n";
+    assert!(said.ends_with(none), "{said}");
+    // Triangle 1 is folded onto 0, 2 crosses both, 3 crosses them at a corner, and 4 is 0 again.
+    let corners = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nv 1 0.5 -1\nv 1 0.5 1\nv 3 0.5 1\nv 1 2 -1\nv 1 2 1\n";
+    directory.write("bad.obj", format!("{corners}f 1 2 3\nf 1 2 4\nf 5 6 7\nf 1 8 9\nf 2 1 3\n"));
+    directory.cbvh("bake bad.obj -o b.cbvh").done();
+    let json = directory.cbvh("validate b.cbvh --self-contacts --limit 2 --json").done().json();
+    let found = &json["self_contacts"];
+    let of = |name: &str| found[name].as_u64().unwrap();
+    assert_eq!(of("count"), ["crossing", "at_corner", "folded", "duplicate"].map(of).iter().sum::<u64>());
+    assert_eq!((of("crossing"), of("at_corner"), of("folded"), of("duplicate")), (3, 2, 2, 1), "{json}");
+    let pairs = found["pairs"].as_array().unwrap();
+    let pair =
+        |at: usize| (&pairs[at]["kind"], pairs[at]["triangle_a"].as_u64(), pairs[at]["triangle_b"].as_u64());
+    assert_eq!(pairs.len(), 2);
+    assert_eq!(pair(0), (&"folded".into(), Some(0), Some(1)));
+    assert_eq!(pair(1), (&"crossing".into(), Some(0), Some(2)));
+    let said = directory.cbvh("validate b.cbvh --self-contacts").done().out;
+    assert!(said.contains("  triangle 0 and triangle 4: duplicate\n"), "{said}");
+    assert_eq!(said.lines().count(), 2 + 8, "{said}");
+}
+
+#[test]
 fn a_summary_has_the_size_and_a_folder_is_no_output() {
     let directory = &place();
     directory.write("a.obj", cube());

@@ -22,10 +22,10 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::frame::scale_of;
-use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest, max3, min3, sub};
-use crate::narrow::Triangle;
 use crate::leaf::local::{repeat, tile};
+use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest, max3, min3, sub};
 use crate::leaf::placed_packet::load4;
+use crate::narrow::Triangle;
 use crate::traverse::packet_tree::{BEFORE, Boxes};
 use bvh_format::leaf::{PACKET, Packet};
 use bvh_format::object::Object;
@@ -145,11 +145,8 @@ impl SelfPacket {
     pub(crate) fn enclose<I: Isa>(&mut self, isa: I, frame: &SelfFrame, packet: &Packet, triangles: u8) {
         for axis in 0..3 {
             let corners = &packet.corners;
-            let of: Vec3<I::H> = [
-                isa.load4(&corners[0][axis]),
-                isa.load4(&corners[1][axis]),
-                isa.load4(&corners[2][axis]),
-            ];
+            let of: Vec3<I::H> =
+                [isa.load4(&corners[0][axis]), isa.load4(&corners[1][axis]), isa.load4(&corners[2][axis])];
             let (lo, hi) = (&mut self.boxes.lo[axis], &mut self.boxes.hi[axis]);
             isa.store4(min3(of), lo);
             isa.store4(max3(of), hi);

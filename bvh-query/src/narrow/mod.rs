@@ -23,8 +23,8 @@ mod point;
 mod ray;
 mod region;
 mod rounded;
-mod stretch;
 mod self_contact;
+mod stretch;
 mod winding;
 mod within;
 
@@ -34,9 +34,9 @@ pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};
 pub(crate) use region::{MAX_POINTS, common_region, unit, unit_normal};
 pub(crate) use rounded::rounded_crossing;
-pub(crate) use stretch::{Way, stretch};
 pub use self_contact::SelfContactKind;
 pub(crate) use self_contact::self_contact;
+pub(crate) use stretch::{Way, stretch};
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 

@@ -122,7 +122,8 @@ fn are_folded_in_plane(p: Point, q: Point, r: Point, s: Point) -> bool {
         None => {
             let [low, high] = if lexicographic(p, q).is_lt() { [p, q] } else { [q, p] };
             let both = |is_beyond: &dyn Fn(Point) -> bool| is_beyond(r) && is_beyond(s);
-            both(&|point| lexicographic(point, low).is_lt()) || both(&|point| lexicographic(point, high).is_gt())
+            both(&|point| lexicographic(point, low).is_lt())
+                || both(&|point| lexicographic(point, high).is_gt())
         }
     }
 }
@@ -164,9 +165,8 @@ fn meet_beyond_corner_in_special_position(a: &Triangle, b: &Triangle, is_in_plan
     let (segments_a, segments_b) = ([[p, r, r], [p, s, s]], [[p, t, t], [p, u, u]]);
     let parts_a = if has_area_a { std::slice::from_ref(a) } else { &segments_a };
     let parts_b = if has_area_b { std::slice::from_ref(b) } else { &segments_b };
-    let meet = |a: &Triangle, b: &Triangle| {
-        segment_intersects(b, a[1], a[2]) || segment_intersects(a, b[1], b[2])
-    };
+    let meet =
+        |a: &Triangle, b: &Triangle| segment_intersects(b, a[1], a[2]) || segment_intersects(a, b[1], b[2]);
     parts_a.iter().any(|a| parts_b.iter().any(|b| meet(a, b)))
 }
 

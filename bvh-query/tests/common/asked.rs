@@ -7,7 +7,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
     Bvh, ClosestPoint, Contact, Distance, PatchOptions, Patches, Pose, Querier, QueryError, Ray, RayHit,
-    Relation, Side,
+    Relation, SelfContact, Side,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -19,6 +19,8 @@ pub(crate) struct Answers {
     pub(crate) contacts: Result<Vec<Contact>, QueryError>,
     /// None if there are too many contacts.
     pub(crate) patches: Option<Result<Patches, QueryError>>,
+    /// Of A.
+    pub(crate) self_contacts: Result<Vec<SelfContact>, QueryError>,
     pub(crate) distance: Result<Distance, QueryError>,
     pub(crate) within: Result<bool, QueryError>,
     pub(crate) relation: Result<Relation, QueryError>,
@@ -40,6 +42,7 @@ impl Answers {
             self.collide.as_ref().err(),
             self.contacts.as_ref().err(),
             self.patches.as_ref().and_then(|patches| patches.as_ref().err()),
+            self.self_contacts.as_ref().err(),
             self.distance.as_ref().err(),
             self.within.as_ref().err(),
             self.relation.as_ref().err(),
@@ -69,6 +72,7 @@ impl Answers {
             _ => self.patches.is_none() == other.patches.is_none() || self.contacts.is_err(),
         };
         patches_hold && holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
+            && holds(&self.self_contacts, &other.self_contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
             && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
@@ -89,6 +93,16 @@ impl Answers {
             if contacts.len() < MAX_CONTACTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         contacts.sort_unstable();
+        let mut self_contacts = Vec::new();
+        let self_visited = querier.visit_self_contacts(a, |contact| {
+            self_contacts.push(contact);
+            if self_contacts.len() < MAX_CONTACTS {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        self_contacts.sort_unstable();
         let at = probed.all().at(place);
         let distance = querier.distance(a, b, pose);
         let limit = distance.as_ref().map_or(0.25, |answer| answer.distance);
@@ -97,6 +111,7 @@ impl Answers {
             patches: (contacts.len() < MAX_CONTACTS)
                 .then(|| querier.patches(a, b, pose, &PatchOptions::new().max_contacts(500))),
             contacts: visited.map(|_| contacts),
+            self_contacts: self_visited.map(|_| self_contacts),
             within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),
             distance,
             relation: querier.relation(a, b, pose),
