@@ -189,7 +189,7 @@ fn neighbours_almost_in_one_plane_agree_with_integers() {
         };
         let add = |p: Vector, q: Vector| [0, 1, 2].map(|i| p[i] + q[i]);
         // Corners of a plane through the origin, moved by at most a unit.
-        let (u, v) = (near(600), near(600));
+        let (u, v) = (near(1500), near(1500));
         let in_plane = |[i, j, _]: Vector, off: Vector| add(add(times(i, u), times(j, v)), off);
         let mut corner = || in_plane(near(3), near(1));
         let a = [corner(), corner(), corner()];
@@ -198,11 +198,11 @@ fn neighbours_almost_in_one_plane_agree_with_integers() {
         if let Some(kind) = truth(&a, &b) {
             expected.push(contact(2 * at, 2 * at + 1, kind));
         }
-        let by = [at % 30, at / 30 % 30, at / 900].map(|x| 16_384 * x as i128);
+        let by = [at % 30, at / 30 % 30, at / 900].map(|x| 32_768 * x as i128);
         all.extend([a, b].map(|t| t.map(|p| add(p, by))));
     }
     assert_eq!(querier.self_contacts(&baked(&in_floats(&all))).unwrap(), expected);
-    assert!(querier.stats().exact_tests > 5000, "{:?}", querier.stats());
+    assert!(querier.stats().exact_tests > 1000, "{:?}", querier.stats());
 }
 
 #[test]

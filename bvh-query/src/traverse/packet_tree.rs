@@ -140,7 +140,7 @@ impl PacketTree {
 /// Puts the box of four others in the next place of a level.
 #[inline(always)]
 fn put(level: &mut Vec<Boxes>, place: usize, of: &Boxes) {
-    if place % 4 == 0 {
+    if place.is_multiple_of(4) {
         level.push(Boxes::EMPTY);
     }
     if let Some(boxes) = level.last_mut() {
