@@ -34,9 +34,9 @@ impl Querier {
     /// CGAL's `self_intersections` finds after equal points have been merged. CGAL reports a triangle without area as a pair
     /// with itself, and nothing else about it.
     ///
-    /// Cost: reading the shape once, and 0.1 to 0.3 us per triangle of ordinary meshes. Memory, for the time of
-    /// the call: 11 to 15 bytes per triangle, and 20 per contact. Each leaf packet, each pair of nodes or of leaf packets whose boxes overlap and each contact counts
-    /// as a visit ([`Querier::set_budget`]).
+    /// Cost: reading the shape once, and 0.1 to 0.3 us per triangle of ordinary meshes. Memory, for the time of the call: up
+    /// to 25 bytes per triangle, and 20 per contact. Each leaf packet, each pair of nodes or of leaf packets whose boxes
+    /// overlap and each contact counts as a visit ([`Querier::set_budget`]).
     ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page of the shape is damaged, [`QueryError::Budget`] if the budget does not suffice.

@@ -69,7 +69,7 @@ pub(crate) trait PacketVisitor {
     ) -> Result<ControlFlow<()>, QueryError>;
 }
 
-/// The leaf packets of a shape, and the boxes around them: 44 bytes per packet.
+/// The leaf packets of a shape, and the boxes around them: 44 bytes per packet, and as much again while they grow.
 #[derive(Default)]
 pub(crate) struct PacketTree {
     /// The place of the object in the shape, and the packet.
