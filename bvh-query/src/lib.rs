@@ -101,6 +101,7 @@ pub use query::answers::{
 };
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
+pub use query::depth::clash::{Clash, ClashClass, ClashOptions};
 pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation};
 pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
@@ -114,8 +115,8 @@ pub use query::querier::Querier;
 pub use query::regions::{ContactRegion, ContactRegions, RegionKind};
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
+    Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact,
+    SceneDistance, SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

@@ -24,7 +24,7 @@ pub use groups::Groups;
 pub use instance::InstanceId;
 pub use motion::SceneMotionAnswer;
 pub use probe::{SceneClosestPoint, SceneRayHit};
-pub use question::{SceneContact, SceneDistance, ScenePair};
+pub use question::{SceneClash, SceneContact, SceneDistance, ScenePair};
 
 use crate::file::bvh::Bvh;
 use crate::file::files::SceneShape;

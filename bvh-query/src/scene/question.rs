@@ -4,6 +4,7 @@ use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
+use crate::query::depth::clash::{Clash, ClashClass, ClashOptions};
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
@@ -44,6 +45,16 @@ pub struct SceneDistance {
     pub pair: ScenePair,
     /// The answer of [`Querier::distance`].
     pub nearest: Distance,
+}
+
+/// A pair of instances that clash, and how. Points and translations are in A's frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct SceneClash {
+    /// The instances.
+    pub pair: ScenePair,
+    /// The answer of [`Querier::clash`].
+    pub clash: Clash,
 }
 
 /// The most pairs of a question that are held at a time, which take 1.5 MiB. If more are near each other, pairs are
@@ -152,6 +163,19 @@ impl Scene {
         self.each_near(0.0, |querier, pair| {
             let relation = querier.relation(pair.a, pair.b, &pair.pose)?;
             Ok((relation != Relation::Apart).then_some((pair.ids, relation)))
+        })
+    }
+
+    /// Returns all pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs
+    /// that are apart are left out.
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] if an option is invalid, the errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
+    pub fn clashes(&mut self, options: &ClashOptions) -> Result<Vec<SceneClash>, SceneError> {
+        options.check()?;
+        self.each_near(options.clearance, |querier, pair| {
+            let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
+            Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
         })
     }
 

@@ -1,6 +1,7 @@
 //! How deep shapes overlap: the ways on which they come free, and how far they have to go at least.
 
 mod balls;
+pub(crate) mod clash;
 mod leaving;
 mod line;
 pub(crate) mod penetration;

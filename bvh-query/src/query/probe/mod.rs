@@ -9,6 +9,6 @@ mod near;
 pub(crate) mod placed;
 pub(crate) mod point;
 pub(crate) mod ray;
-mod relation;
+pub(super) mod relation;
 pub(crate) mod segment;
 pub(crate) mod side;

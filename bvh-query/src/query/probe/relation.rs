@@ -168,7 +168,7 @@ impl Querier {
 }
 
 /// Visits the stored triangles of an object until one suffices: where components are not listed, each triangle counts as one.
-fn each_triangle(
+pub(crate) fn each_triangle(
     bvh: &Bvh,
     object: &Object,
     mut visit: impl FnMut(TrianglePlace) -> Result<bool, QueryError>,

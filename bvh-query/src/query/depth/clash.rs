@@ -1,0 +1,291 @@
+//! How two parts of an assembly lie: apart, near, touching, overlapping, one in the other, or twice in one place.
+
+use crate::error::{NumberError, QueryError};
+use crate::file::shape::Shape;
+use crate::pose::Pose;
+use crate::query::answers::{Distance, Relation};
+use crate::query::depth::balls::bounds;
+use crate::query::depth::penetration::{Penetration, PenetrationOptions, check_closed};
+use crate::query::displacement::{displacement, size};
+use crate::query::distance::no_answer;
+use crate::query::exact::{placed, stored_at};
+use crate::query::options::{check, check_distance};
+use crate::query::probe::closest::IsWithin;
+use crate::query::probe::placed::PlacedShape;
+use crate::query::probe::point::check_point;
+use crate::query::probe::relation::each_triangle;
+use crate::query::querier::Querier;
+use crate::query::rounded::limit_of_cores;
+use crate::query::search::Search;
+
+/// How two parts lie. The command and the bindings of other languages use its numbers (`class as u8`) and names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum ClashClass {
+    /// Their surfaces are farther apart than the clearance, and neither is inside the other.
+    Apart = 0,
+    /// Their surfaces do not touch, but are at most the clearance apart.
+    Near = 1,
+    /// They have points in common, and their depth is at most the tolerance.
+    Touching = 2,
+    /// Their depth exceeds the tolerance.
+    Overlapping = 3,
+    /// One is wholly inside the other.
+    Contained = 4,
+    /// Both are the same part in the same place, to within the tolerance.
+    Duplicated = 5,
+    /// They have points in common, and the tolerance lies between the bounds that were found for their depth.
+    Undecided = 6,
+    /// They have points in common, and one is not closed, so that they have no depth.
+    Intersecting = 7,
+}
+
+impl ClashClass {
+    /// All classes, in the order of their numbers.
+    pub const ALL: [Self; 8] = [
+        Self::Apart,
+        Self::Near,
+        Self::Touching,
+        Self::Overlapping,
+        Self::Contained,
+        Self::Duplicated,
+        Self::Undecided,
+        Self::Intersecting,
+    ];
+
+    /// Returns its name: `apart`, `near` and so on.
+    pub fn name(self) -> &'static str {
+        ["apart", "near", "touching", "overlapping", "contained", "duplicated", "undecided", "intersecting"]
+            [self as usize & 7]
+    }
+}
+
+/// How two parts lie, and by how much.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Clash {
+    /// How they lie.
+    pub class: ClashClass,
+    /// Whether they touch and, if not, whether one is inside the other.
+    pub relation: Relation,
+    /// For near parts, how far apart their surfaces are; where the parts touch, 0; else infinite.
+    pub distance: f64,
+    /// For parts that touch, overlap or are undecided: the bounds of their depth.
+    pub depth: Option<Penetration>,
+    /// A point of the clash in A's frame: between the closest points, in both parts, or in contact.
+    pub point: [f64; 3],
+}
+
+/// What counts as a clash.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ClashOptions {
+    /// Parts at most this far apart are near, in mesh units. 0, the default, looks for no near parts.
+    pub clearance: f64,
+    /// Parts overlap if they do so by more than this depth, in mesh units. `None`, the default, stands for a millionth of the
+    /// largest side of both parts.
+    pub tolerance: Option<f64>,
+    /// The search for a depth ends when its bounds are this near each other, as a part of the lower one.
+    pub relative_gap: f64,
+    /// The most visits of the search for the depth of a pair: see [`Querier::set_budget`], whose budget limits it, too.
+    pub visits: u64,
+}
+
+impl Default for ClashOptions {
+    fn default() -> Self {
+        Self { clearance: 0.0, tolerance: None, relative_gap: 0.1, visits: 1 << 20 }
+    }
+}
+
+impl ClashOptions {
+    /// Looks for parts that touch, overlap or contain each other.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Looks for parts that are near each other, too. A query refuses a clearance that is negative or not finite.
+    #[must_use]
+    pub fn clearance(self, clearance: f64) -> Self {
+        Self { clearance, ..self }
+    }
+
+    /// Takes parts for overlapping if they do so by more than a depth. A query refuses one that is negative or not finite.
+    #[must_use]
+    pub fn tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance: Some(tolerance), ..self }
+    }
+
+    /// Ends the search for a depth when its bounds are this near each other. A query refuses a part that is not above 0 or not
+    /// finite.
+    #[must_use]
+    pub fn relative_gap(self, relative_gap: f64) -> Self {
+        Self { relative_gap, ..self }
+    }
+
+    /// Limits the search for the depth of a pair.
+    #[must_use]
+    pub fn visits(self, visits: u64) -> Self {
+        Self { visits, ..self }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), QueryError> {
+        check_distance(self.clearance)?;
+        PenetrationOptions::new().relative_gap(self.relative_gap).check()?;
+        self.tolerance.map_or(Ok(()), |tolerance| check(NumberError::DepthTolerance, tolerance))
+    }
+}
+
+impl Querier {
+    /// Returns how two parts lie, with B placed by a pose in A's frame.
+    ///
+    /// Parts that touch are told apart from parts that overlap by their depth ([`Querier::penetration`]): flush faces overlap by
+    /// roundings in nearly all poses, so a tolerance is part of the question. Where a part fits another one without a gap, like
+    /// a peg in its hole, the depth is mostly undecided: `lower` is at most the tolerance, and `upper` how far it has to be
+    /// pulled.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if an option is invalid; else the errors of [`Querier::relation`].
+    pub fn clash<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        options: &ClashOptions,
+    ) -> Result<Clash, QueryError> {
+        options.check()?;
+        self.start();
+        self.clash_of(a.into(), b.into(), pose, options)
+    }
+
+    fn clash_of(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        options: &ClashOptions,
+    ) -> Result<Clash, QueryError> {
+        let tolerance = options.tolerance.unwrap_or_else(|| 1e-6 * size(a).max(size(b)));
+        let relation = self.relation_of(a, b, pose)?;
+        let clash = |class, point| Clash { class, relation, distance: 0.0, depth: None, point };
+        if matches!(relation, Relation::Apart | Relation::Undefined) {
+            return self.near_or_apart(a, b, pose, (options.clearance, relation));
+        }
+        if self.are_duplicates(a, b, pose, tolerance)? {
+            let [lo, hi] = bounds(&PlacedShape::from(a));
+            return Ok(clash(ClashClass::Duplicated, [0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0)));
+        }
+        let (own, other) = (PlacedShape::from(a), b.at(pose));
+        if matches!(relation, Relation::AInB | Relation::BInA) {
+            let (inner, outer) = if relation == Relation::AInB { (&own, &other) } else { (&other, &own) };
+            return Ok(clash(ClashClass::Contained, self.first_inside(inner, outer)?.unwrap_or_default()));
+        }
+        if check_closed(a, b).is_err() {
+            return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
+        }
+        let search = PenetrationOptions::new().relative_gap(options.relative_gap);
+        let visits = self.memory.budget;
+        self.memory.budget = visits.rest(visits.left().min(options.visits));
+        let depth = self.depth_of_overlap(a, b, pose, &search);
+        let made = self.memory.budget.made();
+        self.memory.budget = visits;
+        self.memory.budget.charge(made)?;
+        let depth = depth?;
+        let class = if depth.lower > tolerance {
+            ClashClass::Overlapping
+        } else if depth.upper <= tolerance {
+            ClashClass::Touching
+        } else {
+            ClashClass::Undecided
+        };
+        let point = if depth.lower > 0.0 { depth.point } else { self.common_contact(a, b, pose)? };
+        Ok(Clash { depth: Some(depth), ..clash(class, point) })
+    }
+
+    /// Tells near parts from parts that are apart.
+    fn near_or_apart(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        (clearance, relation): (f64, Relation),
+    ) -> Result<Clash, QueryError> {
+        let apart = Clash {
+            class: ClashClass::Apart,
+            relation,
+            distance: f64::INFINITY,
+            depth: None,
+            point: [0.0; 3],
+        };
+        if clearance == 0.0 || !self.cores_within(a, b, pose, limit_of_cores(a, b, clearance))? {
+            return Ok(apart);
+        }
+        let nearest = self.nearest_points(a, b, pose)?;
+        let Distance { distance, point_a, point_b, .. } = self.distance_of_shapes(a, b, pose, nearest)?;
+        let point = [0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0);
+        Ok(Clash { class: ClashClass::Near, distance, point, ..apart })
+    }
+
+    /// Returns a point near the contact of two shapes that touch.
+    fn common_contact(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<[f64; 3], QueryError> {
+        let Distance { point_a, point_b, .. } = self.nearest_points(a, b, pose)?;
+        Ok([0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0))
+    }
+
+    /// Returns the distance of two cores.
+    fn nearest_points(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<Distance, QueryError> {
+        let mut search = Search::between_shapes(Default::default(), 0.0);
+        match self.nearest(a, b, pose, &mut search)? {
+            Some(best) => Ok(best.distance(search.proved())),
+            None => Err(no_answer(a)),
+        }
+    }
+
+    /// Returns whether two shapes are the same part in the same place: they have as many triangles and the same box, and each
+    /// vertex of either is within the tolerance of the other's surface.
+    fn are_duplicates(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        tolerance: f64,
+    ) -> Result<bool, QueryError> {
+        if a.triangles() != b.triangles() || a.radius() != b.radius() {
+            return Ok(false);
+        }
+        let (own, other) = (PlacedShape::from(a), b.at(pose));
+        let [box_a, box_b] = [&own, &other].map(bounds);
+        let differ = |x: &f64, y: &f64| (x - y).abs() > tolerance + 1e-9 * (x.abs() + y.abs());
+        if box_a.as_flattened().iter().zip(box_b.as_flattened()).any(|(x, y)| differ(x, y)) {
+            return Ok(false);
+        }
+        if a.identity() == b.identity() && displacement(b, &Pose::IDENTITY, pose) <= tolerance {
+            return Ok(true);
+        }
+        Ok(self.all_within(&own, &other, tolerance)? && self.all_within(&other, &own, tolerance)?)
+    }
+
+    /// Returns whether all vertices of a mesh are within a distance of the core of another shape.
+    fn all_within(
+        &mut self,
+        mesh: &PlacedShape<'_>,
+        other: &PlacedShape<'_>,
+        d: f64,
+    ) -> Result<bool, QueryError> {
+        let bvh = mesh.shape.bvh();
+        let mut are_within = true;
+        for object in mesh.shape.objects() {
+            each_triangle(bvh, object, |place| {
+                let mut corners = stored_at(bvh, object, place)?;
+                if let Some(pose) = &mesh.pose {
+                    corners = placed(&corners, pose);
+                }
+                for corner in &corners {
+                    let corner = check_point(corner)?;
+                    are_within &= self.closest_of_core(other, &corner, d, IsWithin::Closed)?.is_some();
+                }
+                Ok(!are_within)
+            })?;
+        }
+        Ok(are_within)
+    }
+}
