@@ -57,14 +57,18 @@ pub(crate) fn stretch(a: &Triangle, b: &Triangle, way: &Way) -> Stretch {
     let edges = |t: &Triangle| [subtract(t[1], t[0]), subtract(t[2], t[1]), subtract(t[0], t[2])];
     let (edges_a, edges_b) = (edges(&a), edges(&b));
     let (normal_a, normal_b) = (cross(edges_a[0], edges_a[1]), cross(edges_b[0], edges_b[1]));
-    clip.by_product(edges_a[0], edges_a[1], normal_a);
-    clip.by_product(edges_b[0], edges_b[1], normal_b);
+    clip.by(normal_a, error_of_product(edges_a[0], edges_a[1]));
+    clip.by(normal_b, error_of_product(edges_b[0], edges_b[1]));
     for edge_a in edges_a {
         for edge_b in edges_b {
             if clip.is_empty() {
                 return clip.stretch;
             }
-            clip.by_product(edge_a, edge_b, cross(edge_a, edge_b));
+            let (axis, error) = (cross(edge_a, edge_b), error_of_product(edge_a, edge_b));
+            // Edges that are parallel but for roundings span no facet wider than these.
+            if largest(axis) > error {
+                clip.by(axis, error);
+            }
         }
     }
     if clip.stretch.inner[0] >= clip.stretch.inner[1] {
@@ -86,13 +90,6 @@ impl Clip<'_> {
         self.stretch.outer[0] > self.stretch.outer[1]
     }
 
-    /// Clips by the product of two edges, which is a normal of the body.
-    fn by_product(&mut self, e: Point, f: Point, product: Point) {
-        let largest = |v: Point| v[0].abs().max(v[1].abs()).max(v[2].abs());
-        // Each edge is off by U of itself, and each component by three more roundings of two products.
-        self.by(product, 16.0 * U * largest(e) * largest(f));
-    }
-
     /// Clips by an axis, each component of which is off from that of a normal by at most `error`.
     fn by(&mut self, axis: Point, error: f64) {
         let project = |t: &Triangle| t.map(|corner| dot(axis, corner));
@@ -102,10 +99,11 @@ impl Clip<'_> {
         let (start, end) = (least_a - most_b, most_a - least_b);
         let rate = dot(axis, self.way.direction);
         let length = axis[0].abs() + axis[1].abs() + axis[2].abs();
-        let spare = length * (self.way.error + 16.0 * U * (self.reach + self.way.length));
-        let certain = spare + error * (8.0 * self.reach + 4.0 * self.way.length);
-        let outer = interval([start - spare, end + spare], rate);
-        let inner = interval([start + certain, end - certain], rate);
+        let roundings = length * U * (self.reach + self.way.length);
+        let spare = length * self.way.error + 16.0 * roundings;
+        let certain = spare + 128.0 * roundings + error * (8.0 * self.reach + 4.0 * self.way.length);
+        let outer = interval([start - spare, end + spare], rate, |start, end| start <= 0.0 && end >= 0.0);
+        let inner = interval([start + certain, end - certain], rate, |start, end| start < 0.0 && end > 0.0);
         let Stretch { outer: all, inner: sure, normal } = &mut self.stretch;
         all[0] = all[0].max(outer[0] - 4.0 * U * outer[0].abs());
         let outer_end = outer[1] + 4.0 * U * outer[1].abs();
@@ -119,13 +117,24 @@ impl Clip<'_> {
     }
 }
 
-/// Returns where on a way the part along an axis, which grows by `rate`, is from `start` to `end`.
-fn interval([start, end]: [f64; 2], rate: f64) -> [f64; 2] {
+/// Returns a bound on the error of each component of a product of edges. Each edge is off by `U` of itself, and a component by
+/// three more roundings of two products.
+fn error_of_product(e: Point, f: Point) -> f64 {
+    16.0 * U * largest(e) * largest(f)
+}
+
+fn largest(v: Point) -> f64 {
+    v[0].abs().max(v[1].abs()).max(v[2].abs())
+}
+
+/// Returns where on a way the part along an axis, which grows by `rate`, is from `start` to `end`. Where it does not grow,
+/// `holds` tells whether the numbers allow all of the way.
+fn interval([start, end]: [f64; 2], rate: f64, holds: fn(f64, f64) -> bool) -> [f64; 2] {
     if rate > 0.0 {
         [start / rate, end / rate]
     } else if rate < 0.0 {
         [end / rate, start / rate]
-    } else if start <= 0.0 && end >= 0.0 {
+    } else if holds(start, end) {
         [f64::NEG_INFINITY, f64::INFINITY]
     } else {
         [f64::INFINITY, f64::NEG_INFINITY]

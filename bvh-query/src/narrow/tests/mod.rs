@@ -5,4 +5,5 @@ mod generate;
 mod intersect;
 mod many;
 mod region;
+mod stretch;
 mod within;

@@ -25,9 +25,10 @@ pub(super) struct Depths {
 }
 
 impl Depths {
-    /// Returns how far B moves at least until the point is not inside both shapes, or is not in one of them.
+    /// Returns how far B moves at least until the balls have no common point; 0 if one of them is none. On a surface there is none:
+    /// it need not enclose anything.
     pub(super) fn common(&self) -> f64 {
-        if self.a >= 0.0 && self.b >= 0.0 { self.a + self.b } else { 0.0 }
+        if self.a > 0.0 && self.b > 0.0 { self.a + self.b } else { 0.0 }
     }
 }
 

@@ -145,3 +145,84 @@ impl Visitor for LeavingVisitor<'_> {
         self.contacts.finish(isa)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::bvh::Bvh;
+    use crate::isa::Backend;
+    use crate::narrow::triangles_intersect;
+    use crate::pose::Pose;
+    use crate::query::exact::placed as place;
+    use bvh_bake::mesh::Mesh;
+    use bvh_bake::{Options, Profile, to_bytes};
+    use cbvh_testkit::Random;
+
+    fn soup(random: &mut Random, profile: Profile) -> (Vec<Triangle>, Bvh) {
+        let mut triangles = Vec::new();
+        for number in 0..300 {
+            let (at, extent) = (random.point(), if number % 9 == 0 { 0.6 } else { 0.2 });
+            let mut corner = || {
+                let v = random.point();
+                [0, 1, 2].map(|k| f64::from((at[k] + extent * v[k]) as f32))
+            };
+            triangles.push([corner(), corner(), corner()]);
+        }
+        let faces = (0..300).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let mesh = Mesh::from_triangles(triangles.as_flattened().to_vec(), faces);
+        let bytes = to_bytes(&mesh, &Options::default().profile(profile)).unwrap().0;
+        (triangles, Bvh::from_bytes(bytes).unwrap())
+    }
+
+    /// Nothing that is left out may stay longer, on any backend and along directions in which B hardly moves.
+    #[test]
+    fn the_longest_contact_is_that_of_all_pairs() {
+        let random = &mut Random::new(5);
+        for (round, profile) in [Profile::Dop6F16, Profile::Dop14U8, Profile::Dop26U8Wide]
+            .into_iter()
+            .cycle()
+            .take(12)
+            .enumerate()
+        {
+            let ((of_a, a), (of_b, b)) = (soup(random, profile), soup(random, profile));
+            let turn = random.point().map(|x| 0.5 * x);
+            let norm = (1.0 + turn.iter().map(|x| x * x).sum::<f64>()).sqrt();
+            let [x, y, z] = turn.map(|x| x / norm);
+            let pose = Pose::from_quaternion([x, y, z, 1.0 / norm], random.point()).unwrap();
+            let direction = match round % 3 {
+                0 => [0.0, -1.0, 0.0],
+                1 => [0.6, 0.0, 0.8],
+                _ => {
+                    let d = random.point();
+                    let length = d.iter().map(|x| x * x).sum::<f64>().sqrt();
+                    d.map(|x| x / length)
+                }
+            };
+            let line = Line::new(a.all(), b.all(), &pose).along(direction);
+            let at = 0.1 * random.unit();
+            let way = Way { direction, length: line.length, error: line.error };
+            let mut expected = Leaving {
+                crosses_until: 0.0,
+                touches_until: None,
+                normal: direction,
+                last: [[[0.0; 3]; 3]; 2],
+            };
+            for triangle_b in of_b.iter().map(|triangle| place(triangle, &line.pose_at(at))) {
+                for triangle_a in of_a.iter().filter(|a| triangles_intersect(a, &triangle_b)) {
+                    let of = stretch(triangle_a, &triangle_b, &way);
+                    let crosses = of.inner[0] < 0.0 && of.inner[1] > 0.0;
+                    let until = if crosses { of.inner[1] } else { 0.0 };
+                    expected.count((of.outer[1].max(0.0), until), of.normal, [*triangle_a, triangle_b]);
+                }
+            }
+            assert!(expected.touches_until.is_some() && expected.crosses_until > 0.0);
+            for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                let mut querier = Querier::with_backend(backend);
+                querier.start();
+                let found = querier.leaving(&line, at).unwrap();
+                let of = |leaving: &Leaving| (leaving.crosses_until, leaving.touches_until, leaving.normal);
+                assert_eq!(of(&found), of(&expected), "{backend}, round {round}");
+            }
+        }
+    }
+}

@@ -4,7 +4,7 @@
 //! at := what is known to be covered; while at < limit:
 //!     if pairs of triangles certainly cross at `at`: go on to where the last of them has left
 //!     else if the meshes are apart a few roundings after the last contact at `at`: that place is free
-//!     else if a point there is inside both: go on by its depth in A plus its depth in B
+//!     else if a point there is inside both: go on by its depth in A plus its depth in B, or if nothing touches by the gap
 //!     else go on to where the last contact has left; from here on, nothing is covered
 //! ```
 //!
@@ -123,6 +123,7 @@ pub(super) fn moved(pose: &Pose, translation: Point) -> Pose {
 /// Where two cores are that do not touch.
 struct Gap {
     distance: f64,
+    lower: f64,
     point_a: Point,
     point_b: Point,
     /// From A to B.
@@ -196,7 +197,7 @@ impl Querier {
                     return Ok(Some(Free { covered, at: place, last }));
                 }
             }
-            let common = self.common_point(line, at)?;
+            let common = self.common_way(line, at, leaving.touches_until.is_some())?;
             if common > LEAST_PART * line.length {
                 at += common;
                 if is_covered {
@@ -212,35 +213,47 @@ impl Querier {
         Ok(None)
     }
 
+    /// Returns how far interiors meet without a gap, from what is known to be covered up to the end of a way.
+    pub(super) fn cover(&mut self, line: &Line<'_>, mut covered: f64, end: f64) -> Result<f64, QueryError> {
+        while covered < end {
+            let leaving = self.leaving(line, covered)?;
+            covered += if leaving.crosses_until > line.error {
+                leaving.crosses_until
+            } else {
+                let way = self.common_way(line, covered, leaving.touches_until.is_some())?;
+                if way <= LEAST_PART * line.length {
+                    break;
+                }
+                way
+            };
+        }
+        Ok(covered.min(end))
+    }
+
     /// Returns where the cores are at a place, unless they touch.
     fn gap_of_cores(&mut self, line: &Line<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
         let mut search = Search::between_shapes(DistanceOptions::default(), 0.0);
         let Some(best) = self.nearest(line.a, line.b, &line.pose_at(at), &mut search)? else {
             return Ok(None);
         };
-        let Distance { distance, upper, point_a, point_b, .. } = best.distance(search.proved());
+        let Distance { distance, lower, upper, point_a, point_b, .. } = best.distance(search.proved());
         if distance <= line.error {
             return Ok(None);
         }
         let normal = subtract(point_b, point_a).map(|x| x / distance);
-        Ok(Some(Gap { distance: upper, point_a, point_b, normal }))
+        Ok(Some(Gap { distance: upper, lower, point_a, point_b, normal }))
     }
 
-    /// Returns how far B moves at least, from a place on, until a point that is inside both shapes there is inside both no
-    /// more; 0 if no such point is found.
-    fn common_point(&mut self, line: &Line<'_>, at: f64) -> Result<f64, QueryError> {
-        let pose = line.pose_at(at);
-        let (a, b) = (line.a.into(), line.b.at(&pose));
-        let mut best = 0.0f64;
-        for (mesh, container) in [(&b, &a), (&a, &b)] {
-            if let Some(point) = self.first_inside(mesh, container)? {
-                best = best.max(self.depths(&a, &b, &point)?.common() - line.error);
+    /// Returns how far B moves at least, from a place on where nothing certainly crosses, until interiors do not meet; 0 if that is
+    /// not known. If nothing touches, one shape is inside the other, and stays there until the gap is closed.
+    fn common_way(&mut self, line: &Line<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
+        if !touches && let Some(gap) = self.gap_of_cores(line, at)? {
+            let way = gap.lower - 4.0 * line.error;
+            if way > LEAST_PART * line.length {
+                return Ok(way);
             }
         }
-        if best > LEAST_PART * line.length {
-            return Ok(best);
-        }
-        let balls = self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
-        Ok(best.max(balls.lower()))
+        let pose = line.pose_at(at);
+        Ok(self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?.lower())
     }
 }

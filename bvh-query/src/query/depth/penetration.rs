@@ -130,7 +130,7 @@ impl Querier {
         }
         let line = Line::new(a, b, pose).along(direction);
         let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY)? {
-            Some(Free { covered, at, .. }) => (covered, at),
+            Some(Free { covered, at, .. }) => (self.cover(&line, covered, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
             None => (0.0, line.length),
         };
@@ -223,7 +223,7 @@ impl<'a> DepthSearch<'a> {
     /// Begins with the shortest way that takes B's box out of A's.
     fn new(line: Line<'a>, options: &PenetrationOptions) -> Self {
         let [[lo_a, hi_a], [lo_b, hi_b]] = [line.a.into(), line.b.at(line.pose)].map(|shape| bounds(&shape));
-        let spare = 1e-6 * line.length + 16.0 * line.error;
+        let spare = 8.0 * line.error;
         let mut search = Self {
             line,
             options: *options,
