@@ -6,8 +6,8 @@ use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
-    Bvh, ClosestPoint, Contact, Distance, PatchOptions, Patches, Pose, Querier, QueryError, Ray, RayHit,
-    Relation, SelfContact, Side,
+    Bvh, ClosestPoint, Contact, Distance, PatchOptions, Patches, Penetration, PenetrationOptions, Pose,
+    Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -24,6 +24,7 @@ pub(crate) struct Answers {
     pub(crate) distance: Result<Distance, QueryError>,
     pub(crate) within: Result<bool, QueryError>,
     pub(crate) relation: Result<Relation, QueryError>,
+    pub(crate) penetration: Result<Penetration, QueryError>,
     /// About a point, a ray and a segment, and B.
     pub(crate) closest: Result<Option<ClosestPoint>, QueryError>,
     pub(crate) side: Result<Side, QueryError>,
@@ -46,15 +47,15 @@ impl Answers {
             self.distance.as_ref().err(),
             self.within.as_ref().err(),
             self.relation.as_ref().err(),
+            self.penetration.as_ref().err(),
             self.closest.as_ref().err(),
             self.side.as_ref().err(),
             self.hits.as_ref().err(),
             self.segment.as_ref().err(),
         ];
-        errors
-            .into_iter()
-            .flatten()
-            .find(|error| !matches!(error, QueryError::NoTopology | QueryError::Rounded))
+        errors.into_iter().flatten().find(|error| {
+            !matches!(error, QueryError::NoTopology | QueryError::Rounded | QueryError::NotClosed(_))
+        })
     }
 
     /// Returns whether any answer was refused.
@@ -74,7 +75,7 @@ impl Answers {
         patches_hold && holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
             && holds(&self.self_contacts, &other.self_contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
-            && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
+            && holds(&self.penetration, &other.penetration) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
             // The limit of `within` is the distance, which may have been refused.
             && (self.distance.is_err() || holds(&self.within, &other.within))
@@ -115,6 +116,7 @@ impl Answers {
             within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),
             distance,
             relation: querier.relation(a, b, pose),
+            penetration: querier.penetration(a, b, pose, &PenetrationOptions::new()),
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
