@@ -87,7 +87,7 @@ impl PartialEq for Cell {
 impl Eq for Cell {}
 
 /// The search ends when no sum can exceed the one found by more than this part.
-const ASCENT_STEPS: u32 = 10;
+pub(super) const ASCENT_STEPS: u32 = 10;
 const PRECISION: f64 = 1.0 / 64.0;
 
 impl Querier {
@@ -150,7 +150,7 @@ impl Querier {
             step /= 4.0;
         }
         if balls.lower() > 0.0 {
-            self.ascend(&a, &b, &mut balls)?;
+            self.ascend(&a, &b, &mut balls, ASCENT_STEPS)?;
         }
         Ok(balls)
     }
@@ -161,9 +161,10 @@ impl Querier {
         a: &PlacedShape<'_>,
         b: &PlacedShape<'_>,
         balls: &mut Balls,
+        steps: u32,
     ) -> Result<(), QueryError> {
         let mut step = balls.depths.common() / 2.0;
-        for _ in 0..ASCENT_STEPS {
+        for _ in 0..steps {
             let (from, depths) = (balls.centre, balls.depths);
             let away = depths.closest.map(|closest| {
                 let way = [0, 1, 2].map(|k| from[k] - closest[k]);

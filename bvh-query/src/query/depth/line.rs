@@ -16,6 +16,7 @@ use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
 use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
+use crate::query::depth::balls::Balls;
 use crate::query::depth::leaving::Leaving;
 use crate::query::options::DistanceOptions;
 use crate::query::querier::Querier;
@@ -66,6 +67,11 @@ const STEPS: [f64; 4] = [0.0, 1.0, 8.0, 64.0];
 
 /// The number of points that are tried to find one that is inside both shapes.
 const COMMON_POINTS: u32 = 64;
+
+/// How many crossings follow each other before a common point is tried to take a longer step; and the steps that it is moved by
+/// to where it is deeper.
+const FIRST_CROSSINGS: u32 = 6;
+const STEPS_ON_THE_WAY: u32 = 3;
 
 /// The part of a way by which a common point has to bring it on.
 const LEAST_PART: f64 = 1e-7;
@@ -147,14 +153,16 @@ impl Gap {
 impl Querier {
     /// Returns the first place on a line where interiors are certainly disjoint, if it is before `limit`. Interiors are known
     /// to meet at all moves shorter than `covered`.
+    /// A common point before the move, if one is known, helps to find others on the way.
     pub(super) fn free_on(
         &mut self,
         line: &Line<'_>,
-        covered: f64,
+        (covered, mut common): (f64, Option<Point>),
         limit: f64,
     ) -> Result<Option<Free>, QueryError> {
         let (mut at, mut covered, mut is_covered, mut stuck) = (covered, covered, true, 1.0);
         let (mut last, mut rounded) = (None, None);
+        let (mut crossings, mut patience) = (0, FIRST_CROSSINGS);
         while at < limit && at <= line.length {
             let leaving = self.leaving(line, at)?;
             if leaving.touches_until.is_some() {
@@ -162,6 +170,21 @@ impl Querier {
             }
             if leaving.crosses_until > line.error {
                 at += leaving.crosses_until;
+                crossings += 1;
+                while crossings >= patience
+                    && at < limit
+                    && let Some(point) = common
+                {
+                    // Near a point that was inside both, with B half as far back as it has moved since.
+                    let balls = self.balls_near(line, at, point)?;
+                    if balls.lower() < 2.0 * leaving.crosses_until {
+                        (crossings, patience) = (0, 2 * patience);
+                        common = common.filter(|_| balls.lower() > 0.0);
+                        break;
+                    }
+                    at += balls.lower();
+                    common = Some([0, 1, 2].map(|k| balls.centre[k] - 0.5 * at * line.direction[k]));
+                }
                 if is_covered {
                     covered = at;
                 }
@@ -211,6 +234,20 @@ impl Querier {
             }
         }
         Ok(None)
+    }
+
+    /// Returns a deep point at a place on a line, found from one that is given for no move: B's part of it moves as far as B does,
+    /// A's does not, and their middle half as far.
+    fn balls_near(&mut self, line: &Line<'_>, at: f64, point: Point) -> Result<Balls, QueryError> {
+        let pose = line.pose_at(at);
+        let (a, b) = (line.a.into(), line.b.at(&pose));
+        let centre = [0, 1, 2].map(|k| point[k] + 0.5 * at * line.direction[k]);
+        let mut balls = line.no_balls();
+        balls.take(centre, self.depths(&a, &b, &centre)?);
+        if balls.lower() > 0.0 {
+            self.ascend(&a, &b, &mut balls, STEPS_ON_THE_WAY)?;
+        }
+        Ok(balls)
     }
 
     /// Returns how far interiors meet without a gap, from what is known to be covered up to the end of a way.

@@ -10,7 +10,7 @@ use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle, cross, dot, subtract};
 use crate::pose::Pose;
 use crate::query::answers::Relation;
-use crate::query::depth::balls::{Balls, Depths, bounds};
+use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
 use crate::query::depth::line::{Free, LastContact, Line, moved};
 use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::options::check;
@@ -129,7 +129,7 @@ impl Querier {
             return Ok(Separation { lower: 0.0, upper: 0.0, translation: [0.0; 3] });
         }
         let line = Line::new(a, b, pose).along(direction);
-        let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY)? {
+        let (lower, upper) = match self.free_on(&line, (0.0, None), f64::INFINITY)? {
             Some(Free { covered, at, .. }) => (self.cover(&line, covered, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
             None => (0.0, line.length),
@@ -344,7 +344,9 @@ impl<'a> DepthSearch<'a> {
     fn attempt(&mut self, querier: &mut Querier, direction: Point) -> Result<Option<Free>, QueryError> {
         let line = self.line.along(direction);
         // All moves shorter than the lower bound are covered, in whatever direction.
-        let free = querier.free_on(&line, self.balls.lower(), WAY_FACTOR * self.best)?;
+        let lower = self.balls.lower();
+        let common = (lower > 0.0).then_some(self.balls.centre);
+        let free = querier.free_on(&line, (lower, common), WAY_FACTOR * self.best)?;
         if let Some(free) = &free
             && free.at < self.best
         {
@@ -374,7 +376,7 @@ impl<'a> DepthSearch<'a> {
             best.take(centre, querier.depths(&a, &b, &centre)?);
         }
         if best.lower() > self.balls.lower() {
-            querier.ascend(&a, &b, &mut best)?;
+            querier.ascend(&a, &b, &mut best, ASCENT_STEPS)?;
             self.balls = best;
         }
         Ok(())
