@@ -74,7 +74,12 @@ inline const char *c_text(const char *name, const std::string &text) {
 
 using Point = std::array<double, 3>;
 using Contact = cbvh_contact;
+using ContactRegion = cbvh_contact_region;
+using Patch = cbvh_patch;
+using SelfContact = cbvh_self_contact;
 using DistanceAnswer = cbvh_distance_answer;
+using Separation = cbvh_separation;
+using Penetration = cbvh_penetration;
 using ClosestPoint = cbvh_closest_point;
 using RayHit = cbvh_ray_hit;
 using Segment = cbvh_segment;
@@ -184,6 +189,29 @@ struct DistanceOptions {
     double abs_err = 0;
 
     cbvh_distance_options raw() const { return {sizeof(cbvh_distance_options), rel_err, abs_err}; }
+};
+
+struct PenetrationOptions {
+    double relative_gap = 0;
+    double tolerance = 0;
+
+    cbvh_penetration_options raw() const { return {sizeof(cbvh_penetration_options), relative_gap, tolerance}; }
+};
+
+struct PatchOptions {
+    double tolerance = 0;
+    std::size_t max_contacts = 0;
+
+    cbvh_patch_options raw() const { return {sizeof(cbvh_patch_options), tolerance, max_contacts}; }
+};
+
+/// Contacts, joined into patches.
+struct Patches {
+    std::vector<Patch> patches;
+    /// The contacts of the first patch, of the second one, and so on.
+    std::vector<ContactRegion> regions;
+    /// The number of all contacts: more than there are here if `max_contacts` left some out.
+    std::size_t total = 0;
 };
 
 /// See cbvh_bake_options. Empty text stands for the default.
@@ -718,6 +746,78 @@ public:
                                      count);
             });
     }
+    /// Where do they touch: in which points, curves and polygons?
+    std::vector<ContactRegion> contact_regions(const Mesh &a, const Mesh &b, const Pose &pose) {
+        return detail::list<ContactRegion>(
+            region_room_, [&](ContactRegion *regions, std::size_t capacity, std::size_t *count) {
+                return cbvh_contact_regions(raw(), a.raw(), b.raw(), &pose, 1, nullptr, regions, capacity, count);
+            });
+    }
+    std::vector<std::vector<ContactRegion>> contact_regions(const Mesh &a, const Mesh &b,
+                                                            const std::vector<Pose> &poses) {
+        return detail::lists<ContactRegion>(
+            region_room_, poses.size(),
+            [&](std::size_t *counts, ContactRegion *regions, std::size_t capacity, std::size_t *count) {
+                return cbvh_contact_regions(raw(), a.raw(), b.raw(), poses.data(), poses.size(), counts, regions,
+                                            capacity, count);
+            });
+    }
+    /// The same contacts, joined into patches.
+    Patches patches(const Mesh &a, const Mesh &b, const Pose &pose, const PatchOptions &options = {}) {
+        const cbvh_patch_options raw_options = options.raw();
+        Patches found;
+        // There are no more patches than contacts.
+        std::size_t patch_count = region_room_.length(), region_count = patch_count;
+        cbvh_patch_counts counts{};
+        cbvh_status status = CBVH_BUFFER_TOO_SMALL;
+        while (status == CBVH_BUFFER_TOO_SMALL) {
+            found.patches.resize(patch_count);
+            found.regions.resize(region_count);
+            status = cbvh_patches(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &counts, found.patches.data(),
+                                  found.patches.size(), &patch_count, found.regions.data(), found.regions.size(),
+                                  &region_count);
+        }
+        check(status);
+        found.patches.resize(patch_count);
+        found.regions.resize(region_count);
+        found.total = counts.total;
+        region_room_.set(std::max(region_count, detail::few));
+        return found;
+    }
+    /// How far does b move along a direction until their interiors are disjoint?
+    Separation separation(const Mesh &a, const Mesh &b, const Pose &pose, const Point &direction) {
+        Separation answer{};
+        check(cbvh_separations(raw(), a.raw(), b.raw(), &pose, direction.data(), 1, &answer));
+        return answer;
+    }
+    std::vector<Separation> separation(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                                       const std::vector<Point> &directions) {
+        detail::same_length(poses.size(), directions.size(), "expected as many directions as poses");
+        return detail::answers<Separation>(poses.size(), [&](Separation *answers) {
+            return cbvh_separations(raw(), a.raw(), b.raw(), poses.data(), detail::numbers(directions), poses.size(),
+                                    answers);
+        });
+    }
+    /// How deep do they overlap?
+    Penetration penetration(const Mesh &a, const Mesh &b, const Pose &pose, const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        Penetration answer{};
+        check(cbvh_penetrations(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<Penetration> penetration(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                                         const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        return detail::answers<Penetration>(poses.size(), [&](Penetration *answers) {
+            return cbvh_penetrations(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+        });
+    }
+    /// Which triangles of a mesh meet where they should not?
+    std::vector<SelfContact> self_contacts(const Mesh &mesh) {
+        return detail::list<SelfContact>(room_, [&](SelfContact *contacts, std::size_t capacity, std::size_t *count) {
+            return cbvh_self_contacts(raw(), mesh.raw(), contacts, capacity, count);
+        });
+    }
     /// The first pose in which they touch.
     std::optional<std::size_t> first_collision(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
         std::size_t number = 0;
@@ -877,7 +977,7 @@ private:
         }
         return handles;
     }
-    detail::Room room_;
+    detail::Room room_, region_room_;
     Owned handle_;
 };
 

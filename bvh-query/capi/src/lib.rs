@@ -19,6 +19,7 @@ mod input;
 mod mesh;
 mod motions;
 mod output;
+mod overlaps;
 mod pairs;
 mod paths;
 mod poses;

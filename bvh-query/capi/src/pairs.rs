@@ -12,12 +12,12 @@ use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
 use std::ops::ControlFlow;
 
 /// A querier, two meshes, and poses of the second in the frame of the first.
-struct Question {
-    querier: QuerierHandle,
-    a: MeshHandle,
-    b: MeshHandle,
-    poses: *const PoseRows,
-    count: usize,
+pub(crate) struct Question {
+    pub(crate) querier: QuerierHandle,
+    pub(crate) a: MeshHandle,
+    pub(crate) b: MeshHandle,
+    pub(crate) poses: *const PoseRows,
+    pub(crate) count: usize,
 }
 
 impl Question {
@@ -25,7 +25,7 @@ impl Question {
     ///
     /// # Safety
     /// As for `poses::read_many`.
-    unsafe fn ask(
+    pub(crate) unsafe fn ask(
         &self,
         ask: impl FnOnce(&mut Querier, Option<Batch<'_>>, [Shape<'_>; 2], &[Pose]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn cbvh_distances(
 }
 
 /// The least of any number of values, in ascending order, and how many there are.
-struct Least<T> {
+pub(crate) struct Least<T> {
     most: usize,
     /// At most twice as many: then the greater half goes.
     kept: Vec<T>,
@@ -130,12 +130,12 @@ struct Least<T> {
 }
 
 impl<T: Ord + Copy> Least<T> {
-    fn new(most: usize) -> Self {
+    pub(crate) fn new(most: usize) -> Self {
         Self { most, kept: Vec::new(), count: 0, out_of_memory: None }
     }
 
     /// Takes a value, and breaks where memory runs out.
-    fn add(&mut self, value: T) -> ControlFlow<()> {
+    pub(crate) fn add(&mut self, value: T) -> ControlFlow<()> {
         self.count += 1;
         if self.most == 0 {
             return ControlFlow::Continue(());
@@ -153,11 +153,11 @@ impl<T: Ord + Copy> Least<T> {
         ControlFlow::Continue(())
     }
 
-    fn check(&mut self) -> Result<(), Failure> {
+    pub(crate) fn check(&mut self) -> Result<(), Failure> {
         self.out_of_memory.take().map_or(Ok(()), Err)
     }
 
-    fn finish(mut self) -> (Vec<T>, usize) {
+    pub(crate) fn finish(mut self) -> (Vec<T>, usize) {
         self.kept.sort_unstable();
         self.kept.truncate(self.most);
         (self.kept, self.count)

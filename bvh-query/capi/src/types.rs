@@ -5,9 +5,10 @@
 use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
-    Backend, ClosestPoint, Contact, Distance, DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Pose,
-    QueryStats, Ray, RayHit, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer,
-    ScenePair, SceneRayHit, Side, SignedDistance,
+    Backend, ClosestPoint, Contact, ContactRegion, Distance, DistanceOptions, InstanceId, MotionAnswer,
+    MotionOptions, Patch, PatchOptions, Penetration, PenetrationOptions, Pose, QueryStats, Ray, RayHit,
+    RegionKind, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer, ScenePair,
+    SceneRayHit, SelfContact, SelfContactKind, Separation, Side, SignedDistance,
 };
 use std::ffi::c_char;
 
@@ -46,6 +47,8 @@ structures! {
     PoseRows { rows: [f64; 12] }
     DistanceChoices { size: usize, rel_err: f64, abs_err: f64 }
     MotionChoices { size: usize, clearance: f64, tolerance: f64 }
+    PenetrationChoices { size: usize, relative_gap: f64, tolerance: f64 }
+    PatchChoices { size: usize, tolerance: f64, max_contacts: usize }
     BakeChoices {
         size: usize,
         profile: *const c_char,
@@ -79,6 +82,29 @@ structures! {
         object_b: u32,
         triangle_b: u32,
     }
+    SeparationRow { lower: f64, upper: f64, translation: [f64; 3] }
+    PenetrationRow {
+        lower: f64,
+        upper: f64,
+        translation: [f64; 3],
+        point: [f64; 3],
+        radii: [f64; 2],
+        is_spent: i32,
+        reserved: i32,
+    }
+    RegionRow {
+        contact: ContactRow,
+        kind: i32,
+        count: u32,
+        points: [[f64; 3]; 6],
+        normal_a: [f64; 3],
+        normal_b: [f64; 3],
+        error: f64,
+        overlap: f64,
+    }
+    PatchRow { first: usize, count: usize, center: [f64; 3], normal: [f64; 3], length: f64, area: f64, depth: f64 }
+    PatchCounts { patches: usize, contacts: usize, total: usize }
+    SelfContactRow { object_a: u32, triangle_a: u32, object_b: u32, triangle_b: u32, kind: i32 }
     MotionRow {
         outcome: i32,
         reserved: i32,
@@ -122,6 +148,8 @@ macro_rules! numbers {
 numbers!(MAP = 0, MAP_SPARSE = 1, MAP_WHOLE = 2, READ = 3);
 numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3, BACKEND_NEON = 4);
 numbers!(TOUCHING = 0, APART = 1, A_IN_B = 2, B_IN_A = 3, MIXED = 4, RELATION_UNDEFINED = 5);
+numbers!(REGION_POINT = 0, REGION_SEGMENT = 1, REGION_POLYGON = 2);
+numbers!(SELF_CROSSING = 0, SELF_AT_CORNER = 1, SELF_FOLDED = 2, SELF_DUPLICATE = 3);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
 numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 3);
 
@@ -188,6 +216,26 @@ impl MotionChoices {
     }
 }
 
+impl PenetrationChoices {
+    pub(crate) fn read(&self) -> PenetrationOptions {
+        let mut options = PenetrationOptions::new();
+        if self.relative_gap != 0.0 {
+            options = options.relative_gap(self.relative_gap);
+        }
+        if self.tolerance != 0.0 {
+            options = options.tolerance(self.tolerance);
+        }
+        options
+    }
+}
+
+impl PatchChoices {
+    pub(crate) fn read(&self) -> PatchOptions {
+        let most = if self.max_contacts == 0 { usize::MAX } else { self.max_contacts };
+        PatchOptions::new().tolerance(self.tolerance).max_contacts(most)
+    }
+}
+
 impl StatsRow {
     pub(crate) fn new(of: QueryStats, pairs: u64) -> Self {
         Self { node_tests: of.node_tests, packet_tests: of.packet_tests, exact_tests: of.exact_tests, pairs }
@@ -223,10 +271,47 @@ row!(SceneContact { pair, contact } => SceneContactRow {});
 row!(SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
 row!(Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
     => DistanceRow {});
+row!(Separation { lower, upper, translation } => SeparationRow {});
+row!(Penetration { lower, upper, translation, point, radii, is_spent } => PenetrationRow { reserved: 0 });
+row!(Patch { first, count, center, normal, length, area, depth } => PatchRow {});
 row!(ClosestPoint { distance, lower, upper, point, object, triangle }
     => ClosestRow { instance: Instance::NONE, found: 1, side: SIDE_NOT_ASKED });
 row!(RayHit { t, lower, upper, point, object, triangle }
     => HitRow { instance: Instance::NONE, found: 1, reserved: 0 });
+
+impl From<ContactRegion> for RegionRow {
+    fn from(of: ContactRegion) -> Self {
+        let kind = match of.kind {
+            RegionKind::Point => REGION_POINT,
+            RegionKind::Segment => REGION_SEGMENT,
+            RegionKind::Polygon => REGION_POLYGON,
+        };
+        let ContactRegion { contact, count, all_points: points, normal_a, normal_b, error, overlap, .. } = of;
+        Self {
+            contact: contact.into(),
+            kind,
+            count: count.into(),
+            points,
+            normal_a,
+            normal_b,
+            error,
+            overlap,
+        }
+    }
+}
+
+impl From<SelfContact> for SelfContactRow {
+    fn from(of: SelfContact) -> Self {
+        let kind = match of.kind {
+            SelfContactKind::Crossing => SELF_CROSSING,
+            SelfContactKind::AtCorner => SELF_AT_CORNER,
+            SelfContactKind::Folded => SELF_FOLDED,
+            SelfContactKind::Duplicate => SELF_DUPLICATE,
+        };
+        let SelfContact { object_a, triangle_a, object_b, triangle_b, .. } = of;
+        Self { object_a, triangle_a, object_b, triangle_b, kind }
+    }
+}
 
 /// Makes a row of what may be no answer.
 macro_rules! found {

@@ -1,5 +1,5 @@
 /* What the header promises beyond answers: lists and text that do not fit, what lives on, borrowed bytes, paths of the
- * caller, files, scenes, and cubes, simple shapes and margins whose answers are known. */
+ * caller, files, scenes, and cubes, overlaps, simple shapes and margins whose answers are known. */
 #include "support.h"
 #include <sys/stat.h>
 
@@ -114,6 +114,166 @@ static void lists(void) {
     CHECK(length == 0 && text[0] == 0);
     OK(cbvh_mesh_free(again));
     OK(cbvh_mesh_free(mesh));
+}
+
+/* Where and how deep cubes overlap. */
+static void overlaps(void) {
+    const cbvh_mesh one = cube(1), quarter = cube(0.25);
+    /* What they have in common is a box with the sides 1/4, 7/8 and 15/16, and then nothing, and a face. */
+    const cbvh_pose poses[4] = {shift(0.75, 0.125, 0.0625), shift(3, 0, 0), shift(1, 0.25, 0), shift(0, 0.125, 0)};
+    const double directions[12] = {1, 0, 0, 1, 0, 0, 0, -2, 0, 0, 0, 1};
+    cbvh_separation ways[4];
+    OK(cbvh_separations(querier, one, one, poses, directions, 3, ways));
+    CHECK(ways[0].lower > 0.2499999 && ways[0].lower <= 0.25 && ways[0].upper >= 0.25 && ways[0].upper < 0.2500001);
+    CHECK(ways[0].translation[0] >= 0.25 && ways[0].translation[1] == 0 && ways[0].translation[2] == 0);
+    CHECK(ways[1].lower == 0 && ways[1].upper == 0 && ways[1].translation[0] == 0);
+    const double back[9] = {-3, 0, 0, 0, 0.5, 0, 0, 0, 7}, lengths[3] = {1.75, 0.875, 0.9375};
+    const cbvh_pose same[3] = {poses[0], poses[0], poses[0]};
+    OK(cbvh_separations(querier, one, one, same, back, 3, ways));
+    for (int k = 0; k < 3; k++) {
+        CHECK(ways[k].lower <= lengths[k] && lengths[k] <= ways[k].upper && ways[k].upper - ways[k].lower < 1e-6);
+    }
+    cbvh_penetration depths[3];
+    OK(cbvh_penetrations(querier, one, one, poses, 3, NULL, depths));
+    CHECK(depths[0].lower > 0.247 && depths[0].lower <= 0.25 && depths[0].upper >= 0.25 && depths[0].upper < 0.2525);
+    CHECK(fabs(depths[0].radii[0] + depths[0].radii[1] - depths[0].lower) < 1e-6 && !depths[0].is_spent);
+    CHECK(depths[0].point[0] > 0.25 && depths[0].point[0] < 0.5 && depths[1].upper == 0);
+    CHECK(depths[2].lower == 0 && depths[2].upper < 1e-6);
+    /* What is inside another one is that deep, and all translations separate. */
+    OK(cbvh_penetrations(querier, one, quarter, &poses[3], 1, NULL, &depths[1]));
+    CHECK(depths[1].lower > 0.3 && depths[1].lower <= 0.5 && depths[1].upper >= 0.5 && depths[1].upper < 0.505);
+    for (int k = 0; k < 2; k++) {
+        const double *by = depths[k].translation, *from = poses[3 * k].rows;
+        const cbvh_pose moved = shift(from[3] + by[0], from[7] + by[1], from[11] + by[2]);
+        cbvh_relation relation;
+        OK(cbvh_relations(querier, one, k ? quarter : one, &moved, 1, &relation));
+        CHECK(relation == CBVH_APART && depths[k].upper >= sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2]));
+    }
+    /* The search ends early: at a gap, at a length, and where the budget does. */
+    const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = 100},
+        shallow = {.size = sizeof shallow, .tolerance = 0.01}, deep = {.size = sizeof deep, .tolerance = 0.6};
+    OK(cbvh_penetrations(querier, one, one, poses, 1, &gap, depths));
+    CHECK(depths[0].lower > 0 && depths[0].upper <= 101 * depths[0].lower);
+    OK(cbvh_penetrations(querier, one, one, poses, 1, &shallow, depths));
+    CHECK(depths[0].lower > 0.01 && depths[0].upper >= 0.25);
+    OK(cbvh_penetrations(querier, one, one, poses, 1, &deep, depths));
+    CHECK(depths[0].lower <= 0.25 && depths[0].upper <= 0.6);
+    OK(cbvh_querier_set_budget(querier, 100));
+    OK(cbvh_penetrations(querier, one, one, poses, 1, NULL, depths));
+    CHECK(depths[0].is_spent && depths[0].lower <= 0.25 && depths[0].upper >= 0.25);
+    OK(cbvh_querier_set_budget(querier, UINT64_MAX));
+
+    /* The same pairs as contacts. Points are on both surfaces. */
+    static cbvh_contact_region regions[200], some[200], pattern;
+    static cbvh_contact contacts[200];
+    size_t count, counts[4], contact_count;
+    OK(cbvh_contacts(querier, one, one, poses, 4, NULL, contacts, 200, &contact_count));
+    OK(cbvh_contact_regions(querier, one, one, poses, 4, counts, regions, 200, &count));
+    CHECK(count == contact_count && counts[0] + counts[2] + counts[3] == count && counts[1] == 0);
+    for (size_t k = 0; k < count; k++) {
+        const size_t pose = k < counts[0] ? 0 : k < counts[0] + counts[2] ? 2 : 3;
+        CHECK(memcmp(&regions[k].contact, &contacts[k], sizeof *contacts) == 0);
+        CHECK(regions[k].count >= 1 && regions[k].count <= 6 && regions[k].error < 1e-9 && regions[k].overlap == 0);
+        for (uint32_t place = 0; place < regions[k].count; place++) {
+            double far_a = 0, far_b = 0;
+            for (int axis = 0; axis < 3; axis++) {
+                const double x = regions[k].points[place][axis];
+                far_a = fmax(far_a, fabs(x));
+                far_b = fmax(far_b, fabs(x - poses[pose].rows[4 * axis + 3]));
+            }
+            CHECK(fabs(far_a - 0.5) <= regions[k].error && fabs(far_b - 0.5) <= regions[k].error);
+        }
+    }
+    memset(&pattern, 0xA5, sizeof pattern);
+    for (size_t capacity = 0; capacity <= count; capacity++) {
+        size_t found = 999;
+        memset(some, 0xA5, sizeof some);
+        const cbvh_status status = cbvh_contact_regions(querier, one, one, poses, 4, NULL, capacity ? some : NULL,
+            capacity, &found);
+        CHECK(found == count && status == (capacity < count ? CBVH_BUFFER_TOO_SMALL : CBVH_OK));
+        CHECK(memcmp(some, regions, capacity * sizeof *some) == 0);
+        CHECK(memcmp(&some[capacity], &pattern, sizeof pattern) == 0);
+    }
+    /* Both corners that overlap have the same curve: six edges of the box. Faces that touch have an area. */
+    const cbvh_pose three[4] = {poses[0], poses[1], poses[2], poses[0]};
+    cbvh_patch patches[3];
+    cbvh_patch_counts of[4];
+    size_t region_count;
+    OK(cbvh_patches(querier, one, one, three, 4, NULL, of, patches, 3, &count, some, 200, &region_count));
+    CHECK(count == 3 && of[0].patches == 1 && of[1].patches == 0 && of[2].patches == 1 && of[3].patches == 1);
+    CHECK(of[0].contacts == counts[0] && of[0].total == counts[0] && of[1].total == 0 && of[2].total == counts[2]);
+    CHECK(region_count == 2 * counts[0] + counts[2] && memcmp(some, regions, counts[0] * sizeof *some) == 0);
+    CHECK(patches[0].first == 0 && patches[1].first == counts[0] && patches[2].first == counts[0] + counts[2]);
+    CHECK(patches[0].count == counts[0] && patches[1].count == counts[2] && patches[2].depth == patches[0].depth);
+    const double areas[3] = {0.875 * 0.9375, 0.25 * 0.9375, 0.25 * 0.875};
+    const double area = sqrt(areas[0] * areas[0] + areas[1] * areas[1] + areas[2] * areas[2]);
+    for (int k = 0; k < 3; k++) {
+        CHECK(fabs(patches[0].normal[k] - areas[k] / area) < 1e-9 && fabs(patches[1].normal[k] - (k == 0)) < 1e-12);
+    }
+    CHECK(fabs(patches[0].length - 2 * (0.25 + 0.875 + 0.9375)) < 1e-9 && patches[0].area == 0);
+    CHECK(patches[0].depth > 0.25 && fabs(patches[1].area - 0.75) < 1e-9 && patches[1].depth < 1e-9);
+    CHECK(fabs(patches[1].center[0] - 0.5) < 1e-12 && fabs(patches[1].center[1] - 0.125) < 1e-12);
+    const cbvh_patch_options few = {.size = sizeof few, .max_contacts = 5};
+    OK(cbvh_patches(querier, one, one, three, 1, &few, of, patches, 3, &count, NULL, 0, NULL));
+    CHECK(of[0].contacts == 5 && of[0].total == counts[0]);
+    FAILS(cbvh_patches(querier, one, one, three, 4, NULL, NULL, patches, 2, &count, some, 200, &region_count),
+          CBVH_BUFFER_TOO_SMALL, "patches: expected room for 3 elements, found room for 2");
+    CHECK(count == 3 && region_count == 2 * counts[0] + counts[2]);
+    FAILS(cbvh_patches(querier, one, one, three, 4, NULL, NULL, patches, 3, &count, some, 4, &region_count),
+          CBVH_BUFFER_TOO_SMALL, "regions: expected room for");
+    CHECK(count == 3 && region_count == 2 * counts[0] + counts[2]);
+    /* Two points of a cloud are two patches, or one where they may be that far apart. */
+    const double points[6] = {0, 0, 0, 0.5, 0, 0};
+    cbvh_mesh cloud, balls;
+    OK(cbvh_bake_cloud(points, 2, &cloud));
+    OK(cbvh_mesh_rounded(cloud, 0.625, &balls));
+    for (int k = 0; k < 2; k++) {
+        const cbvh_pose above = shift(0, 0, 1);
+        const cbvh_patch_options joined = {.size = sizeof joined, .tolerance = 2};
+        OK(cbvh_patches(querier, balls, balls, &above, 1, k ? &joined : NULL, of, patches, 3, &count, NULL, 0, NULL));
+        CHECK(count == (k ? 1 : of[0].contacts) && fabs(patches[0].depth - 0.25) < 1e-12);
+    }
+    OK(cbvh_mesh_free(cloud));
+    OK(cbvh_mesh_free(balls));
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(quarter));
+}
+
+/* Where a mesh meets itself: pairs of triangles of each kind, far apart from each other. */
+static void self_contacts(void) {
+    const double vertices[3 * 24] = {
+        0, 0, 0, 1, 0, 0, 0, 1, 0, 0.2, 0.2, -1, 0.3, 0.2, -1, 0.2, 0.2, 1,   /* They cross. */
+        0, 0, 9, 1, 0, 9, 0, 1, 9, 0, 0, 9, 1, 1, 8, 1, 1, 10,                /* They share a corner. */
+        0, 0, 20, 1, 0, 20, 0, 1, 20, 0, 0, 20, 1, 0, 20, 0.2, 0.5, 20,       /* They share an edge. */
+        0, 0, 30, 1, 0, 30, 0, 1, 30, 0, 0, 30, 1, 0, 30, 0, 1, 30};          /* They are one. */
+    uint32_t faces[24];
+    for (uint32_t k = 0; k < 24; k++) {
+        faces[k] = k;
+    }
+    const cbvh_mesh fine = cube(1);
+    cbvh_mesh mesh;
+    cbvh_self_contact found[5], some[5], pattern;
+    size_t count = 7;
+    OK(cbvh_bake(vertices, 24, faces, 8, NULL, &mesh));
+    OK(cbvh_self_contacts(querier, mesh, found, 5, &count));
+    CHECK(count == 4);
+    for (uint32_t k = 0; k < 4; k++) {
+        CHECK(found[k].triangle_a == 2 * k && found[k].triangle_b == 2 * k + 1 && found[k].kind == (int32_t)k);
+        CHECK(found[k].object_a == 0 && found[k].object_b == 0);
+    }
+    CHECK(found[0].kind == CBVH_SELF_CROSSING && found[3].kind == CBVH_SELF_DUPLICATE);
+    memset(&pattern, 0xA5, sizeof pattern);
+    for (size_t capacity = 0; capacity < 4; capacity++) {
+        memset(some, 0xA5, sizeof some);
+        FAILS(cbvh_self_contacts(querier, mesh, capacity ? some : NULL, capacity, &count), CBVH_BUFFER_TOO_SMALL,
+              "contacts: expected room for 4 elements");
+        CHECK(count == 4 && memcmp(some, found, capacity * sizeof *some) == 0);
+        CHECK(memcmp(&some[capacity], &pattern, sizeof pattern) == 0);
+    }
+    OK(cbvh_self_contacts(querier, fine, NULL, 0, &count));
+    CHECK(count == 0);
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_mesh_free(fine));
 }
 
 static int released;
@@ -955,6 +1115,8 @@ int main(int count, char **arguments) {
     cubes(", all cores");
     OK(cbvh_querier_set_parallel(querier, 0));
     lists();
+    overlaps();
+    self_contacts();
     borrowed();
     paths();
     trackers();

@@ -123,6 +123,15 @@ static void *ask(void *parallel) {
         OK(cbvh_scene_motion(scene, &instance, &path, 1, NULL, &motion));
         OK(cbvh_scene_is_free(scene, &instance, &path, 1, NULL, answer));
     }
+    const cbvh_pose near = shift(0.75, 0.125, 0.0625);
+    const double x_axis[3] = {1, 0, 0};
+    cbvh_separation way;
+    cbvh_penetration depth;
+    size_t count;
+    OK(cbvh_separations(querier, mesh, mesh, &near, x_axis, 1, &way));
+    OK(cbvh_penetrations(querier, mesh, mesh, &near, 1, NULL, &depth));
+    (void)cbvh_patches(querier, mesh, other, &near, 1, NULL, NULL, NULL, 0, &count, NULL, 0, NULL);
+    (void)cbvh_self_contacts(querier, other, NULL, 0, &count);
     cbvh_mesh cylinder, solid, padded;
     bool touching;
     cbvh_distance_answer apart;

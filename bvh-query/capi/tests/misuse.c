@@ -390,6 +390,106 @@ static void shapes(void) {
           "cell: expected a pointer, found NULL");
 }
 
+/* Where and how deep meshes overlap. */
+static void overlaps(void) {
+    const cbvh_mesh no_mesh = {0};
+    cbvh_pose poses[2] = {CBVH_IDENTITY, CBVH_IDENTITY};
+    cbvh_separation ways[2];
+    cbvh_penetration depths[2];
+    cbvh_contact_region regions[1];
+    cbvh_patch patches[1];
+    cbvh_self_contact contacts[1];
+    size_t count, region_count;
+    double directions[6] = {1, 0, 0, 0, 1, 0};
+    FAILS(cbvh_separations(querier, no_mesh, mesh, poses, directions, 2, ways), CBVH_INVALID_HANDLE, "a: ");
+    FAILS(cbvh_separations(querier, mesh, mesh, NULL, directions, 2, ways), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_separations(querier, mesh, mesh, poses, NULL, 2, ways), CBVH_INVALID_ARGUMENT,
+          "directions: expected a pointer, found NULL");
+    FAILS(cbvh_separations(querier, mesh, mesh, poses, MISALIGNED(double), 2, ways), CBVH_INVALID_ARGUMENT,
+          "directions: expected an address");
+    FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, SIZE_MAX / 24 + 1, ways), CBVH_INVALID_ARGUMENT,
+          "directions: expected at most");
+    FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 2, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
+    const double bad[] = {NAN, INFINITY, 0, 0x1p-501, 0x1p501};
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        directions[4] = bad[k];
+        FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 2, ways), CBVH_INVALID_ARGUMENT,
+              "directions[1]: direction: expected numbers");
+    }
+    FAILS(cbvh_penetrations(querier, mesh, no_mesh, poses, 2, NULL, depths), CBVH_INVALID_HANDLE, "b: ");
+    FAILS(cbvh_penetrations(querier, mesh, mesh, NULL, 2, NULL, depths), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, NULL, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
+    const double wrong[] = {NAN, -1, INFINITY, -0x1p-1074};
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = wrong[k]},
+            tolerance = {.size = sizeof tolerance, .tolerance = wrong[k]};
+        const cbvh_patch_options apart = {.size = sizeof apart, .tolerance = wrong[k]};
+        FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &gap, depths), CBVH_INVALID_ARGUMENT, "relative_gap: ");
+        FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &tolerance, depths), CBVH_INVALID_ARGUMENT,
+              "tolerance: ");
+        FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, &apart, NULL, patches, 1, &count, NULL, 0, NULL),
+              CBVH_INVALID_ARGUMENT, "tolerance: ");
+    }
+    const cbvh_penetration_options other = {.size = 8}, all = {.size = sizeof all};
+    const cbvh_patch_options larger = {.size = sizeof larger + 8};
+    FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &other, depths), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 24");
+    FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, &larger, NULL, patches, 1, &count, NULL, 0, NULL),
+          CBVH_INVALID_ARGUMENT, "options.size: expected 24");
+    /* 0 stands for the defaults. */
+    cbvh_penetration by_default;
+    OK(cbvh_penetrations(querier, mesh, mesh, poses, 1, &all, depths));
+    OK(cbvh_penetrations(querier, mesh, mesh, poses, 1, NULL, &by_default));
+    CHECK(memcmp(depths, &by_default, sizeof by_default) == 0);
+    /* One triangle has no inside, and nobody knows of a mesh that was baked without topology. */
+    cbvh_mesh open, unknown;
+    const cbvh_bake_options bare = {.size = sizeof bare, .no_topology = 1};
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 1, NULL, &open));
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &bare, &unknown));
+    directions[4] = 1;
+    FAILS(cbvh_separations(querier, open, mesh, poses, directions, 2, ways), CBVH_INVALID_ARGUMENT, "closed objects");
+    FAILS(cbvh_penetrations(querier, mesh, open, poses, 2, NULL, depths), CBVH_INVALID_ARGUMENT, "closed objects");
+    FAILS(cbvh_separations(querier, mesh, unknown, poses, directions, 2, ways), CBVH_INVALID_ARGUMENT,
+          "does not say which objects are closed");
+    FAILS(cbvh_penetrations(querier, unknown, mesh, poses, 2, NULL, depths), CBVH_INVALID_ARGUMENT,
+          "does not say which objects are closed");
+    OK(cbvh_mesh_free(open));
+    OK(cbvh_mesh_free(unknown));
+    FAILS(cbvh_contact_regions(querier, mesh, mesh, poses, 2, NULL, NULL, 1, &count), CBVH_INVALID_ARGUMENT,
+          "regions: expected a pointer, found NULL");
+    FAILS(cbvh_contact_regions(querier, mesh, mesh, poses, 2, NULL, regions, 1, NULL), CBVH_INVALID_ARGUMENT,
+          "count: expected a pointer, found NULL");
+    FAILS(cbvh_contact_regions(querier, mesh, mesh, poses, 2, MISALIGNED(size_t), regions, 1, &count),
+          CBVH_INVALID_ARGUMENT, "counts: expected an address");
+    FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, NULL, NULL, 1, &count, regions, 1, &region_count),
+          CBVH_INVALID_ARGUMENT, "patches: expected a pointer, found NULL");
+    FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, NULL, patches, 1, NULL, regions, 1, &region_count),
+          CBVH_INVALID_ARGUMENT, "count: expected a pointer, found NULL");
+    FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, NULL, patches, 1, &count, NULL, 1, &region_count),
+          CBVH_INVALID_ARGUMENT, "regions: expected a pointer, found NULL");
+    FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, MISALIGNED(cbvh_patch_counts), patches, 1, &count, NULL, 0,
+              NULL), CBVH_INVALID_ARGUMENT, "counts: expected an address");
+    FAILS(cbvh_self_contacts(querier, no_mesh, contacts, 1, &count), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_self_contacts(querier, mesh, NULL, 1, &count), CBVH_INVALID_ARGUMENT,
+          "contacts: expected a pointer, found NULL");
+    FAILS(cbvh_self_contacts(querier, mesh, contacts, 1, NULL), CBVH_INVALID_ARGUMENT,
+          "count: expected a pointer, found NULL");
+    OK(cbvh_separations(querier, mesh, mesh, NULL, NULL, 0, NULL));
+    OK(cbvh_penetrations(querier, mesh, mesh, NULL, 0, NULL, NULL));
+    OK(cbvh_patches(querier, mesh, mesh, NULL, 0, NULL, NULL, NULL, 0, &count, NULL, 0, &region_count));
+    CHECK(count == 0 && region_count == 0);
+    /* A budget that ends all of them. */
+    OK(cbvh_querier_set_budget(querier, 0));
+    FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 1, NULL, depths), CBVH_LIMIT, "budget");
+    FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 1, ways), CBVH_LIMIT, "budget");
+    FAILS(cbvh_self_contacts(querier, mesh, contacts, 1, &count), CBVH_LIMIT, "budget");
+    OK(cbvh_querier_set_budget(querier, UINT64_MAX));
+}
+
 static void scenes(void) {
     cbvh_instance none = {0}, found, foreign = {1ull << 40};
     cbvh_pose rounded = CBVH_IDENTITY;
@@ -455,6 +555,7 @@ int main(void) {
     numbers();
     bakes();
     shapes();
+    overlaps();
     scenes();
     limits();
     OK(cbvh_scene_free(scene));

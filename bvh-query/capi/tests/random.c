@@ -145,7 +145,7 @@ int main(void) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(81)) {
+        switch (below(86)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -227,6 +227,12 @@ int main(void) {
         case 77: status = cbvh_scene_detach(s, i); break;
         case 78: status = cbvh_scene_parent(s, i, out); break;
         case 79: status = cbvh_scene_set_mesh(s, i, a); break;
+        case 80: status = cbvh_separations(q, a, b, in, more, n, out); break;
+        case 81: status = cbvh_penetrations(q, a, b, in, n, options, out); break;
+        case 82: status = cbvh_contact_regions(q, a, b, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
+        case 83: status = cbvh_patches(q, a, b, in, n, options, NULL, out, capacity, &count, NULL, 0,
+            below(2) ? NULL : counts); break;
+        case 84: status = cbvh_self_contacts(q, a, out, capacity, &count); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;

@@ -168,6 +168,35 @@ void answers(bool parallel) {
     FAILS(querier.within(one, one, poses, -1), CBVH_INVALID_ARGUMENT, "d: ");
 }
 
+// Where and how deep cubes overlap.
+void overlaps() {
+    const cbvh::Mesh one = cube(1);
+    cbvh::Querier querier;
+    const cbvh::Pose corner = cbvh::Pose::translation(0.75, 0.125, 0.0625), away = cbvh::Pose::translation(3, 0, 0);
+    const std::vector<cbvh::Pose> poses{corner, away};
+    CHECK(std::abs(querier.separation(one, one, corner, {0, 0, 2}).upper - 0.9375) < 1e-6);
+    const auto ways = querier.separation(one, one, poses, {{1, 0, 0}, {1, 0, 0}});
+    CHECK(std::abs(ways[0].upper - 0.25) < 1e-6 && ways[1].upper == 0);
+    FAILS(querier.separation(one, one, poses, {{1, 0, 0}}), CBVH_INVALID_ARGUMENT, "as many directions as poses");
+    FAILS(querier.separation(one, one, corner, {0, 0, 0}), CBVH_INVALID_ARGUMENT, "directions[0]: ");
+    const auto depth = querier.penetration(one, one, corner);
+    CHECK(depth.lower <= 0.25 && depth.upper >= 0.25 && depth.upper < 0.2525 && !depth.is_spent);
+    CHECK(querier.penetration(one, one, poses, {0, 0.1})[0].lower > 0.1 && querier.penetration(one, one, poses)[1].upper == 0);
+    const auto regions = querier.contact_regions(one, one, corner);
+    CHECK(regions.size() == querier.contacts(one, one, corner).size() && regions[0].count > 0);
+    const auto lists = querier.contact_regions(one, one, poses);
+    CHECK(lists[0].size() == regions.size() && lists[1].empty());
+    const auto found = querier.patches(one, one, corner);
+    CHECK(found.patches.size() == 1 && found.regions.size() == regions.size() && found.total == regions.size());
+    CHECK(std::abs(found.patches[0].length - 4.125) < 1e-9 && querier.patches(one, one, away).patches.empty());
+    const auto few = querier.patches(one, one, corner, {0, 5});
+    CHECK(few.regions.size() == 5 && few.total == regions.size());
+    CHECK(querier.self_contacts(one).empty());
+    const cbvh::Mesh twice = cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}});
+    const auto own = querier.self_contacts(twice);
+    CHECK(own.size() == 1 && own[0].triangle_b == 1 && own[0].kind == CBVH_SELF_DUPLICATE);
+}
+
 // Lists that are longer than there is room for, and shorter again.
 void lists() {
     std::vector<cbvh::Point> vertices;
@@ -184,6 +213,9 @@ void lists() {
         CHECK(querier.contacts(sheets, needle, most == 100 ? cbvh::Pose() : below).size() == most);
         const auto contacts = querier.contacts(sheets, needle, {cbvh::Pose(), below, cbvh::Pose::translation(5, 0, 0)});
         CHECK(contacts[0].size() == 100 && contacts[1].size() == 51 && contacts[2].empty());
+        CHECK(querier.contact_regions(sheets, needle, most == 100 ? cbvh::Pose() : below).size() == most);
+        const auto patches = querier.patches(sheets, needle, most == 100 ? cbvh::Pose() : below);
+        CHECK(patches.patches.size() == most && patches.regions.size() == most);
         const auto hits = querier.all_hits(sheets, {{{0.2, 0.2, 5}, {0, 0, -1}}, {{5, 5, 5}, {0, 0, -1}}});
         CHECK(hits[0].size() == 100 && hits[1].empty());
     }
@@ -377,6 +409,7 @@ int main() {
     handles();
     answers(false);
     answers(true);
+    overlaps();
     lists();
     motions();
     scenes();
