@@ -124,14 +124,31 @@ static void overlaps(void) {
     const double directions[12] = {1, 0, 0, 1, 0, 0, 0, -2, 0, 0, 0, 1};
     cbvh_separation ways[4];
     OK(cbvh_separations(querier, one, one, poses, directions, 3, ways));
-    CHECK(ways[0].lower > 0.2499999 && ways[0].lower <= 0.25 && ways[0].upper >= 0.25 && ways[0].upper < 0.2500001);
+    CHECK(ways[0].lower <= 0.25 && ways[0].upper >= 0.25 && ways[0].upper < 0.2500001);
     CHECK(ways[0].translation[0] >= 0.25 && ways[0].translation[1] == 0 && ways[0].translation[2] == 0);
     CHECK(ways[1].lower == 0 && ways[1].upper == 0 && ways[1].translation[0] == 0);
     const double back[9] = {-3, 0, 0, 0, 0.5, 0, 0, 0, 7}, lengths[3] = {1.75, 0.875, 0.9375};
     const cbvh_pose same[3] = {poses[0], poses[0], poses[0]};
     OK(cbvh_separations(querier, one, one, same, back, 3, ways));
     for (int k = 0; k < 3; k++) {
-        CHECK(ways[k].lower <= lengths[k] && lengths[k] <= ways[k].upper && ways[k].upper - ways[k].lower < 1e-6);
+        CHECK(ways[k].lower <= lengths[k] && lengths[k] <= ways[k].upper && ways[k].upper < lengths[k] + 1e-6);
+    }
+    /* Edges are parallel no more: both bounds agree, and B is not free before. */
+    random_source source = {11};
+    for (int k = 0; k < 20; k++) {
+        const cbvh_pose turned = random_pose(&source, 0.3);
+        const double direction[3] = {random_signed(&source), random_signed(&source), random_signed(&source)};
+        OK(cbvh_separations(querier, one, one, &turned, direction, 1, ways));
+        CHECK(ways[0].lower > 0.1 && ways[0].lower <= ways[0].upper && ways[0].upper - ways[0].lower < 1e-9);
+        for (int part = 0; part < 2; part++) {
+            cbvh_pose moved = turned;
+            for (int axis = 0; axis < 3; axis++) {
+                moved.rows[4 * axis + 3] += (part ? 1 : 0.999999) * ways[0].translation[axis];
+            }
+            cbvh_relation relation;
+            OK(cbvh_relations(querier, one, one, &moved, 1, &relation));
+            CHECK(relation == (part ? CBVH_APART : CBVH_TOUCHING));
+        }
     }
     cbvh_penetration depths[3];
     OK(cbvh_penetrations(querier, one, one, poses, 3, NULL, depths));
@@ -222,7 +239,7 @@ static void overlaps(void) {
     FAILS(cbvh_patches(querier, one, one, three, 4, NULL, NULL, patches, 3, &count, some, 4, &region_count),
           CBVH_BUFFER_TOO_SMALL, "regions: expected room for");
     CHECK(count == 3 && region_count == 2 * counts[0] + counts[2]);
-    /* Two points of a cloud are two patches, or one where they may be that far apart. */
+    /* Each contact of two balls is a point, and two of four are the same. Points that may be far apart are one patch. */
     const double points[6] = {0, 0, 0, 0.5, 0, 0};
     cbvh_mesh cloud, balls;
     OK(cbvh_bake_cloud(points, 2, &cloud));
@@ -231,7 +248,7 @@ static void overlaps(void) {
         const cbvh_pose above = shift(0, 0, 1);
         const cbvh_patch_options joined = {.size = sizeof joined, .tolerance = 2};
         OK(cbvh_patches(querier, balls, balls, &above, 1, k ? &joined : NULL, of, patches, 3, &count, NULL, 0, NULL));
-        CHECK(count == (k ? 1 : of[0].contacts) && fabs(patches[0].depth - 0.25) < 1e-12);
+        CHECK(of[0].contacts == 4 && count == (k ? 1 : 3) && fabs(patches[0].depth - 0.25) < 1e-12);
     }
     OK(cbvh_mesh_free(cloud));
     OK(cbvh_mesh_free(balls));

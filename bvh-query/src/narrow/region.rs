@@ -22,6 +22,7 @@ use super::intersect::{Aligned, Hull, Plane, are_collinear, area, area_axis, hei
 use super::intersect::{triangle_contains, volume};
 use super::{Point, Triangle, UNIT_ROUNDOFF, dot, subtract};
 use num_bigint::BigInt;
+use std::cmp::Ordering;
 
 /// The largest number of extreme points that two triangles have in common.
 pub(crate) const MAX_POINTS: usize = 6;
@@ -244,7 +245,7 @@ fn flat_region(a: &Triangle, b: &Triangle) -> Region {
             return polygon(points, axis, area(axis, a[0], a[1], a[2]) < 0.0);
         }
     }
-    points.sort_by(|p, q| lexicographic(p.point, q.point));
+    sort_few(&mut points, |p, q| lexicographic(p.point, q.point));
     Region::of(&points)
 }
 
@@ -279,7 +280,7 @@ fn polygon(mut points: Vec<Constructed>, axis: usize, is_clockwise: bool) -> Reg
         let projected = |p: &Constructed| [p.point[(axis + 1) % 3], p.point[(axis + 2) % 3], 0.0];
         lexicographic(projected(p), projected(q))
     };
-    points.sort_by(order);
+    sort_few(&mut points, order);
     points.dedup_by(|p, q| order(p, q).is_eq());
     let half = |points: &mut dyn Iterator<Item = &Constructed>| {
         let mut chain: Vec<Constructed> = Vec::with_capacity(MAX_POINTS);
@@ -304,6 +305,17 @@ fn polygon(mut points: Vec<Constructed>, axis: usize, is_clockwise: bool) -> Reg
         hull[1..].reverse();
     }
     Region { corners, ..Region::of(&hull) }
+}
+
+/// Sorts a few values, in less code than sorts of many take. Equal ones keep their order.
+fn sort_few<T>(values: &mut [T], order: impl Fn(&T, &T) -> Ordering) {
+    for end in 1..values.len() {
+        let mut at = end;
+        while at > 0 && order(&values[at - 1], &values[at]).is_gt() {
+            values.swap(at - 1, at);
+            at -= 1;
+        }
+    }
 }
 
 /// Returns the unit normal of a triangle in the orientation of its corners, or zero if it has no area.

@@ -187,10 +187,10 @@ struct Sides {
 }
 
 /// Visits two leaf packets.
-struct VisitLeaves<'a, W> {
-    visitor: &'a mut W,
-    leaves: (LeafPacket, LeafPacket),
-    at_once: bool,
+pub(crate) struct VisitLeaves<'a, W> {
+    pub(crate) visitor: &'a mut W,
+    pub(crate) leaves: (LeafPacket, LeafPacket),
+    pub(crate) at_once: bool,
 }
 
 impl<W: Visitor> Task for VisitLeaves<'_, W> {
@@ -203,7 +203,7 @@ impl<W: Visitor> Task for VisitLeaves<'_, W> {
 }
 
 /// Completes what is pending after the last pair.
-struct Finish<'a, W>(&'a mut W);
+pub(crate) struct Finish<'a, W>(pub(crate) &'a mut W);
 
 impl<W: Visitor> Task for Finish<'_, W> {
     type Output = Result<(), QueryError>;

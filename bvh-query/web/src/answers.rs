@@ -17,7 +17,7 @@ pub(crate) fn small(of: impl Iterator<Item = u8>) -> Uint8Array {
     Uint8Array::from(&of.collect::<Vec<u8>>()[..])
 }
 
-fn points(of: impl Iterator<Item = [f64; 3]>) -> JsValue {
+pub(crate) fn points(of: impl Iterator<Item = [f64; 3]>) -> JsValue {
     Float64Array::from(of.collect::<Vec<[f64; 3]>>().as_flattened()).into()
 }
 

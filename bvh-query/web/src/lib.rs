@@ -10,6 +10,7 @@ mod arguments;
 mod bake;
 mod mesh;
 mod motions;
+mod overlaps;
 mod pairs;
 mod paths;
 mod poses;

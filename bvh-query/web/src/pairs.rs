@@ -8,10 +8,10 @@ use js_sys::{Array, Float64Array, Uint8Array};
 use wasm_bindgen::prelude::*;
 
 /// Asks about all poses, one after the other.
-fn ask<T>(
+pub(crate) fn ask<T>(
     meshes: [&Mesh; 2],
     array: &Float64Array,
-    one: impl Fn(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError>,
+    mut one: impl FnMut(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError>,
 ) -> Answer<Vec<T>> {
     let (poses, shapes) = (poses(array, "poses")?, meshes.map(|mesh| mesh.shape.shape()));
     with_querier(|querier| poses.iter().map(|pose| one(querier, shapes, pose).map_err(refused)).collect())

@@ -44,6 +44,11 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.distance(b, pose, { relErr: x, absErr: y }),
         () => a.relation(b, pose),
         () => a.contacts(b, pose),
+        () => a.contactRegions(b, pose),
+        () => a.patches(b, pose, { tolerance: x, maxContacts: 1000 }),
+        () => a.separation(b, pose, [x, y, z]),
+        () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
+        () => a.selfContacts(),
         () => a.motion(b, Motion.between(at(x, y, z), pose), { clearance: w, tolerance: v }),
         () => a.isFree(b, screw()),
         () => a.motion(b, Motion.through([...pose, ...at(u, v, w)])),
@@ -107,6 +112,66 @@ export const cases = {
         const contacts = cube.contacts(cube, at(2, 2, 2));
         ok(contacts.length > 0 && contacts.length % 4 === 0, "rows of four");
         equal(cube.contactsEach(cube, [...at(2, 2, 2), ...at(9, 0, 0)]), [contacts, []]);
+    },
+
+    "cubes overlap where and as deep as they do": (cbvh) => {
+        const { RegionKind, Relation, SelfContactKind } = cbvh;
+        const cube = cubeOf(cbvh);
+        const near = (found, expected, error, what) =>
+            ok(Math.abs(found - expected) <= error, `${what}: ${expected}, found ${found}`);
+        // What they have in common is a box with the sides 1/2, 7/4 and 15/8.
+        const corner = at(1.5, 0.25, 0.125);
+        const moved = (by) => at(1.5 + by[0], 0.25 + by[1], 0.125 + by[2]);
+        const depth = cube.penetration(cube, corner);
+        ok(depth.lower <= 0.5 && depth.lower > 0.49 && depth.upper >= 0.5 && depth.upper < 0.505, "bounds around the depth");
+        equal(cube.relation(cube, moved(depth.translation)), Relation.APART);
+        near(depth.radii[0] + depth.radii[1], depth.lower, 1e-6, "radii");
+        equal(cube.penetration(cube, at(9, 0, 0)).upper, 0);
+        ok(cube.penetration(cube, corner, { tolerance: 0.01 }).lower > 0.01, "deeper than the tolerance");
+        const both = cube.penetrationEach(cube, [...corner, ...at(9, 0, 0)]);
+        equal([both.upper, both.point.length, both.radii.length], [[depth.upper, 0], 6, 4]);
+        const up = cube.separation(cube, corner, [0, 0, 7]);
+        near(up.upper, 1.875, 1e-9, "the way up");
+        ok(up.lower <= 1.875 && up.translation[0] === 0, "along the direction");
+        equal(cube.relation(cube, moved(up.translation)), Relation.APART);
+        const ways = cube.separationEach(cube, [...corner, ...at(9, 0, 0)], [-1, 0, 0, 1, 0, 0]);
+        near(ways.upper[0], 3.5, 1e-9, "the way back");
+        equal([ways.upper[1], ways.translation.length], [0, 6]);
+
+        const regions = cube.contactRegions(cube, corner);
+        equal(regions.triangles, cube.contacts(cube, corner));
+        const count = regions.total;
+        equal([regions.kind.length, regions.points.length, regions.normalA.length], [count, 18 * count, 3 * count]);
+        regions.kind.forEach((kind, k) => {
+            ok(kind === RegionKind.POINT || kind === RegionKind.SEGMENT, "faces that cross");
+            for (let place = 18 * k; place < 18 * k + 3 * regions.count[k]; place += 3) {
+                const point = [...regions.points.subarray(place, place + 3)];
+                near(Math.max(...point.map(Math.abs)), 1, 1e-12, "on the first surface");
+                const from = [1.5, 0.25, 0.125];
+                near(Math.max(...point.map((x, axis) => Math.abs(x - from[axis]))), 1, 1e-12, "on the second surface");
+            }
+        });
+        const few = cube.contactRegions(cube, corner, { limit: 3 });
+        equal([few.kind.length, few.total], [3, count]);
+        // The curve is six edges of the box, and faces that touch have an area.
+        const patches = cube.patches(cube, corner);
+        equal([patches.first, patches.count, patches.regions.total], [[0], [count], count]);
+        near(patches.length[0], 2 * (0.5 + 1.75 + 1.875), 1e-9, "the length");
+        ok(patches.depth[0] > 0.5 && patches.normal[0] > 0.9, "a direction and a depth");
+        const face = cube.patches(cube, at(2, 0.5, 0));
+        near(face.area[0], 3, 1e-9, "the area");
+        equal([face.normal, face.count.length, face.regions.kind.includes(RegionKind.POLYGON)], [[1, 0, 0], 1, true]);
+        equal(cube.patches(cube, corner, { maxContacts: 3 }).regions.kind.length, 3);
+        equal(cube.patches(cube, at(9, 0, 0)).first, []);
+
+        equal(cube.selfContacts().triangles, []);
+        const [first, crossing] = [
+            [0, 0, 0, 1, 0, 0, 0, 1, 0],
+            [0.2, 0.2, -1, 0.3, 0.2, -1, 0.2, 0.2, 1],
+        ];
+        const own = cbvh.Mesh.bake([...first, ...crossing, ...first]).selfContacts();
+        equal(own.triangles, [0, 0, 0, 1, 0, 0, 0, 2, 0, 1, 0, 2]);
+        equal(own.kind, [SelfContactKind.CROSSING, SelfContactKind.DUPLICATE, SelfContactKind.CROSSING]);
     },
 
     "a baked cube answers every question about motions": (cbvh) => {
@@ -534,6 +599,21 @@ export const cases = {
             [() => gone.bytes(), "mesh: expected a Mesh in use, found one that was freed"],
             [() => cube.within(cube, at(0, 0, 0), -1), "d: expected a finite distance of at least 0, found -1"],
             [() => cube.within(cube, at(0, 0, 0), "1"), "d: expected a number, found a string"],
+            [() => cube.separation(cube, at(0, 0, 0), [NaN, 0, 0]), /^direction: expected numbers/],
+            [() => cube.separation(cube, at(0, 0, 0), [0, 0, 0]), /^direction: expected numbers/],
+            [() => cube.separation(cube, at(0, 0, 0), [0, 0]), "directions: expected 3 numbers for each, found 2 numbers in all"],
+            [() => cube.separation(cube, at(0, 0, 0), []), "directions: expected as many as poses, 1, found 0"],
+            [() => cube.penetration(cube, at(0, 0, 0), { relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],
+            [() => cube.penetration(cube, at(0, 0, 0), { tolerance: -1 }), /^tolerance: expected/],
+            [() => cube.penetration(cube, at(0, 0, 0), { tolerance: "1" }), "tolerance: expected a number, found a string"],
+            [() => cube.penetration(Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]), at(0, 0, 0)), /^expected closed objects/],
+            [() => cube.patches(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected/],
+            [
+                () => cube.patches(cube, at(0, 0, 0), { maxContacts: -1 }),
+                "maxContacts: expected a whole number from 0 to 2^32 - 1, found -1",
+            ],
+            [() => cube.contactRegions(cube, [1, 2]), "pose: expected 12 numbers, found 2"],
+            [() => gone.selfContacts(), "mesh: expected a Mesh in use, found one that was freed"],
             [() => cube.motion(cube, {}), "motion: expected a Motion, found Object"],
             [
                 () => cube.motion(cube, Motion.between(at(0, 0, 0).concat(at(1, 0, 0)), at(0, 0, 0).concat(at(1, 0, 0)))),

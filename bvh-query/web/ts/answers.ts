@@ -73,6 +73,125 @@ export interface Distances {
     triangleB: Uint32Array;
 }
 
+/** What two triangles have in common. `RegionKind[number]` is its name. */
+export enum RegionKind {
+    /** They touch in one point. */
+    POINT = 0,
+    /** They meet in a segment: they cross, or an edge touches. */
+    SEGMENT = 1,
+    /** They overlap in one plane, in a convex polygon. */
+    POLYGON = 2,
+}
+
+/** How two triangles of one mesh meet, by the corners that they have in common. `SelfContactKind[number]` is its name. */
+export enum SelfContactKind {
+    /** They have no corner in common, and touch or cross. */
+    CROSSING = 0,
+    /** They have one corner in common, and another point. */
+    AT_CORNER = 1,
+    /** They have two corners in common, lie in one plane, and overlap beyond that edge. */
+    FOLDED = 2,
+    /** They have the same corners, in any order. */
+    DUPLICATE = 3,
+}
+
+/** How far the other mesh moves along a direction until interiors are disjoint, in mesh units. */
+export interface Separation {
+    /** Interiors meet at all shorter moves along the direction. */
+    lower: number;
+    /** The length of `translation`. */
+    upper: number;
+    /** A move of the other mesh along the direction, after which interiors are disjoint. */
+    translation: Float64Array;
+}
+
+/** N answers of the type `Separation`: numbers of length N, and translations of length 3 N. */
+export interface Separations {
+    lower: Float64Array;
+    upper: Float64Array;
+    translation: Float64Array;
+}
+
+/** How deep two meshes overlap, in mesh units. */
+export interface Penetration {
+    /** No shorter translation makes interiors disjoint. */
+    lower: number;
+    /** The length of `translation`. */
+    upper: number;
+    /** A translation of the other mesh, after which interiors are disjoint. */
+    translation: Float64Array;
+    /** What proves `lower`: a ball about this point is inside this mesh, and another one about it inside the other mesh. */
+    point: Float64Array;
+    /** The radii of both balls. Their sum is `lower`, but for roundings. */
+    radii: Float64Array;
+}
+
+/** N answers of the type `Penetration`: numbers of length N, translations and points of length 3 N, and radii of length 2 N. */
+export interface Penetrations {
+    lower: Float64Array;
+    upper: Float64Array;
+    translation: Float64Array;
+    point: Float64Array;
+    radii: Float64Array;
+}
+
+/** Where K pairs of triangles in contact meet, in the frame of the first mesh and in mesh units. */
+export interface ContactRegions {
+    /** Object and triangle of the first mesh, object and triangle of the second: length 4 K. */
+    triangles: Uint32Array;
+    /** Numbers of `RegionKind`, decided exactly. */
+    kind: Uint8Array;
+    /** The number of points of each region, from 1 to 6. */
+    count: Uint8Array;
+    /**
+     * One point, the two ends of a segment, or the corners of a polygon. Those of region `k` begin at `18 * k`, and numbers
+     * after the last point are 0: length 18 K. Where two planes cross, the ends follow the cross product of `normalA` and
+     * `normalB`, so that the segments of closed meshes form directed loops. Corners go counterclockwise around a polygon, seen
+     * from where `normalA` points to.
+     */
+    points: Float64Array;
+    /** Unit normals of the first mesh's triangles, 0 without area; between two meshes with a radius whose triangles are apart,
+     * the direction from one to the other: length 3 K. */
+    normalA: Float64Array;
+    /** The same of the second mesh. */
+    normalB: Float64Array;
+    /** Certified bounds: each point is at most this far from the exact one. */
+    error: Float64Array;
+    /** The sums of the radii less the distances of the triangles; 0 for meshes without radii. */
+    overlap: Float64Array;
+    /** The number of all contacts, which is larger than K if the question was about the first ones only. */
+    total: number;
+}
+
+/** P groups of contacts that belong together. Numbers are in mesh units, rounded, and not certified. */
+export interface Patches {
+    /** The place of the first contact of each patch in `regions`. */
+    first: Uint32Array;
+    /** The number of contacts of each patch. */
+    count: Uint32Array;
+    /** The mean of the polygons by area, if triangles face each other in one plane; else of the curves by length; else of the
+     * points: length 3 P. */
+    center: Float64Array;
+    /** The directions in which this mesh pushes the other one, at length 1; 0 if the normals of the contacts cancel: length 3 P. */
+    normal: Float64Array;
+    /** The lengths of the curves in which the surfaces meet. */
+    length: Float64Array;
+    /** The areas of what triangles in one plane have in common. */
+    area: Float64Array;
+    /** Estimates of how far the other mesh has to move along the normal to leave this one there. */
+    depth: Float64Array;
+    /** The contacts of the first patch, of the second one, and so on. */
+    regions: ContactRegions;
+}
+
+/** K pairs of triangles of one mesh that meet where they should not. */
+export interface SelfContacts {
+    /** Object and triangle of the first one, object and triangle of the second: length 4 K. */
+    triangles: Uint32Array;
+    /** Numbers of `SelfContactKind`. */
+    kind: Uint8Array;
+}
+
 /** Whether a path is free, and where it ends if it is not. */
 export interface MotionAnswer {
     kind: MotionKind;
@@ -191,6 +310,25 @@ export const distances = (parts: unknown[]): Distances => {
     return { distance, lower, upper, pointA, pointB, objectA, triangleA, objectB, triangleB } as Distances;
 };
 
+export const separations = ([lower, upper, translation]: unknown[]): Separations =>
+    ({ lower, upper, translation }) as Separations;
+
+export const penetrations = ([lower, upper, translation, point, radii]: unknown[]): Penetrations =>
+    ({ lower, upper, translation, point, radii }) as Penetrations;
+
+export function regions(parts: unknown[], total: unknown): ContactRegions {
+    const [triangles, kind, count, points, normalA, normalB, error, overlap] = parts;
+    return { triangles, kind, count, points, normalA, normalB, error, overlap, total } as ContactRegions;
+}
+
+export function patches(parts: unknown[]): Patches {
+    const [first, count, center, normal, length, area, depth, contacts, total] = parts;
+    const ofContacts = regions(contacts as unknown[], total);
+    return { first, count, center, normal, length, area, depth, regions: ofContacts } as Patches;
+}
+
+export const selfContacts = ([triangles, kind]: unknown[]): SelfContacts => ({ triangles, kind }) as SelfContacts;
+
 export const motions = ([kind, freeUntil, at, nearest]: unknown[]): MotionAnswers =>
     ({ kind, freeUntil, at, nearest: distances(nearest as unknown[]) }) as MotionAnswers;
 
@@ -202,6 +340,13 @@ export const hits = ([found, t, lower, upper, point, object, triangle]: unknown[
 
 export const sceneHits = ([instance, of]: unknown[]): SceneRayHits =>
     ({ instance, hit: hits(of as unknown[]) }) as SceneRayHits;
+
+/** Takes the only element of the bounds of an answer. */
+export const onlyBounds = <T extends { lower: Float64Array; upper: Float64Array }>(of: T) => ({
+    ...of,
+    lower: of.lower[0] as number,
+    upper: of.upper[0] as number,
+});
 
 /** Takes the only element of an answer with one distance. */
 export function onlyDistance(of: Distances): Distance {

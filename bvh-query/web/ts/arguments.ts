@@ -106,6 +106,10 @@ export function integer(value: number, name: string): number {
     return value;
 }
 
+/** Reads the greatest number of something, which there need not be. */
+export const most = (value: number | undefined, name: string): number =>
+    value === undefined ? 2 ** 32 - 1 : integer(value, name);
+
 /** Reads the bytes of a file. */
 export function bytes(value: Bytes, name: string): Uint8Array {
     if (value instanceof Uint8Array) {

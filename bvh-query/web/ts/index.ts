@@ -6,10 +6,14 @@
 
 export type {
     ClosestPoints,
+    ContactRegions,
     Distance,
     Distances,
     MotionAnswer,
     MotionAnswers,
+    Patches,
+    Penetration,
+    Penetrations,
     RayHits,
     SceneClosestPoints,
     SceneContacts,
@@ -17,10 +21,20 @@ export type {
     SceneMotionAnswer,
     SceneRayHits,
     SceneRelations,
+    SelfContacts,
+    Separation,
+    Separations,
 } from "./answers.js";
-export { MotionKind, Relation, Side } from "./answers.js";
+export { MotionKind, RegionKind, Relation, SelfContactKind, Side } from "./answers.js";
 export type { Bytes, Integers, Numbers } from "./arguments.js";
-export type { BakeOptions, DistanceOptions, MotionOptions, RayOptions } from "./mesh.js";
+export type {
+    BakeOptions,
+    DistanceOptions,
+    MotionOptions,
+    PatchOptions,
+    PenetrationOptions,
+    RayOptions,
+} from "./mesh.js";
 export { Mesh } from "./mesh.js";
 export type { ModuleSource } from "./module.js";
 export { init, initSync, memoryBytes } from "./module.js";

@@ -1,7 +1,22 @@
 /** Meshes, and all questions about one mesh or a pair. */
 
 import * as answers from "./answers.js";
-import type { ClosestPoints, Distance, Distances, MotionAnswer, MotionAnswers, RayHits, Relation } from "./answers.js";
+import type {
+    ClosestPoints,
+    ContactRegions,
+    Distance,
+    Distances,
+    MotionAnswer,
+    MotionAnswers,
+    Patches,
+    Penetration,
+    Penetrations,
+    RayHits,
+    Relation,
+    SelfContacts,
+    Separation,
+    Separations,
+} from "./answers.js";
 import {
     bytes,
     described,
@@ -9,6 +24,7 @@ import {
     floats,
     instance,
     integers,
+    most,
     text,
     type Bytes,
     type Integers,
@@ -45,6 +61,23 @@ export interface DistanceOptions {
     relErr?: number;
     /** A length in mesh units that is allowed as well. 0 by default. */
     absErr?: number;
+}
+
+/** When the search for a depth ends; in any case when it has tried all it knows. */
+export interface PenetrationOptions {
+    /** When the upper bound exceeds the lower one by no more than this part of it: above 0. 0.01 by default. */
+    relativeGap?: number;
+    /** When it is known whether the depth exceeds this length, in mesh units. */
+    tolerance?: number;
+}
+
+/** How contacts are joined into patches. */
+export interface PatchOptions {
+    /** How far apart points of two contacts may be that belong together, in mesh units, beyond their errors. Meshes with a
+     * radius, whose contacts are points, need more than 0. 0 by default. */
+    tolerance?: number;
+    /** The number of contacts that are considered, the first ones in ascending order; all by default. */
+    maxContacts?: number;
 }
 
 /** What counts as a hit, and how exactly time is searched. */
@@ -85,10 +118,13 @@ function checked(options: BakeOptions): BakeOptions {
     return options;
 }
 
+/** Reads a number, if there is one. */
+const optional = (value: number | undefined, name: string) => (value === undefined ? undefined : float(value, name));
+
 /** Reads the clearance and the tolerance. */
 export function limits(options: MotionOptions): [number, number | undefined] {
     const { clearance = 0, tolerance } = options;
-    return [float(clearance, "clearance"), tolerance === undefined ? undefined : float(tolerance, "tolerance")];
+    return [float(clearance, "clearance"), optional(tolerance, "tolerance")];
 }
 
 /** Reads the greatest parameters of rays. */
@@ -308,6 +344,69 @@ export class Mesh extends Handle<raw.Mesh> {
     /** `contacts` for N poses: an array for each. */
     contactsEach(other: Mesh, poses: Numbers): Uint32Array[] {
         return this.#pair(other, poses, raw.contacts);
+    }
+
+    /**
+     * Where do these triangles meet? The contacts of `contacts`, in the same order, with the points, curves and polygons that
+     * both triangles have in common.
+     *
+     * @param options `limit`: the number of contacts to answer, the first ones; all by default.
+     */
+    contactRegions(other: Mesh, pose: Numbers, options: { limit?: number } = {}): ContactRegions {
+        const [at, limit] = [onePose(pose), most(options.limit, "limit")];
+        const [parts, total] = this.#pair(other, at, (a, b) => raw.contactRegions(a, b, at, limit));
+        return answers.regions(parts, total);
+    }
+
+    /**
+     * The same contacts, joined into connected patches, each with a centre, a normal and an estimated depth. It takes some
+     * microseconds more for each patch.
+     */
+    patches(other: Mesh, pose: Numbers, options: PatchOptions = {}): Patches {
+        const { tolerance = 0, maxContacts } = options;
+        const [at, apart, limit] = [onePose(pose), float(tolerance, "tolerance"), most(maxContacts, "maxContacts")];
+        return answers.patches(this.#pair(other, at, (a, b) => raw.patches(a, b, at, apart, limit)));
+    }
+
+    /**
+     * How far does `other` move along a direction until interiors are disjoint? A mesh inside the other one moves until it is
+     * out. All numbers are 0 if the meshes are apart. Both bounds are certain. They agree to some roundings, unless surfaces
+     * slide along each other or edges are parallel: `lower` may then end there. Both meshes must be closed.
+     *
+     * @param direction 3 numbers in the frame of this mesh, of any length.
+     */
+    separation(other: Mesh, pose: Numbers, direction: Numbers): Separation {
+        return answers.onlyBounds(this.separationEach(other, onePose(pose), direction));
+    }
+
+    /** `separation` for N poses and a direction for each: 3 N numbers. */
+    separationEach(other: Mesh, poses: Numbers, directions: Numbers): Separations {
+        const ways = floats(directions, "directions");
+        return answers.separations(this.#pair(other, poses, (a, b, array) => raw.separation(a, b, array, ways)));
+    }
+
+    /**
+     * How deep do they overlap? Certified bounds of the length of the shortest translation of `other` after which interiors are
+     * disjoint, and such a translation. All numbers are 0 if the meshes are apart. For convex meshes, `upper` is mostly within a
+     * per cent of the depth, and `lower` more than half of it. It takes up to some milliseconds. Both meshes must be closed.
+     */
+    penetration(other: Mesh, pose: Numbers, options: PenetrationOptions = {}): Penetration {
+        return answers.onlyBounds(this.penetrationEach(other, onePose(pose), options));
+    }
+
+    /** `penetration` for N poses. */
+    penetrationEach(other: Mesh, poses: Numbers, options: PenetrationOptions = {}): Penetrations {
+        const gap = optional(options.relativeGap, "relativeGap");
+        const tolerance = optional(options.tolerance, "tolerance");
+        return answers.penetrations(this.#pair(other, poses, (a, b, array) => raw.penetration(a, b, array, gap, tolerance)));
+    }
+
+    /**
+     * Which triangles of this mesh meet where they should not? All pairs, in ascending order, that have more in common than
+     * their common corners and what is between these, exactly. A radius does not matter.
+     */
+    selfContacts(): SelfContacts {
+        return answers.selfContacts(this.#call((mesh) => raw.selfContacts(mesh)));
     }
 
     /**

@@ -6,7 +6,7 @@
 //! the search takes the cell with the largest bound, looks at its centre and halves it (Piyavskii 1972, Hansen, Jaumard 1995).
 
 use crate::error::QueryError;
-use crate::narrow::{Point, cross, subtract, triangle_distance};
+use crate::narrow::{Point, cross, subtract, triangle_distance_apart};
 use crate::query::answers::Side;
 use crate::query::depth::line::Line;
 use crate::query::probe::closest::IsWithin;
@@ -137,7 +137,7 @@ impl Querier {
             return Ok(balls);
         }
         let [of_a, of_b] = &leaving.last;
-        let point = triangle_distance(of_a, of_b).point_a;
+        let point = triangle_distance_apart(of_a, of_b).point_a;
         let inwards = leaving.last.map(|[p, q, r]| {
             let normal = cross(subtract(q, p), subtract(r, p));
             let scale = length(normal).max(f64::MIN_POSITIVE);

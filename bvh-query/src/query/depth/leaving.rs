@@ -14,7 +14,7 @@ use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::align::round_up;
 use crate::traverse::node_filter::Measure;
-use crate::traverse::walk::{Order, Visitor};
+use crate::traverse::walk::{Finish, Order, VisitLeaves, Visitor};
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
@@ -130,6 +130,7 @@ impl Visitor for LeavingVisitor<'_> {
         round_up(-self.found.get().crosses_until)
     }
 
+    // These tasks are compiled once for both visitors.
     #[inline(always)]
     fn leaves<I: Isa>(
         &mut self,
@@ -137,12 +138,12 @@ impl Visitor for LeavingVisitor<'_> {
         leaves: (LeafPacket, LeafPacket),
         at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
-        self.contacts.leaves(isa, leaves, at_once)
+        isa.run(VisitLeaves { visitor: &mut self.contacts, leaves, at_once })
     }
 
     #[inline(always)]
     fn finish<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
-        self.contacts.finish(isa)
+        isa.run(Finish(&mut self.contacts))
     }
 }
 

@@ -90,14 +90,18 @@ impl Vertices {
             }
         }
         let firsts = sets.firsts();
-        let mut order: Vec<usize> = (0..regions).collect();
-        order.sort_by_key(|&region| firsts[region]);
-        let mut ranges: Vec<Range<usize>> = Vec::new();
-        for (place, &region) in order.iter().enumerate() {
-            match ranges.last_mut() {
-                Some(range) if firsts[order[range.start]] == firsts[region] => range.end = place + 1,
-                _ => ranges.push(place..place + 1),
-            }
+        // The number of contacts of each patch, by its first contact, and then the place of the next one.
+        let mut places = vec![0; regions];
+        firsts.iter().for_each(|&first| places[first] += 1);
+        let (mut ranges, mut end) = (Vec::new(), 0);
+        for place in places.iter_mut().filter(|count| **count > 0) {
+            ranges.push(end..end + *place);
+            (*place, end) = (end, end + *place);
+        }
+        let mut order = vec![0; regions];
+        for (region, &first) in firsts.iter().enumerate() {
+            order[places[first]] = region;
+            places[first] += 1;
         }
         Joined { order, ranges }
     }

@@ -3,6 +3,8 @@
 use crate::narrow::{MAX_POINTS, UNIT_ROUNDOFF, cross, dot, subtract, unit};
 use crate::query::patches::join::Vertices;
 use crate::query::regions::{ContactRegion, RegionKind};
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 
 type Vector = [f64; 3];
 
@@ -16,8 +18,7 @@ pub(super) struct Measured {
 
 /// A part of a curve, which several contacts may have in common.
 struct Segment {
-    /// Its vertices.
-    ends: [usize; 2],
+    /// Its ends, the vertex of the lesser number first.
     points: [Vector; 2],
     /// How many contacts it has from the first end to the second one, less those the other way.
     turns: i32,
@@ -116,41 +117,37 @@ fn polygons<'r>(
         key.sort_unstable();
         key
     };
+    let mut seen = HashSet::new();
     let of_kind = contacts.iter().filter(|&&i| regions[i].kind == RegionKind::Polygon);
-    let mut keyed: Vec<_> = of_kind.map(|&i| (key(i), i)).collect();
-    keyed.sort_unstable();
-    keyed.dedup_by_key(|(key, _)| *key);
-    keyed.sort_unstable_by_key(|(_, region)| *region);
-    keyed.into_iter().map(|(_, region)| &regions[region])
+    of_kind.filter(move |&&i| seen.insert(key(i))).map(|&i| &regions[i])
 }
 
-/// Returns the segments of a patch, each once.
+/// Returns the segments of a patch, each once: the first contact gives its points.
 fn segments(regions: &[ContactRegion], vertices: &Vertices, contacts: &[usize]) -> Vec<Segment> {
-    let mut segments = Vec::new();
+    let (mut segments, mut places) = (Vec::<Segment>::new(), HashMap::new());
     for &i in contacts {
         let region = &regions[i];
         if region.kind != RegionKind::Segment {
             continue;
         }
         if let ([p, q], [first, last]) = (region.points(), vertices.of(i)) {
-            let mut segment =
-                Segment { ends: [*first, *last], points: [*p, *q], turns: 1, error: region.error };
+            let mut segment = Segment { points: [*p, *q], turns: 1, error: region.error };
             if first > last {
-                segment = Segment { ends: [*last, *first], points: [*q, *p], turns: -1, ..segment };
+                segment = Segment { points: [*q, *p], turns: -1, ..segment };
             }
-            segments.push(segment);
+            match places.entry([*first.min(last), *last.max(first)]) {
+                Entry::Vacant(place) => {
+                    place.insert(segments.len());
+                    segments.push(segment);
+                }
+                Entry::Occupied(place) => {
+                    let known = &mut segments[*place.get()];
+                    known.turns += segment.turns;
+                    known.error = known.error.max(segment.error);
+                }
+            }
         }
     }
-    // Stable, so that the first contact gives the points.
-    segments.sort_by_key(|segment| segment.ends);
-    segments.dedup_by(|later, earlier| {
-        let is_same = later.ends == earlier.ends;
-        if is_same {
-            earlier.turns += later.turns;
-            earlier.error = earlier.error.max(later.error);
-        }
-        is_same
-    });
     segments
 }
 

@@ -1,0 +1,118 @@
+//! Where and how deep two meshes overlap, and where a mesh meets itself.
+
+use crate::answers::{contacts, floats, ids, points, small};
+use crate::arguments::{Answer, pose, refused, rows, same_count, with_querier};
+use crate::mesh::Mesh;
+use crate::pairs::ask;
+use bvh_query::{Contact, ContactRegion, Patch, PatchOptions, PenetrationOptions};
+use js_sys::{Array, Float64Array};
+use wasm_bindgen::prelude::*;
+
+/// Lower and upper bound, and translation. There is a direction for each pose.
+#[wasm_bindgen]
+pub fn separation(a: &Mesh, b: &Mesh, poses: &Float64Array, directions: &Float64Array) -> Answer<Array> {
+    let directions = rows::<3>(directions, "directions")?;
+    same_count("directions", directions.len(), "poses", poses.length() as usize / 12)?;
+    let mut directions = directions.into_iter();
+    let found = ask([a, b], poses, |querier, [a, b], pose| {
+        querier.separation(a, b, pose, directions.next().unwrap_or_default())
+    })?;
+    let parts = [
+        floats(found.iter().map(|way| way.lower)),
+        floats(found.iter().map(|way| way.upper)),
+        points(found.iter().map(|way| way.translation)),
+    ];
+    Ok(parts.into_iter().collect())
+}
+
+/// Lower and upper bound, translation, centre and radii of the balls.
+#[wasm_bindgen]
+pub fn penetration(
+    a: &Mesh,
+    b: &Mesh,
+    poses: &Float64Array,
+    relative_gap: Option<f64>,
+    tolerance: Option<f64>,
+) -> Answer<Array> {
+    let mut options = PenetrationOptions::new();
+    options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
+    options.tolerance = tolerance;
+    let found = ask([a, b], poses, |querier, [a, b], pose| querier.penetration(a, b, pose, &options))?;
+    let parts = [
+        floats(found.iter().map(|depth| depth.lower)),
+        floats(found.iter().map(|depth| depth.upper)),
+        points(found.iter().map(|depth| depth.translation)),
+        points(found.iter().map(|depth| depth.point)),
+        floats(found.iter().flat_map(|depth| depth.radii)),
+    ];
+    Ok(parts.into_iter().collect())
+}
+
+/// Object and triangle of A and of B, kind, number of points, points, normals of A and of B, error and overlap.
+fn regions(of: &[ContactRegion]) -> Array {
+    let parts = [
+        contacts(of.iter().map(|region| &region.contact)).into(),
+        small(of.iter().map(|region| region.kind as u8)).into(),
+        small(of.iter().map(|region| region.count)).into(),
+        points(of.iter().flat_map(|region| region.all_points)),
+        points(of.iter().map(|region| region.normal_a)),
+        points(of.iter().map(|region| region.normal_b)),
+        floats(of.iter().map(|region| region.error)),
+        floats(of.iter().map(|region| region.overlap)),
+    ];
+    parts.into_iter().collect()
+}
+
+/// The parts of the regions, and the number of all contacts.
+#[wasm_bindgen(js_name = contactRegions)]
+pub fn contact_regions(a: &Mesh, b: &Mesh, at: &Float64Array, limit: u32) -> Answer<Array> {
+    let pose = pose(at, "pose")?;
+    with_querier(|querier| {
+        let found = querier.contact_regions(&a.shape, &b.shape, &pose, limit as usize).map_err(refused)?;
+        Ok([regions(&found.regions).into(), JsValue::from(found.total as f64)].into_iter().collect())
+    })
+}
+
+/// First contact, number of contacts, centre, normal, length, area and depth of each patch, the parts of the regions, and the
+/// number of all contacts.
+#[wasm_bindgen]
+pub fn patches(a: &Mesh, b: &Mesh, at: &Float64Array, tolerance: f64, limit: u32) -> Answer<Array> {
+    let pose = pose(at, "pose")?;
+    let options = PatchOptions::new().tolerance(tolerance).max_contacts(limit as usize);
+    with_querier(|querier| {
+        let found = querier.patches(&a.shape, &b.shape, &pose, &options).map_err(refused)?;
+        let of = || found.patches.iter();
+        let numbers = |part: fn(&Patch) -> f64| floats(of().map(part));
+        let parts = [
+            ids(of().map(|patch| patch.first as u32)),
+            ids(of().map(|patch| patch.count as u32)),
+            points(of().map(|patch| patch.center)),
+            points(of().map(|patch| patch.normal)),
+            numbers(|patch| patch.length),
+            numbers(|patch| patch.area),
+            numbers(|patch| patch.depth),
+            regions(&found.regions).into(),
+            JsValue::from(found.total as f64),
+        ];
+        Ok(parts.into_iter().collect())
+    })
+}
+
+/// Object and triangle of the first and of the second triangle, and kind.
+#[wasm_bindgen(js_name = selfContacts)]
+pub fn self_contacts(mesh: &Mesh) -> Answer<Array> {
+    with_querier(|querier| {
+        let found = querier.self_contacts(&mesh.shape).map_err(refused)?;
+        let pairs: Vec<Contact> = found
+            .iter()
+            .map(|pair| Contact {
+                object_a: pair.object_a,
+                triangle_a: pair.triangle_a,
+                object_b: pair.object_b,
+                triangle_b: pair.triangle_b,
+            })
+            .collect();
+        let kinds = small(found.iter().map(|pair| pair.kind as u8));
+        Ok([contacts(pairs.iter()).into(), JsValue::from(kinds)].into_iter().collect())
+    })
+}
