@@ -124,16 +124,16 @@ static void overlaps(void) {
     const double directions[12] = {1, 0, 0, 1, 0, 0, 0, -2, 0, 0, 0, 1};
     cbvh_separation ways[4];
     OK(cbvh_separations(querier, one, one, poses, directions, 3, ways));
-    CHECK(ways[0].lower <= 0.25 && ways[0].upper >= 0.25 && ways[0].upper < 0.2500001);
+    CHECK(ways[0].lower > 0.2499999 && ways[0].lower <= 0.25 && ways[0].upper >= 0.25 && ways[0].upper < 0.2500001);
     CHECK(ways[0].translation[0] >= 0.25 && ways[0].translation[1] == 0 && ways[0].translation[2] == 0);
     CHECK(ways[1].lower == 0 && ways[1].upper == 0 && ways[1].translation[0] == 0);
     const double back[9] = {-3, 0, 0, 0, 0.5, 0, 0, 0, 7}, lengths[3] = {1.75, 0.875, 0.9375};
     const cbvh_pose same[3] = {poses[0], poses[0], poses[0]};
     OK(cbvh_separations(querier, one, one, same, back, 3, ways));
     for (int k = 0; k < 3; k++) {
-        CHECK(ways[k].lower <= lengths[k] && lengths[k] <= ways[k].upper && ways[k].upper < lengths[k] + 1e-6);
+        CHECK(ways[k].lower <= lengths[k] && lengths[k] <= ways[k].upper && ways[k].upper - ways[k].lower < 1e-6);
     }
-    /* Edges are parallel no more: both bounds agree, and B is not free before. */
+    /* However it is turned, both bounds agree, and B is not free before. */
     random_source source = {11};
     for (int k = 0; k < 20; k++) {
         const cbvh_pose turned = random_pose(&source, 0.3);

@@ -371,7 +371,7 @@ export class Mesh extends Handle<raw.Mesh> {
     /**
      * How far does `other` move along a direction until interiors are disjoint? A mesh inside the other one moves until it is
      * out. All numbers are 0 if the meshes are apart. Both bounds are certain. They agree to some roundings, unless surfaces
-     * slide along each other or edges are parallel: `lower` may then end there. Both meshes must be closed.
+     * only slide along each other on a part of the way: `lower` ends there. Both meshes must be closed.
      *
      * @param direction 3 numbers in the frame of this mesh, of any length.
      */
