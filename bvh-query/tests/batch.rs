@@ -7,7 +7,7 @@ use bvh_bake::Options;
 use bvh_bake::mesh::Mesh;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_query::{Backend, Batch, Bvh, Pose, Querier, QueryError, Tracker};
+use bvh_query::{Backend, Batch, Bvh, PatchOptions, PenetrationOptions, Pose, Querier, QueryError, Tracker};
 use common::shapes::{cube, dirty, moved, soup, sphere, torus};
 use common::{Random, backends, bake, baked, mesh, options, random_pose, translation};
 
@@ -48,6 +48,36 @@ fn batches_answer_as_one_by_one() {
             }
         }
     }
+}
+
+#[test]
+fn batches_answer_about_overlaps_as_one_by_one() {
+    let (a, b) = (baked(&cube()), baked(&moved(&cube(), 0.75, [0.25, 0.0, 0.5])));
+    let poses = poses(&mut Random::new(5), 48);
+    let (depth, patch) = (PenetrationOptions::new().relative_gap(0.5), PatchOptions::new().max_contacts(20));
+    let up = [0.0, 0.0, 2.0];
+    let mut querier = Querier::new().unwrap();
+    let (mut separations, mut penetrations, mut regions, mut patches) = (vec![], vec![], vec![], vec![]);
+    for pose in &poses {
+        separations.push(querier.separation(&a, &b, pose, up).unwrap());
+        penetrations.push(querier.penetration(&a, &b, pose, &depth).unwrap());
+        regions.push(querier.contact_regions(&a, &b, pose, 10).unwrap());
+        patches.push(querier.patches(&a, &b, pose, &patch).unwrap());
+    }
+    assert!(penetrations.iter().any(|of| of.lower > 0.0) && regions.iter().any(|of| of.is_truncated()));
+    let batch = Batch::new(&a, &b).unwrap();
+    for pool in &pools() {
+        pool.install(|| {
+            assert_eq!(batch.separations(&poses, up), Ok(separations.clone()));
+            assert_eq!(batch.penetrations(&poses, &depth), Ok(penetrations.clone()));
+            assert_eq!(batch.contact_regions(&poses, 10), Ok(regions.clone()));
+            assert_eq!(batch.patches(&poses, &patch), Ok(patches.clone()));
+        });
+    }
+    // Numbers are checked even without poses.
+    assert!(batch.separations(&[], [0.0; 3]).is_err());
+    assert!(batch.penetrations(&[], &depth.relative_gap(0.0)).is_err());
+    assert!(batch.patches(&[], &patch.tolerance(-1.0)).is_err());
 }
 
 /// Of many contacts, it must not matter which one some thread finds first.

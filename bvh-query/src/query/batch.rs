@@ -14,9 +14,12 @@ use crate::isa::{Backend, BackendError};
 use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
+use crate::query::depth::penetration::{Penetration, PenetrationOptions, Separation, unit};
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
+use crate::query::patches::{PatchOptions, Patches};
 use crate::query::querier::Querier;
+use crate::query::regions::ContactRegions;
 use crate::query::tracker::Tracker;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -122,6 +125,49 @@ impl<'a> Batch<'a> {
     /// Returns the error of the first pose that fails.
     pub fn relations(&self, poses: &[Pose]) -> Result<Vec<Relation>, QueryError> {
         self.each(poses, |querier, _, pose| querier.relation(self.a, self.b, pose))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::separation`] for each pose, along one direction in A's frame.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the direction is zero or not finite; else the error of the first pose that fails.
+    pub fn separations(&self, poses: &[Pose], direction: [f64; 3]) -> Result<Vec<Separation>, QueryError> {
+        unit(direction)?;
+        self.each(poses, |querier, _, pose| querier.separation(self.a, self.b, pose, direction))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::penetration`] for each pose. Where the budget per pose ends a search, the bounds so far are the answer.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if an option is invalid; else the error of the first pose that fails.
+    pub fn penetrations(
+        &self,
+        poses: &[Pose],
+        options: &PenetrationOptions,
+    ) -> Result<Vec<Penetration>, QueryError> {
+        options.check()?;
+        self.each(poses, |querier, _, pose| querier.penetration(self.a, self.b, pose, options))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::contact_regions`] for each pose, with at most `limit` regions for each.
+    ///
+    /// # Errors
+    /// Returns the error of the first pose that fails.
+    pub fn contact_regions(&self, poses: &[Pose], limit: usize) -> Result<Vec<ContactRegions>, QueryError> {
+        self.each(poses, |querier, _, pose| querier.contact_regions(self.a, self.b, pose, limit))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::patches`] for each pose.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the tolerance is negative, NaN or infinite; else the error of the first pose that fails.
+    pub fn patches(&self, poses: &[Pose], options: &PatchOptions) -> Result<Vec<Patches>, QueryError> {
+        options.check()?;
+        self.each(poses, |querier, _, pose| querier.patches(self.a, self.b, pose, options))
             .map_err(|(_, error)| error)
     }
 

@@ -430,8 +430,8 @@ fn length_above(v: Point) -> f64 {
     length(v) * (1.0 + 4.0 * f64::EPSILON)
 }
 
-/// Returns a direction at unit length.
-fn unit(direction: Point) -> Result<Point, QueryError> {
+/// Returns a direction at unit length, or an error if it is zero or not finite.
+pub(crate) fn unit(direction: Point) -> Result<Point, QueryError> {
     let larger = |most: f64, x: &f64| if x.abs() > most || x.is_nan() { x.abs() } else { most };
     let largest = direction.iter().fold(0.0, larger);
     if !(2f64.powi(-500)..=2f64.powi(500)).contains(&largest) {

@@ -53,6 +53,10 @@ impl PatchOptions {
     pub fn max_contacts(self, max_contacts: usize) -> Self {
         Self { max_contacts, ..self }
     }
+
+    pub(crate) fn check(&self) -> Result<(), QueryError> {
+        check(NumberError::PatchTolerance, self.tolerance)
+    }
 }
 
 /// Contacts that belong together, in A's frame and in mesh units. All but the first two numbers are rounded, and not certified.
@@ -133,7 +137,7 @@ impl Querier {
         pose: &Pose,
         options: &PatchOptions,
     ) -> Result<Patches, QueryError> {
-        check(NumberError::PatchTolerance, options.tolerance)?;
+        options.check()?;
         self.start();
         let (a, b) = (a.into(), b.into());
         let (mut found, mut triangles) = (Vec::new(), Vec::new());
