@@ -3,7 +3,9 @@
 //! An answer of several parts is a tuple. An answer that may be missing begins with a bool; if it is missing, the other
 //! parts are NaN and 0.
 
-use bvh_query::{ClosestPoint, Contact, Distance, MotionAnswer, Pose, RayHit};
+use bvh_query::{
+    ClosestPoint, Contact, ContactRegion, Distance, MotionAnswer, Patches, Penetration, Pose, RayHit,
+};
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -150,6 +152,60 @@ pub(crate) fn motions<'py>(to: Answers<'py>, of: &[MotionAnswer]) -> PyResult<Bo
 /// Object and triangle of A, and of B.
 pub(crate) fn triangles(contact: &Contact) -> [u32; 4] {
     [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b]
+}
+
+/// Lower and upper bound, translation, point and radii that prove the lower one, and whether the budget ended the search.
+pub(crate) fn penetrations<'py>(to: Answers<'py>, of: &[Penetration]) -> PyResult<Bound<'py, PyTuple>> {
+    (
+        to.values(of.iter().map(|of| of.lower))?,
+        to.values(of.iter().map(|of| of.upper))?,
+        to.rows(of.iter().map(|of| of.translation))?,
+        to.rows(of.iter().map(|of| of.point))?,
+        to.rows(of.iter().map(|of| of.radii))?,
+        to.values(of.iter().map(|of| of.is_spent))?,
+    )
+        .into_pyobject(to.py)
+}
+
+/// Triangles, kind, count and points (the rest NaN), normals, error and overlap of each region, and the number of all contacts.
+pub(crate) fn regions<'py>(
+    py: Python<'py>,
+    of: &[ContactRegion],
+    total: u64,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let points = of.iter().flat_map(|of| {
+        let mut points = [[f64::NAN; 3]; 6];
+        points.iter_mut().zip(of.points()).for_each(|(to, point)| *to = *point);
+        points
+    });
+    (
+        table(py, of.iter().map(|of| triangles(&of.contact)))?,
+        array(py, of.iter().map(|of| of.kind as u8)),
+        array(py, of.iter().map(|of| of.count)),
+        table(py, points)?.reshape([of.len(), 6, 3])?,
+        table(py, of.iter().map(|of| of.normal_a))?,
+        table(py, of.iter().map(|of| of.normal_b))?,
+        array(py, of.iter().map(|of| of.error)),
+        array(py, of.iter().map(|of| of.overlap)),
+        total,
+    )
+        .into_pyobject(py)
+}
+
+/// Centre, normal, length, area, depth, first and count of each patch, and the regions in their order.
+pub(crate) fn patches<'py>(py: Python<'py>, of: &Patches) -> PyResult<Bound<'py, PyTuple>> {
+    let patches = || of.patches.iter();
+    (
+        table(py, patches().map(|of| of.center))?,
+        table(py, patches().map(|of| of.normal))?,
+        array(py, patches().map(|of| of.length)),
+        array(py, patches().map(|of| of.area)),
+        array(py, patches().map(|of| of.depth)),
+        array(py, patches().map(|of| of.first as i64)),
+        array(py, patches().map(|of| of.count as i64)),
+        regions(py, &of.regions, of.total)?,
+    )
+        .into_pyobject(py)
 }
 
 /// Distance or parameter with its bounds, point, object and triangle of one answer.

@@ -181,6 +181,27 @@ pub(crate) fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     })
 }
 
+/// Reads an array of shape (3,).
+pub(crate) fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
+    let array = numbers(value, name)?;
+    let vector = array.as_slice()?.first_chunk().filter(|_| array.shape() == [3]);
+    vector.copied().ok_or_else(|| shape_error(name, "(3,)", array.shape()))
+}
+
+/// Reads how many there may be; as many as there are if it is `None`.
+pub(crate) fn limit(value: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<usize> {
+    let Some(value) = value else { return Ok(usize::MAX) };
+    value.extract().map_err(|error: PyErr| {
+        if error.is_instance_of::<PyTypeError>(value.py()) {
+            PyTypeError::new_err(format!("{name}: expected a whole number or None, found {}", kind(value)))
+        } else {
+            PyValueError::new_err(format!(
+                "{name}: expected a whole number from 0 to 2^64 - 1, found {value}"
+            ))
+        }
+    })
+}
+
 /// Reads a choice.
 pub(crate) fn flag(value: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
     let wrong = |_| PyTypeError::new_err(format!("{name}: expected a bool, found {}", kind(value)));

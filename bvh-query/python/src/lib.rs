@@ -34,6 +34,13 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![shapes::cylinder_core, shapes::cone_core, shapes::height_field_core, shapes::voxels_core];
     functions![shapes::octree_core, shapes::convex_hull_core];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
+    functions![
+        pairs::penetration,
+        pairs::separation,
+        pairs::contact_regions,
+        pairs::patches,
+        pairs::self_contacts
+    ];
     functions![motions::motion, motions::is_free];
     functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];
     functions![poses::relative_poses, poses::nearest_poses];

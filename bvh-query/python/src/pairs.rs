@@ -1,11 +1,13 @@
-//! Questions about two meshes in many poses.
+//! Questions about two meshes in many poses, and about a mesh that meets itself.
 
-use crate::answers::{self, Answers, table};
-use crate::arguments::{self, Rows, flag, number};
+use crate::answers::{self, Answers, array, table};
+use crate::arguments::{self, Rows, flag, limit, number, vector};
 use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::{backend_error, query_error};
 use crate::mesh::Mesh;
-use bvh_query::{Batch, Contact, DistanceOptions, Pose, Querier, QueryError, Shape};
+use bvh_query::{
+    Batch, Contact, DistanceOptions, PatchOptions, PenetrationOptions, Pose, Querier, QueryError, Shape,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -105,4 +107,108 @@ pub(crate) fn contacts<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyAny>> {
     let py = question.py;
     let triangles = |rows: &Vec<Contact>| Ok(table(py, rows.iter().map(answers::triangles))?.into_any());
     question.answers().lists(&found, triangles)
+}
+
+/// Reads what ends a search for a depth.
+pub(crate) fn depth_options(
+    relative_gap: &Bound<'_, PyAny>,
+    tolerance: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PenetrationOptions> {
+    let options = PenetrationOptions::new().relative_gap(number(relative_gap, "relative_gap")?);
+    Ok(match tolerance {
+        Some(tolerance) => options.tolerance(number(tolerance, "tolerance")?),
+        None => options,
+    })
+}
+
+#[pyfunction]
+pub(crate) fn penetration<'py>(
+    asked: Asked<'py>,
+    relative_gap: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
+    budget: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(&asked)?;
+    let (options, budget) = (depth_options(relative_gap, tolerance)?, limit(budget, "budget")? as u64);
+    let found = question.ask(
+        |batch, poses| {
+            let mut batch = *batch;
+            batch.set_budget(budget);
+            batch.penetrations(poses, &options)
+        },
+        |querier, [a, b], pose| {
+            querier.set_budget(budget);
+            let found = querier.penetration(a, b, pose, &options);
+            querier.set_budget(u64::MAX);
+            found
+        },
+    )?;
+    answers::penetrations(question.answers(), &found)
+}
+
+#[pyfunction]
+pub(crate) fn separation<'py>(
+    asked: Asked<'py>,
+    direction: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let (question, direction) = (Question::new(&asked)?, vector(direction, "direction")?);
+    let found = question.ask(
+        |batch, poses| batch.separations(poses, direction),
+        |querier, [a, b], pose| querier.separation(a, b, pose, direction),
+    )?;
+    let to = question.answers();
+    let numbers = || found.iter().map(|of| (of.lower, of.upper));
+    (
+        to.values(numbers().map(|of| of.0))?,
+        to.values(numbers().map(|of| of.1))?,
+        to.rows(found.iter().map(|of| of.translation))?,
+    )
+        .into_pyobject(question.py)
+}
+
+#[pyfunction]
+pub(crate) fn contact_regions<'py>(
+    asked: Asked<'py>,
+    most: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (question, most) = (Question::new(&asked)?, limit(most, "limit")?);
+    let found = question.ask(
+        |batch, poses| batch.contact_regions(poses, most),
+        |querier, [a, b], pose| querier.contact_regions(a, b, pose, most),
+    )?;
+    let py = question.py;
+    question.answers().lists(&found, |of| Ok(answers::regions(py, &of.regions, of.total)?.into_any()))
+}
+
+#[pyfunction]
+pub(crate) fn patches<'py>(
+    asked: Asked<'py>,
+    tolerance: &Bound<'py, PyAny>,
+    max_contacts: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(&asked)?;
+    let most = limit(max_contacts, "max_contacts")?;
+    let options = PatchOptions::new().tolerance(number(tolerance, "tolerance")?).max_contacts(most);
+    let found = question.ask(
+        |batch, poses| batch.patches(poses, &options),
+        |querier, [a, b], pose| querier.patches(a, b, pose, &options),
+    )?;
+    let py = question.py;
+    question.answers().lists(&found, |of| Ok(answers::patches(py, of)?.into_any()))
+}
+
+/// Object and triangle of both, kinds, and the number of all.
+#[pyfunction]
+pub(crate) fn self_contacts<'py>(
+    py: Python<'py>,
+    mesh: &Mesh,
+    most: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let most = limit(most, "limit")?;
+    let shapes = [mesh.shape().shape()];
+    let found = one_by_one(py, &shapes, |querier, &shape| querier.self_contacts(shape).map_err(query_error))?;
+    let found: Vec<_> = found.into_iter().flatten().collect();
+    let first = || found.iter().take(most);
+    let triangles = first().map(|of| [of.object_a, of.triangle_a, of.object_b, of.triangle_b]);
+    (table(py, triangles)?, array(py, first().map(|of| of.kind as u8)), found.len()).into_pyobject(py)
 }

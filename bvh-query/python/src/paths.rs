@@ -1,7 +1,7 @@
 //! Paths: the motions and polylines of the library, and paths that Python code defines.
 
 use crate::answers::Answers;
-use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error};
+use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error, vector};
 use crate::asking::detached;
 use crate::errors::value_error;
 use bvh_query::floats::with_default_floats;
@@ -123,13 +123,6 @@ impl Paths {
         let found: Vec<f64> = detached(py, || self.paths.iter().map(of).collect());
         Answers { py, one: self.one }.values(found.into_iter())
     }
-}
-
-/// Reads an array of shape (3,).
-fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
-    let array = numbers(value, name)?;
-    let vector = array.as_slice()?.first_chunk().filter(|_| array.shape() == [3]);
-    vector.copied().ok_or_else(|| shape_error(name, "(3,)", array.shape()))
 }
 
 /// How many poses of a path of Python code are kept, since questions ask for the ends of an interval again and again.

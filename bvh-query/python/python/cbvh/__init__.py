@@ -19,6 +19,10 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 **Motions.** `Motion.between`, `Motion.screw`, `Polyline` and objects of your own (`Path`) are paths of a body.
 `Mesh.motion` and `Mesh.is_free` tell whether a path is free; the answer is certain at every moment.
 
+**Overlap.** `Mesh.penetration` bounds how deep closed meshes overlap, and gives a translation that separates them.
+`Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
+itself.
+
 **Scenes** are many placed meshes (`Scene`). `CollisionManager` has trimesh's interface for them.
 
 **Answers** to one question are plain values. Answers to N questions are arrays of N elements or rows, or lists of N
@@ -41,18 +45,26 @@ are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be bake
 
 from ._answers import (
     ClosestPoint,
+    ContactRegions,
     Distance,
     MotionAnswer,
     MotionKind,
+    Patches,
+    Penetration,
     RayHit,
+    RegionKind,
     Relation,
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
     SceneDistances,
     SceneMotionAnswer,
+    ScenePenetrations,
     SceneRayHit,
     SceneRelations,
+    SelfContactKind,
+    SelfContacts,
+    Separation,
     Side,
 )
 from ._baking import bake, bake_files
@@ -68,15 +80,19 @@ __all__ = [
     "BakeError",
     "ClosestPoint",
     "CollisionManager",
+    "ContactRegions",
     "Distance",
     "FormatError",
     "Mesh",
     "Motion",
     "MotionAnswer",
     "MotionKind",
+    "Patches",
     "Path",
+    "Penetration",
     "Polyline",
     "RayHit",
+    "RegionKind",
     "Relation",
     "Scene",
     "SceneClosestPoint",
@@ -84,8 +100,12 @@ __all__ = [
     "SceneDistance",
     "SceneDistances",
     "SceneMotionAnswer",
+    "ScenePenetrations",
     "SceneRayHit",
     "SceneRelations",
+    "SelfContactKind",
+    "SelfContacts",
+    "Separation",
     "Side",
     "bake",
     "bake_files",

@@ -62,6 +62,34 @@ class MotionKind(_Named):
     NEAR = 2
 
 
+class RegionKind(_Named):
+    """What two triangles in contact have in common.
+
+    - ``POINT``: they touch in one point.
+    - ``SEGMENT``: they meet in a segment: they cross, or an edge touches.
+    - ``POLYGON``: they overlap in one plane, in a convex polygon.
+    """
+
+    POINT = 0
+    SEGMENT = 1
+    POLYGON = 2
+
+
+class SelfContactKind(_Named):
+    """How two triangles of one mesh meet where they should not.
+
+    - ``CROSSING``: they have no corner in common, and touch or cross.
+    - ``AT_CORNER``: they have one corner in common, and another point.
+    - ``FOLDED``: they have an edge in common and overlap beyond it, in one plane.
+    - ``DUPLICATE``: they have the same corners, in any order.
+    """
+
+    CROSSING = 0
+    AT_CORNER = 1
+    FOLDED = 2
+    DUPLICATE = 3
+
+
 class Distance(NamedTuple):
     """The least distance of two meshes. After N questions, each field has N elements or rows.
 
@@ -84,6 +112,107 @@ class Distance(NamedTuple):
     triangle_a: Any
     object_b: Any
     triangle_b: Any
+
+
+class Separation(NamedTuple):
+    """How far the second mesh moves along a direction until the insides are disjoint. After N questions, each field has N
+    elements or rows.
+
+    - ``lower``: the insides meet at all shorter moves along the direction, in mesh units. Shape () or (N,).
+    - ``upper``: the length of ``translation``.
+    - ``translation``: a move of the second mesh along the direction, in the frame of the first, at which the insides are
+      disjoint. Shape (3,) or (N, 3).
+    """
+
+    lower: Any
+    upper: Any
+    translation: Floats
+
+
+class Penetration(NamedTuple):
+    """How deep two meshes overlap. After N questions, each field has N elements or rows.
+
+    - ``lower``: no shorter translation makes the insides disjoint, in mesh units. Shape () or (N,).
+    - ``upper``: the length of ``translation``.
+    - ``translation``: a translation of the second mesh, in the frame of the first, at which the insides are disjoint. Shape
+      (3,) or (N, 3).
+    - ``point``: what proves ``lower``: a ball about this point, in the frame of the first mesh, is inside the first mesh,
+      and another one about it is inside the second. Shape (3,) or (N, 3).
+    - ``radii``: the radii of these balls. Their sum is ``lower``, but for roundings. Shape (2,) or (N, 2).
+    - ``is_spent``: whether the budget ended the search. Shape () or (N,).
+    """
+
+    lower: Any
+    upper: Any
+    translation: Floats
+    point: Floats
+    radii: Floats
+    is_spent: Any
+
+
+class ContactRegions(NamedTuple):
+    """Where triangles in contact meet, in the frame of the first mesh and in mesh units.
+
+    - ``triangles``: object and triangle of the first mesh, object and triangle of the second, uint32 of shape (K, 4).
+    - ``kind``: what they have in common, exactly: numbers of `RegionKind` as uint8, shape (K,), printed as names.
+    - ``point_count``: the number of points of each region, uint8 of shape (K,).
+    - ``points``: a point, the ends of a segment, or the corners of a polygon; the rest is NaN. Shape (K, 6, 3). Where two
+      planes cross, the ends follow the cross product of ``normal_a`` and ``normal_b``, so that the segments of closed meshes
+      form directed loops. Corners go around counterclockwise, seen from where ``normal_a`` points to.
+    - ``normal_a``: the unit normals of the first mesh's triangles, 0 for those without area, shape (K, 3). Between two
+      rounded meshes whose cores are apart, the direction from the first core to the second.
+    - ``normal_b``: those of the second mesh's; between such rounded meshes, the opposite.
+    - ``error``: each point is certainly at most this far from the exact one, shape (K,).
+    - ``overlap``: the sum of the radii less the distance of the triangles, at least 0; 0 without radii. Shape (K,).
+    - ``total``: the number of all contacts, which is greater than K if the limit left some out.
+    """
+
+    triangles: NDArray[np.uint32]
+    kind: Any
+    point_count: NDArray[np.uint8]
+    points: Floats
+    normal_a: Floats
+    normal_b: Floats
+    error: Floats
+    overlap: Floats
+    total: int
+
+
+class Patches(NamedTuple):
+    """Contacts that are joined into P connected patches, in the frame of the first mesh and in mesh units. Numbers are
+    rounded, and not certified.
+
+    - ``center``: the mean of a patch's polygons by area; else of its curves by length; else of its points. Shape (P, 3).
+    - ``normal``: the direction in which the first mesh pushes the second, at length 1; 0 if the normals cancel. Shape (P, 3).
+    - ``length``: the length of the curves in which the surfaces meet, shape (P,).
+    - ``area``: the area of what triangles have in common that are in one plane, shape (P,).
+    - ``depth``: an estimate of how far the second mesh has to move along the normal to leave the first here, shape (P,).
+    - ``first``: the row in ``regions`` of a patch's first contact, shape (P,).
+    - ``contact_count``: the number of its contacts, shape (P,).
+    - ``regions``: the `ContactRegions` of the first patch, of the second one, and so on, in ascending order within each.
+    """
+
+    center: Floats
+    normal: Floats
+    length: Floats
+    area: Floats
+    depth: Floats
+    first: NDArray[np.int64]
+    contact_count: NDArray[np.int64]
+    regions: ContactRegions
+
+
+class SelfContacts(NamedTuple):
+    """Pairs of triangles of one mesh that meet where they should not, in ascending order.
+
+    - ``triangles``: object and triangle of the one, object and triangle of the other, uint32 of shape (K, 4).
+    - ``kind``: numbers of `SelfContactKind` as uint8, shape (K,), printed as names.
+    - ``total``: the number of all pairs, which is greater than K if the limit left some out.
+    """
+
+    triangles: NDArray[np.uint32]
+    kind: Any
+    total: int
 
 
 class MotionAnswer(NamedTuple):
@@ -193,6 +322,17 @@ class SceneDistances(NamedTuple):
     nearest: Distance
 
 
+class ScenePenetrations(NamedTuple):
+    """Pairs of instances, and how deep they overlap.
+
+    - ``pairs``: numbers of instances, A and B, shape (K, 2).
+    - ``depth``: the answers of `Mesh.penetration`, arrays of K elements or rows, in A's frame.
+    """
+
+    pairs: NDArray[np.int64]
+    depth: Penetration
+
+
 class SceneMotionAnswer(NamedTuple):
     """Whether the paths of instances are free.
 
@@ -281,9 +421,31 @@ class _MotionKinds(_Names):
     kind = MotionKind
 
 
-_ARRAYS: dict[type[_Named], type[_Names]] = {Relation: _Relations, Side: _Sides, MotionKind: _MotionKinds}
+class _RegionKinds(_Names):
+    kind = RegionKind
+
+
+class _SelfContactKinds(_Names):
+    kind = SelfContactKind
+
+
+_ARRAYS: dict[type[_Named], type[_Names]] = {
+    array.kind: array for array in (_Relations, _Sides, _MotionKinds, _RegionKinds, _SelfContactKinds)
+}
 
 
 def named(kind: type[_Named], found: Any) -> Any:
     """The name of a number, or an array of the numbers of N answers that prints their names."""
     return kind(found) if type(found) is int else found.view(_ARRAYS[kind])
+
+
+def regions_of(found: tuple[Any, ...]) -> ContactRegions:
+    """What the compiled module tells of contact regions."""
+    triangles, kind, *rest = found
+    return ContactRegions(triangles, named(RegionKind, kind), *rest)
+
+
+def patches_of(found: tuple[Any, ...]) -> Patches:
+    """What the compiled module tells of patches."""
+    regions: Any = regions_of(found[-1])
+    return Patches(*found[:-1] + (regions,))

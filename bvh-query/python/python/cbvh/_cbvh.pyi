@@ -40,6 +40,7 @@ __all__ = [
     "cloud_core",
     "collide",
     "cone_core",
+    "contact_regions",
     "contacts",
     "convex_hull_core",
     "copied_numbers",
@@ -54,6 +55,8 @@ __all__ = [
     "motion",
     "nearest_poses",
     "octree_core",
+    "patches",
+    "penetration",
     "poses_of",
     "relation",
     "relative_poses",
@@ -66,6 +69,8 @@ __all__ = [
     "scene_pairs_within",
     "scene_relations",
     "scene_within",
+    "self_contacts",
+    "separation",
     "sides",
     "signed_distances",
     "voxels_core",
@@ -176,6 +181,13 @@ def distance(
     asked: _Asked, rel_err: float, abs_err: float
 ) -> _Parts: ...
 def contacts(asked: _Asked) -> Any: ...
+def penetration(
+    asked: _Asked, relative_gap: float, tolerance: float | None, budget: int | None
+) -> _Parts: ...
+def separation(asked: _Asked, direction: ArrayLike) -> _Parts: ...
+def contact_regions(asked: _Asked, most: int | None) -> Any: ...
+def patches(asked: _Asked, tolerance: float, max_contacts: int | None) -> Any: ...
+def self_contacts(mesh: Mesh, most: int | None) -> tuple[_Ids, _Bytes, int]: ...
 def motion(
     a: Mesh, b: Mesh, paths: _Ways, clearance: float, tolerance: float | None, parallel: bool
 ) -> _Parts: ...

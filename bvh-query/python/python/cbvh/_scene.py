@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 import os
-from typing import Any, Iterator, Mapping
+from typing import Any, Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from ._answers import (
     Distance,
     Floats,
     MotionKind,
+    Penetration,
     RayHit,
     Relation,
     SceneClosestPoint,
@@ -22,6 +24,7 @@ from ._answers import (
     SceneDistance,
     SceneDistances,
     SceneMotionAnswer,
+    ScenePenetrations,
     SceneRayHit,
     SceneRelations,
     Side,
@@ -352,13 +355,45 @@ class Scene:
             rows = scene._ids(pairs, "pairs", (2,)).reshape(-1, 2)
         else:
             rows = scene._asked() if within is None else scene.pairs_within(within)
-        places, of_rows = np.unique(rows, return_inverse=True)
-        of_rows = of_rows.reshape(rows.shape)
-        poses, meshes = scene.poses(places), [scene.mesh(number) for number in places.tolist()]
+        return SceneDistances(rows, Distance(*scene._of_pairs(rows, lambda a, b, at: a.distance(b, at, parallel=parallel))))
+
+    def penetrations(
+        self,
+        pairs: ArrayLike | None = None,
+        *,
+        relative_gap: float = 0.01,
+        tolerance: float | None = None,
+        budget: int | None = None,
+        parallel: bool = False,
+    ) -> ScenePenetrations:
+        """How deep pairs of instances overlap, pair by pair, with translations of B in A's frame that separate them.
+
+        ``pairs``: numbers or names of instances, shape (K, 2). These may be any pairs. None: the pairs of `relations`, which
+        touch or of which one is inside the other, wholly or in part. Each answer is that of `Mesh.penetration` for the
+        pose of B in A's frame, and the other arguments are those of that. Raises ValueError if a mesh of a pair is not
+        closed.
+        """
+        scene = self.copy()
+        rows = scene.relations().pairs if pairs is None else scene._ids(pairs, "pairs", (2,)).reshape(-1, 2)
+
+        def ask(a: Mesh, b: Mesh, poses: Floats) -> Penetration:
+            return a.penetration(
+                b, poses, relative_gap=relative_gap, tolerance=tolerance, budget=budget, parallel=parallel
+            )
+
+        return ScenePenetrations(rows, Penetration(*scene._of_pairs(rows, ask)))
+
+    def _of_pairs(
+        self, rows: NDArray[np.int64], ask: Callable[[Mesh, Mesh, Floats], tuple[Any, ...]]
+    ) -> list[NDArray[Any]]:
+        """The parts of the answers about pairs of instances of a scene that nobody changes."""
+        places, inverse = np.unique(rows, return_inverse=True)
+        of_rows: NDArray[Any] = inverse.reshape(-1, 2)
+        poses, meshes = self.poses(places), [self.mesh(number) for number in places.tolist()]
         relative_poses = _cbvh.relative_poses(poses[of_rows[:, 0]], poses[of_rows[:, 1]])
         # One question per pair of meshes and margins, of which a scene has few.
-        of_pair = {(a, b): margin for a, b, margin in scene._scene.pair_margins()}
-        margins = [scene.margin(number) for number in places.tolist()]
+        of_pair = {(a, b): margin for a, b, margin in self._scene.pair_margins()}
+        margins = [self.margin(number) for number in places.tolist()]
         numbers: dict[tuple[Mesh, float], int] = {}
         kinds = np.zeros(rows.shape, np.int64)
         for row, (pair, (a, b)) in enumerate(zip(rows.tolist(), of_rows.tolist())):
@@ -366,15 +401,14 @@ class Scene:
             for side, key in enumerate(((meshes[a], margins[a] + further), (meshes[b], margins[b]))):
                 kinds[row, side] = numbers.setdefault(key, len(numbers))
         shapes = [mesh.rounded(mesh.radius + margin) if margin else mesh for mesh, margin in numbers]
-        floats, ids, count = np.float64, np.uint32, len(rows)
-        parts = [np.zeros(count, floats) for _ in range(3)] + [np.zeros((count, 3), floats) for _ in range(2)]
-        parts += [np.zeros(count, ids) for _ in range(4)]
+        # The answer to no question tells the parts, and the other arguments are checked.
+        empty = _empty()
+        parts = [np.zeros((len(rows), *part.shape[1:]), part.dtype) for part in ask(empty, empty, relative_poses[:0])]
         for a, b in np.unique(kinds, axis=0).tolist():
             chosen = np.flatnonzero((kinds == [a, b]).all(axis=1))
-            mesh_a, mesh_b = shapes[a], shapes[b]
-            for part, found in zip(parts, mesh_a.distance(mesh_b, relative_poses[chosen], parallel=parallel)):
+            for part, found in zip(parts, ask(shapes[a], shapes[b], relative_poses[chosen])):
                 part[chosen] = found
-        return SceneDistances(rows, Distance(*parts))
+        return parts
 
     def _asked(self) -> NDArray[np.int64]:
         """All pairs that are asked about, in their order, shape (K, 2)."""
@@ -471,6 +505,12 @@ class Scene:
         if len(set(numbers)) < len(numbers):
             raise ValueError("paths: expected one path per instance, found two for one")
         return numbers, [read_path(path, f"paths[{number!r}]") for number, path in items]
+
+
+@functools.cache
+def _empty() -> Mesh:
+    """A mesh that no question is asked about."""
+    return Mesh(_cbvh.cloud_core([[0, 0, 0]]))
 
 
 def _hits(found: tuple[Any, tuple[Any, ...]]) -> SceneRayHit:

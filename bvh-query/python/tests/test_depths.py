@@ -1,0 +1,245 @@
+"""Tests of questions about overlaps: how deep, in which regions, in which patches, and where a mesh meets itself."""
+
+import json
+import math
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+import cbvh
+from common import COMMAND, SHARED, WITHOUT_COMMAND
+from common import bottom_row, check_errors, cube, random_poses, shifts, turns, write_rows
+
+WITHOUT_DEPTHS = "there is no folder shared beside the checkout, with overlaps of known depth"
+
+
+def moved(poses, translations):
+    """Poses of which B is moved in A's frame."""
+    poses = poses.copy()
+    poses[..., :3, 3] += translations
+    return poses
+
+
+def opened():
+    """A cube without one triangle."""
+    vertices, faces = cube()
+    return cbvh.bake(vertices, faces[:-1])
+
+
+class Depths(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.cube, cls.small = cbvh.bake(*cube()), cbvh.bake(*cube(0.25))
+
+    def test_depths_of_cubes_are_known(self):
+        offsets = np.random.default_rng(1).uniform(-1.2, 1.2, (100, 3))
+        offsets[:3] = [[0, 0, 0], [1, 0, 0], [3, 0, 0]]
+        poses, known = shifts(*offsets), np.maximum(1 - np.abs(offsets).max(axis=1), 0)
+        of_one = [self.cube.penetration(self.cube, pose) for pose in poses]
+        for parallel in (False, True):
+            found = self.cube.penetration(self.cube, poses, parallel=parallel)
+            self.assertTrue(np.all(found.lower <= known + 1e-12) and np.all(known <= found.upper))
+            np.testing.assert_allclose(found.upper, known, rtol=0.011, atol=1e-12)
+            np.testing.assert_allclose(np.linalg.norm(found.translation, axis=1), found.upper, rtol=1e-15)
+            np.testing.assert_allclose(found.radii.sum(axis=1), found.lower, atol=1e-12)
+            self.assertFalse(found.is_spent.any())
+            apart = self.cube.relation(self.cube, moved(poses, found.translation), parallel=parallel)
+            self.assertEqual(set(apart.tolist()), {cbvh.Relation.APART})
+            for number, one in enumerate(of_one):
+                for part, parts in zip(one, found):
+                    np.testing.assert_array_equal(part, parts[number])
+        one = of_one[0]
+        self.assertEqual((type(one.lower), type(one.is_spent)), (float, bool))
+        self.assertEqual((one.translation.shape, one.point.shape, one.radii.shape), ((3,), (3,), (2,)))
+        none = self.cube.penetration(self.cube, np.zeros((0, 4, 4)))
+        self.assertEqual((none.upper.shape, none.point.shape, none.radii.shape), ((0,), (0, 3), (0, 2)))
+        # A mesh inside another one has to go all the way out.
+        self.assertAlmostEqual(self.cube.penetration(self.small, np.eye(4), relative_gap=1e-9).upper, 0.625, places=9)
+        # Balls overlap by what their radii say.
+        depth = cbvh.sphere(1.0).penetration(cbvh.sphere(0.5), shifts([0.6, 0.8, 0])[0], relative_gap=1e-6)
+        self.assertAlmostEqual(depth.upper, 0.5, delta=0.01)
+        self.assertTrue(depth.lower <= 0.5 <= depth.upper)
+
+    def test_a_search_ends_where_it_is_told_to(self):
+        poses = random_poses(3, 50, 0.4)
+        full = self.cube.penetration(self.cube, poses)
+        for parallel in (False, True):
+            spent = self.cube.penetration(self.cube, poses, budget=300, parallel=parallel)
+            self.assertTrue(spent.is_spent.any() and np.all(spent.lower <= full.upper) and np.all(full.lower <= spent.upper))
+            apart = self.cube.relation(self.cube, moved(poses, spent.translation))
+            self.assertEqual(set(apart.tolist()), {cbvh.Relation.APART})
+            # The budget is that of one call.
+            again = self.cube.penetration(self.cube, poses, parallel=parallel)
+            np.testing.assert_array_equal(again.upper, full.upper)
+        deeper = self.cube.penetration(self.cube, poses, tolerance=0.2)
+        self.assertTrue(np.all((deeper.lower > 0.2) == (full.lower > 0.2)))
+
+    def test_separations_are_along_the_direction(self):
+        offsets = np.random.default_rng(2).uniform(-0.9, 0.9, (30, 3))
+        poses = shifts(*offsets, (0, 0, 5))
+        for parallel in (False, True):
+            found = self.cube.separation(self.cube, poses, [0, -3, 0], parallel=parallel)
+            known = [*(1 + offsets[:, 1]), 0]
+            self.assertTrue(np.all(found.lower <= np.array(known) + 1e-12))
+            np.testing.assert_allclose(found.upper, known, atol=1e-11)
+            np.testing.assert_allclose(found.lower, known, atol=1e-11)
+            np.testing.assert_allclose(found.translation, np.outer(found.upper, [0, -1, 0]), rtol=1e-14)
+        along = self.cube.separation(self.cube, np.eye(4), [1, 1, 0])
+        self.assertAlmostEqual(along.upper, math.sqrt(2), places=11)
+
+    def test_regions_are_where_triangles_meet(self):
+        poses = np.concatenate([shifts((0.5, 0.3, 0.1), (1, 0, 0), (1, 1, 1), (3, 0, 0)), turns(2, 0.3)])
+        for parallel in (False, True):
+            found = self.cube.contact_regions(self.cube, poses, parallel=parallel)
+            contacts = self.cube.contacts(self.cube, poses)
+            for pose, of, rows in zip(poses, found, contacts):
+                np.testing.assert_array_equal(of.triangles, rows)
+                self.assertEqual((of.total, of.points.shape), (len(rows), (len(rows), 6, 3)))
+                is_point = np.arange(6) < of.point_count[:, None]
+                np.testing.assert_array_equal(np.isnan(of.points[:, :, 0]), ~is_point)
+                # Each point is in the planes of both triangles.
+                of_b = self.cube.triangles[of.triangles[:, 3]] @ pose[:3, :3].T + pose[:3, 3]
+                for corners, normals in ((self.cube.triangles[of.triangles[:, 1]], of.normal_a), (of_b, of.normal_b)):
+                    height = np.einsum("kpi,ki->kp", of.points - corners[:, :1], normals)
+                    self.assertLess(np.abs(height[is_point]).max(initial=0), 1e-12)
+        self.assertEqual({cbvh.RegionKind(kind).name for kind in found[1].kind}, {"POINT", "SEGMENT", "POLYGON"})
+        self.assertIn("POLYGON", str(found[1].kind))
+        self.assertEqual((found[2].kind.tolist(), found[3].points.shape), ([0] * len(found[2].kind), (0, 6, 3)))
+        first = self.cube.contact_regions(self.cube, poses[0], limit=2)
+        self.assertEqual((len(first.points), first.total), (2, found[0].total))
+        np.testing.assert_array_equal(first.points, found[0].points[:2])
+        self.assertEqual(self.cube.contact_regions(self.cube, poses[:0]), [])
+
+    def test_patches_are_those_of_cubes(self):
+        on_face, poked = shifts((0.25, 0, 0.625), (0.25, 0, 0.55))
+        patches = self.cube.patches(self.small, np.stack([on_face, poked, shifts((9, 0, 0))[0]]), parallel=True)
+        self.assertEqual([len(of.depth) for of in patches], [1, 1, 0])
+        touching, deep, apart = patches
+        np.testing.assert_allclose(touching.area, 0.0625)
+        np.testing.assert_allclose(touching.normal, [[0, 0, 1]], atol=1e-15)
+        np.testing.assert_allclose(deep.length, 1.0)
+        np.testing.assert_allclose(deep.center, [[0.25, 0, 0.5]])
+        np.testing.assert_allclose((deep.depth, *deep.normal.T), [[0.075], [0], [0], [1]], atol=1e-15)
+        self.assertEqual((deep.first.tolist(), deep.contact_count.tolist()), ([0], [deep.regions.total]))
+        self.assertEqual((apart.center.shape, apart.regions.triangles.shape), ((0, 3), (0, 4)))
+        # Meshes that are not closed have patches as well.
+        one = opened().patches(self.small, poked)
+        self.assertEqual(len(one.depth), 1)
+        two = cbvh.cloud([[0, 0, 0], [0, 0, 1]], 0.1).patches(cbvh.capsule(0.1, 4.0), shifts((0.15, 0, 0))[0])
+        np.testing.assert_allclose((len(two.depth), *two.depth), [2, 0.05, 0.05])
+        cut = self.cube.patches(self.small, poked, max_contacts=3, tolerance=0.1)
+        self.assertEqual((len(cut.regions.triangles), cut.regions.total), (3, deep.regions.total))
+
+    def test_self_contacts_are_those_of_known_meshes(self):
+        vertices, faces = cube()
+        both = cbvh.bake(np.concatenate([vertices, vertices + 0.5]), np.concatenate([faces, np.array(faces) + 8]))
+        found = both.self_contacts()
+        pairs = self.cube.contacts(self.cube, shifts((0.5, 0.5, 0.5))[0])
+        self.assertEqual(found.triangles[:, [1, 3]].tolist(), [[a, b + 12] for _, a, _, b in pairs.tolist()])
+        self.assertEqual((found.total, set(found.kind.tolist())), (len(pairs), {cbvh.SelfContactKind.CROSSING}))
+        first = both.self_contacts(limit=3)
+        self.assertEqual((first.triangles.tolist(), first.total), (found.triangles[:3].tolist(), found.total))
+        self.assertEqual(str(first.kind), "[CROSSING, CROSSING, CROSSING]")
+        folded = cbvh.bake([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [0, 1, 3], [2, 1, 0]]).self_contacts()
+        names = [cbvh.SelfContactKind(kind).name for kind in folded.kind]
+        self.assertEqual(names, ["FOLDED", "DUPLICATE", "FOLDED"])
+        none = self.cube.self_contacts()
+        self.assertEqual((none.triangles.shape, none.total, str(none.kind)), ((0, 4), 0, "[]"))
+
+    def test_numbers_are_checked(self):
+        mesh, at, none = self.cube, np.eye(4), np.zeros((0, 4, 4))
+        depth = lambda **options: lambda: mesh.penetration(mesh, none, **options)
+        cases = [
+            (ValueError, "relative_gap: expected a finite part above 0, found 0", depth(relative_gap=0)),
+            (ValueError, "relative_gap: expected a finite part above 0, found NaN", depth(relative_gap=np.nan)),
+            (ValueError, "tolerance: expected a finite depth of at least 0, found -1", depth(tolerance=-1)),
+            (TypeError, "tolerance: expected a number, found str", depth(tolerance="x")),
+            (TypeError, "budget: expected a whole number or None, found float", depth(budget=1.5)),
+            (ValueError, "budget: expected a whole number from 0 to 2^64 - 1, found -1", depth(budget=-1)),
+            (ValueError, "budget", lambda: mesh.penetration(mesh, at, budget=0)),
+            (ValueError, "direction: expected numbers the largest of which", mesh.separation, mesh, none, [0, 0, 0]),
+            (ValueError, "direction: expected shape (3,), found (1, 3)", mesh.separation, mesh, at, [[0, 0, 1]]),
+            (ValueError, "limit: expected a whole number", lambda: mesh.contact_regions(mesh, at, limit=-1)),
+            (ValueError, "tolerance: expected a finite length of at least 0", lambda: mesh.patches(mesh, none, tolerance=-1)),
+            (TypeError, "max_contacts: expected a whole number", lambda: mesh.patches(mesh, at, max_contacts="x")),
+            (TypeError, "limit: expected a whole number", lambda: mesh.self_contacts(limit="x")),
+            (TypeError, "other: expected a cbvh.Mesh", mesh.penetration, "x", at),
+            (ValueError, "poses: expected shape (4, 4) or (N, 4, 4), found (3, 4)", mesh.patches, mesh, at[:3]),
+            (ValueError, "expected closed objects, found object 0 with a boundary", opened().penetration, mesh, at),
+            (ValueError, "expected closed objects, found object 0 with a boundary", mesh.separation, opened(), at, [1, 0, 0]),
+            (ValueError, "topology", cbvh.bake(*cube(), topology=False).penetration, mesh, at),
+        ]
+        check_errors(self, cases)
+
+    def test_scenes_ask_about_pairs(self):
+        scene = cbvh.Scene()
+        poses = random_poses(5, 1, 2.0)[0] @ shifts((0, 0, 0), (0.75, 0, 0), (5, 0, 0), (0.2, 0, 0))
+        for name, mesh, pose in zip("abcd", (self.cube, self.cube, self.cube, self.small), poses):
+            scene.add(mesh, pose, name=name)
+        found = scene.penetrations()
+        np.testing.assert_array_equal(found.pairs, scene.relations().pairs)
+        self.assertEqual(found.pairs.tolist(), [[0, 1], [0, 3], [1, 3]])
+        np.testing.assert_allclose(found.depth.upper, [0.25, 0.425, 0.075], rtol=0.011)
+        any_pairs = scene.penetrations([["b", "a"], ["a", "c"]], parallel=True)
+        np.testing.assert_allclose(any_pairs.depth.upper, [0.25, 0], rtol=0.011)
+        scene.set_margin("a", 0.05)
+        wider = scene.penetrations([["a", "b"]], relative_gap=1e-6).depth
+        self.assertAlmostEqual(wider.upper[0], 0.3, places=6)
+        self.assertEqual(cbvh.Scene().penetrations().depth.translation.shape, (0, 3))
+        scene.add(opened(), poses[0], name="open")
+        with self.assertRaisesRegex(ValueError, "expected closed objects"):
+            scene.penetrations()
+
+
+@unittest.skipUnless(COMMAND, WITHOUT_COMMAND)
+class SameBits(unittest.TestCase):
+    def test_depths_are_those_of_the_command(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            a, b = cbvh.bake(*cube()), cbvh.convex_hull(np.random.default_rng(4).normal(size=(60, 3)))
+            for mesh, file in ((a, "a.cbvh"), (b, "b.cbvh")):
+                mesh.save(folder / file)
+            poses = random_poses(6, 100, 2.0)
+            write_rows(folder / "poses.txt", poses[:, :3].reshape(-1, 12))
+            arguments = [COMMAND, "query", "a.cbvh", "b.cbvh", "poses.txt", "--mode", "penetration", "--json"]
+            asked = subprocess.run(arguments, cwd=folder, check=True, capture_output=True, text=True)
+            rows = [json.loads(line) for line in asked.stdout.splitlines()]
+            self.assertEqual(len(rows), 100)
+            found = a.penetration(b, poses, parallel=True)
+            for name in ("lower", "upper", "translation", "point", "radii"):
+                np.testing.assert_array_equal(getattr(found, name), [row[name] for row in rows], name)
+            self.assertTrue(0 < np.count_nonzero(found.lower) < 100)
+
+
+@unittest.skipUnless((SHARED / "depth").exists(), WITHOUT_DEPTHS)
+class Labels(unittest.TestCase):
+    def test_labelled_depths_are_between_the_bounds(self):
+        count = 0
+        for line in (SHARED / "depth" / "pairs.txt").read_text().splitlines():
+            words = line.split("#")[0].split()
+            if not words:
+                continue
+            with tempfile.TemporaryDirectory() as folder:
+                a, b = (cbvh.bake_files(SHARED / "depth" / name, f"{folder}/{side}") for side, name in enumerate(words[1:3]))
+                labelled = [text.split("#") for text in (SHARED / "depth" / f"{words[0]}.txt").read_text().splitlines()]
+                labelled = [(numbers.split(), label.split()) for numbers, label in labelled if numbers.strip()][::5]
+                poses = bottom_row([numbers for numbers, _ in labelled])
+                if labelled[0][1][0] == "open":
+                    self.assertRaisesRegex(ValueError, "expected closed objects", a.penetration, b, poses)
+                    continue
+                found = a.penetration(b, poses, parallel=True)
+                least = np.array([float(label[1]) for _, label in labelled])
+                most = np.array([float(label[2]) if label[2:] and label[2][0].isdigit() else float(label[1]) for _, label in labelled])
+                self.assertTrue(np.all(found.lower <= most * (1 + 1e-9) + 1e-13), line)
+                self.assertTrue(np.all(found.upper >= least * (1 - 1e-9) - 1e-13), line)
+                apart = a.relation(b, moved(poses, found.translation), parallel=True)
+                self.assertEqual(set(apart[found.lower > 0].tolist()), {cbvh.Relation.APART}, line)
+                count += len(poses)
+        self.assertGreater(count, 100)
+
+
+if __name__ == "__main__":
+    unittest.main()
