@@ -82,14 +82,52 @@ class Manager(unittest.TestCase):
             pose = self.relative(objects[a][1], objects[b][1])
             expected |= {(a, b, of_a, of_b) for _, of_a, _, of_b in objects[a][0].contacts(objects[b][0], pose).tolist()}
         self.assertEqual(rows, expected)
-        self.assertFalse(hasattr(contacts[0], "depth") or hasattr(contacts[0], "normal"))
+        # Depths and normals are those of pairs of objects: the one that is last in alphabetical order has to move.
+        for contact in contacts:
+            (a, at), (b, bt) = (objects[name] for name in sorted(contact.names))
+            self.assertGreater(contact.depth, 0)
+            self.assertAlmostEqual(np.linalg.norm(contact.normal), 1, places=12)
+            bt = bt.copy()
+            bt[:3, 3] += 1.0000001 * contact.depth * contact.normal
+            self.assertEqual(a.relation(b, self.relative(at, bt)), cbvh.Relation.APART)
         with self.assertRaisesRegex(KeyError, "expected one of .*found 'no such'"):
             contacts[0].index("no such")
         mesh, pose = objects["part 0"]
         single = manager.in_collision_single(mesh, pose, return_names=True, return_data=True)
         self.assertEqual({name for contact in single[2] for name in contact.names}, single[1] | {"__external"})
-        with self.assertRaisesRegex(AttributeError, "found a cbvh.Mesh"):
-            single[2][0].point
+        self.assertEqual(single[2][0].point.shape, (3,))
+
+    def test_depths_and_normals_of_cubes_are_known(self):
+        manager, turned = cbvh.CollisionManager(), random_poses(6, 1, 2.0)[0]
+        manager.add_object("b", solid(), turned)
+        at = turned @ shifts((0.9, 0.2, 0))[0]
+        along = turned[:3, 0]
+        manager.add_object("a", solid(), at)
+        # The second object has to move: the last one in alphabetical order, or that of the question or the other manager.
+        other = cbvh.CollisionManager()
+        other.add_object("0", solid(), at)
+        pairs = manager.in_collision_internal(return_data=True)[1]
+        manager.remove_object("a")
+        asked = [(pairs, -along), (manager.in_collision_single(solid(), at, return_data=True)[1], along)]
+        asked += [(manager.in_collision_other(other, return_data=True)[1], along)]
+        asked += [(other.in_collision_other(manager, return_data=True)[1], -along)]
+        for contacts, normal in asked:
+            for contact in contacts:
+                self.assertAlmostEqual(contact.depth, 0.1, places=6)
+                np.testing.assert_allclose(contact.normal, normal, atol=1e-6)
+        self.assertAlmostEqual(manager.min_distance_single(solid(), at), -0.1, places=6)
+        # A mesh that is not closed has patches, and no negative distance.
+        opened = solid()
+        opened.faces = opened.faces[:4]
+        _, contacts = manager.in_collision_single(opened, turned @ shifts((0, 0, 0.9))[0], return_data=True)
+        self.assertEqual(len({contact.depth for contact in contacts}), 1)
+        self.assertTrue(all(contact.normal.shape == contact.point.shape == (3,) for contact in contacts))
+        self.assertEqual(manager.min_distance_single(opened, turned @ shifts((0, 0, 0.9))[0]), 0.0)
+        # The deepest pair counts.
+        manager.add_object("c", solid(), turned @ shifts((0, 0.5, 0))[0])
+        distance, names, data = manager.min_distance_internal(return_names=True, return_data=True)
+        self.assertEqual((names, data.distance, data.names), (("b", "c"), distance, {"b", "c"}))
+        self.assertAlmostEqual(distance, -0.5, places=6)
 
     def test_distances_are_the_least_of_all_pairs(self):
         manager, other = cbvh.CollisionManager(), cbvh.CollisionManager()
@@ -113,8 +151,9 @@ class Manager(unittest.TestCase):
         self.assertEqual((distance, name, data.names), (2.0, "c", {"c", "__external"}))
         self.assertEqual((data.point("c")[2], data.point("__external")[2]), (0.5, 2.5))
         self.assertIn(data.index("c"), range(12))
-        # A cube in another one: 0 where they touch, and no less.
-        self.assertEqual(manager.min_distance_single(solid(), shifts((0.5, 0, 0))[0]), 0.0)
+        # A cube in another one: less the depth, and 0 where they only touch.
+        self.assertAlmostEqual(manager.min_distance_single(solid(), shifts((0.5, 0, 0))[0]), -0.5, places=9)
+        self.assertEqual(manager.min_distance_single(solid(), shifts((-1, 0, 0))[0]), 0.0)
 
     def test_objects_come_go_and_move(self):
         manager = cbvh.CollisionManager()
@@ -210,6 +249,16 @@ class Primitives(unittest.TestCase):
         self.assertAlmostEqual(manager.min_distance_internal(), 0.0, delta=1e-14)
         manager.set_transform("ball", shifts([-2, -2, 0])[0])
         self.assertTrue(manager.in_collision_internal())
+
+    def test_what_is_inside_a_solid_has_a_contact_without_triangles(self):
+        manager, block = cbvh.CollisionManager(), cbvh.box([2, 2, 2])
+        manager.add_object("block", block)
+        self.assertIs(manager.in_collision_single(solid(0.5)), True)
+        found, names, (contact,) = manager.in_collision_single(solid(0.5), return_names=True, return_data=True)
+        self.assertEqual((found, names, contact.index("block"), contact.index("__external")), (True, {"block"}, -1, -1))
+        self.assertTrue(np.abs(contact.point).max() <= 0.25)
+        self.assertAlmostEqual(contact.depth, 1.25, places=6)
+        self.assertAlmostEqual(manager.min_distance_single(solid(0.5)), -1.25, places=6)
 
 
 if __name__ == "__main__":

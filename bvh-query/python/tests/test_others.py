@@ -53,6 +53,8 @@ class Primitives(unittest.TestCase):
             expected = distance_of(kind, numbers, points @ inverse[:3, :3].T + inverse[:3, 3])
             probe = cbvh.sphere(0.0)
             found = np.array([manager.min_distance_single(probe, shifts(point)[0]) for point in points])
+            self.assertTrue(np.all(found[expected > 0] > -1e-6))
+            found = np.maximum(found, 0)
             error = 0.0025 * numbers["radius"] if kind == "Cylinder" else 2e-6
             self.assertTrue(np.all(found <= expected + 2e-6) and np.all(found >= expected - error), kind)
             self.assertTrue(np.any(expected == 0) and np.any(expected > 0))
@@ -109,7 +111,7 @@ class Primitives(unittest.TestCase):
         manager, probe = cbvh.CollisionManager(), cbvh.sphere(0.1)
         manager.add_object("extrusion", solid)
         for pose in shifts(*np.random.default_rng(2).uniform(-3, 3, (50, 3))):
-            self.assertEqual(manager.min_distance_single(probe, pose), mesh.distance(probe, pose).distance)
+            self.assertEqual(max(manager.min_distance_single(probe, pose), 0), mesh.distance(probe, pose).distance)
 
     def test_clouds_are_points_with_a_radius(self):
         import trimesh
@@ -121,14 +123,14 @@ class Primitives(unittest.TestCase):
         for shift in rng.uniform(-1.5, 1.5, (40, 3)):
             gaps = np.linalg.norm(points - shift, axis=1) - 0.05 - 0.25
             ball = trimesh.primitives.Sphere(radius=0.25, center=shift)
-            self.assertAlmostEqual(manager.min_distance_single(ball), max(gaps.min(), 0), places=6)
+            self.assertAlmostEqual(max(manager.min_distance_single(ball), 0), max(gaps.min(), 0), places=6)
             found, contacts = manager.in_collision_single(ball, return_data=True)
             self.assertEqual({contact.index("cloud") for contact in contacts}, set(np.flatnonzero(gaps <= 0).tolist()))
             self.assertEqual(found, gaps.min() <= 0)
             # The same by a radius of the question.
             point = trimesh.PointCloud([shift])
             self.assertEqual(manager.in_collision_single(point, radius=0.25), found)
-            self.assertAlmostEqual(manager.min_distance_single(point, radius=0.25), max(gaps.min(), 0), places=6)
+            self.assertAlmostEqual(max(manager.min_distance_single(point, radius=0.25), 0), max(gaps.min(), 0), places=6)
         # A point that both have.
         manager.add_object("box", trimesh.primitives.Box(extents=[0.5, 0.5, 0.5]), radius=0.01)
         for contact in manager.in_collision_internal(return_data=True)[1]:

@@ -9,9 +9,17 @@ It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
   trimesh. ``Cylinder`` is a polyhedron around it, 0.002 of the radius larger, and not one inside it. An ``Extrusion`` is a
   mesh. Their transforms must be rigid. A primitive counts as it is when it is added or asked about.
 - A ``PointCloud`` is its points, and answers name their numbers. ``radius``, here and for any mesh, is added on all sides.
-- Contact is exact, and distances are 0 if meshes touch. There is no penetration depth and no normal: answers do not
-  have the attributes ``depth`` and ``normal``, and no distance is negative.
-- Contacts are all pairs of triangles that touch, each once.
+- Contact is exact. Contacts are all pairs of triangles that touch, each once, with the number of a triangle of each object;
+  FCL finds one contact of two convex meshes, without these numbers. The points are where the two triangles meet.
+- The depth of a contact is that of the two objects, if both are closed and not flat: the length of a translation that
+  separates them (`Mesh.penetration`). For nearly all convex meshes, this is the shortest one. The normal is its direction.
+  For other objects, both are estimates for the contact's patch (`Mesh.patches`).
+- A normal is the direction in which the second object has to move: the one that is asked about, the one of the other
+  manager, or the one that is last in alphabetical order. FCL has no such order among the objects of one manager. Where
+  several translations are equally short, as of cubes in the same place, it is one of them.
+- Distances are negative if insides meet, as they are for convex meshes in trimesh: less the depth. Among objects that are
+  not closed, they are 0 if these touch.
+- A primitive also touches what is all inside it. That contact has the number -1 in place of triangles.
 - `add_object` returns None, not an object of FCL.
 - If there is no pair of objects, a distance is infinite, and the names and the data are None.
 - A manager cannot be pickled or copied; a `Scene` can.
@@ -19,6 +27,7 @@ It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import threading
 import weakref
@@ -29,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
-from ._answers import Floats
+from ._answers import Distance, Floats
 from ._baking import bake
 from ._mesh import Mesh, _length
 from ._poses import relative
@@ -43,17 +52,32 @@ EXTERNAL = "__external"
 _OWN, _OTHERS = 1, 2
 # What other libraries call half-spaces.
 _HALF_SPACES = {"Halfspace", "HalfSpace", "Plane"}
+# How much longer than the shortest one a translation may be, as a part, where bounds can tell: less than tests allow.
+_GAP = 1e-6
 # How many baked meshes are kept that nothing else holds.
 _KEPT = 16
 
 
 class _Geometry:
-    """A mesh, and its arrays, as far as they are known."""
+    """A mesh, and whether it has an inside, as soon as that is known."""
 
-    __slots__ = ("mesh", "vertices", "faces", "__weakref__")
+    __slots__ = ("mesh", "_has_inside", "__weakref__")
 
-    def __init__(self, mesh: Mesh, vertices: Floats | None = None, faces: NDArray[Any] | None = None) -> None:
-        self.mesh, self.vertices, self.faces = mesh, vertices, faces
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._has_inside: bool | None = None
+
+    @property
+    def has_inside(self) -> bool:
+        if self._has_inside is None:
+            try:
+                closed = self.mesh.solid()
+                self._has_inside = closed.radius > 0 or bool(np.all(np.ptp(closed.bounds, axis=0) > 0))
+            except _cbvh.FormatError:
+                raise
+            except ValueError:
+                self._has_inside = False
+        return self._has_inside
 
 
 _Names = dict[int, Hashable]
@@ -69,7 +93,7 @@ def _geometry(mesh: Any, radius: float = 0.0) -> _Geometry:
     geometry = _of_radius_0(mesh)
     if _length(radius, "radius") == 0:
         return geometry
-    return _Geometry(geometry.mesh.rounded(geometry.mesh.radius + radius), geometry.vertices, geometry.faces)
+    return _Geometry(geometry.mesh.rounded(geometry.mesh.radius + radius))
 
 
 def _of_radius_0(mesh: Any) -> _Geometry:
@@ -110,9 +134,8 @@ def _of_radius_0(mesh: Any) -> _Geometry:
     with _baking:
         geometry = _baked.get(key)
         if geometry is None:
-            # Callers may change their arrays.
             baked = bake(vertices, faces)
-            geometry = _Geometry(baked.solid() if is_solid else baked, vertices.copy(), faces.copy())
+            geometry = _Geometry(baked.solid() if is_solid else baked)
             _baked[key] = geometry
         _recent[key] = geometry
         _recent.move_to_end(key)
@@ -137,45 +160,95 @@ def _transform(transform: ArrayLike | None) -> Floats:
     return pose
 
 
+class _Contacts:
+    """All contacts of two objects, A and B. What is known of them is computed when it is first needed."""
+
+    def __init__(
+        self,
+        names: tuple[Hashable, Hashable],
+        geometries: tuple[_Geometry, _Geometry],
+        poses: Floats,
+        is_swapped: bool,
+    ) -> None:
+        self.names, self._geometries = names, geometries
+        # Normals point from A to B, unless A is the second one for callers.
+        self._sign = -1.0 if is_swapped else 1.0
+        self._rotation, self._translation = poses[0, :3, :3], poses[0, :3, 3]
+        self._question = (geometries[0].mesh, geometries[1].mesh, relative(poses[0], poses[1]))
+
+    @functools.cached_property
+    def points(self) -> Floats:
+        """A point in the world of each contact, shape (K, 3); if no triangles touch, one point."""
+        a, b, pose = self._question
+        regions = a.contact_regions(b, pose)
+        points: Floats = np.nansum(regions.points, axis=1) / regions.point_count[:, None]
+        if len(points) == 0:
+            points = a.distance(b, pose).point_a[None]
+        placed: Floats = points @ self._rotation.T + self._translation
+        return placed
+
+    @functools.cached_property
+    def depths(self) -> tuple[Floats, Floats]:
+        """The depth of each contact, shape (K,), and the normals in the world, shape (K, 3). One row alone serves all."""
+        a, b, pose = self._question
+        if all(geometry.has_inside for geometry in self._geometries):
+            found = a.penetration(b, pose, relative_gap=_GAP)
+            depths, normals = np.array([found.upper]), found.translation[None] / (found.upper or 1.0)
+        else:
+            patches = a.patches(b, pose)
+            # The order of the contacts in that of the patches.
+            order = np.lexsort(patches.regions.triangles.T[::-1])
+            of_contact = np.repeat(np.arange(len(patches.depth)), patches.contact_count)[order]
+            depths, normals = patches.depth[of_contact], patches.normal[of_contact]
+            if len(order) == 0:
+                depths, normals = np.zeros(1), np.zeros((1, 3))
+        return depths, self._sign * normals @ self._rotation.T
+
+
 class ContactData:
     """Two triangles of two objects that touch."""
 
-    __slots__ = ("names", "_rows", "_point")
+    __slots__ = ("names", "_of", "_number", "_triangles")
 
-    def __init__(self, rows: list[tuple[Hashable, _Geometry, int, Floats]]) -> None:
-        self.names = {row[0] for row in rows}
+    def __init__(self, of: _Contacts, number: int, triangles: tuple[int, int]) -> None:
+        self.names = set(of.names)
         """The names of the two objects."""
-        self._rows = rows
-        self._point: Floats | None = None
+        self._of, self._number, self._triangles = of, number, triangles
 
     def index(self, name: Hashable) -> int:
-        """The number of the triangle of the object with this name."""
-        for row in self._rows:
-            if row[0] == name:
-                return row[2]
+        """The number of the triangle of the object with this name; -1 if one object is all inside the other."""
+        for of, triangle in zip(self._of.names, self._triangles):
+            if of == name:
+                return triangle
         raise KeyError(f"name: expected one of {sorted(self.names, key=str)}, found {name!r}")
 
     @property
     def point(self) -> Floats:
-        """A point in the world that both triangles have, to within rounding, shape (3,).
+        """The middle of what both triangles have in common, in the world, shape (3,).
 
-        It is computed at the first access. There is none for balls, for capsules, and for a `cbvh.Mesh`.
+        The first access to it computes the points of all contacts of the two objects.
         """
-        if self._point is None:
-            meshes, poses = [], []
-            for _, geometry, triangle, pose in self._rows:
-                if geometry.vertices is None or geometry.faces is None:
-                    raise AttributeError("point: expected objects with vertices and faces, found a cbvh.Mesh, a ball or a capsule")
-                corners = bake(geometry.vertices[geometry.faces[triangle]], [[0, 1, 2]])
-                meshes.append(corners.rounded(geometry.mesh.radius))
-                poses.append(pose)
-            found = meshes[0].distance(meshes[1], relative(*poses)).point_a
-            self._point = poses[0][:3, :3] @ found + poses[0][:3, 3]
-        return self._point
+        point: Floats = self._of.points[self._number]
+        return point
+
+    @property
+    def depth(self) -> float:
+        """How deep the objects are in each other, in mesh units: how far the second has to move along `normal`. The first
+        access computes it, which may take milliseconds."""
+        depths, _ = self._of.depths
+        return float(depths[self._number % len(depths)])
+
+    @property
+    def normal(self) -> Floats:
+        """The direction in which the second object has to move, in the world, shape (3,); 0 if none is known. See
+        `cbvh.manager` for which one is the second."""
+        _, normals = self._of.depths
+        normal: Floats = normals[self._number % len(normals)]
+        return normal
 
 
 class DistanceData:
-    """The least distance of two objects."""
+    """The least distance of two objects. Where it is not above 0, the points and triangles are those of one contact."""
 
     __slots__ = ("names", "distance", "_rows")
 
@@ -183,7 +256,7 @@ class DistanceData:
         self.names = set(rows)
         """The names of the two objects."""
         self.distance = distance
-        """The distance in mesh units, 0 where they touch."""
+        """The distance in mesh units; where insides meet, less the depth."""
         self._rows = rows
 
     def index(self, name: Hashable) -> int:
@@ -268,7 +341,7 @@ class CollisionManager:
         """
         with self._lock:
             found, pairs, data = self._collisions(self._among, self._among_names, {}, return_names, return_data)
-        return _asked(found, {_sorted(pair) for pair in pairs}, data, return_names, return_data)
+        return _asked(found, pairs, data, return_names, return_data)
 
     def in_collision_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -315,7 +388,7 @@ class CollisionManager:
                     distance, names, data = self._nearest(self._against, self._against_names, {})
                 finally:
                     self._against.set_groups(against, member=_OWN, meets=_OTHERS)
-        return _asked(distance, names and _sorted(names), data, return_names, return_data)
+        return _asked(distance, names, data, return_names, return_data)
 
     def min_distance_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -359,17 +432,21 @@ class CollisionManager:
         if not return_data:
             pairs = [_ordered(a, b, own, others)[0] for a, b in scene.pairs_in_contact().tolist()]
             return bool(pairs), set(pairs), []
-        contacts = scene.contacts()
-        names, data = set(), []
-        poses = {number: scene.pose(number) for number in np.unique(contacts.pairs).tolist()}
-        for (a, b), (_, triangle_a, _, triangle_b) in zip(contacts.pairs.tolist(), contacts.triangles.tolist()):
-            names.add(_ordered(a, b, own, others)[0])
-            rows = []
-            for number, triangle in ((a, triangle_a), (b, triangle_b)):
-                name, geometry = others[number] if number in others else (own[number], self._objects[own[number]][2])
-                rows.append((name, geometry, triangle, poses[number]))
-            data.append(ContactData(rows))
+        contacts, names, data = scene.contacts(), set(), []
+        triangles: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for (a, b), (_, of_a, _, of_b) in zip(contacts.pairs.tolist(), contacts.triangles.tolist()):
+            triangles.setdefault((a, b), []).append((of_a, of_b))
+        for a, b in scene.pairs_in_contact().tolist():
+            pair, is_swapped = _ordered(a, b, own, others)
+            names.add(pair)
+            geometries = (self._geometry_of(a, own, others), self._geometry_of(b, own, others))
+            found = _Contacts(pair[::-1] if is_swapped else pair, geometries, scene.poses([a, b]), is_swapped)
+            of_pair = triangles.get((a, b), [(-1, -1)])
+            data += [ContactData(found, number, both) for number, both in enumerate(of_pair)]
         return bool(data), names, data
+
+    def _geometry_of(self, number: int, own: _Names, others: _OtherNames) -> _Geometry:
+        return others[number][1] if number in others else self._objects[own[number]][2]
 
     def _nearest(
         self, scene: Scene, own: _Names, others: _OtherNames
@@ -378,11 +455,23 @@ class CollisionManager:
         least = scene.distance()
         if least is None:
             return float("inf"), None, None
-        found, pose = least.nearest, scene.pose(least.a)
-        names, is_swapped = _ordered(least.a, least.b, own, others)
+        a, b, found = least
+        distance = found.distance
+        if distance == 0:
+            pairs = scene.pairs_in_contact().tolist()
+            pairs = [pair for pair in pairs if all(self._geometry_of(one, own, others).has_inside for one in pair)]
+            if pairs:
+                depth = scene.penetrations(pairs, relative_gap=_GAP).depth
+                # Where they only touch, the translation is some roundings long.
+                depths = np.where(depth.lower > 0, depth.upper, 0.0)
+                a, b = pairs[int(np.argmax(depths))]
+                distance = 0.0 - float(np.max(depths))
+                found = Distance(*(part[0] for part in scene.distances([[a, b]]).nearest))
+        pose = scene.pose(a)
+        names, is_swapped = _ordered(a, b, own, others)
         points = [pose[:3, :3] @ point + pose[:3, 3] for point in (found.point_a, found.point_b)]
-        rows = list(zip((found.triangle_a, found.triangle_b), points))
-        return found.distance, names, DistanceData(dict(zip(names, rows[::-1] if is_swapped else rows)), found.distance)
+        rows = list(zip((int(found.triangle_a), int(found.triangle_b)), points))
+        return distance, names, DistanceData(dict(zip(names, rows[::-1] if is_swapped else rows)), distance)
 
 
 def _manager(manager: Any) -> CollisionManager:
@@ -415,16 +504,13 @@ class _Added:
 
 
 def _ordered(a: int, b: int, own: _Names, others: _OtherNames) -> tuple[tuple[Hashable, Hashable], bool]:
-    """The names of a pair, those of others last, and whether that swaps them."""
+    """The names of a pair, and whether they are swapped: those of others last, and own ones in alphabetical order."""
     if a in others:
         return (own[b], others[a][0]), True
-    return (own[a], others[b][0] if b in others else own[b]), False
-
-
-def _sorted(names: tuple[Hashable, Hashable]) -> tuple[Hashable, Hashable]:
-    """A pair of names in alphabetical order."""
-    first, second = sorted(names, key=str)
-    return first, second
+    if b in others:
+        return (own[a], others[b][0]), False
+    first, second = sorted((own[a], own[b]), key=str)
+    return (first, second), first != own[a]
 
 
 def _asked(answer: Any, names: Any, data: Any, return_names: bool, return_data: bool) -> Any:
