@@ -70,10 +70,8 @@ impl Gatherer<'_> {
         let progress = &resources.progress;
         let checksums = Checksums::of_gltf(input, &mut found, resources.document, progress, FILE_BYTES)?;
         found.faces.finish()?;
-        found.check().map_err(|fault| match fault {
-            Ok(source) => ReadError::Mesh { path: input.path().to_owned(), source }.into(),
-            Err(halt) => halt,
-        })?;
+        let wrong = |source| Halt::from(ReadError::Mesh { path: input.path().to_owned(), source });
+        found.check().map_err(|fault| fault.map_or_else(|halt| halt, wrong))?;
         let Found { faces, names, mut instances, .. } = found;
         let first = self.names.len();
         let tally = progress.tally(Step::Read, WHOLE - FILE_BYTES, input.length(), faces.corner_count());
@@ -81,15 +79,15 @@ impl Gatherer<'_> {
         instances.iter_mut().for_each(|instance| instance.object += first as u32);
         instances.retain(|instance| self.names[instance.object as usize].1);
         tell_apart(&mut instances);
+        check_instances(&instances, self.names.len()).map_err(wrong)?;
         self.instances.append(&mut instances);
         Ok(checksums)
     }
 }
 
 impl Found<'_> {
-    /// Checks what the reader does not: the coordinates that triangles use, and the instances.
+    /// Checks what the reader does not: the coordinates that triangles use.
     fn check(&self) -> Result<(), Result<InputError, Halt>> {
-        check_instances(&self.instances, self.names.len()).map_err(Ok)?;
         let failed = |error: crate::error::BakeError| Err(error.into());
         let Some((corner, vertex)) = self.faces.first_misfit(None).map_err(failed)? else { return Ok(()) };
         let object = self.vertices.partition_point(|&first| first <= u64::from(vertex)) - 1;
