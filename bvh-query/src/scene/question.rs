@@ -172,11 +172,30 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Query`] if an option is invalid, the errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
     pub fn clashes(&mut self, options: &ClashOptions) -> Result<Vec<SceneClash>, SceneError> {
+        self.clashes_among(options, |_| true)
+    }
+
+    /// Returns the clashes of those pairs that `is_asked` accepts, as [`Scene::clashes`] does. Several machines can so share the
+    /// pairs of one scene. Files of other pairs are not opened ([`Files`](crate::Files)).
+    ///
+    /// # Errors
+    /// The errors of [`Scene::clashes`].
+    pub fn clashes_among(
+        &mut self,
+        options: &ClashOptions,
+        is_asked: impl Fn(ScenePair) -> bool,
+    ) -> Result<Vec<SceneClash>, SceneError> {
         options.check()?;
-        self.each_near(options.clearance, |querier, pair| {
-            let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
-            Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
-        })
+        let mut all = Vec::new();
+        self.each_piece(options.clearance, |scene, mut near_pairs| {
+            near_pairs.retain(|near_pair| scene.ids(near_pair).is_some_and(&is_asked));
+            all.extend(scene.each(&near_pairs, |querier, pair| {
+                let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
+                Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
+            })?);
+            Ok(ControlFlow::Continue(()))
+        })?;
+        Ok(all)
     }
 
     /// Returns all pairs of triangles in contact.
@@ -506,9 +525,10 @@ impl Scene {
         let asked = AtomicU64::new(self.pairs_asked);
         let scene = &*self;
         let found = scene.workers.each(near_pairs, &mut stats, |querier, near_pair| {
-            let Some((a, b)) = scene.both(near_pair) else { return Ok(None) };
+            let (Some((a, b)), Some(ids)) = (scene.both(near_pair), scene.ids(near_pair)) else {
+                return Ok(None);
+            };
             let pose = Pose::relative_of_instances(&a.world, &b.world);
-            let ids = ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) };
             let before = querier.questions();
             let margins = (a.margin + scene.contents.margin_of_pair(near_pair.a, near_pair.b), b.margin);
             let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
@@ -520,11 +540,8 @@ impl Scene {
             answer
         });
         (self.stats, self.pairs_asked) = (stats, asked.into_inner());
-        found.map_err(|(number, source)| match self.both(&near_pairs[number]) {
-            Some((a, b)) => {
-                let NearPair { a: place_a, b: place_b, .. } = near_pairs[number];
-                self.pair_error(ScenePair { a: a.id(place_a), b: b.id(place_b) }, source)
-            }
+        found.map_err(|(number, source)| match self.ids(&near_pairs[number]) {
+            Some(pair) => self.pair_error(pair, source),
             None => source.into(),
         })
     }
@@ -537,6 +554,12 @@ impl Scene {
     /// Returns both instances of a candidate.
     fn both(&self, near_pair: &NearPair) -> Option<(&Instance, &Instance)> {
         self.instances_at(near_pair.a, near_pair.b)
+    }
+
+    /// Returns the identifiers of a candidate.
+    fn ids(&self, near_pair: &NearPair) -> Option<ScenePair> {
+        let (a, b) = self.both(near_pair)?;
+        Some(ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) })
     }
 
     /// Returns the instances in two places.
