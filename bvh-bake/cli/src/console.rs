@@ -292,6 +292,35 @@ macro_rules! record {
 }
 pub(crate) use record;
 
+/// Writes rows as comma-separated values (RFC 4180): a line of the names of fields, then one line per row. A figure that was not
+/// taken is absent, never 0 or NaN.
+pub(crate) fn csv<'a>(names: &[&'static str], rows: impl IntoIterator<Item = &'a Record>) -> String {
+    let line = |fields: Vec<String>| fields.join(",") + "\n";
+    let quoted = |field: String| {
+        let is_plain = !field.contains([',', '"', '\n', '\r']);
+        if is_plain { field } else { format!("\"{}\"", field.replace('"', "\"\"")) }
+    };
+    let mut text = line(names.iter().map(|&name| name.to_owned()).collect());
+    for row in rows {
+        text += &line(names.iter().map(|name| quoted(row.text(name))).collect());
+    }
+    text
+}
+
+/// Escapes text for an element or an attribute of XML.
+pub(crate) fn escape(text: &str) -> String {
+    let escaped = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        // XML has no way to write most of these.
+        c if c.is_control() => "\u{fffd}".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(escaped).collect()
+}
+
 /// Returns a checksum in the form that scripts compare.
 pub(crate) fn hex(sum: u64) -> String {
     format!("{sum:016x}")

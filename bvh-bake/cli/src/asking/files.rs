@@ -1,9 +1,12 @@
-//! Files of questions, one per line: poses, motions and others; and the files that answers are written to.
+//! Files of questions, one per line: poses, motions and others; manifests and folders; and the files that answers are written
+//! to.
 
 use super::AskingArguments;
 use crate::console::Failure;
 use bvh_query::{Motion, Pose};
-use std::io;
+use serde::de::DeserializeOwned;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Reads all files of a list before any question is asked, so that a mistake in the last file is reported first.
@@ -84,6 +87,68 @@ pub(crate) fn read_lines<T>(
         questions.extend(question.map(|question| (number, question)));
     }
     if questions.is_empty() { Err(Failure::invalid(path, none)) } else { Ok(questions) }
+}
+
+/// The most bytes of a line of JSON. Paths that a system opens are much shorter.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+/// Reads a file of one JSON object per line, and calls `add` with the number of each line and what it holds. Empty lines are
+/// skipped, but counted. Messages say what an object is `expected` to be.
+pub(crate) fn each_json_line<T: DeserializeOwned>(
+    path: &Path,
+    expected: &str,
+    mut add: impl FnMut(u64, T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let failed = |error| Failure::from_input(path, &error);
+    let mut lines = BufReader::new(File::open(path).map_err(failed)?);
+    for number in 1.. {
+        let mut bytes = Vec::new();
+        if lines.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut bytes).map_err(failed)? == 0 {
+            break;
+        }
+        bytes.pop_if(|last| *last == b'\n');
+        if number == 1 && bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
+        if bytes.len() as u64 > MAX_LINE_BYTES {
+            return Err(Failure::Limit(format!(
+                "{}: line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more",
+                path.display()
+            )));
+        }
+        if bytes.trim_ascii().is_empty() {
+            continue;
+        }
+        let line = serde_json::from_slice(&bytes).map_err(|error| {
+            let (column, text) = (error.column(), error.to_string());
+            // The parser sees one line, so that its line number is always 1.
+            let text = text.split(" at line ").next().unwrap_or(&text);
+            let what = format_args!("line {number}: column {column}: expected {expected}, found: {text}");
+            Failure::invalid(path, what)
+        })?;
+        add(number, line)?;
+    }
+    Ok(())
+}
+
+/// Returns the wanted files in a folder and its subfolders, sorted by path. Links to folders are not followed, because they may
+/// form a cycle.
+pub(crate) fn files_below(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, Failure> {
+    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        let failed = |error| Failure::from_folder(&folder, &error);
+        for entry in std::fs::read_dir(&folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let path = entry.path();
+            if entry.file_type().map_err(failed)?.is_dir() {
+                folders.push(path);
+            } else if is_wanted(&path) && !path.is_dir() {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 /// Parses the question of an option. Commas may separate the numbers.

@@ -5,8 +5,9 @@
 //! appends to it, and removes it when the output manifest is written. It is locked, so that two processes never share
 //! it.
 
-use crate::bake::{Report, Shard};
+use crate::bake::Report;
 use crate::console::{Failure, counted};
+use crate::options::Shard;
 use crate::process;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -122,11 +123,7 @@ const CODES_BY_PRECEDENCE: [u8; 4] = [3, 4, 2, 1];
 
 impl Summary {
     pub(super) fn new(shard: Option<Shard>, assets: usize) -> Self {
-        Self {
-            shard: shard.map(|shard| format!("{}/{}", shard.index, shard.count)),
-            assets: assets as u64,
-            ..Self::default()
-        }
+        Self { shard: shard.map(|shard| shard.to_string()), assets: assets as u64, ..Self::default() }
     }
 
     pub(super) fn add(&mut self, report: &Report) {

@@ -1,7 +1,7 @@
 //! Lists of assets: manifests, with one JSON object per line, and folders of meshes. Each asset is a mesh file with an output
 //! that no other asset has.
 
-use crate::asking::files::BYTE_ORDER_MARK;
+use crate::asking::files::{each_json_line, files_below};
 use crate::console::Failure;
 use crate::{bake, options};
 use bvh_bake::Options;
@@ -9,8 +9,7 @@ use bvh_bake::input::MeshFormat;
 use bvh_format::leaf::TriangleEncoding;
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// One of many bakes.
@@ -119,9 +118,6 @@ fn resolve(folder: &Path) -> PathBuf {
     }
 }
 
-/// The most bytes of a line. Paths that a system opens are much shorter.
-const MAX_LINE_BYTES: u64 = 1 << 16;
-
 /// A line. The command line gives the defaults of its options.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -146,30 +142,11 @@ pub(super) fn read_manifest(
     options: &Options,
     max_memory: Option<u64>,
 ) -> Result<Vec<Asset>, Failure> {
-    let failed = |error| Failure::from_input(manifest, &error);
     let folder = manifest.parent().unwrap_or(Path::new(""));
     let (mut assets, mut known) = (Vec::new(), 0);
-    let mut lines = BufReader::new(File::open(manifest).map_err(failed)?);
-    for number in 1.. {
-        let mut bytes = Vec::new();
-        if lines.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut bytes).map_err(failed)? == 0 {
-            break;
-        }
-        bytes.pop_if(|last| *last == b'\n');
-        if number == 1 && bytes.starts_with(BYTE_ORDER_MARK) {
-            bytes.drain(..BYTE_ORDER_MARK.len());
-        }
-        if bytes.len() as u64 > MAX_LINE_BYTES {
-            return Err(Failure::Limit(format!(
-                "{}: line {number}: expected at most {MAX_LINE_BYTES} bytes in a line, found more",
-                manifest.display()
-            )));
-        }
-        if bytes.trim_ascii().is_empty() {
-            continue;
-        }
+    let expected = "a JSON object with input, output and options";
+    each_json_line(manifest, expected, |number, line: Line| {
         let wrong = |what: String| Failure::invalid(manifest, format_args!("line {number}: {what}"));
-        let line = parse(&bytes).map_err(wrong)?;
         let options = line.options(options).map_err(wrong)?;
         let place = |name: &str| match name {
             "" => Err(wrong("expected the name of a file, found an empty one".into())),
@@ -181,17 +158,9 @@ pub(super) fn read_manifest(
         known += asset.bytes();
         require_memory(manifest, known, max_memory)?;
         assets.push(asset);
-    }
+        Ok(())
+    })?;
     Ok(assets)
-}
-
-fn parse(bytes: &[u8]) -> Result<Line, String> {
-    serde_json::from_slice(bytes).map_err(|error| {
-        let (column, text) = (error.column(), error.to_string());
-        // The parser sees one line, so that its line number is always 1.
-        let text = text.split(" at line ").next().unwrap_or(&text);
-        format!("column {column}: expected a JSON object with input, output and options, found: {text}")
-    })
 }
 
 /// Parses the choice that a field names.
@@ -235,8 +204,7 @@ impl Line {
     }
 }
 
-/// Returns all files with the extension of a mesh, sorted by path. Links to folders are not followed, because they may
-/// form a cycle.
+/// Returns all files with the extension of a mesh, sorted by path.
 pub(super) fn read_folder(
     folder: &Path,
     output: &Path,
@@ -247,26 +215,12 @@ pub(super) fn read_folder(
         let output = output.display();
         return Err(Failure::Usage(format!("{output}: expected a folder, existing or new, found a file")));
     }
-    let mut inputs = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        let failed = |error| Failure::from_folder(&folder, &error);
-        for entry in fs::read_dir(&folder).map_err(failed)? {
-            let entry = entry.map_err(failed)?;
-            let path = entry.path();
-            if entry.file_type().map_err(failed)?.is_dir() {
-                folders.push(path);
-            } else if MeshFormat::from_extension(&path).is_some() && !path.is_dir() {
-                inputs.push(path);
-            }
-        }
-    }
+    let inputs = files_below(folder, |path| MeshFormat::from_extension(path).is_some())?;
     if inputs.is_empty() {
         // Most likely the name is wrong, so that this counts as a missing file.
         let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf, .glb, .xyz or .pcd, found none";
         return Err(Failure::system(folder, what));
     }
-    inputs.sort();
     let asset = |(line, input): (u64, PathBuf)| {
         let below = input.strip_prefix(folder).unwrap_or(&input);
         let output = output.join(below).with_extension("cbvh");

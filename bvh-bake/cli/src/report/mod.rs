@@ -13,7 +13,7 @@ mod timing;
 mod ways;
 
 use crate::asking::{self, files};
-use crate::console::{self, Failure, Record, spinner};
+use crate::console::{self, Failure, Record, csv, spinner};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Options};
 use bvh_query::{Backend, Bvh, Querier, QueryError};
@@ -253,9 +253,10 @@ impl Report {
             wrong: sections.iter().flat_map(|section| &section.wrong).collect(),
             rows: sections.iter().flat_map(|section| &section.rows).collect(),
         };
+        let columns: Vec<&str> = json.rows.iter().take(1).flat_map(|row| row.names()).collect();
         let panels: Vec<&[Panel]> = sections.iter().map(|section| &section.panels[..]).collect();
         for (name, text) in [
-            ("report.csv", csv(&json.rows)),
+            ("report.csv", csv(&columns, json.rows.iter().copied())),
             ("report.json", table::json(&json).map_err(|error| Failure::System(error.to_string()))?),
             ("report.svg", plot::svg(&panels)),
             ("report.html", page::page(self, words)),
@@ -276,19 +277,6 @@ impl Report {
     }
 }
 
-/// Writes rows as comma-separated values (RFC 4180): a line of names, then one line per row. A figure that was not taken is
-/// absent, never 0 or NaN.
-fn csv(rows: &[&Record]) -> String {
-    let line = |fields: Vec<String>| fields.join(",") + "\n";
-    let quoted = |field: String| {
-        let is_plain = !field.contains([',', '"', '\n', '\r']);
-        if is_plain { field } else { format!("\"{}\"", field.replace('"', "\"\"")) }
-    };
-    let mut text = rows.first().map_or(String::new(), |row| line(row.names().map(str::to_owned).collect()));
-    rows.iter().for_each(|row| text += &line(row.names().map(|name| quoted(row.text(name))).collect()));
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -297,7 +285,10 @@ mod tests {
     #[test]
     fn csv_and_json_hold_the_same_figures_under_the_same_names() {
         let row = record! { name: "a, \"b\"", none: f64::NAN, of: 0.1, is: true, count: None::<u64> };
-        assert_eq!(csv(&[&row]), "name,none,of,is,count\n\"a, \"\"b\"\"\",,0.1,1,\n");
+        assert_eq!(
+            csv(&row.names().collect::<Vec<_>>(), [&row]),
+            "name,none,of,is,count\n\"a, \"\"b\"\"\",,0.1,1,\n"
+        );
         let json: Value = serde_json::from_str(&table::json(&row).unwrap()).unwrap();
         assert_eq!(json, json!({ "name": "a, \"b\"", "none": null, "of": 0.1, "is": true, "count": null }));
         assert_eq!((row.number("of"), row.number("is"), row.number("none")), (Some(0.1), Some(1.0), None));

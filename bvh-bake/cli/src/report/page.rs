@@ -2,9 +2,9 @@
 //!
 //! Each figure of a table carries the value that `report.csv` has for it, and the best ones are bold.
 
-use super::plot::{self, escape};
+use super::plot;
 use super::{Measured, Report};
-use crate::console::{Record, trimmed};
+use crate::console::{Record, escape, trimmed};
 
 const STYLE: &str = "\
 :root { color-scheme: light; } \

@@ -5,6 +5,8 @@
 //! thin line leads from each number to its mark. Text is never measured, so no fonts are needed; the reader's program chooses
 //! them.
 
+use crate::console::escape;
+
 /// Colours that people with any colour vision can tell apart (Okabe and Ito), darkened for white paper.
 const COLOURS: [&str; 4] = ["#0072b2", "#b35a00", "#00805c", "#a03c82"];
 /// The corners of the mark of each colour around its middle, in pixels.
@@ -152,20 +154,6 @@ fn mark(kind: usize, [x, y]: [f64; 2]) -> String {
 
 fn pixels(points: &[[f64; 2]]) -> String {
     points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
-}
-
-/// Escapes text for an element or an attribute.
-pub(super) fn escape(text: &str) -> String {
-    let escaped = |c: char| match c {
-        '&' => "&amp;".to_owned(),
-        '<' => "&lt;".to_owned(),
-        '>' => "&gt;".to_owned(),
-        '"' => "&quot;".to_owned(),
-        // XML has no way to write most of these.
-        c if c.is_control() => "\u{fffd}".to_owned(),
-        c => c.to_string(),
-    };
-    text.chars().map(escaped).collect()
 }
 
 /// A logarithmic axis, with room at its lower end for figures that are 0.
