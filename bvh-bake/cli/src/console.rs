@@ -24,6 +24,8 @@ pub(crate) enum Failure {
     Invalid(String),
     /// A limit was reached. Exit code 4.
     Limit(String),
+    /// What `--fail-on` names was found. Exit code 5.
+    Found(String),
     /// The command printed help, or its reader closed the pipe. Exit code 0.
     Nothing,
 }
@@ -141,6 +143,7 @@ impl Failure {
             Self::System(text) => (2, text),
             Self::Invalid(text) => (3, text),
             Self::Limit(text) => (4, text),
+            Self::Found(text) => (5, text),
         };
         Some((code, one_line(&text)))
     }

@@ -1,7 +1,7 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
-//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `report`. They import these modules, which do not import them:
+//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `clash`; `report`. They import these modules, which do not import them:
 //! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
 //! (memory, mapped files and signals) and `console` (output and exit codes). `cbvh --help` and the help of each
 //! command state what scripts may rely on.
@@ -10,6 +10,7 @@ mod asking;
 mod assets;
 mod bake;
 mod check;
+mod clash;
 mod console;
 mod dump;
 mod motion;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Command::Motion(arguments) => motion::run(&arguments),
         Command::Probe(arguments) => probe::run(&arguments),
         Command::Scene(arguments) => scene::run(&arguments),
+        Command::Clash(arguments) => clash::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     });
     match result {
@@ -47,7 +49,7 @@ fn main() -> ExitCode {
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 1 wrong usage; 2 the system refused (a missing file, a full disk, a missing permission); 3 an input \
-is invalid; 4 a limit was reached. Each error is one line on standard error. The environment variable CBVH_ISA=scalar, \
+is invalid; 4 a limit was reached; 5 clash --fail-on found one. Each error is one line on standard error. The environment variable CBVH_ISA=scalar, \
 avx2, avx512 or neon selects the instruction set of queries.";
 
 /// Exact collision and distance queries between triangle meshes.
@@ -76,6 +78,8 @@ enum Command {
     Probe(probe::ProbeArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(scene::SceneArguments),
+    /// Find the parts of an assembly that touch, overlap, contain or come near each other, and how deep or how near
+    Clash(clash::ClashArguments),
     /// Measure speed against error on your own meshes: for each layout, or for ways to ask about motions
     Report(report::ReportArguments),
 }
@@ -88,7 +92,7 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query, motion, probe, scene or report (see cbvh --help)"
+            "expected a command: bake, dump, validate, verify, query, motion, probe, scene, clash or report (see cbvh --help)"
                 .into(),
         );
     }

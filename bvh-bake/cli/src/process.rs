@@ -3,7 +3,7 @@
 use crate::console::Failure;
 #[cfg(any(unix, windows))]
 use crate::console::tell_line;
-use bvh_query::{Bvh, OpenError, ReadAhead};
+use bvh_query::{Bvh, Files, OpenError, ReadAhead};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -46,7 +46,7 @@ pub(crate) fn memory_in_words() -> String {
     peak_bytes().map_or(String::new(), |bytes| format!(", {:.0} MiB of memory", bytes as f64 / 1048576.0))
 }
 
-/// Maps a file that a person names. The README says that a mapped file must not change while it is open. Only here, the
+/// Maps a file that a person names. The README says that a mapped file must not change while it is open. Only here and in [`files`], the
 /// command promises that nobody changes it.
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> Result<Bvh, OpenError> {
@@ -56,6 +56,19 @@ pub(crate) fn map(path: &Path, read_ahead: ReadAhead) -> Result<Bvh, OpenError> 
     }
     // SAFETY: the command never writes to a file that it maps, and those who run it are told that nobody else may.
     unsafe { Bvh::map_with(path, read_ahead) }
+}
+
+/// The most files that stay mapped at a time, where many are mapped at first need.
+const MAX_OPEN_FILES: usize = 1000;
+
+/// Returns a set of files that are mapped when they are first needed, with the same promise as [`map`].
+#[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
+pub(crate) fn files() -> Files {
+    if cfg!(target_family = "wasm") {
+        return Files::new(MAX_OPEN_FILES);
+    }
+    // SAFETY: as for `map`.
+    unsafe { Files::mapped(MAX_OPEN_FILES) }
 }
 
 /// Makes the allocator return large freed blocks to the system at once. The GNU C library would otherwise keep more and

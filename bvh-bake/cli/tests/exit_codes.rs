@@ -19,7 +19,9 @@ fn help_and_version_are_no_errors() {
     let here = Path::new(".");
     assert!(here.cbvh("--version").done().out.starts_with("cbvh "));
     let help = here.cbvh("--help").done().out;
-    for command in ["bake", "dump", "validate", "verify", "query", "motion", "probe", "scene", "report"] {
+    for command in
+        ["bake", "dump", "validate", "verify", "query", "motion", "probe", "scene", "clash", "report"]
+    {
         assert!(help.contains(command));
         assert!(cbvh_in(here, &[command, "--help"]).done().out.contains("Example"));
     }

@@ -1,0 +1,365 @@
+//! `cbvh clash`: asks which parts of an assembly touch, overlap, contain or come near each other.
+
+mod baseline;
+mod bcf;
+mod found;
+mod parts;
+mod zip;
+
+use crate::asking::{self, files::write_file};
+use crate::console::{self, Failure, Record, counted, csv, record, spinner};
+use crate::options::{Shard, not_negative, threads, whole};
+use crate::process;
+use baseline::{Baseline, Old};
+use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, QueryError, SceneError};
+use clap::Args;
+use found::{BY_WEIGHT, Found, Status, both, short};
+use parts::{Assembly, Part};
+use std::path::PathBuf;
+use std::time::Instant;
+
+const HELP: &str = "\
+Examples:
+  cbvh clash factory.glb
+  cbvh clash parts --clearance 2 --tolerance 0.01 --csv clashes.csv
+  cbvh clash base.stl arm.stl cover.cbvh --json > clashes.json
+  cbvh clash factory.glb --baseline clashes.json --fail-on overlapping,intersecting
+  cbvh clash factory.cbvh --bcf clashes.bcfzip
+  cbvh clash --manifest parts.jsonl --shard 3/16 --json > clashes.3.json
+
+The parts are the instances of a scene (.glb and .gltf files, and what cbvh bake --scene made), the objects of a .cbvh file, \
+and other mesh files, each as a whole. A mesh file alone is split into its objects, and so are all with --split-objects. All \
+parts are in one frame. A part has the name of its instance or object, after the name of its file if several are given; the \
+files of a folder have their paths in it, without extensions. #2, #3 and so on are added to a name that occurs again.
+
+Each pair that is not apart is a clash of one class:
+
+  overlapping   they are deeper in each other than the tolerance
+  undecided     they have points in common, and the tolerance lies between the bounds found for their depth
+  intersecting  they have points in common, and one is not closed, so that they have no depth
+  duplicated    they are the same part in the same place, to within the tolerance
+  contained     one is wholly inside the other
+  near          they are at most the clearance apart
+  touching      they have points in common, and are no deeper in each other than the tolerance
+
+The list has them in this order, deep ones and near ones first. The depth is the length of the shortest move of the second part \
+after which they do not overlap; it is certainly between the two bounds. --visits limits the search for it, for each pair. \
+Lengths are in mesh units, which glTF defines as metres.
+
+A part that is the same as an earlier one, with the same bits of its pose, is reported once, as a duplicate of that one. It is \
+not asked about other parts, because they clash with the earlier one in the same way.
+
+--json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not asked about others), triangles, \
+seconds, classes (the number of clashes of each), and clashes. A clash has id, class, a, b, relation (as cbvh query numbers it), \
+distance, lower and upper (the bounds of the depth), translation (what moves b out of a) and point, both in the world. What \
+there is not is null. --csv writes the same rows. The id is a hash of both names, and stays the same while they do.
+
+--baseline compares with an earlier --json. Each clash gets a status: new, changed (another class, or a distance or a bound that \
+differs by more than the tolerance) or same; gone has those that are no more. Ask with the same --clearance. --fail-on is then about new and changed ones only.
+
+--bcf writes BCF 2.1 for CAD and BIM tools: a topic for each clash, with a view of it in which both parts are selected. Its \
+identifiers follow from the id. Such tools take mesh units for metres, and z for up. SOURCE_DATE_EPOCH sets its date.
+
+Each line of a manifest is a JSON object such as {\"file\": \"arm.cbvh\", \"name\": \"left arm\", \"pose\": [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, \
+1, 0]}. The pose has the rows of the matrix [R | t]; it and the name may be missing. Files are relative to the manifest. With \
+--shard I/N, only pairs whose earlier part is among every N-th part are asked, so that the clashes of all shards are those of \
+the whole. Each .cbvh file is opened when it is first needed, so that memory stays low; other meshes are baked by each shard.
+
+--fail-on exits with code 5 after everything else is done.";
+
+/// What `clash` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct ClashArguments {
+    /// A scene, the files of parts, or folders of such files
+    #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Read the files of parts, their names and poses from this file, one JSON object per line
+    #[arg(long, value_name = "PARTS.jsonl")]
+    manifest: Option<PathBuf>,
+    /// Ask only the pairs whose earlier part is every N-th one, starting with the I-th; I is from 1 to N
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
+    shard: Option<Shard>,
+    /// Also find parts that are at most this far apart, in mesh units
+    #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
+    clearance: f64,
+    /// How deep parts may be in each other and count as touching, in mesh units [default: a millionth of the assembly's diagonal]
+    #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true)]
+    tolerance: Option<f64>,
+    /// The most visits of the search for the depth of a pair
+    #[arg(long, value_name = "N", default_value_t = ClashOptions::default().visits, value_parser = whole::<u64>, allow_negative_numbers = true)]
+    visits: u64,
+    /// Make each object of a mesh file a part
+    #[arg(long)]
+    split_objects: bool,
+    /// Compare with what --json printed earlier
+    #[arg(long, value_name = "OLD.json", conflicts_with = "shard")]
+    baseline: Option<PathBuf>,
+    /// Exit with code 5 if there is a clash of these classes, separated by commas; with --baseline, a new or changed one
+    #[arg(long, value_name = "CLASS", value_delimiter = ',', value_parser = class)]
+    fail_on: Vec<ClashClass>,
+    /// Write the clashes to this file as comma-separated values
+    #[arg(long, value_name = "F.csv")]
+    csv: Option<PathBuf>,
+    /// Write the clashes to this file as topics of BCF 2.1
+    #[arg(long, value_name = "F.bcfzip")]
+    bcf: Option<PathBuf>,
+    /// The most clashes to list for a person; 0 lists all
+    #[arg(long, value_name = "N", default_value = "100", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    limit: usize,
+    /// Print one JSON object with all clashes
+    #[arg(long)]
+    json: bool,
+    /// The instruction set: auto, scalar, avx2, avx512 or neon. auto is the fastest one of this CPU, unless CBVH_ISA names one
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    isa: String,
+    /// The number of threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    jobs: Option<u16>,
+}
+
+/// Parses the name of a class of clashes.
+fn class(name: &str) -> Result<ClashClass, String> {
+    let names = || BY_WEIGHT.map(ClashClass::name).join(", ");
+    BY_WEIGHT
+        .into_iter()
+        .find(|class| class.name() == name)
+        .ok_or_else(|| format!("expected one of {}", names()))
+}
+
+/// Finds all clashes, prints and writes them, and fails if `--fail-on` says so.
+pub(crate) fn run(arguments: &ClashArguments) -> Result<(), Failure> {
+    let backend = asking::backend(&arguments.isa)?;
+    // WebAssembly has one thread, and a pool would start another.
+    let has_threads = !cfg!(target_family = "wasm");
+    match arguments.jobs.filter(|jobs| has_threads || *jobs > 1) {
+        None => run_with(arguments, backend, has_threads),
+        Some(jobs) => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build();
+            let pool = pool.map_err(|error| Failure::from_threads(jobs, error))?;
+            pool.install(|| run_with(arguments, backend, jobs > 1))
+        }
+    }
+}
+
+fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> Result<(), Failure> {
+    let start = Instant::now();
+    let baseline = arguments.baseline.as_deref().map(Baseline::read).transpose()?;
+    let spinner = spinner(false);
+    process::remove_unfinished_files(&spinner)?;
+    spinner.set_message("reading parts");
+    let assembly = Assembly::read(arguments)?;
+    let tolerance = arguments.tolerance.unwrap_or_else(|| 1e-6 * assembly.diagonal());
+    let options =
+        ClashOptions::new().clearance(arguments.clearance).tolerance(tolerance).visits(arguments.visits);
+    spinner.set_message(format!("asking about {} parts", assembly.parts.len()));
+    let (mut scene, numbers) = assembly.scene(backend)?;
+    scene.set_parallel(is_parallel);
+    let part_of = |id: bvh_query::InstanceId| numbers[id.to_bits() as usize];
+    let is_asked = |part: usize| arguments.shard.is_none_or(|shard| shard.has(part as u64));
+    let clashes = scene
+        .clashes_among(&options, |pair| is_asked(part_of(pair.a)))
+        .map_err(|error| blame(&assembly, &part_of, error))?;
+    let mut found: Vec<Found<'_>> = clashes
+        .iter()
+        .map(|clash| Found::of(&assembly, [clash.pair.a, clash.pair.b].map(part_of), clash))
+        .collect();
+    let copies = assembly.parts.iter().enumerate().filter_map(|(number, part)| Some([part.same_as?, number]));
+    found.extend(copies.filter(|&[first, _]| is_asked(first)).map(|pair| Found::of_copy(&assembly, pair)));
+    found.sort_by(Found::order);
+    let gone = baseline.map(|baseline| baseline.compare(&mut found, tolerance));
+    spinner.finish_and_clear();
+    let answer = Answer {
+        arguments,
+        assembly: &assembly,
+        tolerance,
+        found,
+        gone,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    answer.write_files()?;
+    if arguments.json {
+        console::json(&answer.json())?
+    } else {
+        console::text(&answer.text())?
+    }
+    answer.failure().map_or(Ok(()), Err)
+}
+
+/// Turns an error about a pair into one of the file that caused it.
+fn blame(
+    assembly: &Assembly,
+    part_of: &impl Fn(bvh_query::InstanceId) -> usize,
+    error: SceneError,
+) -> Failure {
+    let SceneError::Pair { a, b, source } = error else { return Failure::usage(error) };
+    let parts = [&a, &b].map(|label| &assembly.parts[part_of(label.id)]);
+    let at_fault = match &source {
+        QueryError::File { found: FileChange::Unreadable(_), .. } => {
+            return Failure::System(source.to_string());
+        }
+        QueryError::File { .. } => return Failure::Invalid(source.to_string()),
+        _ => {
+            // The error does not say which part it is about.
+            let is_damaged = |part: &&Part| part.shape.opened().is_ok_and(|of| of.bvh().validate().is_err());
+            parts.into_iter().find(is_damaged).unwrap_or(parts[0])
+        }
+    };
+    Failure::invalid(&at_fault.file, format_args!("part {:?}: {source}", at_fault.name))
+}
+
+/// All that is known at the end.
+struct Answer<'a> {
+    arguments: &'a ClashArguments,
+    assembly: &'a Assembly,
+    tolerance: f64,
+    found: Vec<Found<'a>>,
+    /// The clashes of the baseline that are no more.
+    gone: Option<Vec<Old>>,
+    seconds: f64,
+}
+
+impl Answer<'_> {
+    fn write_files(&self) -> Result<(), Failure> {
+        if let Some(path) = &self.arguments.csv {
+            write_file(path, &self.csv())?;
+        }
+        if let Some(path) = &self.arguments.bcf {
+            let bytes = bcf::archive(path, self.assembly, &self.found)?;
+            let written = bvh_bake::write_atomically(path, &bytes);
+            written.map_err(|error| Failure::from_bake(path.display(), &error))?;
+        }
+        Ok(())
+    }
+
+    fn csv(&self) -> String {
+        let rows: Vec<Record> = self.found.iter().map(Found::row).collect();
+        csv(&Found::COLUMNS, &rows)
+    }
+
+    /// Returns the number of clashes of a class.
+    fn count(&self, class: ClashClass) -> u64 {
+        self.found.iter().filter(|clash| clash.class == class).count() as u64
+    }
+
+    /// Returns the number of clashes of a status.
+    fn count_of(&self, status: Status) -> u64 {
+        self.found.iter().filter(|clash| clash.status == Some(status)).count() as u64
+    }
+
+    /// Returns the number of parts that are the same as an earlier one.
+    fn copies(&self) -> u64 {
+        self.assembly.parts.iter().filter(|part| part.same_as.is_some()).count() as u64
+    }
+
+    fn unit(&self) -> &'static str {
+        if self.assembly.is_in_metres { "metres" } else { "mesh units" }
+    }
+
+    fn json(&self) -> Record {
+        let ClashArguments { files, manifest, shard, clearance, .. } = self.arguments;
+        let inputs = files.iter().chain(manifest).map(|path| path.display().to_string()).collect::<Vec<_>>();
+        let classes = BY_WEIGHT.map(|class| Record::field(class.name(), &self.count(class)));
+        record! {
+            inputs: inputs,
+            shard: shard.map(|shard| shard.to_string()),
+            units: self.unit(),
+            clearance: clearance,
+            tolerance: self.tolerance,
+            parts: self.assembly.parts.len(),
+            copies: self.copies(),
+            triangles: self.assembly.triangles,
+            seconds: self.seconds,
+            classes: Record::new(classes.to_vec()),
+        }
+        .with(self.gone.as_ref().map(|gone| {
+            let statuses = Status::ALL.map(|status| Record::field(status.name(), &self.count_of(status)));
+            let statuses = Record::new(statuses.to_vec()).with(record! { gone: gone.len() });
+            record! { statuses: statuses }
+        }))
+        .with(record! { clashes: self.found.iter().map(Found::json).collect::<Vec<_>>() })
+        .with(self.gone.as_ref().map(|gone| record! { gone: gone.iter().map(Old::json).collect::<Vec<_>>() }))
+    }
+
+    /// Returns what is told to a person.
+    fn text(&self) -> String {
+        let Self { arguments, assembly, tolerance, found, gone, .. } = self;
+        let mut text = format!(
+            "{}: {}, {}; clearance {}, tolerance {}{}, in {}\n",
+            assembly.name,
+            counted(assembly.parts.len() as u64, "part"),
+            counted(assembly.triangles, "triangle"),
+            short(arguments.clearance),
+            short(*tolerance),
+            if arguments.tolerance.is_none() { " (a millionth of the diagonal)" } else { "" },
+            self.unit(),
+        );
+        let listed = if arguments.limit == 0 { found.len() } else { arguments.limit.min(found.len()) };
+        let mut lines: Vec<[String; 5]> = Vec::new();
+        if listed > 0 {
+            lines.push(["class", "status", "how much", "at", "parts"].map(str::to_owned));
+        }
+        lines.extend(found[..listed].iter().map(|clash| {
+            let status = clash.status.map_or("", Status::name);
+            [clash.class.name().to_owned(), status.to_owned(), clash.extent(), clash.place(), clash.both()]
+        }));
+        for Old { class, a, b, .. } in gone.iter().flatten() {
+            lines.push([class.clone(), "gone".to_owned(), String::new(), String::new(), both(a, b)]);
+        }
+        let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+        let widths = [0, 1, 2, 3, 4].map(width);
+        for line in &lines {
+            for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
+                match column {
+                    4 => text += cell,
+                    // Without a baseline, there is no status.
+                    1 if gone.is_none() => {}
+                    _ => text += &format!("{cell:width$}  "),
+                }
+            }
+            text += "\n";
+        }
+        let rest = found.len() - listed;
+        if rest > 0 {
+            text += &format!("and {rest} more: --limit 0 lists all\n");
+        }
+        text += &(self.sum() + "\n");
+        if self.copies() > 0 {
+            let copies = self.copies();
+            text += &format!("copies of earlier parts in their places, not asked about others: {copies}\n");
+        }
+        text
+    }
+
+    /// Returns the numbers of clashes in words.
+    fn sum(&self) -> String {
+        let classes = BY_WEIGHT.into_iter().filter(|class| self.count(*class) > 0);
+        let classes = classes.map(|class| format!("{} {}", self.count(class), class.name()));
+        let mut text = match self.found.len() {
+            0 => "no clashes".to_owned(),
+            1 => "1 clash: ".to_owned(),
+            count => format!("{count} clashes: "),
+        };
+        text += &classes.collect::<Vec<_>>().join(", ");
+        if let Some(gone) = &self.gone {
+            let counts = Status::ALL.map(|status| format!("{} {}", self.count_of(status), status.name()));
+            text += &format!("; {}, {} gone", counts.join(", "), gone.len());
+        }
+        text
+    }
+
+    /// Returns the failure that `--fail-on` asks for.
+    fn failure(&self) -> Option<Failure> {
+        let classes = &self.arguments.fail_on;
+        let is_bad = |clash: &&Found<'_>| clash.is_fresh() && classes.contains(&clash.class);
+        let mut bad = self.found.iter().filter(is_bad);
+        let first = bad.next()?;
+        let classes = classes.iter().map(|class| class.name()).collect::<Vec<_>>().join(",");
+        let fresh = if self.gone.is_some() { "new or changed " } else { "" };
+        let (count, pair) = (1 + bad.count(), first.both());
+        let name = &self.assembly.name;
+        Some(Failure::Found(format!(
+            "{name}: --fail-on {classes}: expected no {fresh}clash of these classes, found {count}; the first: {pair}"
+        )))
+    }
+}

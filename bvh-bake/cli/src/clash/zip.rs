@@ -1,0 +1,74 @@
+//! Writes a ZIP archive whose entries are stored as they are: no reader needs more for small texts, and the bytes depend on
+//! nothing else (APPNOTE 6.3.10, sections 4.3.7, 4.3.12 and 4.3.16).
+
+/// The most entries of an archive without ZIP64.
+pub(super) const MAX_ENTRIES: usize = u16::MAX as usize;
+
+/// An archive that is being written.
+#[derive(Default)]
+pub(super) struct Archive {
+    bytes: Vec<u8>,
+    /// The directory, which follows the entries.
+    directory: Vec<u8>,
+    entries: u16,
+}
+
+/// Midnight on the first of January 1980, the earliest time that the format knows.
+const TIME_AND_DATE: [u8; 4] = [0, 0, 0x21, 0];
+/// What is needed to read an entry: version 1.0, UTF-8 names, no compression.
+const VERSION: [u8; 2] = [10, 0];
+const FLAGS_AND_METHOD: [u8; 4] = [0, 8, 0, 0];
+
+impl Archive {
+    /// Adds a file. There are at most [`MAX_ENTRIES`].
+    pub(super) fn add(&mut self, name: &str, content: &[u8]) {
+        let offset = (self.bytes.len() as u32).to_le_bytes();
+        let length = (content.len() as u32).to_le_bytes();
+        let name_length = (name.len() as u16).to_le_bytes();
+        let both = [
+            &FLAGS_AND_METHOD[..],
+            &TIME_AND_DATE,
+            &crc32(content).to_le_bytes(),
+            &length,
+            &length,
+            &name_length,
+            // No extra field.
+            &[0; 2],
+        ]
+        .concat();
+        self.bytes.extend([b"PK\x03\x04", &VERSION[..], &both, name.as_bytes(), content].concat());
+        // No comment, the first disk, and no attributes.
+        let rest = [&[0; 10][..], &offset, name.as_bytes()].concat();
+        self.directory.extend([b"PK\x01\x02", &VERSION[..], &VERSION, &both, &rest].concat());
+        self.entries += 1;
+    }
+
+    /// Returns the bytes of the archive, or `None` if its offsets exceed 32 bits.
+    pub(super) fn finish(mut self) -> Option<Vec<u8>> {
+        let start = u32::try_from(self.bytes.len()).ok()?.to_le_bytes();
+        let length = u32::try_from(self.directory.len()).ok()?.to_le_bytes();
+        let entries = self.entries.to_le_bytes();
+        self.bytes.append(&mut self.directory);
+        // One disk, and no comment.
+        self.bytes
+            .extend([b"PK\x05\x06", &[0; 4][..], &entries, &entries, &length, &start, &[0; 2]].concat());
+        Some(self.bytes)
+    }
+}
+
+/// Returns the checksum of the format: CRC-32 with the reversed polynomial 0xEDB88320.
+fn crc32(bytes: &[u8]) -> u32 {
+    let step = |crc: u32| if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+    !bytes.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| step(crc)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_that_of_the_format() {
+        assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
+        assert_eq!(crc32(b""), 0);
+    }
+}
