@@ -36,7 +36,7 @@ pub(crate) use region::{MAX_POINTS, common_region, unit, unit_normal};
 pub(crate) use rounded::rounded_crossing;
 pub use self_contact::SelfContactKind;
 pub(crate) use self_contact::self_contact;
-pub(crate) use stretch::{Way, stretch};
+pub(crate) use stretch::{Way, leaves_before, stretch};
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 

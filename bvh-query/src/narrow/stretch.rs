@@ -85,6 +85,21 @@ pub(crate) fn stretch(a: &Triangle, b: &Triangle, way: &Way) -> Stretch {
     clip.stretch
 }
 
+/// Returns whether the boxes of two triangles show that `b` has left `a` before a place on the way. Cost: a tenth of that of
+/// [`stretch`].
+pub(crate) fn leaves_before(a: &Triangle, b: &Triangle, way: &Way, place: f64) -> bool {
+    (0..3).any(|k| {
+        let [a, b] = [a, b].map(|t| t.map(|corner| corner[k]));
+        let rate = way.direction[k];
+        let overlap = if rate > 0.0 {
+            a[0].max(a[1]).max(a[2]) - b[0].min(b[1]).min(b[2])
+        } else {
+            b[0].max(b[1]).max(b[2]) - a[0].min(a[1]).min(a[2])
+        };
+        overlap + 2.0 * way.error + 32.0 * U * (overlap.abs() + way.length) < place * rate.abs()
+    })
+}
+
 impl Clip<'_> {
     fn is_empty(&self) -> bool {
         self.stretch.outer[0] > self.stretch.outer[1]

@@ -68,7 +68,7 @@ pub struct Clash {
     pub class: ClashClass,
     /// Whether they touch and, if not, whether one is inside the other.
     pub relation: Relation,
-    /// For near parts, how far apart their surfaces are; where the parts touch, 0; else infinite.
+    /// For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others.
     pub distance: f64,
     /// For parts that touch, overlap or are undecided: the bounds of their depth.
     pub depth: Option<Penetration>,
@@ -179,8 +179,11 @@ impl Querier {
             let (inner, outer) = if relation == Relation::AInB { (&own, &other) } else { (&other, &own) };
             return Ok(clash(ClashClass::Contained, self.first_inside(inner, outer)?.unwrap_or_default()));
         }
-        if check_closed(a, b).is_err() {
-            return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
+        match check_closed(a, b) {
+            Err(QueryError::NotClosed(_)) => {
+                return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
+            }
+            is_closed => is_closed?,
         }
         let search = PenetrationOptions::new().relative_gap(options.relative_gap);
         let visits = self.memory.budget;

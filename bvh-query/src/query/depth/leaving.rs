@@ -5,7 +5,7 @@ use crate::file::place::LeafPacket;
 use crate::isa::Isa;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TrianglePair;
-use crate::narrow::{Point, Triangle, Way, stretch};
+use crate::narrow::{Point, Triangle, Way, leaves_before, stretch};
 use crate::query::answers::QueryStats;
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::collide::{Candidates, ContactVisitor};
@@ -77,9 +77,12 @@ impl Querier {
         let visit = &mut |pair: TrianglePair| {
             let a = placed.triangle_a(pair.a, pair.lane_a)?;
             let b = placed.triangle_b(pair.b, pair.lane_b)?;
+            let mut leaving = found.get();
+            if leaves_before(&a, &b, &way, leaving.crosses_until) {
+                return Ok(ControlFlow::Continue(()));
+            }
             let stretch = stretch(&a, &b, &way);
             let crosses = stretch.inner[0] < 0.0 && stretch.inner[1] > 0.0;
-            let mut leaving = found.get();
             let crosses_until = if crosses { stretch.inner[1] } else { 0.0 };
             leaving.count((stretch.outer[1].max(0.0), crosses_until), stretch.normal, [a, b]);
             found.set(leaving);
