@@ -1,7 +1,6 @@
 //! How deep shapes overlap, against depths that are known.
 
 #[path = "../common/mod.rs"]
-#[allow(dead_code, reason = "every test file uses a part of it")]
 mod common;
 
 mod clashes;
