@@ -25,15 +25,20 @@ Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that plac
 numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
 
 One answer is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
-triangles, distance the distance in mesh units (17 digits), relation a number. The answer about a single pose is printed as \
+triangles, distance the distance in mesh units (17 digits), relation a number, penetration five numbers. The answer about a single pose is printed as \
 text for a person.
 
 collide is about surfaces: a mesh that is inside another without touching it does not collide. relation is 0 touching, \
 1 apart, 2 A inside B, 3 B inside A, 4 mixed (some parts of a mesh are inside the other and some are not, or some of each \
 mesh are), or 5 undefined, because a mesh that might contain the other is not closed.
 
+penetration is how deep closed meshes overlap: a lower and an upper bound of the length of the shortest translation of B after \
+which the insides have nothing in common, and such a translation of the upper length, in the frame of A. All are 0 for meshes \
+that are apart, and nan if a mesh is not closed.
+
 --json prints one object per pose: pose, its number in the file, from 0; poses, the name of the file, if there are several; \
-and collide, within (true or false), relation, contacts and pairs (the triangles), or distance, lower, upper, point_a, \
+and collide, within (true or false), relation, contacts and pairs (the triangles), lower, upper, translation, point and radii (what \
+proves lower: a ball about the point in each mesh), or distance, lower, upper, point_a, \
 point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
 frame of A.
 

@@ -139,11 +139,45 @@ fn a_relation_tells_what_is_inside() {
     }
 }
 
+/// How deep, and the move that ends it; nothing where they are apart; no numbers where a mesh is not closed.
+#[test]
+fn a_penetration_has_bounds_and_the_move_that_ends_it() {
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.write("open.obj", cube_at(1, 0).trim_end().rsplit_once('\n').unwrap().0);
+    let pose = |x: f64| format!("1 0 0 {x:?} 0 1 0 0.25 0 0 1 0.125\n");
+    directory.write("poses.txt", [1.5, 2.5, -1.75].map(pose).concat());
+    let ask = |more: &str| {
+        directory.cbvh(&format!("query cube.obj cube.obj poses.txt --mode penetration{more}")).done()
+    };
+    let printed = ask("").out;
+    let lines: Vec<Vec<f64>> =
+        printed.lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    for (line, depth) in lines.iter().zip([0.5, 0.0, 0.25]) {
+        let [lower, upper, x, y, z] = line[..] else { panic!("{printed}") };
+        assert!(
+            0.3 * depth <= lower && lower <= depth && depth <= upper && upper <= depth + 1e-11,
+            "{printed}"
+        );
+        assert!((x.abs() - upper).abs() < 1e-12 && y.abs() + z.abs() < 1e-12, "{printed}");
+    }
+    assert!(lines[0][2] > 0.0 && lines[2][2] < 0.0 && printed.lines().nth(1) == Some("0 0 0 0 0"));
+    assert_eq!(ask(" --bench").json()["positives"], 2);
+    for (record, line) in ask(" --json").json_lines().iter().zip(&lines) {
+        assert_eq!((record["lower"].as_f64(), record["upper"].as_f64()), (Some(line[0]), Some(line[1])));
+        assert_eq!(record["translation"][0].as_f64(), Some(line[2]));
+    }
+    let open = directory.cbvh("query open.obj cube.obj poses.txt --mode penetration").done().out;
+    assert_eq!(open, "nan nan nan nan nan\n".repeat(3));
+    let words = directory.cbvh("query cube.obj cube.obj --mode penetration").done().out;
+    assert!(words.starts_with("depth from ") && words.contains("makes the insides disjoint"), "{words}");
+}
+
 #[test]
 fn answers_do_not_depend_on_how_they_are_found() {
     let directory = &world();
     let backends = backends(directory);
-    for mode in ["collide", "contacts", "distance", "within", "relation"] {
+    for mode in ["collide", "contacts", "distance", "within", "relation", "penetration"] {
         let within: &[&str] = if mode == "within" { &["--within", "0.25"] } else { &[] };
         let hashes = |more: &[&str]| -> Vec<Value> {
             let lines = ask(directory, &[&["--mode", mode], within, more].concat());

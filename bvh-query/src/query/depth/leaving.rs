@@ -36,7 +36,7 @@ impl Leaving {
     fn count(&mut self, (until, crosses_until): (f64, f64), normal: Point, pair: [Triangle; 2]) {
         self.crosses_until = self.crosses_until.max(crosses_until);
         let is_later = match self.touches_until {
-            Some(latest) => until > latest || until == latest && normal < self.normal,
+            Some(latest) => until > latest || until == latest && (normal, pair) < (self.normal, self.last),
             None => true,
         };
         if is_later {
