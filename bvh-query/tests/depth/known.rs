@@ -141,6 +141,37 @@ fn balls_and_capsules_are_as_deep_as_their_radii_say() {
     }
 }
 
+/// A ball that moves past another one leaves it where the centres are as far apart as both radii; one that is inside a cube
+/// leaves it with its far side.
+#[test]
+fn balls_leave_where_their_radii_say() {
+    let (point, cube) = (baked(&[[[0.0; 3]; 3]]), block([1.0; 3]));
+    let (ball, small) = (point.all().rounded(0.5).unwrap(), point.all().rounded(0.25).unwrap());
+    let mut random = Random::new(3);
+    for querier in &mut queriers() {
+        for _ in 0..40 {
+            let at = random.point().map(|x| 0.4 * x);
+            let d = random.point();
+            let norm = d.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let (along, square) =
+                ((0..3).map(|k| at[k] * d[k] / norm).sum::<f64>(), at.iter().map(|x| x * x).sum::<f64>());
+            let of_balls = (along * along - square + 0.75 * 0.75).sqrt() - along;
+            let pose = translation(at[0], at[1], at[2]);
+            let found = querier.separation(ball, small, &pose, d).unwrap();
+            assert!(
+                found.lower <= of_balls + 1e-12 && of_balls <= found.upper + 1e-12,
+                "{found:?} {of_balls}"
+            );
+            assert!(found.lower > 0.5 * of_balls && found.upper < 1.5 * of_balls, "{found:?} {of_balls}");
+            let axis = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]][random.below(2)];
+            let of_cube = 1.25 - (0..3).map(|k| at[k] * axis[k]).sum::<f64>();
+            let found = querier.separation(&cube, small, &pose, axis).unwrap();
+            assert!(found.lower <= of_cube + 1e-12 && of_cube <= found.upper + 1e-12, "{found:?} {of_cube}");
+            assert!(found.upper < 1.01 * of_cube, "{found:?} {of_cube}");
+        }
+    }
+}
+
 /// A sheet of which both sides are in the mesh encloses nothing.
 #[test]
 fn a_sheet_is_not_deep() {

@@ -1,15 +1,15 @@
 //! The straight ways on which B leaves A.
 //!
 //! ```text
-//! at := what is known to be covered; while at < limit:
+//! at := 0, or what is known to be covered; while at < limit:
 //!     if pairs of triangles certainly cross at `at`: go on to where the last of them has left
-//!     else if the meshes are apart a few roundings after the last contact at `at`: that place is free
-//!     else if a point there is inside both: go on by its depth in A plus its depth in B, or if nothing touches by the gap
-//!     else go on to where the last contact has left; from here on, nothing is covered
+//!     else if the shapes are apart a few roundings after the last contact at `at`: that place is free
+//!     else if interiors certainly meet for some way: go on by that
+//!     else go on to where the last contact has left, and some roundings more each time
 //! ```
 //!
-//! Stretches of crossings and of common points follow each other without a gap, so interiors meet on all of the way that is
-//! covered. The free place is free because exact arithmetic says so of the pose there, and of nothing else.
+//! A way is covered as far as the first two kinds of steps lead without a gap: interiors meet on all of it. The free place is
+//! free because exact arithmetic says so of the pose there, and of nothing else.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -43,8 +43,6 @@ pub(super) struct Line<'a> {
 /// Where a way comes free.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Free {
-    /// Interiors meet at all shorter moves.
-    pub(super) covered: f64,
     /// Interiors are disjoint at this move.
     pub(super) at: f64,
     /// The contact that was the last to leave, if one was met.
@@ -137,10 +135,11 @@ struct Gap {
 }
 
 impl Gap {
-    /// Returns how far B moves until the gap is as wide as the radii need it, if it widens as it begins to.
+    /// Returns how far B moves until the two closest points are as far apart as both radii.
     fn way_out(&self, line: &Line<'_>) -> f64 {
-        let rate = dot(self.normal, line.direction).max(LEAST_PART);
-        (line.radii - self.distance).max(0.0) / rate + 16.0 * line.error
+        let along = self.distance * dot(self.normal, line.direction);
+        let squared = along * along - self.distance * self.distance + line.radii * line.radii;
+        squared.max(0.0).sqrt() - along + 16.0 * line.error
     }
 
     fn contact(&self, line: &Line<'_>, at: f64) -> LastContact {
@@ -151,23 +150,20 @@ impl Gap {
 }
 
 impl Querier {
-    /// Returns the first place on a line where interiors are certainly disjoint, if it is before `limit`. Interiors are known
-    /// to meet at all moves shorter than `covered`.
-    /// A common point before the move, if one is known, helps to find others on the way.
+    /// Returns the first place that is found on a line, before `limit`, where interiors are certainly disjoint. They are known to
+    /// meet at all moves shorter than `from`. A common point before the move, if one is known, helps to find others on the way.
     pub(super) fn free_on(
         &mut self,
         line: &Line<'_>,
-        (covered, mut common): (f64, Option<Point>),
+        (from, mut common): (f64, Option<Point>),
         limit: f64,
     ) -> Result<Option<Free>, QueryError> {
-        let (mut at, mut covered, mut is_covered, mut stuck) = (covered, covered, true, 1.0);
-        let (mut last, mut rounded) = (None, None);
+        let (mut at, mut last, mut stuck) = (from, None, 1.0);
         let (mut crossings, mut patience) = (0, FIRST_CROSSINGS);
         while at < limit && at <= line.length {
             let leaving = self.leaving(line, at)?;
-            if leaving.touches_until.is_some() {
-                last = Some((at, leaving));
-            }
+            let touches = leaving.touches_until.is_some();
+            last = if touches { line.last_contact(at, &leaving) } else { last };
             if leaving.crosses_until > line.error {
                 at += leaving.crosses_until;
                 crossings += 1;
@@ -175,7 +171,6 @@ impl Querier {
                     && at < limit
                     && let Some(point) = common
                 {
-                    // Near a point that was inside both, with B half as far back as it has moved since.
                     let balls = self.balls_near(line, at, point)?;
                     if balls.lower() < 2.0 * leaving.crosses_until {
                         (crossings, patience) = (0, 2 * patience);
@@ -185,53 +180,27 @@ impl Querier {
                     at += balls.lower();
                     common = Some([0, 1, 2].map(|k| balls.centre[k] - 0.5 * at * line.direction[k]));
                 }
-                if is_covered {
-                    covered = at;
-                }
                 continue;
             }
+            let until = at + leaving.touches_until.unwrap_or(0.0);
+            let mut places = STEPS.map(|step| until + step * stuck * line.error).to_vec();
             if line.radii > 0.0
                 && let Some(gap) = self.gap_of_cores(line, at)?
             {
-                last = None;
-                rounded = Some(gap.contact(line, at));
-                let place = at + gap.way_out(line);
-                if place < limit && self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart
-                {
-                    return Ok(Some(Free { covered, at: place, last: rounded }));
-                }
-                let common = line.radii - gap.distance - 4.0 * line.error;
-                if common > LEAST_PART * line.length {
-                    at += common;
-                    if is_covered {
-                        covered = at;
-                    }
-                    continue;
-                }
+                last = Some(gap.contact(line, at));
+                places.insert(0, at + gap.way_out(line));
             }
-            let until = at + leaving.touches_until.unwrap_or(0.0);
-            for step in STEPS {
-                let place = until + step * stuck * line.error;
-                if place >= limit {
-                    return Ok(None);
-                }
+            for place in places.into_iter().filter(|&place| place < limit) {
                 if self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart {
-                    let last = last.and_then(|(at, leaving)| line.last_contact(at, &leaving)).or(rounded);
-                    return Ok(Some(Free { covered, at: place, last }));
+                    return Ok(Some(Free { at: place, last }));
                 }
             }
-            let common = self.common_way(line, at, leaving.touches_until.is_some())?;
-            if common > LEAST_PART * line.length {
-                at += common;
-                if is_covered {
-                    covered = at;
-                }
-                stuck = 1.0;
+            let way = self.common_way(line, at, touches)?;
+            (at, stuck) = if way > 0.0 {
+                (at + way, 1.0)
             } else {
-                is_covered = false;
-                at = until + STEPS[STEPS.len() - 1] * stuck * line.error;
-                stuck *= 4.0;
-            }
+                (until + STEPS[STEPS.len() - 1] * stuck * line.error, 4.0 * stuck)
+            };
         }
         Ok(None)
     }
@@ -250,19 +219,20 @@ impl Querier {
         Ok(balls)
     }
 
-    /// Returns how far interiors meet without a gap, from what is known to be covered up to the end of a way.
-    pub(super) fn cover(&mut self, line: &Line<'_>, mut covered: f64, end: f64) -> Result<f64, QueryError> {
+    /// Returns how far interiors meet without a gap, up to the end of a way.
+    pub(super) fn cover(&mut self, line: &Line<'_>, end: f64) -> Result<f64, QueryError> {
+        let mut covered = 0.0;
         while covered < end {
             let leaving = self.leaving(line, covered)?;
-            covered += if leaving.crosses_until > line.error {
+            let way = if leaving.crosses_until > line.error {
                 leaving.crosses_until
             } else {
-                let way = self.common_way(line, covered, leaving.touches_until.is_some())?;
-                if way <= LEAST_PART * line.length {
-                    break;
-                }
-                way
+                self.common_way(line, covered, leaving.touches_until.is_some())?
             };
+            if way <= 0.0 {
+                break;
+            }
+            covered += way;
         }
         Ok(covered.min(end))
     }
@@ -281,16 +251,25 @@ impl Querier {
         Ok(Some(Gap { distance: upper, lower, point_a, point_b, normal }))
     }
 
-    /// Returns how far B moves at least, from a place on where nothing certainly crosses, until interiors do not meet; 0 if that is
-    /// not known. If nothing touches, one shape is inside the other, and stays there until the gap is closed.
+    /// Returns how far B moves at least, from a place on where no triangles certainly cross, until interiors do not meet; 0 if that
+    /// is not known, or hardly any way. Rounded shapes meet until the gap of their cores is as wide as both radii. If nothing
+    /// touches and neither has a radius, one shape or a part of it is inside the other, and stays there until the gap is closed.
     fn common_way(&mut self, line: &Line<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
+        let pose = line.pose_at(at);
+        let is_enough = |way: &f64| *way > LEAST_PART * line.length;
         if !touches && let Some(gap) = self.gap_of_cores(line, at)? {
-            let way = gap.lower - 4.0 * line.error;
-            if way > LEAST_PART * line.length {
+            let way = if line.radii > 0.0 {
+                line.radii - gap.distance
+            } else if self.relation_of(line.a, line.b, &pose)? == Relation::Apart {
+                return Ok(0.0);
+            } else {
+                gap.lower
+            };
+            if let Some(way) = Some(way - 4.0 * line.error).filter(is_enough) {
                 return Ok(way);
             }
         }
-        let pose = line.pose_at(at);
-        Ok(self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?.lower())
+        let balls = self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
+        Ok(Some(balls.lower()).filter(is_enough).unwrap_or(0.0))
     }
 }

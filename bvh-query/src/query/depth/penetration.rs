@@ -130,7 +130,7 @@ impl Querier {
         }
         let line = Line::new(a, b, pose).along(direction);
         let (lower, upper) = match self.free_on(&line, (0.0, None), f64::INFINITY)? {
-            Some(Free { covered, at, .. }) => (self.cover(&line, covered, at)?, at),
+            Some(Free { at, .. }) => (self.cover(&line, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
             None => (0.0, line.length),
         };
