@@ -35,6 +35,18 @@ impl Querier {
         self.distance_with(a, b, pose, &DistanceOptions::default())
     }
 
+    /// Returns the distance of two cores, as a part of a larger question.
+    pub(super) fn distance_of_cores(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<Distance, QueryError> {
+        let mut search = Search::between_shapes(DistanceOptions::default(), 0.0);
+        let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;
+        Ok(best.distance(search.proved()))
+    }
+
     /// Returns a distance that may exceed the least one by an allowed error, which saves time. `lower` is the bound
     /// that was proved. Different backends may return different allowed answers.
     ///

@@ -214,7 +214,7 @@ impl Line<'_> {
     }
 }
 
-fn length(v: Point) -> f64 {
+pub(super) fn length(v: Point) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 

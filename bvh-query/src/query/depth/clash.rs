@@ -7,7 +7,6 @@ use crate::query::answers::{Distance, Relation};
 use crate::query::depth::balls::bounds;
 use crate::query::depth::penetration::{Penetration, PenetrationOptions, check_closed};
 use crate::query::displacement::{displacement, size};
-use crate::query::distance::no_answer;
 use crate::query::exact::{placed, stored_at};
 use crate::query::options::{check, check_distance};
 use crate::query::probe::closest::IsWithin;
@@ -16,7 +15,6 @@ use crate::query::probe::point::check_point;
 use crate::query::probe::relation::each_triangle;
 use crate::query::querier::Querier;
 use crate::query::rounded::limit_of_cores;
-use crate::query::search::Search;
 
 /// How two parts lie. The command and the bindings of other languages use its numbers (`class as u8`) and names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -222,7 +220,7 @@ impl Querier {
         if clearance == 0.0 || !self.cores_within(a, b, pose, limit_of_cores(a, b, clearance))? {
             return Ok(apart);
         }
-        let nearest = self.nearest_points(a, b, pose)?;
+        let nearest = self.distance_of_cores(a, b, pose)?;
         let Distance { distance, point_a, point_b, .. } = self.distance_of_shapes(a, b, pose, nearest)?;
         let point = [0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0);
         Ok(Clash { class: ClashClass::Near, distance, point, ..apart })
@@ -230,17 +228,8 @@ impl Querier {
 
     /// Returns a point near the contact of two shapes that touch.
     fn common_contact(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<[f64; 3], QueryError> {
-        let Distance { point_a, point_b, .. } = self.nearest_points(a, b, pose)?;
+        let Distance { point_a, point_b, .. } = self.distance_of_cores(a, b, pose)?;
         Ok([0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0))
-    }
-
-    /// Returns the distance of two cores.
-    fn nearest_points(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<Distance, QueryError> {
-        let mut search = Search::between_shapes(Default::default(), 0.0);
-        match self.nearest(a, b, pose, &mut search)? {
-            Some(best) => Ok(best.distance(search.proved())),
-            None => Err(no_answer(a)),
-        }
     }
 
     /// Returns whether two shapes are the same part in the same place: they have as many triangles and the same box, and each

@@ -18,10 +18,8 @@ use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::balls::Balls;
 use crate::query::depth::leaving::Leaving;
-use crate::query::options::DistanceOptions;
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
-use crate::query::search::Search;
 use crate::traverse::placement::POSE_ERROR;
 
 /// Two shapes, and the line that B moves on.
@@ -239,11 +237,8 @@ impl Querier {
 
     /// Returns where the cores are at a place, unless they touch.
     fn gap_of_cores(&mut self, line: &Line<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
-        let mut search = Search::between_shapes(DistanceOptions::default(), 0.0);
-        let Some(best) = self.nearest(line.a, line.b, &line.pose_at(at), &mut search)? else {
-            return Ok(None);
-        };
-        let Distance { distance, lower, upper, point_a, point_b, .. } = best.distance(search.proved());
+        let Distance { distance, lower, upper, point_a, point_b, .. } =
+            self.distance_of_cores(line.a, line.b, &line.pose_at(at))?;
         if distance <= line.error {
             return Ok(None);
         }

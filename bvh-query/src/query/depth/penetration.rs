@@ -10,7 +10,7 @@ use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle, cross, dot, subtract};
 use crate::pose::Pose;
 use crate::query::answers::Relation;
-use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
+use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds, length};
 use crate::query::depth::line::{Free, LastContact, Line, moved};
 use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::options::check;
@@ -419,10 +419,6 @@ fn behind(point: Point, triangle: &Triangle, way: f64) -> Point {
     let along = (way / length(to_centre).max(f64::MIN_POSITIVE)).min(0.5);
     let inwards = way / 4.0 / length(normal).max(f64::MIN_POSITIVE);
     [0, 1, 2].map(|k| point[k] + along * to_centre[k] - inwards * normal[k])
-}
-
-fn length(v: Point) -> f64 {
-    dot(v, v).sqrt()
 }
 
 /// Returns the length of a vector, rounded up.
