@@ -181,12 +181,12 @@ impl Querier {
                 continue;
             }
             let until = at + leaving.touches_until.unwrap_or(0.0);
-            let mut places = STEPS.map(|step| until + step * stuck * line.error).to_vec();
+            let mut places = STEPS.map(|step| until + step * stuck * line.error);
             if line.radii > 0.0
                 && let Some(gap) = self.gap_of_cores(line, at)?
             {
                 last = Some(gap.contact(line, at));
-                places.insert(0, at + gap.way_out(line));
+                places[0] = at + gap.way_out(line);
             }
             for place in places.into_iter().filter(|&place| place < limit) {
                 if self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart {
