@@ -6,7 +6,7 @@
 //! the search takes the cell with the largest bound, looks at its centre and halves it (Piyavskii 1972, Hansen, Jaumard 1995).
 
 use crate::error::QueryError;
-use crate::narrow::{Point, cross, subtract, triangle_distance_apart};
+use crate::narrow::{Point, common_region, cross, subtract};
 use crate::query::answers::Side;
 use crate::query::depth::line::Line;
 use crate::query::probe::closest::IsWithin;
@@ -137,7 +137,9 @@ impl Querier {
             return Ok(balls);
         }
         let [of_a, of_b] = &leaving.last;
-        let point = triangle_distance_apart(of_a, of_b).point_a;
+        let region = common_region(of_a, of_b);
+        let ends = &region.points[..region.count];
+        let point = [0, 1, 2].map(|k| ends.iter().map(|end| end[k]).sum::<f64>() / ends.len() as f64);
         let inwards = leaving.last.map(|[p, q, r]| {
             let normal = cross(subtract(q, p), subtract(r, p));
             let scale = length(normal).max(f64::MIN_POSITIVE);

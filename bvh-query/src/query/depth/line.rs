@@ -8,6 +8,9 @@
 //!     else go on to where the last contact has left, and some roundings more each time
 //! ```
 //!
+//! A search for any free place first steps over fine meshes: while the shapes meet at a place further on, it goes there, and each
+//! step is longer than the one before.
+//!
 //! A way is covered as far as the first two kinds of steps lead without a gap: interiors meet on all of it. The free place is
 //! free because exact arithmetic says so of the pose there, and of nothing else.
 
@@ -16,7 +19,6 @@ use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance_apart};
 use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
-use crate::query::depth::balls::Balls;
 use crate::query::depth::leaving::Leaving;
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
@@ -36,6 +38,8 @@ pub(super) struct Line<'a> {
     pub(super) radii: f64,
     /// A bound on the error of placed coordinates.
     pub(super) error: f64,
+    /// The size of the smaller triangles, about.
+    pub(super) grain: f64,
 }
 
 /// Where a way comes free.
@@ -64,10 +68,11 @@ const STEPS: [f64; 4] = [0.0, 1.0, 8.0, 64.0];
 /// The number of points that are tried to find one that is inside both shapes.
 const COMMON_POINTS: u32 = 64;
 
-/// How many crossings follow each other before a common point is tried to take a longer step; and the steps that it is moved by
-/// to where it is deeper.
-const FIRST_CROSSINGS: u32 = 6;
-const STEPS_ON_THE_WAY: u32 = 3;
+/// A rough search only looks at places on a way that is longer than so many triangles, each step longer than the last one by a
+/// factor. Where it comes free it goes back and divides the step, until that is worth no more than a few crossings.
+const MANY_TRIANGLES: f64 = 8.0;
+const GROWTH: f64 = 1.5;
+const FEW_CROSSINGS: f64 = 4.0;
 
 /// The part of a way by which a common point has to bring it on.
 const LEAST_PART: f64 = 1e-7;
@@ -75,7 +80,7 @@ const LEAST_PART: f64 = 1e-7;
 impl<'a> Line<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {
         let radii = sum_of_radii(a, b);
-        let (mut size, mut magnitude) = (radii, 0.0);
+        let (mut size, mut magnitude, mut grain) = (radii, 0.0, f64::INFINITY);
         for shape in [a, b] {
             let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
             for object in shape.objects() {
@@ -85,11 +90,13 @@ impl<'a> Line<'a> {
                     magnitude += low[k].abs() + high[k].abs();
                 }
             }
-            size += (0..3).map(|k| hi[k] - lo[k]).sum::<f64>();
+            let extent = (0..3).map(|k| hi[k] - lo[k]).sum::<f64>();
+            size += extent;
+            grain = grain.min(extent / (shape.triangles() as f64).sqrt());
         }
         magnitude += pose.translation().iter().map(|t| t.abs()).sum::<f64>();
         let error = POSE_ERROR * (magnitude + size);
-        Self { a, b, pose, direction: [0.0; 3], length: 2.0 * size, radii, error }
+        Self { a, b, pose, direction: [0.0; 3], length: 2.0 * size, radii, error, grain }
     }
 
     pub(super) fn along(self, direction: Point) -> Self {
@@ -149,35 +156,31 @@ impl Gap {
 
 impl Querier {
     /// Returns the first place that is found on a line, before `limit`, where interiors are certainly disjoint. They are known to
-    /// meet at all moves shorter than `from`. A common point before the move, if one is known, helps to find others on the way.
+    /// meet at all moves shorter than `from`. A rough search may pass over places that are free for a part of the way to them.
     pub(super) fn free_on(
         &mut self,
         line: &Line<'_>,
-        (from, mut common): (f64, Option<Point>),
+        from: f64,
         limit: f64,
+        is_rough: bool,
     ) -> Result<Option<Free>, QueryError> {
         let (mut at, mut last, mut stuck) = (from, None, 1.0);
-        let (mut crossings, mut patience) = (0, FIRST_CROSSINGS);
+        let mut step = if is_rough && limit > MANY_TRIANGLES * line.grain { line.grain / 4.0 } else { 0.0 };
+        let mut least = 0.0;
         while at < limit && at <= line.length {
+            while step > least && at < limit {
+                if self.relation_of(line.a, line.b, &line.pose_at(at + step))? == Relation::Apart {
+                    (step, least) = (step / FEW_CROSSINGS, line.grain);
+                } else {
+                    (at, step) = (at + step, step * GROWTH);
+                }
+            }
             let leaving = self.leaving(line, at)?;
             let touches = leaving.touches_until.is_some();
             last = if touches { line.last_contact(at, &leaving) } else { last };
             if leaving.crosses_until > line.error {
                 at += leaving.crosses_until;
-                crossings += 1;
-                while crossings >= patience
-                    && at < limit
-                    && let Some(point) = common
-                {
-                    let balls = self.balls_near(line, at, point)?;
-                    if balls.lower() < 2.0 * leaving.crosses_until {
-                        (crossings, patience) = (0, 2 * patience);
-                        common = common.filter(|_| balls.lower() > 0.0);
-                        break;
-                    }
-                    at += balls.lower();
-                    common = Some([0, 1, 2].map(|k| balls.centre[k] - 0.5 * at * line.direction[k]));
-                }
+                least = FEW_CROSSINGS * leaving.crosses_until;
                 continue;
             }
             let until = at + leaving.touches_until.unwrap_or(0.0);
@@ -201,20 +204,6 @@ impl Querier {
             };
         }
         Ok(None)
-    }
-
-    /// Returns a deep point at a place on a line, found from one that is given for no move: B's part of it moves as far as B does,
-    /// A's does not, and their middle half as far.
-    fn balls_near(&mut self, line: &Line<'_>, at: f64, point: Point) -> Result<Balls, QueryError> {
-        let pose = line.pose_at(at);
-        let (a, b) = (line.a.into(), line.b.at(&pose));
-        let centre = [0, 1, 2].map(|k| point[k] + 0.5 * at * line.direction[k]);
-        let mut balls = line.no_balls();
-        balls.take(centre, self.depths(&a, &b, &centre)?);
-        if balls.lower() > 0.0 {
-            self.ascend(&a, &b, &mut balls, STEPS_ON_THE_WAY)?;
-        }
-        Ok(balls)
     }
 
     /// Returns how far interiors meet without a gap, up to the end of a way.

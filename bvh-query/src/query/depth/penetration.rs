@@ -129,7 +129,7 @@ impl Querier {
             return Ok(Separation { lower: 0.0, upper: 0.0, translation: [0.0; 3] });
         }
         let line = Line::new(a, b, pose).along(direction);
-        let (lower, upper) = match self.free_on(&line, (0.0, None), f64::INFINITY)? {
+        let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY, false)? {
             Some(Free { at, .. }) => (self.cover(&line, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
             None => (0.0, line.length),
@@ -148,7 +148,7 @@ impl Querier {
     /// continuous function of the pose: then `lower` is about 0, and `upper` how far the peg has to be pulled. All numbers have
     /// the same bits on all backends.
     ///
-    /// Cost: up to a millisecond for shapes of a hundred triangles, some for large meshes. A budget
+    /// Cost: up to a millisecond for shapes of a hundred triangles, some ten for large meshes. A budget
     /// ([`Querier::set_budget`]) ends the search early; the bounds so far are the answer.
     ///
     /// # Errors
@@ -344,9 +344,7 @@ impl<'a> DepthSearch<'a> {
     fn attempt(&mut self, querier: &mut Querier, direction: Point) -> Result<Option<Free>, QueryError> {
         let line = self.line.along(direction);
         // All moves shorter than the lower bound are covered, in whatever direction.
-        let lower = self.balls.lower();
-        let common = (lower > 0.0).then_some(self.balls.centre);
-        let free = querier.free_on(&line, (lower, common), WAY_FACTOR * self.best)?;
+        let free = querier.free_on(&line, self.balls.lower(), WAY_FACTOR * self.best, true)?;
         if let Some(free) = &free
             && free.at < self.best
         {
