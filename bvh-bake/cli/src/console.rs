@@ -317,8 +317,8 @@ pub(crate) fn escape(text: &str) -> String {
         '<' => "&lt;".to_owned(),
         '>' => "&gt;".to_owned(),
         '"' => "&quot;".to_owned(),
-        // XML has no way to write most of these.
-        c if c.is_control() => "\u{fffd}".to_owned(),
+        // XML has no way to write most of these (XML 1.0, production 2).
+        c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => "\u{fffd}".to_owned(),
         c => c.to_string(),
     };
     text.chars().map(escaped).collect()
@@ -415,5 +415,16 @@ mod tests {
             assert_eq!(significant(value), expected);
             assert_eq!(expected.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
         }
+    }
+
+    #[test]
+    fn characters_that_xml_lacks_are_replaced() {
+        // The replacement character itself is the last one before U+FFFE.
+        assert_eq!(
+            escape("\u{8}\u{b}\u{1f} \u{fffd}\u{fffe}\u{ffff}"),
+            "\u{fffd}\u{fffd}\u{fffd} \u{fffd}\u{fffd}\u{fffd}"
+        );
+        assert_eq!(escape("\u{d7ff}\u{e000}\u{10000}\u{10ffff}"), "\u{d7ff}\u{e000}\u{10000}\u{10ffff}");
+        assert_eq!(escape("<a & \"b\">"), "&lt;a &amp; &quot;b&quot;&gt;");
     }
 }

@@ -444,13 +444,14 @@ fn topics_of_bcf_can_be_read_back() {
     assert_eq!(bytes, std::fs::read(directory.join("b.bcfzip")).unwrap());
     let files = unzip(&bytes);
     let clashes = answer["clashes"].as_array().unwrap();
-    assert_eq!(files.len(), 1 + 2 * clashes.len());
+    assert_eq!(files.len(), 1 + 3 * clashes.len());
     let parsed =
         |text: &str| elements(text.strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n").unwrap());
     assert_eq!(parsed(&files["bcf.version"])[0].1["VersionId"], "2.1");
     let mut indices = Vec::new();
     for (name, text) in files.iter().filter(|(name, _)| name.ends_with("/markup.bcf")) {
         let folder = name.strip_suffix("/markup.bcf").unwrap();
+        assert_eq!(files[&format!("{folder}/")], "", "an entry of the folder");
         let markup = parsed(text);
         let order: Vec<&str> = markup.iter().map(|(name, _)| &**name).collect();
         let fields =

@@ -13,8 +13,8 @@ use bvh_query::ClashClass;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The files of a topic.
-const FILES_PER_TOPIC: usize = 2;
+/// The entries of a topic in the archive: its folder and its two files.
+const ENTRIES_PER_TOPIC: usize = 3;
 const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
 /// The vertical angle of view in degrees. The format allows 45 to 60.
 const FIELD_OF_VIEW: f64 = 60.0;
@@ -25,12 +25,12 @@ const DIAGONALS_AWAY: f64 = 2.0;
 pub(super) fn archive(path: &Path, assembly: &Assembly, found: &[Found<'_>]) -> Result<Vec<u8>, Failure> {
     let too_many = || {
         let path = path.display();
-        let (most, count) = ((MAX_ENTRIES - 1) / FILES_PER_TOPIC, found.len());
+        let (most, count) = ((MAX_ENTRIES - 1) / ENTRIES_PER_TOPIC, found.len());
         Failure::Limit(format!(
             "{path}: expected at most {most} clashes in a BCF file, found {count}; use --csv or --json"
         ))
     };
-    if 1 + FILES_PER_TOPIC * found.len() > MAX_ENTRIES {
+    if 1 + ENTRIES_PER_TOPIC * found.len() > MAX_ENTRIES {
         return Err(too_many());
     }
     let date = date(seconds_since_1970()?);
@@ -39,6 +39,8 @@ pub(super) fn archive(path: &Path, assembly: &Assembly, found: &[Found<'_>]) -> 
     archive.add("bcf.version", format!("{XML}{version}").as_bytes());
     for (index, clash) in found.iter().enumerate() {
         let topic = guid(clash, "topic");
+        // BCF 2.1 asks for entries of the folders (Implementation Agreements, .BCFZIP encoding guide).
+        archive.add(&format!("{topic}/"), b"");
         archive.add(&format!("{topic}/markup.bcf"), markup(assembly, clash, index, &date).as_bytes());
         archive.add(&format!("{topic}/viewpoint.bcfv"), viewpoint(assembly, clash).as_bytes());
     }

@@ -15,12 +15,12 @@ pub(super) struct Archive {
 
 /// Midnight on the first of January 1980, the earliest time that the format knows.
 const TIME_AND_DATE: [u8; 4] = [0, 0, 0x21, 0];
-/// What is needed to read an entry: version 1.0, UTF-8 names, no compression.
-const VERSION: [u8; 2] = [10, 0];
+/// What is needed to read an entry: version 2.0, the first one with folders, UTF-8 names, no compression.
+const VERSION: [u8; 2] = [20, 0];
 const FLAGS_AND_METHOD: [u8; 4] = [0, 8, 0, 0];
 
 impl Archive {
-    /// Adds a file. There are at most [`MAX_ENTRIES`].
+    /// Adds a file, or a folder, whose name ends with a slash and whose content is empty. There are at most [`MAX_ENTRIES`].
     pub(super) fn add(&mut self, name: &str, content: &[u8]) {
         let offset = (self.bytes.len() as u32).to_le_bytes();
         let length = (content.len() as u32).to_le_bytes();
