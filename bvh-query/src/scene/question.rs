@@ -104,6 +104,12 @@ impl InstancePair<'_> {
     }
 }
 
+/// A question about a pair with yes or no for an answer.
+type YesOrNo<'a> = &'a (dyn Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync);
+
+/// Takes some near pairs of a scene, and breaks where no more are wanted.
+type VisitPairs<'a> = &'a mut dyn FnMut(&mut Scene, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>;
+
 /// Sorts near pairs by the gaps of their boxes.
 fn nearest_first(near_pairs: &mut [NearPair]) {
     near_pairs
@@ -124,7 +130,7 @@ impl Scene {
     /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
     /// suffice, unless another pair is found to touch.
     pub fn collide(&mut self) -> Result<bool, SceneError> {
-        self.any(0.0, |querier, pair| pair.collide(querier))
+        self.any(0.0, &|querier, pair| pair.collide(querier))
     }
 
     /// Returns whether any pair is at most `d` apart, in mesh units.
@@ -133,7 +139,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::collide`].
     pub fn within(&mut self, d: f64) -> Result<bool, SceneError> {
         check_distance(d)?;
-        self.any(d, |querier, pair| pair.within(querier, d))
+        self.any(d, &|querier, pair| pair.within(querier, d))
     }
 
     /// Returns all pairs that touch.
@@ -141,7 +147,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Pair`] with the first pair whose question has no answer.
     pub fn pairs_in_contact(&mut self) -> Result<Vec<ScenePair>, SceneError> {
-        self.all(0.0, |querier, pair| pair.collide(querier))
+        self.all(0.0, &|querier, pair| pair.collide(querier))
     }
 
     /// Returns all pairs that are at most `d` apart, in mesh units.
@@ -150,7 +156,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::pairs_in_contact`].
     pub fn pairs_within(&mut self, d: f64) -> Result<Vec<ScenePair>, SceneError> {
         check_distance(d)?;
-        self.all(d, |querier, pair| pair.within(querier, d))
+        self.all(d, &|querier, pair| pair.within(querier, d))
     }
 
     /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, with their relations.
@@ -187,7 +193,7 @@ impl Scene {
     ) -> Result<Vec<SceneClash>, SceneError> {
         options.check()?;
         let mut all = Vec::new();
-        self.each_piece(options.clearance, |scene, mut near_pairs| {
+        self.each_piece(options.clearance, &mut |scene, mut near_pairs| {
             near_pairs.retain(|near_pair| scene.ids(near_pair).is_some_and(&is_asked));
             all.extend(scene.each(&near_pairs, |querier, pair| {
                 let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
@@ -224,7 +230,7 @@ impl Scene {
         mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
         check_distance(d)?;
-        self.each_piece(d, |scene, near_pairs| {
+        self.each_piece(d, &mut |scene, near_pairs| {
             scene.remember(&near_pairs);
             for near_pair in near_pairs {
                 let found = scene
@@ -246,7 +252,7 @@ impl Scene {
         &mut self,
         mut visit: impl FnMut(ScenePair, &[Contact]) -> ControlFlow<()>,
     ) -> Result<(), SceneError> {
-        self.each_piece(0.0, |scene, near_pairs| {
+        self.each_piece(0.0, &mut |scene, near_pairs| {
             for near_pair in near_pairs {
                 let found = scene.each(&[near_pair], |querier, pair| {
                     Ok(Some((pair.ids, querier.contacts(pair.a, pair.b, &pair.pose)?)))
@@ -345,15 +351,11 @@ impl Scene {
     }
 
     /// Asks the pairs at most `limit` apart until one says yes.
-    fn any(
-        &mut self,
-        limit: f64,
-        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync,
-    ) -> Result<bool, SceneError> {
+    fn any(&mut self, limit: f64, ask: YesOrNo<'_>) -> Result<bool, SceneError> {
         self.start();
         let likely = self.likely_pair();
         if let Some(likely) = likely
-            && self.any_of(&[likely], &ask)?
+            && self.any_of(&[likely], ask)?
         {
             return Ok(true);
         }
@@ -362,7 +364,7 @@ impl Scene {
             near_pairs.retain(|near_pair| likely.is_none_or(|likely| !near_pair.is_of(&likely)));
             // The nearest boxes are the likeliest.
             nearest_first(&mut near_pairs);
-            match self.any_of(&near_pairs, &ask) {
+            match self.any_of(&near_pairs, ask) {
                 Ok(false) => {}
                 Ok(true) => return Ok(true),
                 // Where no visits are left, none of the other pairs has an answer.
@@ -374,11 +376,7 @@ impl Scene {
     }
 
     /// Asks near pairs until one says yes. Where one says yes, an error about another does not matter.
-    fn any_of(
-        &mut self,
-        near_pairs: &[NearPair],
-        ask: &(impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync),
-    ) -> Result<bool, SceneError> {
+    fn any_of(&mut self, near_pairs: &[NearPair], ask: YesOrNo<'_>) -> Result<bool, SceneError> {
         // By a pair that says yes, or because no visits are left.
         let is_decided = AtomicBool::new(false);
         self.remember(near_pairs);
@@ -403,13 +401,9 @@ impl Scene {
     }
 
     /// Asks all pairs at most `limit` apart.
-    fn all(
-        &mut self,
-        limit: f64,
-        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync,
-    ) -> Result<Vec<ScenePair>, SceneError> {
+    fn all(&mut self, limit: f64, ask: YesOrNo<'_>) -> Result<Vec<ScenePair>, SceneError> {
         let mut all = Vec::new();
-        self.each_piece(limit, |scene, near_pairs| {
+        self.each_piece(limit, &mut |scene, near_pairs| {
             scene.remember(&near_pairs);
             all.extend(scene.each(&near_pairs, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))?);
             Ok(ControlFlow::Continue(()))
@@ -424,7 +418,7 @@ impl Scene {
         ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         let mut all = Vec::new();
-        self.each_piece(limit, |scene, near_pairs| {
+        self.each_piece(limit, &mut |scene, near_pairs| {
             all.extend(scene.each(&near_pairs, &ask)?);
             Ok(ControlFlow::Continue(()))
         })?;
@@ -433,11 +427,7 @@ impl Scene {
 
     /// Starts a question, and calls `visit` with the tested pairs whose boxes are at most `limit` apart, until `visit`
     /// breaks. The pairs come in ascending order, in several calls if there are many.
-    fn each_piece(
-        &mut self,
-        limit: f64,
-        mut visit: impl FnMut(&mut Self, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>,
-    ) -> Result<(), SceneError> {
+    fn each_piece(&mut self, limit: f64, visit: VisitPairs<'_>) -> Result<(), SceneError> {
         self.start();
         let mut next = Next::All;
         while let Some(mut near_pairs) = self.next_piece(&mut next, limit)? {
@@ -525,25 +515,42 @@ impl Scene {
         let asked = AtomicU64::new(self.pairs_asked);
         let scene = &*self;
         let found = scene.workers.each(near_pairs, &mut stats, |querier, near_pair| {
-            let (Some((a, b)), Some(ids)) = (scene.both(near_pair), scene.ids(near_pair)) else {
-                return Ok(None);
-            };
-            let pose = Pose::relative_of_instances(&a.world, &b.world);
-            let before = querier.questions();
-            let margins = (a.margin + scene.contents.margin_of_pair(near_pair.a, near_pair.b), b.margin);
-            let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
-            let tracker = scene.trackers.get((near_pair.a, near_pair.b));
-            let (a, b) = (a.shape().with_margin(margins.0), b.shape().with_margin(margins.1));
-            let pair = &mut InstancePair { ids, a, b, pose, tracker };
-            let answer = scene.workers.ask_rest(querier, |querier| ask(querier, pair));
-            asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
-            answer
+            let mut answer = None;
+            scene.ask_pair(querier, near_pair, &asked, &mut |querier, pair| {
+                answer = ask(querier, pair)?;
+                Ok(())
+            })?;
+            Ok(answer)
         });
         (self.stats, self.pairs_asked) = (stats, asked.into_inner());
         found.map_err(|(number, source)| match self.ids(&near_pairs[number]) {
             Some(pair) => self.pair_error(pair, source),
             None => source.into(),
         })
+    }
+
+    /// Asks about a near pair, and counts its questions. It calls `ask` through a pointer, so that it is compiled once, and not
+    /// for each question.
+    fn ask_pair(
+        &self,
+        querier: &mut Querier,
+        near_pair: &NearPair,
+        asked: &AtomicU64,
+        ask: &mut dyn FnMut(&mut Querier, &mut InstancePair<'_>) -> Result<(), QueryError>,
+    ) -> Result<(), QueryError> {
+        let (Some((a, b)), Some(ids)) = (self.both(near_pair), self.ids(near_pair)) else {
+            return Ok(());
+        };
+        let pose = Pose::relative_of_instances(&a.world, &b.world);
+        let before = querier.questions();
+        let margins = (a.margin + self.contents.margin_of_pair(near_pair.a, near_pair.b), b.margin);
+        let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
+        let tracker = self.trackers.get((near_pair.a, near_pair.b));
+        let (a, b) = (a.shape().with_margin(margins.0), b.shape().with_margin(margins.1));
+        let pair = &mut InstancePair { ids, a, b, pose, tracker };
+        let answer = self.workers.ask_rest(querier, |querier| ask(querier, pair));
+        asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
+        answer
     }
 
     /// Names the pair whose question has no answer.

@@ -6,6 +6,7 @@ use crate::query::answers::QueryStats;
 use crate::query::querier::Querier;
 use crate::traverse::budget::Budget;
 use std::fmt;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -106,15 +107,28 @@ impl Workers {
         answer
     }
 
-    /// Lends a querier to `work`.
-    fn lend<R>(&self, work: impl FnOnce(&mut Querier) -> R) -> R {
+    /// Asks about pairs by their numbers, one after the other, and returns the work that it took. It calls `ask` through a
+    /// pointer, so that it is compiled once, and not for each question.
+    fn share(
+        &self,
+        mut numbers: Range<usize>,
+        ask: &mut dyn FnMut(&mut Querier, usize) -> Result<(), QueryError>,
+    ) -> Result<QueryStats, (usize, QueryError)> {
         // A panic elsewhere leaves the list of queriers whole.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut querier = idle().pop().unwrap_or_else(|| Querier::with_backend(self.backend));
         querier.set_budget(self.budget);
-        let result = work(&mut querier);
+        let mut stats = QueryStats::default();
+        let asked = numbers.try_for_each(|number| {
+            let before = querier.questions();
+            ask(&mut querier, number).map_err(|error| (number, error))?;
+            if querier.questions() != before {
+                stats.add(querier.stats().node_tests, querier.stats());
+            }
+            Ok(())
+        });
         idle().push(querier);
-        result
+        asked.map(|()| stats)
     }
 
     /// Asks about each pair and returns the answers that are not `None`, in the order of the pairs. The error is that of the
@@ -128,27 +142,22 @@ impl Workers {
         if pairs.is_empty() {
             return Ok(Vec::new());
         }
-        let share = |first: usize, pairs: &[P]| {
-            self.lend(|querier| {
-                let (mut found, mut stats) = (Vec::new(), QueryStats::default());
-                for (number, pair) in (first..).zip(pairs) {
-                    let before = querier.questions();
-                    let answer = ask(querier, pair).map_err(|error| (number, error))?;
-                    if querier.questions() != before {
-                        stats.add(querier.stats().node_tests, querier.stats());
-                    }
-                    found.extend(answer);
-                }
-                Ok((found, stats))
-            })
+        let share = |numbers: Range<usize>| {
+            let mut found = Vec::new();
+            let part = self.share(numbers, &mut |querier, number| {
+                found.extend(ask(querier, &pairs[number])?);
+                Ok(())
+            })?;
+            Ok((found, part))
         };
         #[cfg(feature = "parallel")]
         if self.threads() > 1 && pairs.len() > 1 {
             use rayon::prelude::*;
             // A few shares for each thread, because pairs take different times.
             let size = pairs.len().div_ceil(4 * self.threads());
-            let of_share = |(number, pairs): (usize, &[P])| share(number * size, pairs);
-            let shares: Vec<_> = pairs.par_chunks(size).enumerate().map(of_share).collect();
+            let of_share = |first: usize| share(first..pairs.len().min(first + size));
+            let firsts: Vec<usize> = (0..pairs.len()).step_by(size).collect();
+            let shares: Vec<_> = firsts.into_par_iter().map(of_share).collect();
             let mut all = Vec::new();
             for part in shares {
                 let (found, part) = part?;
@@ -157,7 +166,7 @@ impl Workers {
             }
             return Ok(all);
         }
-        let (found, part) = share(0, pairs)?;
+        let (found, part) = share(0..pairs.len())?;
         stats.add(part.node_tests, part);
         Ok(found)
     }
