@@ -98,7 +98,7 @@ pub enum NumberError {
     /// The absolute error of a distance.
     #[error("abs_err: expected a finite length of at least 0, found {0}")]
     AbsErr(f64),
-    /// The clearance of a motion.
+    /// The clearance of a motion or of a clash.
     #[error("clearance: expected a finite length of at least 0, found {0}")]
     Clearance(f64),
     /// The tolerance of a motion.

@@ -7,7 +7,9 @@ use bvh_bake::Options;
 use bvh_bake::mesh::Mesh;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
-use bvh_query::{Backend, Batch, Bvh, PatchOptions, PenetrationOptions, Pose, Querier, QueryError, Tracker};
+use bvh_query::{
+    Backend, Batch, Bvh, ClashOptions, PatchOptions, PenetrationOptions, Pose, Querier, QueryError, Tracker,
+};
 use common::shapes::{cube, dirty, moved, soup, sphere, torus};
 use common::{Random, backends, bake, baked, mesh, options, random_pose, translation};
 
@@ -55,12 +57,15 @@ fn batches_answer_about_overlaps_as_one_by_one() {
     let (a, b) = (baked(&cube()), baked(&moved(&cube(), 0.75, [0.25, 0.0, 0.5])));
     let poses = poses(&mut Random::new(5), 48);
     let (depth, patch) = (PenetrationOptions::new().relative_gap(0.5), PatchOptions::new().max_contacts(20));
+    let clash = ClashOptions::new().clearance(0.5).tolerance(0.1);
     let up = [0.0, 0.0, 2.0];
     let mut querier = Querier::new().unwrap();
-    let (mut separations, mut penetrations, mut regions, mut patches) = (vec![], vec![], vec![], vec![]);
+    let (mut separations, mut penetrations, mut clashes) = (vec![], vec![], vec![]);
+    let (mut regions, mut patches) = (vec![], vec![]);
     for pose in &poses {
         separations.push(querier.separation(&a, &b, pose, up).unwrap());
         penetrations.push(querier.penetration(&a, &b, pose, &depth).unwrap());
+        clashes.push(querier.clash(&a, &b, pose, &clash).unwrap());
         regions.push(querier.contact_regions(&a, &b, pose, 10).unwrap());
         patches.push(querier.patches(&a, &b, pose, &patch).unwrap());
     }
@@ -70,6 +75,7 @@ fn batches_answer_about_overlaps_as_one_by_one() {
         pool.install(|| {
             assert_eq!(batch.separations(&poses, up), Ok(separations.clone()));
             assert_eq!(batch.penetrations(&poses, &depth), Ok(penetrations.clone()));
+            assert_eq!(batch.clashes(&poses, &clash), Ok(clashes.clone()));
             assert_eq!(batch.contact_regions(&poses, 10), Ok(regions.clone()));
             assert_eq!(batch.patches(&poses, &patch), Ok(patches.clone()));
         });
@@ -77,6 +83,7 @@ fn batches_answer_about_overlaps_as_one_by_one() {
     // Numbers are checked even without poses.
     assert!(batch.separations(&[], [0.0; 3]).is_err());
     assert!(batch.penetrations(&[], &depth.relative_gap(0.0)).is_err());
+    assert!(batch.clashes(&[], &clash.clearance(-1.0)).is_err());
     assert!(batch.patches(&[], &patch.tolerance(-1.0)).is_err());
 }
 

@@ -14,6 +14,7 @@ use crate::isa::{Backend, BackendError};
 use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
+use crate::query::depth::clash::{Clash, ClashOptions};
 use crate::query::depth::penetration::{Penetration, PenetrationOptions, Separation, unit};
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
@@ -149,6 +150,16 @@ impl<'a> Batch<'a> {
     ) -> Result<Vec<Penetration>, QueryError> {
         options.check()?;
         self.each(poses, |querier, _, pose| querier.penetration(self.a, self.b, pose, options))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::clash`] for each pose.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if an option is invalid; else the error of the first pose that fails.
+    pub fn clashes(&self, poses: &[Pose], options: &ClashOptions) -> Result<Vec<Clash>, QueryError> {
+        options.check()?;
+        self.each(poses, |querier, _, pose| querier.clash(self.a, self.b, pose, options))
             .map_err(|(_, error)| error)
     }
 

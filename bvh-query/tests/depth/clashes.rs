@@ -44,7 +44,7 @@ fn pairs_have_the_class_that_their_gap_and_depth_say() {
             }
         }
         for (options, what) in [
-            (ClashOptions::new().clearance(-1.0), "d: expected"),
+            (ClashOptions::new().clearance(-1.0), "clearance: expected"),
             (ClashOptions::new().tolerance(f64::NAN), "tolerance: expected"),
             (ClashOptions::new().relative_gap(0.0), "relative_gap: expected"),
         ] {

@@ -8,7 +8,7 @@ use crate::query::depth::balls::bounds;
 use crate::query::depth::penetration::{Penetration, PenetrationOptions, check_closed};
 use crate::query::displacement::{displacement, size};
 use crate::query::exact::{placed, stored_at};
-use crate::query::options::{check, check_distance};
+use crate::query::options::check;
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
@@ -127,7 +127,7 @@ impl ClashOptions {
     }
 
     pub(crate) fn check(&self) -> Result<(), QueryError> {
-        check_distance(self.clearance)?;
+        check(NumberError::Clearance, self.clearance)?;
         PenetrationOptions::new().relative_gap(self.relative_gap).check()?;
         self.tolerance.map_or(Ok(()), |tolerance| check(NumberError::DepthTolerance, tolerance))
     }
