@@ -589,6 +589,65 @@ typedef struct cbvh_penetration_options {
 cbvh_status cbvh_penetrations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                               const cbvh_penetration_options *options, cbvh_penetration *answers);
 
+/* How two parts of an assembly lie. */
+typedef int32_t cbvh_clash_class;
+enum {
+    /* Their surfaces are farther apart than the clearance, and neither is inside the other. */
+    CBVH_CLASH_APART = 0,
+    /* Their surfaces do not touch, but are at most the clearance apart. */
+    CBVH_CLASH_NEAR = 1,
+    /* They have points in common, and their depth is at most the tolerance. */
+    CBVH_CLASH_TOUCHING = 2,
+    /* Their depth exceeds the tolerance. */
+    CBVH_CLASH_OVERLAPPING = 3,
+    /* One is wholly inside the other. */
+    CBVH_CLASH_CONTAINED = 4,
+    /* Both are the same part in the same place, to within the tolerance. */
+    CBVH_CLASH_DUPLICATED = 5,
+    /* They have points in common, and the tolerance lies between the bounds that were found for their depth. */
+    CBVH_CLASH_UNDECIDED = 6,
+    /* They have points in common, and one is not closed, so that they have no depth. */
+    CBVH_CLASH_INTERSECTING = 7
+};
+
+/* How two parts lie, and by how much, in mesh units. */
+typedef struct cbvh_clash {
+    cbvh_clash_class kind;
+    cbvh_relation relation;
+    /* For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others. */
+    double distance;
+    /* A point of the clash in A's frame: between the closest points, in both parts, or in contact. 0 for parts that are
+     * apart. */
+    double point[3];
+    /* For parts that touch, overlap or are undecided: the bounds of their depth. NaN for all others. `is_spent` is 1 if
+     * the visits of the options or the budget of the querier ended the search. */
+    cbvh_penetration depth;
+} cbvh_clash;
+
+/* What counts as a clash. */
+typedef struct cbvh_clash_options {
+    size_t size;
+    /* Parts at most this far apart are near: finite, at least 0; 0 looks for no near parts. */
+    double clearance;
+    /* Parts overlap if they do so by more than this depth: finite, above 0; 0 for a millionth of the largest side of both
+     * parts. */
+    double tolerance;
+    /* The search for a depth ends when the upper bound exceeds the lower one by no more than this part of it: finite,
+     * above 0; 0 for 0.1. */
+    double relative_gap;
+    /* The most visits of the search for the depth of a pair, which count towards the budget; 0 for 2^20. */
+    uint64_t visits;
+} cbvh_clash_options;
+
+/* Answers how two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place. Parts that touch
+ * are told apart from parts that overlap by their depth (cbvh_penetrations): flush faces overlap by roundings in nearly
+ * all poses, so that a tolerance is part of the question. Where a part fits another one without a gap, like a peg in its
+ * hole, the depth is mostly undecided. One core is used. CBVH_INVALID_ARGUMENT for a file that was baked without
+ * topology, where the question is about the inside; CBVH_LIMIT if the budget does not suffice for the rest of the
+ * question. */
+cbvh_status cbvh_clashes(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+                         const cbvh_clash_options *options, cbvh_clash *answers);
+
 /* How two triangles of one mesh meet, by the corners that they have in common. */
 typedef int32_t cbvh_self_contact_kind;
 enum {
@@ -949,6 +1008,13 @@ typedef struct cbvh_scene_contact {
     cbvh_contact contact;
 } cbvh_scene_contact;
 
+/* A pair that clashes, and how. */
+typedef struct cbvh_scene_clash {
+    cbvh_scene_pair pair;
+    /* As cbvh_clashes answers, in A's frame. */
+    cbvh_clash clash;
+} cbvh_scene_clash;
+
 /* Answers whether any pair touches. */
 cbvh_status cbvh_scene_collide(cbvh_scene scene, bool *answer);
 /* Answers whether any pair is at most `d` apart. */
@@ -963,6 +1029,10 @@ cbvh_status cbvh_scene_pairs_within(cbvh_scene scene, double d, cbvh_scene_pair 
 cbvh_status cbvh_scene_relations(cbvh_scene scene, cbvh_scene_relation *relations, size_t capacity, size_t *count);
 /* Lists all pairs of triangles in contact. */
 cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, size_t capacity, size_t *count);
+/* Lists all pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs
+ * that are apart are left out. */
+cbvh_status cbvh_scene_clashes(cbvh_scene scene, const cbvh_clash_options *options, cbvh_scene_clash *clashes,
+                               size_t capacity, size_t *count);
 
 /* Answers whether some instances can move freely at the same time along paths in the world, while the others stand
  * still. The answer is the earliest hit of all pairs with at least one moving instance. The present poses of moving

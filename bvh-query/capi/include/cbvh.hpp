@@ -80,6 +80,7 @@ using SelfContact = cbvh_self_contact;
 using DistanceAnswer = cbvh_distance_answer;
 using Separation = cbvh_separation;
 using Penetration = cbvh_penetration;
+using Clash = cbvh_clash;
 using ClosestPoint = cbvh_closest_point;
 using RayHit = cbvh_ray_hit;
 using Segment = cbvh_segment;
@@ -196,6 +197,17 @@ struct PenetrationOptions {
     double tolerance = 0;
 
     cbvh_penetration_options raw() const { return {sizeof(cbvh_penetration_options), relative_gap, tolerance}; }
+};
+
+struct ClashOptions {
+    double clearance = 0;
+    double tolerance = 0;
+    double relative_gap = 0;
+    std::uint64_t visits = 0;
+
+    cbvh_clash_options raw() const {
+        return {sizeof(cbvh_clash_options), clearance, tolerance, relative_gap, visits};
+    }
 };
 
 struct PatchOptions {
@@ -812,6 +824,20 @@ public:
             return cbvh_penetrations(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
         });
     }
+    /// How do two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place?
+    Clash clash(const Mesh &a, const Mesh &b, const Pose &pose, const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        Clash answer{};
+        check(cbvh_clashes(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<Clash> clash(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                             const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        return detail::answers<Clash>(poses.size(), [&](Clash *answers) {
+            return cbvh_clashes(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+        });
+    }
     /// Which triangles of a mesh meet where they should not?
     std::vector<SelfContact> self_contacts(const Mesh &mesh) {
         return detail::list<SelfContact>(room_, [&](SelfContact *contacts, std::size_t capacity, std::size_t *count) {
@@ -1185,6 +1211,15 @@ public:
         return detail::list<cbvh_scene_contact>(
             room_, [&](cbvh_scene_contact *found, std::size_t capacity, std::size_t *count) {
                 return cbvh_scene_contacts(raw(), found, capacity, count);
+            });
+    }
+
+    /// The pairs that are not apart, with how they lie.
+    std::vector<cbvh_scene_clash> clashes(const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        return detail::list<cbvh_scene_clash>(
+            room_, [&](cbvh_scene_clash *found, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_clashes(raw(), &raw_options, found, capacity, count);
             });
     }
 

@@ -7,8 +7,8 @@ use crate::pairs::{Least, Question};
 use crate::queriers;
 use crate::status::Failure;
 use crate::types::{
-    MeshHandle, PatchChoices, PatchCounts, PatchRow, PenetrationChoices, PenetrationRow, PoseRows,
-    QuerierHandle, RegionRow, SelfContactRow, SeparationRow,
+    ClashChoices, ClashRow, MeshHandle, PatchChoices, PatchCounts, PatchRow, PenetrationChoices,
+    PenetrationRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow,
 };
 use bvh_query::{Pose, Querier, QueryError, Shape};
 
@@ -74,6 +74,25 @@ pub unsafe extern "C" fn cbvh_penetrations(
         question.each_on_one_core(answers, |querier, [a, b], (_, pose)| {
             Ok(querier.penetration(a, b, pose, &options)?)
         })
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_clashes(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    poses: *const PoseRows,
+    count: usize,
+    options: *const ClashChoices,
+    answers: *mut ClashRow,
+) -> i32 {
+    let question = Question { querier, a, b, poses, count };
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let options = input::options("options", options)?.read();
+        question
+            .each_on_one_core(answers, |querier, [a, b], (_, pose)| Ok(querier.clash(a, b, pose, &options)?))
     })
 }
 

@@ -5,10 +5,11 @@
 use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
-    Backend, ClosestPoint, Contact, ContactRegion, Distance, DistanceOptions, InstanceId, MotionAnswer,
-    MotionOptions, Patch, PatchOptions, Penetration, PenetrationOptions, Pose, QueryStats, Ray, RayHit,
-    RegionKind, Relation, SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer, ScenePair,
-    SceneRayHit, SelfContact, SelfContactKind, Separation, Side, SignedDistance,
+    Backend, Clash, ClashClass, ClashOptions, ClosestPoint, Contact, ContactRegion, Distance,
+    DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, Penetration,
+    PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
+    SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SelfContact, SelfContactKind,
+    Separation, Side, SignedDistance,
 };
 use std::ffi::c_char;
 
@@ -48,6 +49,7 @@ structures! {
     DistanceChoices { size: usize, rel_err: f64, abs_err: f64 }
     MotionChoices { size: usize, clearance: f64, tolerance: f64 }
     PenetrationChoices { size: usize, relative_gap: f64, tolerance: f64 }
+    ClashChoices { size: usize, clearance: f64, tolerance: f64, relative_gap: f64, visits: u64 }
     PatchChoices { size: usize, tolerance: f64, max_contacts: usize }
     BakeChoices {
         size: usize,
@@ -92,6 +94,7 @@ structures! {
         is_spent: i32,
         reserved: i32,
     }
+    ClashRow { kind: i32, relation: i32, distance: f64, point: [f64; 3], depth: PenetrationRow }
     RegionRow {
         contact: ContactRow,
         kind: i32,
@@ -140,6 +143,7 @@ structures! {
     SceneDistanceRow { pair: PairRow, nearest: DistanceRow, found: i32, reserved: i32 }
     SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
     SceneContactRow { pair: PairRow, contact: ContactRow }
+    SceneClashRow { pair: PairRow, clash: ClashRow }
 }
 
 macro_rules! numbers {
@@ -148,6 +152,8 @@ macro_rules! numbers {
 numbers!(MAP = 0, MAP_SPARSE = 1, MAP_WHOLE = 2, READ = 3);
 numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3, BACKEND_NEON = 4);
 numbers!(TOUCHING = 0, APART = 1, A_IN_B = 2, B_IN_A = 3, MIXED = 4, RELATION_UNDEFINED = 5);
+numbers!(CLASH_APART = 0, CLASH_NEAR = 1, CLASH_TOUCHING = 2, CLASH_OVERLAPPING = 3, CLASH_CONTAINED = 4);
+numbers!(CLASH_DUPLICATED = 5, CLASH_UNDECIDED = 6, CLASH_INTERSECTING = 7);
 numbers!(REGION_POINT = 0, REGION_SEGMENT = 1, REGION_POLYGON = 2);
 numbers!(SELF_CROSSING = 0, SELF_AT_CORNER = 1, SELF_FOLDED = 2, SELF_DUPLICATE = 3);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
@@ -229,6 +235,22 @@ impl PenetrationChoices {
     }
 }
 
+impl ClashChoices {
+    pub(crate) fn read(&self) -> ClashOptions {
+        let mut options = ClashOptions::new().clearance(self.clearance);
+        if self.tolerance != 0.0 {
+            options = options.tolerance(self.tolerance);
+        }
+        if self.relative_gap != 0.0 {
+            options = options.relative_gap(self.relative_gap);
+        }
+        if self.visits != 0 {
+            options = options.visits(self.visits);
+        }
+        options
+    }
+}
+
 impl PatchChoices {
     pub(crate) fn read(&self) -> PatchOptions {
         let most = if self.max_contacts == 0 { usize::MAX } else { self.max_contacts };
@@ -268,6 +290,7 @@ macro_rules! row {
 row!(ScenePair { a, b } => PairRow {});
 row!(Contact { object_a, triangle_a, object_b, triangle_b } => ContactRow {});
 row!(SceneContact { pair, contact } => SceneContactRow {});
+row!(SceneClash { pair, clash } => SceneClashRow {});
 row!(SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
 row!(Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
     => DistanceRow {});
@@ -278,6 +301,23 @@ row!(ClosestPoint { distance, lower, upper, point, object, triangle }
     => ClosestRow { instance: Instance::NONE, found: 1, side: SIDE_NOT_ASKED });
 row!(RayHit { t, lower, upper, point, object, triangle }
     => HitRow { instance: Instance::NONE, found: 1, reserved: 0 });
+
+impl From<Clash> for ClashRow {
+    fn from(of: Clash) -> Self {
+        let kind = match of.class {
+            ClashClass::Apart => CLASH_APART,
+            ClashClass::Near => CLASH_NEAR,
+            ClashClass::Touching => CLASH_TOUCHING,
+            ClashClass::Overlapping => CLASH_OVERLAPPING,
+            ClashClass::Contained => CLASH_CONTAINED,
+            ClashClass::Duplicated => CLASH_DUPLICATED,
+            ClashClass::Undecided => CLASH_UNDECIDED,
+            ClashClass::Intersecting => CLASH_INTERSECTING,
+        };
+        let Clash { distance, point, .. } = of;
+        Self { kind, relation: relation(of.relation), distance, point, depth: of.depth.into() }
+    }
+}
 
 impl From<ContactRegion> for RegionRow {
     fn from(of: ContactRegion) -> Self {
@@ -323,7 +363,8 @@ macro_rules! found {
         }
     )* };
 }
-found!(SceneDistanceRow: Self::NONE, HitRow: Self::NONE, ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
+found!(SceneDistanceRow: Self::NONE, HitRow: Self::NONE, PenetrationRow: Self::NONE);
+found!(ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
 
 impl From<SignedDistance> for ClosestRow {
     fn from(of: SignedDistance) -> Self {

@@ -116,6 +116,57 @@ static void lists(void) {
     OK(cbvh_mesh_free(mesh));
 }
 
+/* How cubes lie. */
+static void clashes(void) {
+    const cbvh_mesh one = cube(1), same = cube(1), quarter = cube(0.25);
+    cbvh_mesh open;
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 11, NULL, &open));
+    const cbvh_clash_options options = {.size = sizeof options, .clearance = 0.25, .tolerance = 0x1p-10};
+    /* The second part and where it is, and the class, the distance and the depth of both, which is NaN where there is none. */
+    const struct {
+        cbvh_mesh b;
+        double x, y;
+        cbvh_clash_class kind;
+        double distance, depth;
+    } cases[] = {
+        {one, 1.375, 0.125, CBVH_CLASH_APART, INFINITY, NAN},
+        {one, 1.0625, 0.125, CBVH_CLASH_NEAR, 0.0625, NAN},
+        {one, 1, 0.125, CBVH_CLASH_TOUCHING, 0, 0},
+        {one, 0.75, 0.125, CBVH_CLASH_OVERLAPPING, 0, 0.25},
+        {quarter, 0.125, 0.125, CBVH_CLASH_CONTAINED, 0, NAN},
+        {same, 0x1p-11, 0, CBVH_CLASH_DUPLICATED, 0, NAN},
+        {open, 1, 0.125, CBVH_CLASH_INTERSECTING, 0, NAN},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const cbvh_pose pose = shift(cases[k].x, cases[k].y, 0);
+        cbvh_clash found;
+        cbvh_relation relation;
+        OK(cbvh_clashes(querier, one, cases[k].b, &pose, 1, &options, &found));
+        OK(cbvh_relations(querier, one, cases[k].b, &pose, 1, &relation));
+        CHECK(found.kind == cases[k].kind && found.relation == relation && found.distance == cases[k].distance);
+        CHECK(isnan(found.depth.lower) == isnan(cases[k].depth) && isnan(found.depth.upper) == isnan(cases[k].depth));
+        CHECK(!(found.depth.lower > cases[k].depth) && !(found.depth.upper < cases[k].depth));
+        CHECK(!(found.depth.upper > 1.1 * found.depth.lower + 0x1p-20) && !found.depth.is_spent);
+        CHECK(fabs(found.point[0]) <= 0.5 + 0x1p-5 && fabs(found.point[1]) <= 0.5 + 0x1p-5);
+    }
+    /* By default nothing is near, and the tolerance is a millionth of the side. */
+    const cbvh_pose poses[3] = {shift(1.0625, 0.125, 0), shift(1 - 0x1p-21, 0.125, 0), shift(1 - 0x1p-18, 0.125, 0)};
+    cbvh_clash several[3];
+    OK(cbvh_clashes(querier, one, one, poses, 3, NULL, several));
+    CHECK(several[0].kind == CBVH_CLASH_APART && several[1].kind == CBVH_CLASH_TOUCHING &&
+          several[2].kind == CBVH_CLASH_OVERLAPPING);
+    /* Where the visits end the search, the bounds so far are the answer. */
+    const cbvh_clash_options few = {.size = sizeof few, .tolerance = 0x1p-10, .relative_gap = 0.01, .visits = 200};
+    const cbvh_pose deep = shift(0.96875, 0.125, 0);
+    OK(cbvh_clashes(querier, one, one, &deep, 1, &few, several));
+    CHECK(several[0].kind == CBVH_CLASH_UNDECIDED && several[0].depth.is_spent);
+    CHECK(several[0].depth.lower <= 0.03125 && several[0].depth.upper >= 0.03125);
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(same));
+    OK(cbvh_mesh_free(quarter));
+    OK(cbvh_mesh_free(open));
+}
+
 /* Where and how deep cubes overlap. */
 static void overlaps(void) {
     const cbvh_mesh one = cube(1), quarter = cube(0.25);
@@ -600,6 +651,15 @@ static void scenes(int parallel, int tracking) {
     OK(cbvh_scene_set_poses(scene, &b, &touching, 1));
     OK(cbvh_scene_pairs_in_contact(scene, pairs, 3, &count));
     CHECK(count == 1 && pairs[0].a.id == a.id && pairs[0].b.id == b.id);
+    cbvh_scene_clash clash[3];
+    const cbvh_clash_options near = {.size = sizeof near, .clearance = 0.5};
+    OK(cbvh_scene_clashes(scene, &near, clash, 3, &count));
+    CHECK(count == 3 && clash[0].pair.b.id == b.id && clash[1].pair.b.id == c.id && clash[2].pair.a.id == b.id);
+    CHECK(clash[0].clash.kind == CBVH_CLASH_TOUCHING && clash[0].clash.depth.lower == 0);
+    CHECK(clash[1].clash.kind == CBVH_CLASH_CONTAINED && clash[1].clash.relation == CBVH_B_IN_A);
+    CHECK(clash[2].clash.kind == CBVH_CLASH_NEAR && clash[2].clash.distance == 0.375);
+    FAILS(cbvh_scene_clashes(scene, NULL, clash, 1, &count), CBVH_BUFFER_TOO_SMALL, "clashes: ");
+    CHECK(count == 2);
     FAILS(cbvh_scene_contacts(scene, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "contacts: ");
     CHECK(count > 0);
     OK(cbvh_scene_set_allowed(scene, a, b, 1));
@@ -1133,6 +1193,7 @@ int main(int count, char **arguments) {
     OK(cbvh_querier_set_parallel(querier, 0));
     lists();
     overlaps();
+    clashes();
     self_contacts();
     borrowed();
     paths();

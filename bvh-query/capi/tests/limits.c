@@ -127,9 +127,11 @@ static void *ask(void *parallel) {
     const double x_axis[3] = {1, 0, 0};
     cbvh_separation way;
     cbvh_penetration depth;
+    cbvh_clash clash;
     size_t count;
     OK(cbvh_separations(querier, mesh, mesh, &near, x_axis, 1, &way));
     OK(cbvh_penetrations(querier, mesh, mesh, &near, 1, NULL, &depth));
+    OK(cbvh_clashes(querier, mesh, mesh, &near, 1, NULL, &clash));
     (void)cbvh_patches(querier, mesh, other, &near, 1, NULL, NULL, NULL, 0, &count, NULL, 0, NULL);
     (void)cbvh_self_contacts(querier, other, NULL, 0, &count);
     cbvh_mesh cylinder, solid, padded;

@@ -396,6 +396,7 @@ static void overlaps(void) {
     cbvh_pose poses[2] = {CBVH_IDENTITY, CBVH_IDENTITY};
     cbvh_separation ways[2];
     cbvh_penetration depths[2];
+    cbvh_clash clashes[2];
     cbvh_contact_region regions[1];
     cbvh_patch patches[1];
     cbvh_self_contact contacts[1];
@@ -428,6 +429,11 @@ static void overlaps(void) {
         const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = wrong[k]},
             tolerance = {.size = sizeof tolerance, .tolerance = wrong[k]};
         const cbvh_patch_options apart = {.size = sizeof apart, .tolerance = wrong[k]};
+        const cbvh_clash_options near = {.size = sizeof near, .clearance = wrong[k]},
+            deep = {.size = sizeof deep, .tolerance = wrong[k]}, part = {.size = sizeof part, .relative_gap = wrong[k]};
+        FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, &near, clashes), CBVH_INVALID_ARGUMENT, "clearance: ");
+        FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, &deep, clashes), CBVH_INVALID_ARGUMENT, "tolerance: ");
+        FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, &part, clashes), CBVH_INVALID_ARGUMENT, "relative_gap: ");
         FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &gap, depths), CBVH_INVALID_ARGUMENT, "relative_gap: ");
         FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &tolerance, depths), CBVH_INVALID_ARGUMENT,
               "tolerance: ");
@@ -438,6 +444,15 @@ static void overlaps(void) {
     const cbvh_patch_options larger = {.size = sizeof larger + 8};
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &other, depths), CBVH_INVALID_ARGUMENT,
           "options.size: expected 24");
+    const cbvh_clash_options smaller = {.size = 24};
+    FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, &smaller, clashes), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 40");
+    FAILS(cbvh_clashes(querier, no_mesh, mesh, poses, 2, NULL, clashes), CBVH_INVALID_HANDLE, "a: ");
+    FAILS(cbvh_clashes(querier, mesh, mesh, NULL, 2, NULL, clashes), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, NULL, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
+    OK(cbvh_clashes(querier, mesh, mesh, NULL, 0, NULL, NULL));
     FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, &larger, NULL, patches, 1, &count, NULL, 0, NULL),
           CBVH_INVALID_ARGUMENT, "options.size: expected 24");
     /* 0 stands for the defaults. */
@@ -486,6 +501,7 @@ static void overlaps(void) {
     OK(cbvh_querier_set_budget(querier, 0));
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 1, NULL, depths), CBVH_LIMIT, "budget");
     FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 1, ways), CBVH_LIMIT, "budget");
+    FAILS(cbvh_clashes(querier, mesh, mesh, poses, 1, NULL, clashes), CBVH_LIMIT, "budget");
     FAILS(cbvh_self_contacts(querier, mesh, contacts, 1, &count), CBVH_LIMIT, "budget");
     OK(cbvh_querier_set_budget(querier, UINT64_MAX));
 }

@@ -70,6 +70,7 @@ static const void *any_options(void) {
     static cbvh_bake_options bake;
     static cbvh_motion_options motion;
     static cbvh_distance_options distance;
+    static cbvh_clash_options clash;
     const char *const names[] = {NULL, "", "f32", "dop6-u8", "fast", "\xC3(", "packed"};
     memset(&bake, 0, sizeof bake);
     bake.size = below(4) ? sizeof bake : below(200);
@@ -79,15 +80,18 @@ static const void *any_options(void) {
     bake.max_error = below(2) ? 0 : any_number();
     bake.no_ids = any_flag();
     bake.force = below(8) == 0;
-    /* The size of the options of a bake would claim bytes that these do not have. */
-    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(sizeof bake), fabs(any_number()),
+    /* The sizes of larger options would claim bytes that these do not have. */
+    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(sizeof clash), fabs(any_number()),
         below(2) ? 0 : any_number()};
-    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(sizeof bake), any_number(),
+    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(sizeof clash), any_number(),
         below(2) ? 0 : any_number()};
-    switch (below(4)) {
+    clash = (cbvh_clash_options){below(4) ? sizeof clash : below(sizeof clash), fabs(any_number()),
+        below(2) ? 0 : any_number(), below(2) ? 0 : fabs(any_number()), below(2000)};
+    switch (below(5)) {
     case 0: return &bake;
     case 1: return &motion;
     case 2: return &distance;
+    case 3: return &clash;
     default: return NULL;
     }
 }
@@ -145,7 +149,7 @@ int main(void) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(86)) {
+        switch (below(88)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -233,6 +237,8 @@ int main(void) {
         case 83: status = cbvh_patches(q, a, b, in, n, options, NULL, out, capacity, &count, NULL, 0,
             below(2) ? NULL : counts); break;
         case 84: status = cbvh_self_contacts(q, a, out, capacity, &count); break;
+        case 85: status = cbvh_clashes(q, a, b, in, n, options, out); break;
+        case 86: status = cbvh_scene_clashes(s, options, out, capacity, &count); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;

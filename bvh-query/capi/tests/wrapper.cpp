@@ -182,6 +182,17 @@ void overlaps() {
     const auto depth = querier.penetration(one, one, corner);
     CHECK(depth.lower <= 0.25 && depth.upper >= 0.25 && depth.upper < 0.2525 && !depth.is_spent);
     CHECK(querier.penetration(one, one, poses, {0, 0.1})[0].lower > 0.1 && querier.penetration(one, one, poses)[1].upper == 0);
+    const cbvh::ClashOptions near{2.5, 0.1, 0, 0};
+    const auto clash = querier.clash(one, one, poses, near);
+    CHECK(clash[0].kind == CBVH_CLASH_OVERLAPPING && clash[1].kind == CBVH_CLASH_NEAR && clash[1].distance == 2);
+    CHECK(querier.clash(one, one, corner).depth.lower > 0.2 && querier.clash(one, one, away).kind == CBVH_CLASH_APART);
+    FAILS(querier.clash(one, one, corner, {-1}), CBVH_INVALID_ARGUMENT, "clearance: ");
+    cbvh::Scene scene;
+    scene.add(one, {});
+    scene.add(one, corner);
+    const auto clashes = scene.clashes(near);
+    CHECK(clashes.size() == 1 && clashes[0].clash.kind == CBVH_CLASH_OVERLAPPING && scene.clashes().size() == 1);
+    FAILS(scene.clashes({0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
     const auto regions = querier.contact_regions(one, one, corner);
     CHECK(regions.size() == querier.contacts(one, one, corner).size() && regions[0].count > 0);
     const auto lists = querier.contact_regions(one, one, poses);

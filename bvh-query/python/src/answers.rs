@@ -4,7 +4,7 @@
 //! parts are NaN and 0.
 
 use bvh_query::{
-    ClosestPoint, Contact, ContactRegion, Distance, MotionAnswer, Patches, Penetration, Pose, RayHit,
+    Clash, ClosestPoint, Contact, ContactRegion, Distance, MotionAnswer, Patches, Penetration, Pose, RayHit,
 };
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
@@ -154,15 +154,36 @@ pub(crate) fn triangles(contact: &Contact) -> [u32; 4] {
     [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b]
 }
 
-/// Lower and upper bound, translation, point and radii that prove the lower one, and whether the budget ended the search.
-pub(crate) fn penetrations<'py>(to: Answers<'py>, of: &[Penetration]) -> PyResult<Bound<'py, PyTuple>> {
+/// Lower and upper bound, translation, point and radii that prove the lower one, and whether the search was ended early.
+pub(crate) fn penetrations<'py>(
+    to: Answers<'py>,
+    of: impl Iterator<Item = Option<Penetration>> + Clone,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let numbers = |part: fn(Penetration) -> f64| to.values(of.clone().map(|of| of.map_or(f64::NAN, part)));
+    let points =
+        |part: fn(Penetration) -> [f64; 3]| to.rows(of.clone().map(|of| of.map_or([f64::NAN; 3], part)));
     (
-        to.values(of.iter().map(|of| of.lower))?,
-        to.values(of.iter().map(|of| of.upper))?,
-        to.rows(of.iter().map(|of| of.translation))?,
-        to.rows(of.iter().map(|of| of.point))?,
-        to.rows(of.iter().map(|of| of.radii))?,
-        to.values(of.iter().map(|of| of.is_spent))?,
+        numbers(|of| of.lower)?,
+        numbers(|of| of.upper)?,
+        points(|of| of.translation)?,
+        points(|of| of.point)?,
+        to.rows(of.clone().map(|of| of.map_or([f64::NAN; 2], |of| of.radii)))?,
+        to.values(of.clone().map(|of| of.is_some_and(|of| of.is_spent)))?,
+    )
+        .into_pyobject(to.py)
+}
+
+/// Class, relation, distance, point, and the parts of the depth.
+pub(crate) fn clashes<'py>(
+    to: Answers<'py>,
+    of: impl Iterator<Item = Clash> + Clone,
+) -> PyResult<Bound<'py, PyTuple>> {
+    (
+        to.values(of.clone().map(|of| of.class as u8))?,
+        to.values(of.clone().map(|of| of.relation as u8))?,
+        to.values(of.clone().map(|of| of.distance))?,
+        to.rows(of.clone().map(|of| of.point))?,
+        penetrations(to, of.map(|of| of.depth))?,
     )
         .into_pyobject(to.py)
 }

@@ -35,6 +35,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![shapes::octree_core, shapes::convex_hull_core];
     functions![pairs::collide, pairs::within, pairs::relation, pairs::distance, pairs::contacts];
     functions![
+        pairs::clash,
         pairs::penetration,
         pairs::separation,
         pairs::contact_regions,
@@ -59,6 +60,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_pairs::scene_pairs_in_contact,
         scene_pairs::scene_pairs_within,
         scene_pairs::scene_relations,
+        scene_pairs::scene_clashes,
         scene_pairs::scene_contacts,
         scene_pairs::scene_distance,
         scene_pairs::scene_motion,

@@ -6,7 +6,8 @@ use crate::asking::{on_all_cores, one_by_one};
 use crate::errors::{backend_error, query_error};
 use crate::mesh::Mesh;
 use bvh_query::{
-    Batch, Contact, DistanceOptions, PatchOptions, PenetrationOptions, Pose, Querier, QueryError, Shape,
+    Batch, ClashOptions, Contact, DistanceOptions, PatchOptions, PenetrationOptions, Pose, Querier,
+    QueryError, Shape,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -143,7 +144,40 @@ pub(crate) fn penetration<'py>(
             found
         },
     )?;
-    answers::penetrations(question.answers(), &found)
+    answers::penetrations(question.answers(), found.iter().copied().map(Some))
+}
+
+/// Clearance, tolerance, relative gap and the most visits of the search for a depth.
+#[derive(FromPyObject)]
+pub(crate) struct ClashLimits<'py>(
+    Bound<'py, PyAny>,
+    Option<Bound<'py, PyAny>>,
+    Bound<'py, PyAny>,
+    Option<Bound<'py, PyAny>>,
+);
+
+impl ClashLimits<'_> {
+    pub(crate) fn read(&self) -> PyResult<ClashOptions> {
+        let Self(clearance, tolerance, relative_gap, visits) = self;
+        let options = ClashOptions::new()
+            .clearance(number(clearance, "clearance")?)
+            .relative_gap(number(relative_gap, "relative_gap")?)
+            .visits(limit(visits.as_ref(), "visits")? as u64);
+        Ok(match tolerance {
+            Some(tolerance) => options.tolerance(number(tolerance, "tolerance")?),
+            None => options,
+        })
+    }
+}
+
+#[pyfunction]
+pub(crate) fn clash<'py>(asked: Asked<'py>, limits: ClashLimits<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    let (question, options) = (Question::new(&asked)?, limits.read()?);
+    let found = question.ask(
+        |batch, poses| batch.clashes(poses, &options),
+        |querier, [a, b], pose| querier.clash(a, b, pose, &options),
+    )?;
+    answers::clashes(question.answers(), found.iter().copied())
 }
 
 #[pyfunction]

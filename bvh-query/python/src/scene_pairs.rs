@@ -4,6 +4,7 @@ use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::arguments::number;
 use crate::asking::on_pool;
 use crate::motions::options;
+use crate::pairs::ClashLimits;
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State};
 use bvh_query::{Distance, InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
@@ -63,6 +64,22 @@ pub(crate) fn scene_relations<'py>(
         |state, found| found.into_iter().map(|(pair, relation)| (state.pair(pair), relation as u8)).collect(),
     )?;
     Ok((table(py, found.iter().map(|row| row.0))?, array(py, found.iter().map(|row| row.1))))
+}
+
+#[pyfunction]
+pub(crate) fn scene_clashes<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    limits: ClashLimits<'py>,
+) -> PyResult<(Pairs<'py>, Bound<'py, PyTuple>)> {
+    let options = limits.read()?;
+    let found: Vec<_> = scene.ask(
+        py,
+        |scene| scene.clashes(&options),
+        |state, found| found.into_iter().map(|row| (state.pair(row.pair), row.clash)).collect(),
+    )?;
+    let clashes = answers::clashes(Answers { py, one: false }, found.iter().map(|row| row.1))?;
+    Ok((table(py, found.iter().map(|row| row.0))?, clashes))
 }
 
 #[pyfunction]

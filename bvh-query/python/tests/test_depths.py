@@ -1,4 +1,4 @@
-"""Tests of questions about overlaps: how deep, in which regions, in which patches, and where a mesh meets itself."""
+"""Tests of questions about overlaps: how deep, in which regions and patches, how parts clash, and where a mesh meets itself."""
 
 import json
 import math
@@ -149,9 +149,68 @@ class Depths(unittest.TestCase):
         none = self.cube.self_contacts()
         self.assertEqual((none.triangles.shape, none.total, str(none.kind)), ((0, 4), 0, "[]"))
 
+    def test_parts_clash_as_their_gap_and_depth_say(self):
+        kind, cube_again = cbvh.ClashClass, cbvh.bake(*cube())
+        options = dict(clearance=0.25, tolerance=2.0**-10)
+        # The cube has sides of 1. The second part and where it is, and the class, the distance and the depth of both.
+        cases = [
+            (self.cube, (1.375, 0.125, 0), kind.APART, np.inf, None),
+            (self.cube, (1.0625, 0.125, 0), kind.NEAR, 0.0625, None),
+            (self.cube, (1, 0.125, 0), kind.TOUCHING, 0, 0),
+            (self.cube, (0.75, 0.125, 0), kind.OVERLAPPING, 0, 0.25),
+            (self.small, (0.125, 0.125, 0), kind.CONTAINED, 0, None),
+            (cube_again, (2.0**-11, 0, 0), kind.DUPLICATED, 0, None),
+            (opened(), (1, 0.125, 0), kind.INTERSECTING, 0, None),
+        ]
+        for other, offset, expected, distance, depth in cases:
+            pose = shifts(offset)[0]
+            found = self.cube.clash(other, pose, **options)
+            self.assertEqual((found.kind, found.distance), (expected, distance))
+            self.assertEqual((type(found.kind), type(found.distance), found.point.shape), (kind, float, (3,)))
+            self.assertIs(found.relation, self.cube.relation(other, pose))
+            self.assertEqual(np.isnan([found.depth.lower, found.depth.upper, *found.depth.translation]).all(), depth is None)
+            self.assertFalse(found.depth.is_spent)
+            if depth is not None:
+                self.assertTrue(found.depth.lower <= depth <= found.depth.upper <= 1.1 * found.depth.lower + 1e-6)
+            if expected == kind.NEAR:
+                self.assertEqual(found.point[0], 0.53125)
+            else:
+                self.assertTrue(np.abs(found.point).max() <= 0.5 + 1e-9)
+        self.assertIs(self.small.clash(self.cube, np.eye(4)).relation, cbvh.Relation.A_IN_B)
+        # Of two cubes side by side, the depth is known, and with it the class.
+        offsets = np.random.default_rng(8).uniform(-1.5, 1.5, (200, 3))
+        poses, gaps = shifts(*offsets), np.abs(offsets) - 1
+        depths, apart = -gaps.max(axis=1), np.linalg.norm(np.maximum(gaps, 0), axis=1)
+        found = self.cube.clash(self.cube, poses, clearance=0.25, tolerance=0.1, relative_gap=1e-3)
+        near = np.where(apart > 0.25, kind.APART, kind.NEAR)
+        known = np.where(depths < 0, near, np.where(depths > 0.1, kind.OVERLAPPING, kind.TOUCHING))
+        np.testing.assert_array_equal(found.kind, known)
+        self.assertEqual(len(set(known.tolist())), 4)
+        is_near = known == kind.NEAR
+        np.testing.assert_allclose(found.distance[is_near], apart[is_near])
+        is_deep = depths >= 0
+        self.assertTrue(np.all(found.depth.lower[is_deep] <= depths[is_deep] + 1e-12))
+        self.assertTrue(np.all(found.depth.upper[is_deep] >= depths[is_deep] - 1e-12))
+        self.assertTrue(np.isnan(found.depth.point[~is_deep]).all())
+        self.assertEqual(str(found.kind[:0]), "[]")
+        self.assertIn("OVERLAPPING", str(found.kind))
+        parallel = self.cube.clash(self.cube, poses, clearance=0.25, tolerance=0.1, relative_gap=1e-3, parallel=True)
+        for one, other in zip((*found[:-1], *found.depth), (*parallel[:-1], *parallel.depth)):
+            np.testing.assert_array_equal(one, other)
+        # Where the visits end the search, the bounds so far are the answer.
+        spent = self.cube.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, relative_gap=0.01, visits=200)
+        self.assertEqual((spent.kind.tolist(), spent.depth.is_spent.tolist()), ([kind.UNDECIDED], [True]))
+        self.assertTrue(spent.depth.lower[0] <= 0.03125 <= spent.depth.upper[0])
+        full = self.cube.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, visits=None)
+        self.assertEqual((full.kind.tolist(), full.depth.is_spent.tolist()), ([kind.OVERLAPPING], [False]))
+        # By default nothing is near, and the tolerance is a millionth of the side.
+        by_default = self.cube.clash(self.cube, shifts((1.0625, 0, 0), (1 - 5e-7, 0.125, 0), (1 - 4e-6, 0.125, 0)))
+        self.assertEqual(by_default.kind.tolist(), [kind.APART, kind.TOUCHING, kind.OVERLAPPING])
+
     def test_numbers_are_checked(self):
         mesh, at, none = self.cube, np.eye(4), np.zeros((0, 4, 4))
         depth = lambda **options: lambda: mesh.penetration(mesh, none, **options)
+        clash = lambda **options: lambda: mesh.clash(mesh, none, **options)
         cases = [
             (ValueError, "relative_gap: expected a finite part above 0, found 0", depth(relative_gap=0)),
             (ValueError, "relative_gap: expected a finite part above 0, found NaN", depth(relative_gap=np.nan)),
@@ -160,6 +219,17 @@ class Depths(unittest.TestCase):
             (TypeError, "budget: expected a whole number or None, found float", depth(budget=1.5)),
             (ValueError, "budget: expected a whole number from 0 to 2^64 - 1, found -1", depth(budget=-1)),
             (ValueError, "budget", lambda: mesh.penetration(mesh, at, budget=0)),
+            (ValueError, "clearance: expected a finite length of at least 0, found -1", clash(clearance=-1)),
+            (ValueError, "clearance: expected a finite length of at least 0, found inf", clash(clearance=np.inf)),
+            (ValueError, "tolerance: expected a finite depth of at least 0, found -1", clash(tolerance=-1)),
+            (ValueError, "tolerance: expected a finite depth of at least 0, found NaN", clash(tolerance=np.nan)),
+            (ValueError, "relative_gap: expected a finite part above 0, found 0", clash(relative_gap=0)),
+            (TypeError, "clearance: expected a number, found str", clash(clearance="x")),
+            (TypeError, "visits: expected a whole number or None, found float", clash(visits=1.5)),
+            (ValueError, "visits: expected a whole number from 0 to 2^64 - 1, found -1", clash(visits=-1)),
+            (ValueError, "tolerance: expected a finite depth", lambda: cbvh.Scene().clashes(tolerance=-1)),
+            (TypeError, "other: expected a cbvh.Mesh", mesh.clash, "x", at),
+            (ValueError, "topology", cbvh.bake(*cube(), topology=False).clash, mesh, shifts((0.5, 0, 0))),
             (ValueError, "direction: expected numbers the largest of which", mesh.separation, mesh, none, [0, 0, 0]),
             (ValueError, "direction: expected shape (3,), found (1, 3)", mesh.separation, mesh, at, [[0, 0, 1]]),
             (ValueError, "limit: expected a whole number", lambda: mesh.contact_regions(mesh, at, limit=-1)),
@@ -189,6 +259,20 @@ class Depths(unittest.TestCase):
         wider = scene.penetrations([["a", "b"]], relative_gap=1e-6).depth
         self.assertAlmostEqual(wider.upper[0], 0.3, places=6)
         self.assertEqual(cbvh.Scene().penetrations().depth.translation.shape, (0, 3))
+        # The cubes a and b overlap by a quarter, c is apart, and d, which is in a, sticks out of b.
+        scene.set_margin("a", 0)
+        for scene.parallel in (False, True):
+            clashes = scene.clashes(tolerance=1e-3)
+            np.testing.assert_array_equal(clashes.pairs, found.pairs)
+            names = [kind.name for kind in clashes.clash.kind]
+            self.assertEqual(names, ["OVERLAPPING", "CONTAINED", "OVERLAPPING"])
+            self.assertTrue(clashes.clash.depth.lower[0] <= 0.25 <= clashes.clash.depth.upper[0])
+            a_b = self.cube.clash(self.cube, cbvh.relative(poses[0], poses[1]), tolerance=1e-3)
+            np.testing.assert_array_equal(clashes.clash.point[0], a_b.point)
+            pairs, near = scene.clashes(clearance=3.5)
+            self.assertEqual((pairs.tolist(), near.kind[2].name), ([[0, 1], [0, 3], [1, 2], [1, 3]], "NEAR"))
+            self.assertAlmostEqual(near.distance[2], 3.25, places=9)
+        self.assertEqual(cbvh.Scene().clashes().clash.depth.translation.shape, (0, 3))
         scene.add(opened(), poses[0], name="open")
         with self.assertRaisesRegex(ValueError, "expected closed objects"):
             scene.penetrations()
@@ -212,6 +296,31 @@ class SameBits(unittest.TestCase):
             for name in ("lower", "upper", "translation", "point", "radii"):
                 np.testing.assert_array_equal(getattr(found, name), [row[name] for row in rows], name)
             self.assertTrue(0 < np.count_nonzero(found.lower) < 100)
+
+
+    def test_clashes_are_those_of_the_command(self):
+        with tempfile.TemporaryDirectory() as folder:
+            a, b = cbvh.bake(*cube()), cbvh.convex_hull(np.random.default_rng(4).normal(size=(60, 3)))
+            scene, rows = cbvh.Scene(), []
+            for number, pose in enumerate(random_poses(7, 30, 5.0)):
+                name, mesh = f"{number:02}", (a, b)[number % 2]
+                mesh.save(f"{folder}/{'ab'[number % 2]}.cbvh")
+                scene.add(mesh, pose, name=name)
+                rows.append({"file": f"{'ab'[number % 2]}.cbvh", "name": name, "pose": pose[:3].ravel().tolist()})
+            pathlib.Path(folder, "parts.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+            arguments = [COMMAND, "clash", "--manifest", "parts.jsonl", "--clearance", "1", "--tolerance", "0.01", "--json"]
+            asked = subprocess.run(arguments, cwd=folder, check=True, capture_output=True, text=True)
+            rows = {(row["a"], row["b"]): row for row in json.loads(asked.stdout)["clashes"]}
+            pairs, found = scene.clashes(clearance=1, tolerance=0.01)
+            self.assertEqual(len(rows), len(pairs))
+            for number, (pair, kind, depth) in enumerate(zip(pairs.tolist(), found.kind, np.array(found.depth[:2]).T)):
+                row = rows[tuple(f"{instance:02}" for instance in pair)]
+                self.assertEqual((row["class"], row["relation"]), (kind.name.lower(), found.relation[number]))
+                known = [math.nan if row[name] is None else row[name] for name in ("lower", "upper")]
+                np.testing.assert_array_equal(depth, known)
+                world = scene.pose(pair[0])
+                np.testing.assert_allclose(world[:3, :3] @ found.point[number] + world[:3, 3], row["point"], atol=1e-12)
+            self.assertGreater(len(set(found.kind.tolist())), 1)
 
 
 @unittest.skipUnless((SHARED / "depth").exists(), WITHOUT_DEPTHS)

@@ -1,6 +1,6 @@
 //! Makes arrays from answers: one array per field, in the order in which `ts/answers.ts` names them.
 
-use bvh_query::{ClosestPoint, Contact, Distance, Pose, RayHit};
+use bvh_query::{Clash, ClosestPoint, Contact, Distance, Penetration, Pose, RayHit};
 use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
 use wasm_bindgen::JsValue;
 
@@ -55,6 +55,38 @@ pub(crate) fn distances(of: &[Option<Distance>]) -> Array {
         numbered(|d| d.triangle_a),
         numbered(|d| d.object_b),
         numbered(|d| d.triangle_b),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// Lower and upper bound, translation, centre and radii of the balls, and whether the visits ended the search. NaN and 0 for
+/// `None`.
+pub(crate) fn penetrations<'a>(of: impl Iterator<Item = Option<&'a Penetration>>) -> Array {
+    let found: Vec<Option<&Penetration>> = of.collect();
+    let numbers = |part: fn(&Penetration) -> f64| floats(found.iter().map(|of| of.map_or(f64::NAN, part)));
+    let places =
+        |part: fn(&Penetration) -> [f64; 3]| points(found.iter().map(|of| of.map_or([f64::NAN; 3], part)));
+    [
+        numbers(|depth| depth.lower),
+        numbers(|depth| depth.upper),
+        places(|depth| depth.translation),
+        places(|depth| depth.point),
+        floats(found.iter().flat_map(|of| of.map_or([f64::NAN; 2], |depth| depth.radii))),
+        small(found.iter().map(|of| of.is_some_and(|depth| depth.is_spent).into())).into(),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// Class, relation, distance, point and parts of the depth.
+pub(crate) fn clashes(of: &[Clash]) -> Array {
+    [
+        small(of.iter().map(|of| of.class as u8)).into(),
+        small(of.iter().map(|of| of.relation as u8)).into(),
+        floats(of.iter().map(|of| of.distance)),
+        points(of.iter().map(|of| of.point)),
+        penetrations(of.iter().map(|of| of.depth.as_ref())).into(),
     ]
     .into_iter()
     .collect()

@@ -1,10 +1,10 @@
 //! Where and how deep two meshes overlap, and where a mesh meets itself.
 
-use crate::answers::{contacts, floats, ids, points, small};
+use crate::answers::{clashes, contacts, floats, ids, penetrations, points, small};
 use crate::arguments::{Answer, pose, refused, rows, same_count, with_querier};
 use crate::mesh::Mesh;
 use crate::pairs::ask;
-use bvh_query::{Contact, ContactRegion, Patch, PatchOptions, PenetrationOptions};
+use bvh_query::{ClashOptions, Contact, ContactRegion, Patch, PatchOptions, PenetrationOptions};
 use js_sys::{Array, Float64Array};
 use wasm_bindgen::prelude::*;
 
@@ -25,7 +25,7 @@ pub fn separation(a: &Mesh, b: &Mesh, poses: &Float64Array, directions: &Float64
     Ok(parts.into_iter().collect())
 }
 
-/// Lower and upper bound, translation, centre and radii of the balls.
+/// The parts of depths.
 #[wasm_bindgen]
 pub fn penetration(
     a: &Mesh,
@@ -38,14 +38,36 @@ pub fn penetration(
     options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
     options.tolerance = tolerance;
     let found = ask([a, b], poses, |querier, [a, b], pose| querier.penetration(a, b, pose, &options))?;
-    let parts = [
-        floats(found.iter().map(|depth| depth.lower)),
-        floats(found.iter().map(|depth| depth.upper)),
-        points(found.iter().map(|depth| depth.translation)),
-        points(found.iter().map(|depth| depth.point)),
-        floats(found.iter().flat_map(|depth| depth.radii)),
-    ];
-    Ok(parts.into_iter().collect())
+    Ok(penetrations(found.iter().map(Some)))
+}
+
+/// Reads what counts as a clash.
+pub(crate) fn clash_options(
+    clearance: f64,
+    tolerance: Option<f64>,
+    relative_gap: Option<f64>,
+    visits: Option<u32>,
+) -> ClashOptions {
+    let mut options = ClashOptions::new().clearance(clearance);
+    options.tolerance = tolerance;
+    options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
+    options.visits = visits.map_or(options.visits, u64::from);
+    options
+}
+
+/// The parts of clashes.
+#[wasm_bindgen]
+pub fn clash(
+    a: &Mesh,
+    b: &Mesh,
+    poses: &Float64Array,
+    clearance: f64,
+    tolerance: Option<f64>,
+    relative_gap: Option<f64>,
+    visits: Option<u32>,
+) -> Answer<Array> {
+    let options = clash_options(clearance, tolerance, relative_gap, visits);
+    Ok(clashes(&ask([a, b], poses, |querier, [a, b], pose| querier.clash(a, b, pose, &options))?))
 }
 
 /// Object and triangle of A and of B, kind, number of points, points, normals of A and of B, error and overlap.

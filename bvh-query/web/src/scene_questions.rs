@@ -1,12 +1,15 @@
 //! Questions about all instances of a scene: about pairs, at rest and in motion, and about probes in the world.
 
-use crate::answers::{closest_row, contacts, distances, floats, found, hit_row, ids, small};
+use crate::answers::{clashes, closest_row, contacts, distances, floats, found, hit_row, ids, small};
 use crate::arguments::{Answer, integers, refused, rows, same_count, with_querier, wrong};
 use crate::motions::{FREE, HIT, NEAR, options};
+use crate::overlaps::clash_options;
 use crate::paths;
 use crate::probes::{Rays, segments};
 use crate::scene::{Scene, beside};
-use bvh_query::{Contact, Distance, InstanceId, OwnedShape, Pose, RigidPath, SceneError, SceneMotionAnswer};
+use bvh_query::{
+    Clash, Contact, Distance, InstanceId, OwnedShape, Pose, RigidPath, SceneError, SceneMotionAnswer,
+};
 use js_sys::{Array, Float64Array, Int8Array, Int32Array, Uint8Array, Uint32Array};
 use wasm_bindgen::prelude::*;
 
@@ -67,6 +70,20 @@ impl Scene {
         let found = self.ask(|scene| scene.contacts())?;
         let triangles: Vec<Contact> = found.iter().map(|found| found.contact).collect();
         Ok(beside(found.iter().map(|found| self.pair(found.pair)), contacts(triangles.iter()).into()))
+    }
+
+    /// Pairs, and the parts of their clashes.
+    pub fn clashes(
+        &mut self,
+        clearance: f64,
+        tolerance: Option<f64>,
+        relative_gap: Option<f64>,
+        visits: Option<u32>,
+    ) -> Answer<Array> {
+        let options = clash_options(clearance, tolerance, relative_gap, visits);
+        let found = self.ask(|scene| scene.clashes(&options))?;
+        let of_pairs: Vec<Clash> = found.iter().map(|found| found.clash).collect();
+        Ok(beside(found.iter().map(|found| self.pair(found.pair)), clashes(&of_pairs).into()))
     }
 
     /// The nearest pair, if there are pairs, and its distance.

@@ -48,6 +48,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.patches(b, pose, { tolerance: x, maxContacts: 1000 }),
         () => a.separation(b, pose, [x, y, z]),
         () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
+        () => a.clash(b, pose, { clearance: x, tolerance: y, relativeGap: z, visits: 1000 }),
         () => a.selfContacts(),
         () => a.motion(b, Motion.between(at(x, y, z), pose), { clearance: w, tolerance: v }),
         () => a.isFree(b, screw()),
@@ -64,6 +65,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => cbvh.nearestPose(pose),
         () => scene((made) => [made.collide(), made.pairsInContact(), made.pairsWithin(x), made.within(y)]),
         () => scene((made) => [made.distance(), made.relations(), made.contacts(), made.distances(["a", "b"])]),
+        () => scene((made) => made.clashes({ clearance: x, tolerance: y })),
         () => scene((made) => made.motion(new Map([["b", screw()]]), { clearance: x })),
         () => scene((made) => [made.closestPoints([x, y, z]), made.sides([x, y, z]), made.allHits([x, y, z], [u, v, w])]),
     ];
@@ -173,6 +175,68 @@ export const cases = {
         const own = cbvh.Mesh.bake([...first, ...crossing, ...first]).selfContacts();
         equal(own.triangles, [0, 0, 0, 1, 0, 0, 0, 2, 0, 1, 0, 2]);
         equal(own.kind, [SelfContactKind.CROSSING, SelfContactKind.DUPLICATE, SelfContactKind.CROSSING]);
+    },
+
+    "parts clash as their gap and their depth say": (cbvh) => {
+        const { ClashClass, Mesh, Relation, Scene } = cbvh;
+        const [cube, same] = [cubeOf(cbvh), cubeOf(cbvh)];
+        const small = Mesh.bake(CUBE.map((x) => x / 4), CUBE_FACES);
+        const open = Mesh.bake(CUBE, CUBE_FACES.slice(3));
+        const options = { clearance: 0.25, tolerance: 1e-3 };
+        // The cube has sides of 2. Parts, where the second one is, and the class, the distance and the depth of the pair.
+        const cases = [
+            [cube, cube, [2.5, 0.25, 0.125], "APART", Infinity, undefined],
+            [cube, cube, [2.125, 0.25, 0.125], "NEAR", 0.125, undefined],
+            [cube, cube, [2, 0.25, 0.125], "TOUCHING", 0, 0],
+            [cube, cube, [1.9375, 0.25, 0.125], "OVERLAPPING", 0, 0.0625],
+            [cube, small, [0.5, 0, 0], "CONTAINED", 0, undefined],
+            [small, cube, [0.5, 0, 0], "CONTAINED", 0, undefined],
+            [cube, same, [1e-4, 0, 0], "DUPLICATED", 0, undefined],
+            [cube, open, [1.5, 0.25, 0.125], "INTERSECTING", 0, undefined],
+        ];
+        for (const [a, b, place, name, distance, known] of cases) {
+            const found = a.clash(b, at(...place), options);
+            equal([ClashClass[found.kind], found.distance, found.depth === undefined], [name, distance, known === undefined], name);
+            equal(found.relation, a.relation(b, at(...place)));
+            const [least, most] = [found.depth?.lower ?? 0, found.depth?.upper ?? 0];
+            ok(least <= (known ?? 0) && (known ?? 0) <= most && most <= 1.1 * least + 1e-6, `${name}: the depth ${known}`);
+            if (found.depth !== undefined) {
+                equal(found.depth.isSpent, false);
+            }
+            if (distance === 0) {
+                const where = [...found.point];
+                ok(where.every((x) => Math.abs(x) <= 1 + 1e-9), `${name}: a point of the cube, found ${where}`);
+            } else {
+                equal([...found.point], name === "NEAR" ? [1.0625, found.point[1], found.point[2]] : [0, 0, 0]);
+            }
+        }
+        // Each of many is what it is alone.
+        const several = cases.filter(([a, b]) => a === cube && b === cube);
+        const each = cube.clashEach(cube, several.flatMap(([, , place]) => at(...place)), options);
+        equal([...each.kind].map((kind) => ClashClass[kind]), several.map(([, , , name]) => name));
+        equal([each.distance, each.point.length, each.depth.translation.length, each.depth.isSpent], [[Infinity, 0.125, 0, 0], 12, 12, [0, 0, 0, 0]]);
+        equal([...each.depth.upper].map(Number.isNaN), [true, true, false, false]);
+        equal(each.depth.upper[3], cube.clash(cube, at(1.9375, 0.25, 0.125), options).depth.upper);
+        // Without visits, the depth that two boxes have stays unknown.
+        const spent = cube.clash(cube, at(1.9375, 0.25, 0.125), { ...options, visits: 200 });
+        equal([ClashClass[spent.kind], spent.depth.isSpent], ["UNDECIDED", true]);
+        ok(spent.depth.lower <= 0.0625 && spent.depth.upper >= 0.0625, "bounds around the depth");
+        // By default nothing is near, and the tolerance is 2e-6.
+        equal(cube.clash(cube, at(2.125, 0, 0)).kind, ClashClass.APART);
+        equal(cube.clash(cube, at(2 - 1e-6, 0.25, 0.125)).kind, ClashClass.TOUCHING);
+        equal(cube.clash(cube, at(2 - 4e-6, 0.25, 0.125)).kind, ClashClass.OVERLAPPING);
+
+        const scene = new Scene();
+        const places = [at(0, 0, 0), at(1.5, 0.25, 0), at(3.5, 0.125, 0.5), at(6, 0, 0), at(6, 0, 0)];
+        places.forEach((place) => scene.add(cube, place));
+        const clashes = scene.clashes({ clearance: 0.75, tolerance: 1e-6 });
+        equal(clashes.pairs, [0, 1, 1, 2, 2, 3, 2, 4, 3, 4]);
+        equal([...clashes.clash.kind].map((kind) => ClashClass[kind]), ["OVERLAPPING", "TOUCHING", "NEAR", "NEAR", "DUPLICATED"]);
+        equal([...clashes.clash.distance], [0, 0, 0.5, 0.5, 0]);
+        const alone = cube.clash(cube, cbvh.relative(places[0], places[1]), { clearance: 0.75, tolerance: 1e-6 });
+        equal([clashes.clash.depth.upper[0], clashes.clash.point.subarray(0, 3)], [alone.depth.upper, alone.point]);
+        equal(scene.clashes().clash.relation, [Relation.TOUCHING, Relation.TOUCHING, Relation.TOUCHING]);
+        equal(new Scene().clashes(), { pairs: [], clash: cube.clashEach(cube, []) });
     },
 
     "a baked cube answers every question about motions": (cbvh) => {
@@ -608,6 +672,16 @@ export const cases = {
             [() => cube.penetration(cube, at(0, 0, 0), { tolerance: -1 }), /^tolerance: expected/],
             [() => cube.penetration(cube, at(0, 0, 0), { tolerance: "1" }), "tolerance: expected a number, found a string"],
             [() => cube.penetration(Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]), at(0, 0, 0)), /^expected closed objects/],
+            [() => cube.clash(cube, at(0, 0, 0), { clearance: -1 }), /^clearance: expected a finite length of at least 0/],
+            [() => cube.clash(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected a finite depth of at least 0/],
+            [() => cube.clash(cube, at(0, 0, 0), { relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],
+            [() => cube.clash(cube, at(0, 0, 0), { relativeGap: "1" }), "relativeGap: expected a number, found a string"],
+            [
+                () => cube.clash(cube, at(0, 0, 0), { visits: 0.5 }),
+                "visits: expected a whole number from 0 to 2^32 - 1, found 0.5",
+            ],
+            [() => cube.clash(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
+            [() => new cbvh.Scene().clashes({ tolerance: -1 }), /^tolerance: expected a finite depth of at least 0/],
             [() => cube.patches(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected/],
             [
                 () => cube.patches(cube, at(0, 0, 0), { maxContacts: -1 }),

@@ -124,15 +124,66 @@ export interface Penetration {
     point: Float64Array;
     /** The radii of both balls. Their sum is `lower`, but for roundings. */
     radii: Float64Array;
+    /** Whether the search made all the visits that it may make. Only `clash` limits them. */
+    isSpent: boolean;
 }
 
-/** N answers of the type `Penetration`: numbers of length N, translations and points of length 3 N, and radii of length 2 N. */
+/** N answers of the type `Penetration`: numbers of length N, translations and points of length 3 N, radii of length 2 N, and 1
+ * or 0 for `isSpent`. */
 export interface Penetrations {
     lower: Float64Array;
     upper: Float64Array;
     translation: Float64Array;
     point: Float64Array;
     radii: Float64Array;
+    isSpent: Uint8Array;
+}
+
+/** How two parts of an assembly lie. `ClashClass[number]` is its name. */
+export enum ClashClass {
+    /** Their surfaces are farther apart than the clearance, and neither is inside the other. */
+    APART = 0,
+    /** Their surfaces do not touch, but are at most the clearance apart. */
+    NEAR = 1,
+    /** They have points in common, and their depth is at most the tolerance. */
+    TOUCHING = 2,
+    /** Their depth exceeds the tolerance. */
+    OVERLAPPING = 3,
+    /** One is wholly inside the other. */
+    CONTAINED = 4,
+    /** Both are the same part in the same place, to within the tolerance. */
+    DUPLICATED = 5,
+    /** They have points in common, and the tolerance lies between the bounds that were found for their depth. */
+    UNDECIDED = 6,
+    /** They have points in common, and one is not closed, so that they have no depth. */
+    INTERSECTING = 7,
+}
+
+/** How two parts of an assembly lie, and by how much. Lengths are in mesh units. */
+export interface Clash {
+    /** How they lie. */
+    kind: ClashClass;
+    /** Whether they touch and, if not, whether one is inside the other. */
+    relation: Relation;
+    /** For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others. */
+    distance: number;
+    /** A point of the clash in the frame of the first mesh: between the closest points, in both parts, or in contact. 0 for parts
+     * that are apart. */
+    point: Float64Array;
+    /** For parts that touch, overlap or are undecided: the bounds of their depth. */
+    depth: Penetration | undefined;
+}
+
+/** N answers of the type `Clash`. Where there is no depth, the numbers of `depth` are NaN and 0. */
+export interface Clashes {
+    /** Numbers of `ClashClass`. */
+    kind: Uint8Array;
+    /** Numbers of `Relation`. */
+    relation: Uint8Array;
+    distance: Float64Array;
+    /** Length 3 N. */
+    point: Float64Array;
+    depth: Penetrations;
 }
 
 /** Where K pairs of triangles in contact meet, in the frame of the first mesh and in mesh units. */
@@ -273,6 +324,14 @@ export interface SceneRelations {
     relations: Uint8Array;
 }
 
+/** Pairs of instances that clash, and how. */
+export interface SceneClashes {
+    /** Numbers of instances, A and B of each pair: length 2 K. */
+    pairs: Uint32Array;
+    /** The answers of `Mesh.clash`, in A's frame. */
+    clash: Clashes;
+}
+
 /** Pairs of triangles in contact. */
 export interface SceneContacts {
     /** Numbers of instances, A and B of each pair of triangles: length 2 K. */
@@ -313,8 +372,11 @@ export const distances = (parts: unknown[]): Distances => {
 export const separations = ([lower, upper, translation]: unknown[]): Separations =>
     ({ lower, upper, translation }) as Separations;
 
-export const penetrations = ([lower, upper, translation, point, radii]: unknown[]): Penetrations =>
-    ({ lower, upper, translation, point, radii }) as Penetrations;
+export const penetrations = ([lower, upper, translation, point, radii, isSpent]: unknown[]): Penetrations =>
+    ({ lower, upper, translation, point, radii, isSpent }) as Penetrations;
+
+export const clashes = ([kind, relation, distance, point, depth]: unknown[]): Clashes =>
+    ({ kind, relation, distance, point, depth: penetrations(depth as unknown[]) }) as Clashes;
 
 export function regions(parts: unknown[], total: unknown): ContactRegions {
     const [triangles, kind, count, points, normalA, normalB, error, overlap] = parts;
@@ -347,6 +409,21 @@ export const onlyBounds = <T extends { lower: Float64Array; upper: Float64Array 
     lower: of.lower[0] as number,
     upper: of.upper[0] as number,
 });
+
+/** Takes the only element of an answer with one depth. */
+export const onlyPenetration = (of: Penetrations): Penetration => ({ ...onlyBounds(of), isSpent: of.isSpent[0] === 1 });
+
+/** Takes the only element of an answer with one clash. */
+export function onlyClash({ kind, relation, distance, point, depth }: Clashes): Clash {
+    const only = onlyPenetration(depth);
+    return {
+        kind: kind[0] as ClashClass,
+        relation: relation[0] as Relation,
+        distance: distance[0] as number,
+        point,
+        depth: Number.isNaN(only.lower) ? undefined : only,
+    };
+}
 
 /** Takes the only element of an answer with one distance. */
 export function onlyDistance(of: Distances): Distance {

@@ -5,6 +5,8 @@
  */
 
 export type {
+    Clash,
+    Clashes,
     ClosestPoints,
     ContactRegions,
     Distance,
@@ -15,6 +17,7 @@ export type {
     Penetration,
     Penetrations,
     RayHits,
+    SceneClashes,
     SceneClosestPoints,
     SceneContacts,
     SceneDistance,
@@ -25,10 +28,11 @@ export type {
     Separation,
     Separations,
 } from "./answers.js";
-export { MotionKind, RegionKind, Relation, SelfContactKind, Side } from "./answers.js";
+export { ClashClass, MotionKind, RegionKind, Relation, SelfContactKind, Side } from "./answers.js";
 export type { Bytes, Integers, Numbers } from "./arguments.js";
 export type {
     BakeOptions,
+    ClashOptions,
     DistanceOptions,
     MotionOptions,
     PatchOptions,

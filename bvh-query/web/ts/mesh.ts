@@ -2,6 +2,8 @@
 
 import * as answers from "./answers.js";
 import type {
+    Clash,
+    Clashes,
     ClosestPoints,
     ContactRegions,
     Distance,
@@ -23,6 +25,7 @@ import {
     float,
     floats,
     instance,
+    integer,
     integers,
     most,
     text,
@@ -69,6 +72,20 @@ export interface PenetrationOptions {
     relativeGap?: number;
     /** When it is known whether the depth exceeds this length, in mesh units. */
     tolerance?: number;
+}
+
+/** What counts as a clash. Lengths are in mesh units. */
+export interface ClashOptions {
+    /** Parts at most this far apart are near. 0, the default, looks for no near parts. */
+    clearance?: number;
+    /** Parts overlap if they do so by more than this depth; by default a millionth of the largest side of both parts. */
+    tolerance?: number;
+    /** The search for a depth ends when the upper bound exceeds the lower one by no more than this part of it: above 0. 0.1 by
+     * default. */
+    relativeGap?: number;
+    /** The most visits of nodes and triangles that the search for the depth of a pair may make, from 0 to 2^32 - 1. 2^20 by
+     * default. */
+    visits?: number;
 }
 
 /** How contacts are joined into patches. */
@@ -125,6 +142,13 @@ const optional = (value: number | undefined, name: string) => (value === undefin
 export function limits(options: MotionOptions): [number, number | undefined] {
     const { clearance = 0, tolerance } = options;
     return [float(clearance, "clearance"), optional(tolerance, "tolerance")];
+}
+
+/** Reads what counts as a clash. */
+export function clashLimits(options: ClashOptions): [number, number?, number?, number?] {
+    const { clearance = 0, tolerance, relativeGap, visits } = options;
+    const [depth, gap] = [optional(tolerance, "tolerance"), optional(relativeGap, "relativeGap")];
+    return [float(clearance, "clearance"), depth, gap, visits === undefined ? undefined : integer(visits, "visits")];
 }
 
 /** Reads the greatest parameters of rays. */
@@ -391,7 +415,7 @@ export class Mesh extends Handle<raw.Mesh> {
      * per cent of the depth, and `lower` more than half of it. It takes up to some milliseconds. Both meshes must be closed.
      */
     penetration(other: Mesh, pose: Numbers, options: PenetrationOptions = {}): Penetration {
-        return answers.onlyBounds(this.penetrationEach(other, onePose(pose), options));
+        return answers.onlyPenetration(this.penetrationEach(other, onePose(pose), options));
     }
 
     /** `penetration` for N poses. */
@@ -399,6 +423,21 @@ export class Mesh extends Handle<raw.Mesh> {
         const gap = optional(options.relativeGap, "relativeGap");
         const tolerance = optional(options.tolerance, "tolerance");
         return answers.penetrations(this.#pair(other, poses, (a, b, array) => raw.penetration(a, b, array, gap, tolerance)));
+    }
+
+    /**
+     * How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place? Parts that touch are told
+     * apart from parts that overlap by their depth, which is that of `penetration`: flush faces overlap by roundings in nearly all
+     * poses, so that a tolerance is part of the question. Meshes need not be closed.
+     */
+    clash(other: Mesh, pose: Numbers, options: ClashOptions = {}): Clash {
+        return answers.onlyClash(this.clashEach(other, onePose(pose), options));
+    }
+
+    /** `clash` for N poses. */
+    clashEach(other: Mesh, poses: Numbers, options: ClashOptions = {}): Clashes {
+        const limits = clashLimits(options);
+        return answers.clashes(this.#pair(other, poses, (a, b, array) => raw.clash(a, b, array, ...limits)));
     }
 
     /**

@@ -3,6 +3,7 @@
 import * as answers from "./answers.js";
 import type {
     Distances,
+    SceneClashes,
     SceneClosestPoints,
     SceneContacts,
     SceneDistance,
@@ -24,7 +25,7 @@ import {
     type Integers,
     type Numbers,
 } from "./arguments.js";
-import { limits, Mesh, onePose, untils, type MotionOptions } from "./mesh.js";
+import { clashLimits, limits, Mesh, onePose, untils, type ClashOptions, type MotionOptions } from "./mesh.js";
 import { call, Handle, raw } from "./module.js";
 import { Motion, onePath } from "./motion.js";
 
@@ -268,6 +269,16 @@ export class Scene extends Handle<raw.Scene> {
     relations(): SceneRelations {
         const [pairs, relations] = this.#call((scene) => scene.relations());
         return { pairs, relations } as SceneRelations;
+    }
+
+    /**
+     * All pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs that are
+     * apart are left out. Options are those of `Mesh.clash`.
+     */
+    clashes(options: ClashOptions = {}): SceneClashes {
+        const limits = clashLimits(options);
+        const [pairs, clash] = this.#call((scene) => scene.clashes(...limits));
+        return { pairs: pairs as Uint32Array, clash: answers.clashes(clash as unknown[]) };
     }
 
     /** All pairs of triangles that touch, exactly. */

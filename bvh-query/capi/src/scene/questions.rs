@@ -2,13 +2,13 @@
 
 use super::ask as ask_scene;
 use crate::entry::write;
-use crate::input::{array, options, reserve};
+use crate::input::{self, array, reserve};
 use crate::output::{List, One};
 use crate::paths::AskedPath;
 use crate::status::Failure;
 use crate::types::{
-    Instance, MotionChoices, MotionRow, PairRow, PathHandle, SceneContactRow, SceneDistanceRow, SceneHandle,
-    SceneRelationRow,
+    ClashChoices, Instance, MotionChoices, MotionRow, PairRow, PathHandle, SceneClashRow, SceneContactRow,
+    SceneDistanceRow, SceneHandle, SceneRelationRow,
 };
 use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
@@ -47,15 +47,15 @@ pub unsafe extern "C" fn cbvh_scene_distance(scene: SceneHandle, answer: *mut Sc
 ///
 /// # Safety
 /// As for `List::new`.
-unsafe fn list<T: Into<R>, R: Copy>(
+unsafe fn list<T: Into<R>, R: Copy, E: Into<Failure>>(
     scene: SceneHandle,
     (name, rows, capacity, count): (&'static str, *mut R, usize, *mut usize),
-    ask: impl FnOnce(&mut Scene) -> Result<Vec<T>, SceneError>,
+    ask: impl FnOnce(&mut Scene) -> Result<Vec<T>, E>,
 ) -> i32 {
     ask_scene(scene, |scene| {
         // SAFETY: the caller vouches for it.
         let mut list = unsafe { List::new(name, rows, capacity, count) }?;
-        list.add(ask(scene)?);
+        list.add(ask(scene).map_err(Into::into)?);
         list.finish()
     })
 }
@@ -80,6 +80,9 @@ lists! {
     cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow, |scene| scene.pairs_within(d);
     cbvh_scene_relations() -> relations: SceneRelationRow, Scene::relations;
     cbvh_scene_contacts() -> contacts: SceneContactRow, Scene::contacts;
+    cbvh_scene_clashes(options: *const ClashChoices,) -> clashes: SceneClashRow, |scene| -> Result<_, Failure> {
+        Ok(scene.clashes(&input::options("options", options)?.read())?)
+    };
 }
 
 /// Refuses an instance that is named twice: only one of its ways would be looked at.
@@ -118,7 +121,7 @@ unsafe fn on_ways<T: Into<R>, R: Copy>(
             (
                 array("instances", instances, count)?,
                 array("paths", paths, count)?,
-                options("options", choices)?.read(),
+                input::options("options", choices)?.read(),
                 One::new("answer", answer)?,
             )
         };

@@ -20,6 +20,7 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 `Mesh.motion` and `Mesh.is_free` tell whether a path is free; the answer is certain at every moment.
 
 **Overlap.** `Mesh.penetration` bounds how deep closed meshes overlap, and gives a translation that separates them.
+`Mesh.clash` and `Scene.clashes` tell parts that touch from parts that overlap, are near, contain each other or are there twice.
 `Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
 itself.
 
@@ -44,6 +45,8 @@ are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be bake
 """
 
 from ._answers import (
+    Clash,
+    ClashClass,
     ClosestPoint,
     ContactRegions,
     Distance,
@@ -54,6 +57,7 @@ from ._answers import (
     RayHit,
     RegionKind,
     Relation,
+    SceneClashes,
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
@@ -78,6 +82,8 @@ from .manager import CollisionManager
 
 __all__ = [
     "BakeError",
+    "Clash",
+    "ClashClass",
     "ClosestPoint",
     "CollisionManager",
     "ContactRegions",
@@ -95,6 +101,7 @@ __all__ = [
     "RegionKind",
     "Relation",
     "Scene",
+    "SceneClashes",
     "SceneClosestPoint",
     "SceneContacts",
     "SceneDistance",

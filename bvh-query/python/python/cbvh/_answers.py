@@ -90,6 +90,29 @@ class SelfContactKind(_Named):
     DUPLICATE = 3
 
 
+class ClashClass(_Named):
+    """How two parts of an assembly lie.
+
+    - ``APART``: their surfaces are farther apart than the clearance, and neither is inside the other.
+    - ``NEAR``: their surfaces do not touch, but are at most the clearance apart.
+    - ``TOUCHING``: they have points in common, and their depth is at most the tolerance.
+    - ``OVERLAPPING``: their depth exceeds the tolerance.
+    - ``CONTAINED``: one is wholly inside the other.
+    - ``DUPLICATED``: both are the same part in the same place, to within the tolerance.
+    - ``UNDECIDED``: they have points in common, and the tolerance lies between the bounds found for their depth.
+    - ``INTERSECTING``: they have points in common, and one is not closed, so that they have no depth.
+    """
+
+    APART = 0
+    NEAR = 1
+    TOUCHING = 2
+    OVERLAPPING = 3
+    CONTAINED = 4
+    DUPLICATED = 5
+    UNDECIDED = 6
+    INTERSECTING = 7
+
+
 class Distance(NamedTuple):
     """The least distance of two meshes. After N questions, each field has N elements or rows.
 
@@ -139,7 +162,7 @@ class Penetration(NamedTuple):
     - ``point``: what proves ``lower``: a ball about this point, in the frame of the first mesh, is inside the first mesh,
       and another one about it is inside the second. Shape (3,) or (N, 3).
     - ``radii``: the radii of these balls. Their sum is ``lower``, but for roundings. Shape (2,) or (N, 2).
-    - ``is_spent``: whether the budget ended the search. Shape () or (N,).
+    - ``is_spent``: whether the budget or the most visits ended the search. Shape () or (N,).
     """
 
     lower: Any
@@ -148,6 +171,26 @@ class Penetration(NamedTuple):
     point: Floats
     radii: Floats
     is_spent: Any
+
+
+class Clash(NamedTuple):
+    """How two parts of an assembly lie, and by how much. After N questions, each field has N elements or rows.
+
+    - ``kind``: a `ClashClass` or, for N poses, their numbers as uint8, shape (N,), printed as names.
+    - ``relation``: whether they touch and, if not, whether one is inside the other: a `Relation`, or numbers likewise.
+    - ``distance``: for near parts, how far apart their surfaces are, in mesh units; infinite for parts that are apart, and 0
+      for all others. Shape () or (N,).
+    - ``point``: a point of the clash in the frame of the first mesh: between the closest points, in both parts, or in contact;
+      0 for parts that are apart. Shape (3,) or (N, 3).
+    - ``depth``: for parts that touch, overlap or are undecided, the bounds of their depth. For all others, its numbers are
+      NaN.
+    """
+
+    kind: Any
+    relation: Any
+    distance: Any
+    point: Floats
+    depth: Penetration
 
 
 class ContactRegions(NamedTuple):
@@ -333,6 +376,17 @@ class ScenePenetrations(NamedTuple):
     depth: Penetration
 
 
+class SceneClashes(NamedTuple):
+    """Pairs of instances that clash, and how.
+
+    - ``pairs``: numbers of instances, A and B, shape (K, 2).
+    - ``clash``: the answers of `Mesh.clash`, arrays of K elements or rows, in A's frame.
+    """
+
+    pairs: NDArray[np.int64]
+    clash: Clash
+
+
 class SceneMotionAnswer(NamedTuple):
     """Whether the paths of instances are free.
 
@@ -429,14 +483,25 @@ class _SelfContactKinds(_Names):
     kind = SelfContactKind
 
 
+class _ClashClasses(_Names):
+    kind = ClashClass
+
+
 _ARRAYS: dict[type[_Named], type[_Names]] = {
-    array.kind: array for array in (_Relations, _Sides, _MotionKinds, _RegionKinds, _SelfContactKinds)
+    array.kind: array
+    for array in (_Relations, _Sides, _MotionKinds, _RegionKinds, _SelfContactKinds, _ClashClasses)
 }
 
 
 def named(kind: type[_Named], found: Any) -> Any:
     """The name of a number, or an array of the numbers of N answers that prints their names."""
     return kind(found) if type(found) is int else found.view(_ARRAYS[kind])
+
+
+def clash_of(found: tuple[Any, ...]) -> Clash:
+    """What the compiled module tells of clashes."""
+    kind, relation, distance, point, depth = found
+    return Clash(named(ClashClass, kind), named(Relation, relation), distance, point, Penetration(*depth))
 
 
 def regions_of(found: tuple[Any, ...]) -> ContactRegions:

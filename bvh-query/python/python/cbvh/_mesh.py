@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
 from ._answers import (
+    Clash,
     ClosestPoint,
     Distance,
     Floats,
@@ -23,6 +24,7 @@ from ._answers import (
     SelfContacts,
     Separation,
     Side,
+    clash_of,
     named,
     patches_of,
     regions_of,
@@ -263,6 +265,33 @@ class Mesh:
         """
         asked = (self._mesh, _other(other), poses, parallel)
         return Penetration(*_cbvh.penetration(asked, relative_gap, tolerance, budget))
+
+    def clash(
+        self,
+        other: Mesh,
+        poses: ArrayLike,
+        *,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        relative_gap: float = 0.1,
+        visits: int | None = 1 << 20,
+        parallel: bool = False,
+    ) -> Clash:
+        """How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place?
+
+        Parts that touch are told apart from parts that overlap by their depth, which is that of `penetration`: flush faces
+        overlap by roundings in nearly all poses, so that a tolerance is part of the question. Where a part fits another one
+        without a gap, like a peg in its hole, the depth is mostly undecided. Parts need not be closed.
+
+        ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4). ``clearance``: parts at
+        most this far apart are near, in mesh units; 0 looks for no near parts. ``tolerance``: parts overlap if they do so by
+        more than this depth, in mesh units; None: a millionth of the largest side of both. The search for a depth ends when
+        ``upper`` exceeds ``lower`` by no more than ``relative_gap`` of it, a part above 0, or after ``visits`` visits of nodes
+        and triangles; None: no limit. Raises ValueError where the question is about the inside of a mesh that was baked without
+        topology.
+        """
+        asked = (self._mesh, _other(other), poses, parallel)
+        return clash_of(_cbvh.clash(asked, (clearance, tolerance, relative_gap, visits)))
 
     def separation(
         self, other: Mesh, poses: ArrayLike, direction: ArrayLike, *, parallel: bool = False

@@ -19,6 +19,7 @@ from ._answers import (
     Penetration,
     RayHit,
     Relation,
+    SceneClashes,
     SceneClosestPoint,
     SceneContacts,
     SceneDistance,
@@ -28,6 +29,7 @@ from ._answers import (
     SceneRayHit,
     SceneRelations,
     Side,
+    clash_of,
     named,
 )
 from ._mesh import Mesh, _length
@@ -328,6 +330,19 @@ class Scene:
         """All pairs that touch, or of which one is inside the other, wholly or in part, with their relations."""
         pairs, relations = _cbvh.scene_relations(self._scene)
         return SceneRelations(pairs, named(Relation, relations))
+
+    def clashes(
+        self,
+        *,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        relative_gap: float = 0.1,
+        visits: int | None = 1 << 20,
+    ) -> SceneClashes:
+        """All pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs
+        that are apart are left out. Arguments are those of `Mesh.clash`."""
+        pairs, clash = _cbvh.scene_clashes(self._scene, (clearance, tolerance, relative_gap, visits))
+        return SceneClashes(pairs, clash_of(clash))
 
     def contacts(self) -> SceneContacts:
         """All pairs of triangles that touch, exactly."""
