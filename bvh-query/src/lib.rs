@@ -49,8 +49,6 @@
 //! - `cargo run --release --example path`: a path of poses, with a [`Tracker`] and with a [`Batch`].
 //! - `cargo run --release --example planner`: a path through an environment, each edge of which is certified to be
 //!   free.
-//! - `cargo run --release --example robot`: a robot from a URDF file among obstacles, in a [`Scene`], in poses and on
-//!   the motions between them.
 //! - `cargo run --release --example shared`: a mesh in memory, shared between threads.
 //!
 //! In short:

@@ -88,7 +88,7 @@ pub(crate) fn table<T: Element, const K: usize>(
     PyArray1::from_vec(py, flat).reshape([rows, K])
 }
 
-fn matrix(pose: &Pose) -> [f64; 16] {
+pub(crate) fn matrix(pose: &Pose) -> [f64; 16] {
     let (r, t) = (pose.rotation(), pose.translation());
     let row = |k: usize| [r[k][0], r[k][1], r[k][2], t[k]];
     let mut matrix = [0.0; 16];

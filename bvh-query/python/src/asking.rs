@@ -92,7 +92,8 @@ pub(crate) fn on_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
     Ok(pool.install(work))
 }
 
-fn in_turns<P, T>(
+/// Asks about so many items at a time, and lets Python handle signals in between.
+pub(crate) fn in_turns<P, T>(
     items: &[P],
     size: usize,
     mut ask: impl FnMut(&[P]) -> PyResult<Vec<T>>,

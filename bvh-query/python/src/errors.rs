@@ -21,7 +21,7 @@ pub(crate) fn open_error(error: OpenError) -> PyErr {
 }
 
 /// The exception of what the system refuses, such as `FileNotFoundError`.
-fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr {
+pub(crate) fn system_error(path: &Path, source: &std::io::Error, message: String) -> PyErr {
     match source.raw_os_error() {
         // With its number, `OSError` picks the class.
         Some(number) => {

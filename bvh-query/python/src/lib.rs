@@ -14,6 +14,7 @@ mod pairs;
 mod paths;
 mod poses;
 mod probes;
+mod robot;
 mod scene;
 mod scene_pairs;
 mod shapes;
@@ -25,6 +26,7 @@ use pyo3::prelude::*;
 fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<mesh::Mesh>()?;
     module.add_class::<paths::Paths>()?;
+    module.add_class::<robot::Robot>()?;
     module.add_class::<scene::Scene>()?;
     macro_rules! functions {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };

@@ -76,6 +76,7 @@ from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
+from ._robot import Robot, RobotDistance, RobotMotion
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
 from .manager import CollisionManager
@@ -100,6 +101,9 @@ __all__ = [
     "RayHit",
     "RegionKind",
     "Relation",
+    "Robot",
+    "RobotDistance",
+    "RobotMotion",
     "Scene",
     "SceneClashes",
     "SceneClosestPoint",

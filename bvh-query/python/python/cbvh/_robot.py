@@ -1,0 +1,324 @@
+"""Robots: questions in joint space, about a URDF among obstacles."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Iterable, Literal, Mapping, NamedTuple, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _cbvh
+from ._answers import Floats, MotionKind
+from ._mesh import Mesh
+
+Paths = Iterable["str | os.PathLike[str]"]
+
+
+class RobotDistance(NamedTuple):
+    """The nearest two bodies, or those of each of N configurations."""
+
+    distance: Any
+    """How far apart they are: a number, or an array of shape (N,). Infinite if no pairs are asked about."""
+    lower: Any
+    """A lower bound of the exact distance."""
+    upper: Any
+    """An upper bound of it."""
+    bodies: Any
+    """Their names, or a list of those."""
+    points: Any
+    """The nearest points of both in the world, shape (2, 3) or (N, 2, 3)."""
+
+
+class RobotMotion(NamedTuple):
+    """How a motion in joint space ends."""
+
+    kind: MotionKind
+    free_until: float
+    """Before this time certainly nothing comes within the clearance. 1 if the motion is free."""
+    touching_at: float
+    """The time of the hit, or of the first undecided configuration; NaN if the motion is free."""
+    joints: Floats
+    """The joint values at that time."""
+    bodies: tuple[str, str] | None
+    """The two bodies that come near."""
+    distance: float
+    """Their distance at that time."""
+
+
+class Robot:
+    """A robot among obstacles, asked about with the values of its joints.
+
+    A body is a link, an obstacle or an attached object. Questions are about all pairs of bodies that can move against each
+    other, but for those whose contact is allowed: by `allow`, or by the SRDF. Links that only fixed joints connect, and
+    obstacles among themselves, are never asked about. Links are surfaces, if they are meshes, and primitives are solid.
+
+    An array of joint values ``q`` has shape (n,) for one configuration, or (N, n) for N of them, in the order of `joints`.
+    Angles are in radians, lengths in metres. Answers are certain, and the same bits on all systems. ``parallel=True`` divides
+    N configurations among all cores. Threads may share a robot: a question is about the robot as it is when the question
+    begins.
+
+    >>> robot = cbvh.Robot.from_urdf("panda.urdf", srdf="panda.srdf")       # doctest: +SKIP
+    >>> robot.add_obstacle(cbvh.box([1, 1, 0.02]), name="table")            # doctest: +SKIP
+    >>> robot.is_free(robot.states["arm"]["home"], goal)                    # doctest: +SKIP
+    True
+    """
+
+    __slots__ = ("_robot",)
+
+    def __init__(self) -> None:
+        raise TypeError("Robot: use Robot.from_urdf")
+
+    @classmethod
+    def _of(cls, robot: _cbvh.Robot) -> Robot:
+        self = object.__new__(cls)
+        self._robot = robot
+        return self
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | os.PathLike[str],
+        package_dirs: Paths = (),
+        srdf: str | os.PathLike[str] | None = None,
+        *,
+        geometry: Literal["collision", "visual"] = "collision",
+        base: Literal["fixed", "planar", "floating"] = "fixed",
+        cylinder_error: float = 1e-3,
+        cache: str | os.PathLike[str] | None = None,
+    ) -> Robot:
+        """Reads a URDF file and bakes the shapes of all links: OBJ, STL, PLY, glTF and COLLADA meshes, and primitives.
+
+        ``package://`` paths are looked for in ``package_dirs``, in ``ROS_PACKAGE_PATH`` and in the folders above the file.
+        Pairs of links that ``srdf`` disables are not asked about. A ``base`` that moves adds joint values: ``base/x``,
+        ``base/y`` and ``base/theta``, or ``base/x`` to ``base/z`` and a quaternion, ``base/qx`` to ``base/qw``. A cylinder is a
+        prism around it, wider by at most ``cylinder_error`` of its radius. ``cache`` names a folder for baked meshes.
+
+        Raises ValueError for a description that is not as it should be, FileNotFoundError and BakeError for its meshes.
+        """
+        for name, value, known in (
+            ("geometry", geometry, ("collision", "visual")),
+            ("base", base, ("fixed", "planar", "floating")),
+        ):
+            if value not in known:
+                raise ValueError(f"{name}: expected one of {', '.join(known)}, found {value!r}")
+        if isinstance(package_dirs, (str, os.PathLike)):
+            package_dirs = [package_dirs]
+        return cls._of(
+            _cbvh.Robot.from_urdf(
+                os.fspath(path),
+                [os.fspath(folder) for folder in package_dirs],
+                None if srdf is None else os.fspath(srdf),
+                geometry == "visual",
+                base,
+                float(cylinder_error),
+                None if cache is None else os.fspath(cache),
+            )
+        )
+
+    def copy(self) -> Robot:
+        """A robot of its own with the same obstacles. It shares all meshes."""
+        return self._of(self._robot.copy())
+
+    @property
+    def name(self) -> str:
+        """The name of the robot."""
+        return self._robot.name()
+
+    @property
+    def joints(self) -> list[str]:
+        """The names of the joint values, in the order of ``q``, which is that of the URDF file.
+
+        A planar joint has three, ``NAME/x``, ``NAME/y`` and ``NAME/theta``, a floating one seven, ``NAME/x`` to ``NAME/z`` and
+        ``NAME/qx`` to ``NAME/qw``. Fixed joints and those that mimic others have none.
+        """
+        return self._robot.joints()
+
+    @property
+    def limits(self) -> NDArray[np.float64]:
+        """The lower and upper limit of each joint value, shape (n, 2), infinite where there is none. No question checks them."""
+        return np.array(self._robot.limits(), dtype=np.float64).reshape(-1, 2)
+
+    @property
+    def links(self) -> list[str]:
+        """The names of the links, each after the link that it hangs from."""
+        return self._robot.links()
+
+    @property
+    def groups(self) -> dict[str, list[str]]:
+        """The joint values of each group of the SRDF."""
+        joints = self.joints
+        return {name: [joints[place] for place in places] for name, places in self._robot.groups()}
+
+    @property
+    def states(self) -> dict[str, dict[str, dict[str, float]]]:
+        """The named configurations of the SRDF: for each group and name, values by the names of joints. See `q`."""
+        joints = self.joints
+        states: dict[str, dict[str, dict[str, float]]] = {}
+        for group, name, values in self._robot.states():
+            states.setdefault(group, {})[name] = {joints[place]: value for place, value in values}
+        return states
+
+    def q(self, values: Mapping[str, float] | None = None, **more: float) -> NDArray[np.float64]:
+        """Joint values by name; 0 for all others, and no rotation for a floating joint."""
+        joints = self.joints
+        q = np.array([1.0 if name.endswith("/qw") else 0.0 for name in joints])
+        for name, value in {**(values or {}), **more}.items():
+            if name not in joints:
+                raise KeyError(f"expected the name of a joint value, found {name!r}")
+            q[joints.index(name)] = value
+        return q
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs of bodies that are asked about."""
+        return [(a, b) for a, b in self._robot.pairs()]
+
+    def allow(self, a: str, b: str, allowed: bool = True) -> None:
+        """Lets two bodies touch, so that they are not asked about; or asks about them again."""
+        self._robot.allow(a, b, bool(allowed))
+
+    def allow_frequent(self, samples: int = 1000, share: float = 0.95) -> list[tuple[tuple[str, str], float]]:
+        """Lets pairs touch that nearly always do, as MoveIt's assistant does, and returns them with their shares.
+
+        These are the pairs that touch in at least ``share`` of some random configurations within the joints' limits. A joint
+        value without limits is taken between -pi and pi. The configurations are the same each time.
+        """
+        found = self._robot.allow_frequent(int(samples), float(share))
+        return [((a, b), part) for (a, b), part in found]
+
+    def add_obstacle(self, mesh: Mesh, pose: ArrayLike | None = None, name: str | None = None) -> str:
+        """Adds an obstacle: a mesh or a shape that stands in the world, at a pose of shape (4, 4). Returns its name."""
+        name = self._free_name("obstacle") if name is None else name
+        self._robot.add_obstacle(name, mesh._mesh, pose)
+        return name
+
+    def attach(
+        self,
+        mesh: Mesh,
+        link: str,
+        pose: ArrayLike | None = None,
+        name: str | None = None,
+        may_touch: Sequence[str] = (),
+    ) -> str:
+        """Attaches a mesh to a link, at a pose in the link's frame. It may touch that link and those of ``may_touch``."""
+        name = self._free_name("attached") if name is None else name
+        self._robot.attach(name, mesh._mesh, link, pose, list(may_touch))
+        return name
+
+    def _free_name(self, kind: str) -> str:
+        number = 0
+        while True:
+            number += 1
+            name = f"{kind} {number}"
+            try:
+                self._robot.set_margin(name, 0.0)
+            except KeyError:
+                return name
+
+    def remove(self, name: str) -> None:
+        """Removes an obstacle or an attached object."""
+        self._robot.remove(name)
+
+    def set_pose(self, name: str, pose: ArrayLike) -> None:
+        """Moves an obstacle, or an attached object in the frame of its link."""
+        self._robot.set_pose(name, pose)
+
+    def set_margin(self, name: str, margin: float) -> None:
+        """Sets how near others may come to a body. Nearer counts as contact, and distances are less by it."""
+        self._robot.set_margin(name, float(margin))
+
+    def _rows(self, q: ArrayLike, name: str = "q") -> tuple[NDArray[np.float64], bool]:
+        rows = np.ascontiguousarray(q, dtype=np.float64)
+        count = len(self.joints)
+        if rows.ndim not in (1, 2) or rows.shape[-1] != count:
+            raise ValueError(f"{name}: expected shape ({count},) or (N, {count}), found {rows.shape}")
+        return np.atleast_2d(rows), rows.ndim == 1
+
+    def link_poses(self, q: ArrayLike) -> NDArray[np.float64]:
+        """The poses of all links in the world, in the order of `links`: shape (links, 4, 4) or (N, links, 4, 4)."""
+        rows, one = self._rows(q)
+        poses = self._robot.link_poses(rows).reshape(len(rows), -1, 4, 4)
+        return poses[0] if one else poses
+
+    def collide(self, q: ArrayLike, *, parallel: bool = False) -> Any:
+        """Whether any two bodies touch: a bool, or an array of shape (N,)."""
+        rows, one = self._rows(q)
+        found = self._robot.collide(rows, parallel)
+        return bool(found[0]) if one else found
+
+    def pairs_in_contact(self, q: ArrayLike, *, parallel: bool = False) -> Any:
+        """The names of the bodies that touch: a list of pairs, or a list of N lists."""
+        rows, one = self._rows(q)
+        found = [[(a, b) for a, b in pairs] for pairs in self._robot.pairs_in_contact(rows, parallel)]
+        return found[0] if one else found
+
+    def distance(self, q: ArrayLike, *, parallel: bool = False) -> RobotDistance:
+        """The nearest two bodies, how far apart they are, and where; with arrays for N configurations."""
+        rows, one = self._rows(q)
+        found = self._robot.distance(rows, parallel)
+        numbers = np.array([of[1] for of in found]).reshape(-1, 3)
+        points = np.array([of[3] for of in found]).reshape(-1, 2, 3)
+        bodies = [tuple(of[2]) if of[0] else None for of in found]
+        if one:
+            distance, lower, upper = numbers[0].tolist()
+            return RobotDistance(distance, lower, upper, bodies[0], points[0])
+        return RobotDistance(numbers[:, 0], numbers[:, 1], numbers[:, 2], bodies, points)
+
+    def is_free(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        *,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """Whether the straight motion from q0 to q1 in joint space is certainly free, at every moment.
+
+        False means that at some moment two bodies are within the clearance, or that their gap beyond it falls below the
+        tolerance: a millionth of the size of the larger one, unless another one is given. A floating joint turns about one
+        axis, the shorter way. One row serves all rows of the other argument.
+        """
+        (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
+        if len(from_) != len(to) and not (one or other):
+            raise ValueError(f"q1: expected {len(from_)} rows, as q0, found {len(to)}")
+        from_, to = np.broadcast_arrays(from_, to)
+        free = self._robot.is_free(
+            np.ascontiguousarray(from_), np.ascontiguousarray(to), float(clearance), tolerance, parallel
+        )
+        return bool(free[0]) if one and other else free
+
+    def motion(
+        self, q0: ArrayLike, q1: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None
+    ) -> RobotMotion:
+        """What touches first on the straight motion from q0 to q1, and when. See `is_free`."""
+        (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
+        if not (one and other):
+            raise ValueError("q0 and q1: expected one configuration each, found several")
+        return self.motion_along(np.stack([from_[0], to[0] - from_[0]], axis=1), clearance=clearance, tolerance=tolerance)
+
+    def motion_along(
+        self, coefficients: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None
+    ) -> RobotMotion:
+        """What touches first while each joint value follows a polynomial of time, from 0 to 1.
+
+        ``coefficients`` has shape (n, degree + 1), the constants first: a piece of a spline, or of a trapezoidal profile.
+        """
+        of = np.ascontiguousarray(coefficients, dtype=np.float64)
+        count = len(self.joints)
+        if of.ndim != 2 or of.shape[0] != count or of.shape[1] == 0:
+            raise ValueError(f"coefficients: expected shape ({count}, degree + 1), found {of.shape}")
+        kind, free_until, at, joints, bodies, distance = self._robot.motion(of, float(clearance), tolerance)
+        is_free = kind == 0
+        return RobotMotion(
+            MotionKind(kind),
+            free_until,
+            float("nan") if is_free else at,
+            np.array(joints),
+            None if is_free else (bodies[0], bodies[1]),
+            distance,
+        )
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name!r}: {len(self.joints)} joint values, {len(self.links)} links>"

@@ -1,0 +1,606 @@
+//! Motions in joint space, certain at every moment.
+//!
+//! While all joints follow polynomials of time, each link moves on a path, and so does B in A's frame for each pair: along the chain
+//! of joints between both, and whatever moves both alike does not matter. Such a path needs a bound of its sagitta.
+//!
+//! # Bound
+//! Follow a point of B from B's frame outwards along the chain. In the frame that has been reached, let it be within R of the origin,
+//! have a speed of at most V, and an acceleration of at most A, all the time. In the next frame:
+//!
+//! | step | R | V | A |
+//! |---|---|---|---|
+//! | a fixed frame with its origin at distance d | R + d | V | A |
+//! | a turn at a rate of at most w, with an angular acceleration of at most a | R | V + w R | A + 2 w V + (w^2 + a) R |
+//! | a slide by at most s, at a speed of at most v, with an acceleration of at most a | R + s | V + v | A + a |
+//!
+//! A turn takes y(t) = Q(t) z(t). With the angular velocity w and its derivative a, y' = w x y + Q z', and
+//! y'' = a x y + w x (w x y) + 2 w x Q z' + Q z''; w x y is no longer than w R. A step and its inverse have the same bounds, with the
+//! slide of an inverse planar or floating joint before its turn.
+//!
+//! A function on [t0, t1] with a second derivative of at most A leaves its chord by at most A (t1 - t0)^2 / 8. Poses are off by their
+//! roundings: less than 16 u per step of all that has been reached, with u = 2^-53.
+
+use crate::asker::{Asker, failed};
+use crate::error::RobotError;
+use crate::frame::{Frame, Point, length};
+use crate::model::{Kind, Model, Value, quaternion_length};
+use crate::questions::bodies;
+use crate::robot::{Pair, Robot, Setting};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, Pose, RigidPath};
+use rayon::prelude::*;
+
+/// A motion of all joints: a polynomial of time, from 0 to 1, for each joint value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Edge {
+    /// The coefficients of each, the constant first.
+    coefficients: Vec<Vec<f64>>,
+}
+
+impl Edge {
+    /// Goes straight from one configuration to another, each joint at its constant rate. A floating joint turns about one axis, the
+    /// shorter way.
+    ///
+    /// # Errors
+    /// [`RobotError::Count`] if one has more values than the other.
+    pub fn straight(from: &[f64], to: &[f64]) -> Result<Self, RobotError> {
+        if from.len() != to.len() {
+            return Err(RobotError::Count { expected: from.len(), found: to.len() });
+        }
+        let coefficients = from.iter().zip(to).map(|(from, to)| vec![*from, to - from]);
+        Ok(Self { coefficients: coefficients.collect() })
+    }
+
+    /// Follows polynomials of time, from 0 to 1: the coefficients of each joint value, the constant first. Splines and trapezoidal
+    /// profiles are some of these, one after the other.
+    pub fn polynomials(coefficients: Vec<Vec<f64>>) -> Self {
+        Self { coefficients }
+    }
+
+    /// Returns bounds of a joint value on the whole way.
+    fn bounds(&self, number: usize) -> Bounds {
+        let of = &self.coefficients[number];
+        let first = derivative(of);
+        Bounds { way: most(of), rate: most(&first), acceleration: most(&derivative(&first)) }
+    }
+
+    /// Returns bounds of a joint that turns or slides by a multiple of a value.
+    fn bounds_of(&self, by: &Value) -> Bounds {
+        let of = self.bounds(by.number);
+        let factor = by.factor.abs();
+        Bounds {
+            way: factor * of.way + by.offset.abs(),
+            rate: factor * of.rate,
+            acceleration: factor * of.acceleration,
+        }
+    }
+}
+
+/// Bounds of the magnitude of a value and of its derivatives.
+#[derive(Clone, Copy, Default)]
+struct Bounds {
+    way: f64,
+    rate: f64,
+    acceleration: f64,
+}
+
+impl Bounds {
+    /// Returns bounds of the length of a vector of values.
+    fn long<const N: usize>(of: [Self; N]) -> Self {
+        let norm = |part: fn(&Self) -> f64| of.iter().map(|of| part(of).powi(2)).sum::<f64>().sqrt();
+        Self { way: norm(|of| of.way), rate: norm(|of| of.rate), acceleration: norm(|of| of.acceleration) }
+    }
+}
+
+/// Returns the coefficients of a derivative.
+fn derivative(of: &[f64]) -> Vec<f64> {
+    of.iter().enumerate().skip(1).map(|(power, coefficient)| power as f64 * coefficient).collect()
+}
+
+/// Returns a bound of the magnitude of a polynomial on [0, 1]: the largest of its Bernstein coefficients, of which its values are
+/// averages.
+fn most(of: &[f64]) -> f64 {
+    let degree = of.len().saturating_sub(1);
+    let binomial =
+        |n: usize, k: usize| (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64);
+    let bernstein = |i: usize| -> f64 {
+        (0..=i.min(degree)).map(|k| binomial(i, k) / binomial(degree, k) * of.get(k).unwrap_or(&0.0)).sum()
+    };
+    (0..=degree).map(|i| bernstein(i).abs()).fold(0.0, f64::max)
+}
+
+/// Whether a motion in joint space is free.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum RobotMotion {
+    /// At no time from 0 to 1 is any pair within the clearance.
+    Free,
+    /// Two bodies are within the clearance at `touching_at`.
+    Hit {
+        /// Before this time certainly no pair is within the clearance.
+        free_until: f64,
+        /// A time at which the bodies are within the clearance: the earliest one found.
+        touching_at: f64,
+        /// The joint values at that time.
+        joints: Vec<f64>,
+        /// The bodies.
+        bodies: [String; 2],
+        /// Their distance at that time, with the points in the frames of shapes.
+        nearest: Distance,
+    },
+    /// Two bodies come near, but it is undecided whether they come within the clearance: their gap falls below the tolerance
+    /// beyond it.
+    Near {
+        /// Before this time certainly no pair is within the clearance.
+        free_until: f64,
+        /// The time of the first undecided configuration.
+        at: f64,
+        /// The joint values at that time.
+        joints: Vec<f64>,
+        /// The bodies.
+        bodies: [String; 2],
+        /// Their distance at that time.
+        nearest: Distance,
+    },
+}
+
+impl Robot {
+    /// Returns whether a straight motion in joint space is certainly free, at every moment. `false` means that two bodies touch at
+    /// some moment, or that their gap falls below the tolerance: a millionth of the size of the larger part, unless another one is
+    /// given ([`MotionOptions::tolerance`]).
+    ///
+    /// Cost: that of [`Querier::is_free`](bvh_query::Querier::is_free) for each pair that may come near on the way, until one is
+    /// not free.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`].
+    pub fn is_free(&mut self, from: &[f64], to: &[f64]) -> Result<bool, RobotError> {
+        self.is_edge_free(&Edge::straight(from, to)?, &MotionOptions::default())
+    }
+
+    /// Returns whether a motion is certainly free, as [`Robot::is_free`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn is_edge_free(&mut self, edge: &Edge, options: &MotionOptions) -> Result<bool, RobotError> {
+        self.refresh();
+        self.asker.is_free(&self.setting, edge, options)
+    }
+
+    /// Returns whether each of many motions is certainly free. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    pub fn are_free(&mut self, edges: &[Edge], options: &MotionOptions) -> Result<Vec<bool>, RobotError> {
+        self.refresh();
+        let (setting, asker) = (&*self.setting, &self.asker);
+        let ask = |asker: &mut Asker, edge: &Edge| asker.is_free(setting, edge, options);
+        edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Returns whether a motion is free, and otherwise what touches first, and when.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
+        self.refresh();
+        self.asker.motion(&self.setting, edge, options)
+    }
+
+    /// Returns what touches first on a path of straight motions through many configurations, with the number of the motion; `None`
+    /// if the whole path is free.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn first_hit<'a>(
+        &mut self,
+        path: impl IntoIterator<Item = &'a [f64]>,
+        options: &MotionOptions,
+    ) -> Result<Option<(usize, RobotMotion)>, RobotError> {
+        let mut path = path.into_iter();
+        let Some(mut from) = path.next() else { return Ok(None) };
+        for (number, to) in path.enumerate() {
+            let found = self.motion(&Edge::straight(from, to)?, options)?;
+            if found != RobotMotion::Free {
+                return Ok(Some((number, found)));
+            }
+            from = to;
+        }
+        Ok(None)
+    }
+}
+
+impl Asker {
+    fn is_free(
+        &mut self,
+        setting: &Setting,
+        edge: &Edge,
+        options: &MotionOptions,
+    ) -> Result<bool, RobotError> {
+        check(setting, edge)?;
+        // Most motions that are not free touch at one of these.
+        if options.clearance == 0.0 {
+            for t in [1.0, 0.5, 0.25, 0.75] {
+                if self.collide(setting, &at(&setting.model, edge, t))? {
+                    return Ok(false);
+                }
+            }
+        }
+        for pair in &setting.pairs {
+            let path = PairPath::new(setting, pair, edge);
+            if path.stays_apart(options) {
+                continue;
+            }
+            let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
+            let free = self.querier.is_free(a, b, &path, options);
+            if !free.map_err(|source| failed(setting, pair, source))? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn motion(
+        &mut self,
+        setting: &Setting,
+        edge: &Edge,
+        options: &MotionOptions,
+    ) -> Result<RobotMotion, RobotError> {
+        check(setting, edge)?;
+        let (mut free_until, mut first): (f64, Option<(bool, f64, usize, Distance)>) = (1.0, None);
+        for (number, pair) in setting.pairs.iter().enumerate() {
+            let path = PairPath::new(setting, pair, edge);
+            if path.stays_apart(options) {
+                continue;
+            }
+            let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
+            let answer = self.querier.motion(a, b, &path, options);
+            let (free, found) = match answer.map_err(|source| failed(setting, pair, source))? {
+                MotionAnswer::Free => continue,
+                MotionAnswer::Hit { free_until, touching_at, nearest } => {
+                    (free_until, (true, touching_at, number, nearest))
+                }
+                MotionAnswer::Near { free_until, at, nearest } => (free_until, (false, at, number, nearest)),
+            };
+            free_until = free_until.min(free);
+            // A hit counts before what is only near, however early that is, because it is certain.
+            let order = |of: &(bool, f64, usize, Distance)| (!of.0, of.1);
+            if first.as_ref().is_none_or(|held| order(&found) < order(held)) {
+                first = Some(found);
+            }
+        }
+        let Some((is_hit, time, number, nearest)) = first else { return Ok(RobotMotion::Free) };
+        let (joints, bodies) = (at(&setting.model, edge, time), bodies(setting, number));
+        Ok(if is_hit {
+            RobotMotion::Hit { free_until, touching_at: time, joints, bodies, nearest }
+        } else {
+            RobotMotion::Near { free_until, at: time, joints, bodies, nearest }
+        })
+    }
+}
+
+/// Returns an error unless the edge is of all joint values, and both ends are valid. Quaternions only turn at a constant rate.
+fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
+    let model = &setting.model;
+    for t in [0.0, 1.0] {
+        let numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();
+        model.check(&numbers)?;
+    }
+    for joint in &model.joints {
+        if let Kind::Floating(first) = joint.kind
+            && let Some(found) = edge.coefficients[first + 3..first + 7].iter().find(|of| of.len() > 2)
+        {
+            let (joint, expected) =
+                (joint.name.clone(), "a quaternion on a straight motion, with 2 coefficients");
+            return Err(RobotError::Value { joint, expected, found: found.len() as f64 });
+        }
+    }
+    Ok(())
+}
+
+/// The path of B in A's frame.
+struct PairPath<'a> {
+    setting: &'a Setting,
+    pair: &'a Pair,
+    edge: &'a Edge,
+    /// Bounds of the acceleration, of the speed and of the reach of a point of B: at B's origin, and more per distance from it.
+    acceleration: [f64; 2],
+    speed: [f64; 2],
+    reach: f64,
+}
+
+impl<'a> PairPath<'a> {
+    fn new(setting: &'a Setting, pair: &'a Pair, edge: &'a Edge) -> Self {
+        let [at_0, at_1] = [0.0, 1.0].map(|radius| Bound::along(setting, pair, edge, radius));
+        Self {
+            setting,
+            pair,
+            edge,
+            acceleration: [at_0.acceleration, at_1.acceleration - at_0.acceleration],
+            speed: [at_0.speed, at_1.speed - at_0.speed],
+            reach: at_0.reach,
+        }
+    }
+
+    /// Returns the frame of B in A's.
+    fn frame(&self, t: f64) -> Frame {
+        let (model, chain) = (&self.setting.model, &self.pair.chain);
+        let numbers = at(model, self.edge, t);
+        let part = |number: usize| &self.setting.parts[number];
+        let mut of_a = Frame::IDENTITY;
+        for &joint in chain.up.iter().rev() {
+            of_a = of_a.of(&model.joints[joint].at(&numbers));
+        }
+        let mut of_b = Frame::IDENTITY;
+        for &joint in &chain.down {
+            of_b = of_b.of(&model.joints[joint].at(&numbers));
+        }
+        of_a.of(&part(self.pair.a).origin).relative(&of_b.of(&part(self.pair.b).origin))
+    }
+
+    /// Returns whether the balls around both parts are farther apart than the clearance at every moment. Intervals in which
+    /// that is not seen at once are halved a few times.
+    fn stays_apart(&self, options: &MotionOptions) -> bool {
+        let parts = [self.pair.a, self.pair.b].map(|part| &self.setting.parts[part]);
+        let [of_a, of_b] = parts.map(|part| part.middle);
+        let far = length(of_b) + parts[1].radius;
+        let rounding = ROUNDING * (self.reach + far);
+        let speed = self.speed[0] + self.speed[1] * far;
+        let limit = self.pair.reach + options.clearance + options.tolerance.unwrap_or(0.0) + rounding;
+        let is_apart = |[t0, t1]: [f64; 2]| {
+            let middle = self.frame((t0 + t1) / 2.0).place(of_b);
+            let gap = length([0, 1, 2].map(|k| middle[k] - of_a[k]));
+            gap > limit + DEFAULT_TOLERANCE * parts[0].radius.max(parts[1].radius) + speed * (t1 - t0) / 2.0
+        };
+        let mut todo = vec![[0.0, 1.0]];
+        let mut left = MOST_INTERVALS;
+        while let Some([t0, t1]) = todo.pop() {
+            if is_apart([t0, t1]) {
+                continue;
+            }
+            if left == 0 {
+                return false;
+            }
+            left -= 1;
+            let middle = (t0 + t1) / 2.0;
+            todo.extend([[middle, t1], [t0, middle]]);
+        }
+        true
+    }
+}
+
+/// The most intervals that are halved before a pair is asked about.
+const MOST_INTERVALS: u32 = 12;
+/// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball.
+const DEFAULT_TOLERANCE: f64 = 4e-6;
+/// More than the roundings of a frame along a chain of a few hundred joints, as a part of what it reaches: 16 u for each.
+const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+
+impl RigidPath for PairPath<'_> {
+    fn pose(&self, t: f64) -> Pose {
+        // The ends are valid, and a pose in between is as rigid as they are.
+        self.frame(t).pose().unwrap_or(Pose::IDENTITY)
+    }
+
+    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
+        let acceleration = self.acceleration[0] + self.acceleration[1] * radius;
+        acceleration * (1.0 + ROUNDING) * (t1 - t0).powi(2) / 8.0 + ROUNDING * (self.reach + radius)
+    }
+}
+
+/// Where a point of B may be in the frame that has been reached, and how it moves there.
+struct Bound {
+    reach: f64,
+    speed: f64,
+    acceleration: f64,
+}
+
+impl Bound {
+    /// Follows a point at a distance from B's origin to A's frame.
+    fn along(setting: &Setting, pair: &Pair, edge: &Edge, radius: f64) -> Self {
+        let (model, parts) = (&setting.model, &setting.parts);
+        let mut bound = Self { reach: radius, speed: 0.0, acceleration: 0.0 };
+        bound.shift(parts[pair.b].origin.translation);
+        for &joint in pair.chain.down.iter().rev() {
+            let joint = &model.joints[joint];
+            let [turn, slide] = parts_of(&joint.kind, edge);
+            bound.turn(turn);
+            bound.slide(slide);
+            bound.shift(joint.origin.translation);
+        }
+        for &joint in &pair.chain.up {
+            let joint = &model.joints[joint];
+            let [turn, slide] = parts_of(&joint.kind, edge);
+            bound.shift(joint.origin.translation);
+            bound.slide(slide);
+            bound.turn(turn);
+        }
+        bound.shift(parts[pair.a].origin.translation);
+        bound
+    }
+
+    fn shift(&mut self, by: Point) {
+        self.reach += length(by);
+    }
+
+    fn turn(&mut self, of: Bounds) {
+        self.acceleration += 2.0 * of.rate * self.speed + (of.rate * of.rate + of.acceleration) * self.reach;
+        self.speed += of.rate * self.reach;
+    }
+
+    fn slide(&mut self, of: Bounds) {
+        self.reach += of.way;
+        self.speed += of.rate;
+        self.acceleration += of.acceleration;
+    }
+}
+
+/// Returns bounds of how a joint turns and of how it slides.
+fn parts_of(kind: &Kind, edge: &Edge) -> [Bounds; 2] {
+    let still = Bounds::default();
+    match kind {
+        Kind::Turn { by, .. } => [edge.bounds_of(by), still],
+        Kind::Slide { by, .. } => [still, edge.bounds_of(by)],
+        &Kind::Planar(first) => {
+            [edge.bounds(first + 2), Bounds::long([0, 1].map(|k| edge.bounds(first + k)))]
+        }
+        &Kind::Floating(first) => {
+            let angle = Turning::of(edge, first).angle;
+            let turn = Bounds { way: angle, rate: angle, acceleration: 0.0 };
+            [turn, Bounds::long([0, 1, 2].map(|k| edge.bounds(first + k)))]
+        }
+    }
+}
+
+/// How the quaternion of a floating joint turns: about one axis, at a constant rate, the shorter way.
+struct Turning {
+    from: [f64; 4],
+    to: [f64; 4],
+    /// The whole angle of the turn.
+    angle: f64,
+}
+
+impl Turning {
+    fn of(edge: &Edge, first: usize) -> Self {
+        let unit = |t: f64| {
+            let numbers: Vec<f64> =
+                edge.coefficients[first..first + 7].iter().map(|of| value(of, t)).collect();
+            let long = quaternion_length(&numbers, 0);
+            [3, 4, 5, 6].map(|k| numbers[k] / long)
+        };
+        let (from, to) = (unit(0.0), unit(1.0));
+        let cosine: f64 = from.iter().zip(&to).map(|(a, b)| a * b).sum();
+        let to = if cosine < 0.0 { to.map(|x| -x) } else { to };
+        // From the chord, which is accurate for small angles as well.
+        let chord = |to: &[f64; 4]| from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        Self { from, to, angle: 4.0 * libm::asin((chord(&to) / 2.0).min(1.0)) }
+    }
+
+    /// Returns the quaternion at a time.
+    fn at(&self, t: f64) -> [f64; 4] {
+        let half = self.angle / 2.0;
+        if half < 1e-9 {
+            // Linear to within 1e-19, and the length is divided out.
+            return [0, 1, 2, 3].map(|k| (1.0 - t) * self.from[k] + t * self.to[k]);
+        }
+        let [a, b] = [(1.0 - t) * half, t * half].map(libm::sin);
+        let whole = libm::sin(half);
+        [0, 1, 2, 3].map(|k| (a * self.from[k] + b * self.to[k]) / whole)
+    }
+}
+
+/// Returns the value of a polynomial.
+fn value(of: &[f64], t: f64) -> f64 {
+    match of {
+        // Exactly what was given, at the end as well.
+        &[from, way] if t == 1.0 => from + way,
+        of => of.iter().rev().fold(0.0, |sum, coefficient| sum * t + coefficient),
+    }
+}
+
+/// Returns the joint values at a time, with quaternions that turn at a constant rate.
+fn at(model: &Model, edge: &Edge, t: f64) -> Vec<f64> {
+    let mut numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();
+    for joint in &model.joints {
+        if let Kind::Floating(first) = joint.kind {
+            numbers[first + 3..first + 7].copy_from_slice(&Turning::of(edge, first).at(t));
+        }
+    }
+    numbers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Base;
+    use crate::testing::{robot, tree, values};
+    use cbvh_testkit::Random;
+
+    /// Returns how far a point of B is at most from its chord in A's frame, as a share of the bound, at one of three scales.
+    fn departure(path: &PairPath<'_>, random: &mut Random) -> f64 {
+        let long = [1.0, 0.1, 1e-3][random.below(3)];
+        let t0 = (1.0 - long) * random.unit();
+        let t1 = t0 + long;
+        let radius = 0.5 * random.unit();
+        let p = random.point();
+        let p = p.map(|x| x * radius / length(p));
+        let bound = path.sagitta(radius, t0, t1);
+        let [from, to] = [t0, t1].map(|t| path.pose(t).place(p));
+        let mut largest: f64 = 0.0;
+        for step in 1..32 {
+            let share = f64::from(step) / 32.0;
+            let at = path.pose(t0 + share * (t1 - t0)).place(p);
+            let off = length([0, 1, 2].map(|k| at[k] - from[k] - share * (to[k] - from[k])));
+            largest = largest.max(off / bound);
+        }
+        largest
+    }
+
+    #[test]
+    fn no_point_leaves_its_chord_by_more_than_the_sagitta() {
+        let random = &mut Random::new(35);
+        let (mut largest, mut pairs): (f64, u32) = (0.0, 0);
+        for round in 0..60 {
+            let base = [Base::Fixed, Base::Planar, Base::Floating][round % 3];
+            let mut robot = robot(&tree(random, 2 + round % 9), base);
+            robot.refresh();
+            let far = [0.3, 3.0][round % 2];
+            let [from, to] = [(); 2].map(|()| values(random, &robot, far));
+            let mut edge = Edge::straight(&from, &to).unwrap();
+            let is_turning = robot.joints().iter().any(|name| name.ends_with("/qx"));
+            if round % 2 == 1 && !is_turning {
+                for of in &mut edge.coefficients {
+                    of.extend([0.5 * random.signed(), random.signed(), random.signed()]);
+                }
+            }
+            for pair in &robot.setting.pairs {
+                let path = PairPath::new(&robot.setting, pair, &edge);
+                for _ in 0..4 {
+                    let ratio = departure(&path, random);
+                    assert!(ratio <= 1.0, "{ratio} in round {round}");
+                    largest = largest.max(ratio);
+                    pairs += 1;
+                }
+            }
+        }
+        assert!(pairs > 1000 && largest > 0.3, "{pairs} {largest}");
+    }
+
+    /// No time is found at which a pair touches whose balls are said to stay apart.
+    #[test]
+    fn balls_that_stay_apart_do() {
+        let random = &mut Random::new(36);
+        let (mut apart, mut all) = (0, 0);
+        for round in 0..30 {
+            let mut robot = robot(&tree(random, 2 + round % 7), Base::Fixed);
+            robot.refresh();
+            let [from, to] = [(); 2].map(|()| values(random, &robot, 0.6));
+            let edge = Edge::straight(&from, &to).unwrap();
+            for pair in &robot.setting.pairs {
+                let path = PairPath::new(&robot.setting, pair, &edge);
+                all += 1;
+                if !path.stays_apart(&MotionOptions::new().clearance(0.01)) {
+                    continue;
+                }
+                apart += 1;
+                let [a, b] = [pair.a, pair.b].map(|part| &robot.setting.parts[part]);
+                for step in 0..=200 {
+                    let place = path.frame(f64::from(step) / 200.0).place(b.middle);
+                    let gap = length([0, 1, 2].map(|k| place[k] - a.middle[k])) - a.radius - b.radius;
+                    assert!(gap > 0.01, "{gap} in round {round}");
+                }
+            }
+        }
+        assert!(apart > all / 10 && apart < all, "{apart} of {all}");
+    }
+
+    #[test]
+    fn bounds_of_polynomials_hold() {
+        let random = &mut Random::new(37);
+        for _ in 0..500 {
+            let of: Vec<f64> = (0..1 + random.below(6)).map(|_| random.signed()).collect();
+            let bound = most(&of) * (1.0 + 1e-12);
+            let largest = (0..=100).map(|k| value(&of, f64::from(k) / 100.0).abs()).fold(0.0, f64::max);
+            assert!(largest <= bound && bound <= of.iter().map(|x| x.abs()).sum::<f64>() * (1.0 + 1e-9));
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What can go wrong when a robot is read and when a question is asked.
+
+use bvh_bake::BakeError;
+use bvh_query::{BackendError, OpenError, PoseError, QueryError};
+use std::io;
+use std::path::PathBuf;
+
+/// Why there is no robot, or no answer about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RobotError {
+    /// The system refused a file.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The error of the system.
+        source: io::Error,
+    },
+    /// A description is not what it should be.
+    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
+    Description {
+        /// The URDF or SRDF file.
+        path: PathBuf,
+        /// The element in question.
+        place: String,
+        /// What should be there.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// A mesh is in none of the places where it was looked for.
+    #[error(
+        "{}: link {link}: expected the mesh {uri}, found none at {}; give the folder that contains the package",
+        path.display(), list(tried)
+    )]
+    NoMesh {
+        /// The URDF file.
+        path: PathBuf,
+        /// The link.
+        link: String,
+        /// The mesh, as the file names it.
+        uri: String,
+        /// The places.
+        tried: Vec<PathBuf>,
+    },
+    /// A mesh cannot be baked.
+    #[error("{}: link {link}: {source}", path.display())]
+    Mesh {
+        /// The URDF file.
+        path: PathBuf,
+        /// The link.
+        link: String,
+        /// What is wrong with the mesh.
+        source: Box<BakeError>,
+    },
+    /// A baked mesh in the cache is damaged.
+    #[error("{source}; remove it, and it will be baked again")]
+    Cache {
+        /// What is wrong with the file.
+        source: OpenError,
+    },
+    /// A name is of nothing that the robot has.
+    #[error("expected the name of a {what}, found '{name}'; there are {}", known.join(", "))]
+    Unknown {
+        /// What was looked for: a link, a joint, a body, a group or a state.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The names that there are.
+        known: Vec<String>,
+    },
+    /// A name is taken.
+    #[error(
+        "expected a name of its own, found '{0}', which the robot has; remove that one first, or choose another name"
+    )]
+    Taken(String),
+    /// Not as many numbers as the robot has joint values.
+    #[error("expected {expected} joint values, in the order of `joints`, found {found}")]
+    Count {
+        /// The numbers of the robot.
+        expected: usize,
+        /// The numbers given.
+        found: usize,
+    },
+    /// A joint value is not finite, or a quaternion is 0.
+    #[error("joint {joint}: expected {expected}, found {found}")]
+    Value {
+        /// The joint.
+        joint: String,
+        /// What should be there.
+        expected: &'static str,
+        /// The number.
+        found: f64,
+    },
+    /// A pose is not rigid, or too far away.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// A number or a shape was refused.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+    /// The question about two bodies has no answer.
+    #[error("{a} and {b}: {source}")]
+    Pair {
+        /// The body that comes first.
+        a: String,
+        /// The other body.
+        b: String,
+        /// Why there is none.
+        source: QueryError,
+    },
+    /// `CBVH_ISA` names no backend that there is.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+}
+
+/// Joins paths with commas.
+fn list(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,92 @@
+//! Rigid frames in plain `f64`, as kinematics composes them.
+//!
+//! A [`Pose`] checks that it is rigid and flushes tiny numbers whenever one is made. Along a chain of joints that is only of use at
+//! the end.
+
+use bvh_query::{Pose, PoseError};
+
+pub(crate) type Point = [f64; 3];
+type Matrix = [[f64; 3]; 3];
+
+/// A rotation, by rows, and a translation in mesh units. A point x of the body is at R x + t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) rotation: Matrix,
+    pub(crate) translation: Point,
+}
+
+impl Frame {
+    pub(crate) const IDENTITY: Self =
+        Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+
+    /// Returns the frame of turns about the fixed axes x, y and z, and then a translation, as URDF writes it.
+    pub(crate) fn from_angles([roll, pitch, yaw]: Point, translation: Point) -> Self {
+        let [(sr, cr), (sp, cp), (sy, cy)] = [roll, pitch, yaw].map(libm::sincos);
+        let rotation = [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ];
+        Self { rotation, translation }
+    }
+
+    /// Returns the frame of a unit quaternion, the real part last.
+    pub(crate) fn from_quaternion([x, y, z, w]: [f64; 4], translation: Point) -> Self {
+        let rotation = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        Self { rotation, translation }
+    }
+
+    /// Returns this frame with a body's own rotation and translation in front of it: first `inner`, then this one.
+    pub(crate) fn of(&self, inner: &Self) -> Self {
+        Self {
+            rotation: product(&self.rotation, &inner.rotation),
+            translation: self.place(inner.translation),
+        }
+    }
+
+    /// Returns the frame with the inner one seen from this one.
+    pub(crate) fn relative(&self, inner: &Self) -> Self {
+        let way = [0, 1, 2].map(|k| inner.translation[k] - self.translation[k]);
+        let column = |k: usize, v: Point| {
+            self.rotation[0][k] * v[0] + self.rotation[1][k] * v[1] + self.rotation[2][k] * v[2]
+        };
+        let of = |k: usize, j: usize| column(k, [0, 1, 2].map(|row| inner.rotation[row][j]));
+        Self {
+            rotation: [0, 1, 2].map(|k| [of(k, 0), of(k, 1), of(k, 2)]),
+            translation: [0, 1, 2].map(|k| column(k, way)),
+        }
+    }
+
+    /// Returns where a point of the body is.
+    #[inline]
+    pub(crate) fn place(&self, [x, y, z]: Point) -> Point {
+        [0, 1, 2].map(|k| {
+            let row = &self.rotation[k];
+            row[0] * x + row[1] * y + row[2] * z + self.translation[k]
+        })
+    }
+
+    /// Returns the frame as a pose.
+    pub(crate) fn pose(&self) -> Result<Pose, PoseError> {
+        Pose::new(self.rotation, self.translation)
+    }
+}
+
+impl From<&Pose> for Frame {
+    fn from(pose: &Pose) -> Self {
+        Self { rotation: *pose.rotation(), translation: pose.translation() }
+    }
+}
+
+/// Returns the product of two matrices.
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    a.map(|row| [0, 1, 2].map(|j| row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j]))
+}
+
+pub(crate) fn length(v: Point) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}

@@ -1,0 +1,32 @@
+//! Robots from URDF files: exact collision queries, distances and certified motions in joint space.
+//!
+//! ```text
+//! URDF (urdf) ──> kinematic tree (model) ─┐
+//!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
+//! SRDF (srdf) ──> allowed pairs, groups ──┘        │
+//!                                                  ├──> questions about configurations (questions, asker)
+//!                                                  └──> motions in joint space, certain at every moment (edge)
+//! ```
+//!
+//! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
+
+mod asker;
+mod edge;
+mod error;
+mod frame;
+mod model;
+mod packages;
+mod questions;
+mod robot;
+mod shapes;
+mod srdf;
+#[cfg(test)]
+mod testing;
+mod urdf;
+mod xml;
+
+pub use edge::{Edge, RobotMotion};
+pub use error::RobotError;
+pub use questions::RobotDistance;
+pub use robot::{Base, Geometry, Robot, RobotOptions};
+pub use srdf::{Group, State};

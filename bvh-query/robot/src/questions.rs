@@ -1,0 +1,169 @@
+//! Questions about configurations: one, or many on all threads.
+
+use crate::asker::{Asker, Nearest};
+use crate::error::RobotError;
+use crate::robot::{Robot, Setting};
+use bvh_query::Distance;
+use rayon::prelude::*;
+
+/// The nearest two bodies.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct RobotDistance {
+    /// The names of both.
+    pub bodies: [String; 2],
+    /// How far they are apart, and which triangles are nearest. Its points are in the frames of shapes.
+    pub nearest: Distance,
+    /// The nearest points of both, in the world.
+    pub points: [[f64; 3]; 2],
+}
+
+impl Robot {
+    /// Returns whether any two bodies touch.
+    ///
+    /// Cost: the poses of all links, a comparison of balls for each pair, and a question about contact for pairs whose balls
+    /// meet, until one touches.
+    ///
+    /// # Errors
+    /// [`RobotError::Count`] and [`RobotError::Value`] for invalid joint values, [`RobotError::Pose`] if a link is too far away,
+    /// and [`RobotError::Pair`] if a question has no answer.
+    pub fn collide(&mut self, joints: &[f64]) -> Result<bool, RobotError> {
+        self.refresh();
+        self.asker.collide(&self.setting, joints)
+    }
+
+    /// Returns the bodies that touch, in the order of [`Robot::pairs`].
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`].
+    pub fn pairs_in_contact(&mut self, joints: &[f64]) -> Result<Vec<[String; 2]>, RobotError> {
+        self.refresh();
+        let touching = self.asker.touching(&self.setting, joints)?;
+        Ok(names(&self.setting, &touching))
+    }
+
+    /// Returns the nearest two bodies; `None` if there are no pairs.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`].
+    pub fn distance(&mut self, joints: &[f64]) -> Result<Option<RobotDistance>, RobotError> {
+        self.refresh();
+        let nearest = self.asker.nearest(&self.setting, joints)?;
+        Ok(nearest.map(|nearest| of_bodies(&self.setting, nearest)))
+    }
+
+    /// Returns for each of many configurations, one after the other, whether any two bodies touch. Uses all threads of the rayon
+    /// pool in which it is called; the answers do not depend on their number.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`], for the first configuration that has one; [`RobotError::Count`] also if the numbers are
+    /// no whole number of configurations.
+    pub fn collide_many(&mut self, joints: &[f64]) -> Result<Vec<bool>, RobotError> {
+        self.many(joints, Asker::collide)
+    }
+
+    /// Returns the nearest two bodies for each of many configurations, as [`Robot::collide_many`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide_many`].
+    pub fn distance_many(&mut self, joints: &[f64]) -> Result<Vec<Option<RobotDistance>>, RobotError> {
+        self.many(joints, |asker, setting, joints| {
+            Ok(asker.nearest(setting, joints)?.map(|nearest| of_bodies(setting, nearest)))
+        })
+    }
+
+    /// Returns the bodies that touch for each of many configurations, as [`Robot::collide_many`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide_many`].
+    pub fn pairs_in_contact_many(&mut self, joints: &[f64]) -> Result<Vec<Vec<[String; 2]>>, RobotError> {
+        self.many(joints, |asker, setting, joints| Ok(names(setting, &asker.touching(setting, joints)?)))
+    }
+
+    /// Asks about many configurations.
+    fn many<R: Send>(
+        &mut self,
+        joints: &[f64],
+        ask: impl Fn(&mut Asker, &Setting, &[f64]) -> Result<R, RobotError> + Sync,
+    ) -> Result<Vec<R>, RobotError> {
+        self.refresh();
+        let expected = self.setting.model.numbers.len();
+        if expected == 0 || !joints.len().is_multiple_of(expected) {
+            return Err(RobotError::Count { expected, found: joints.len() });
+        }
+        let (setting, asker) = (&*self.setting, &self.asker);
+        // Long runs, so that an asker remembers what is near.
+        let run = (joints.len() / expected).div_ceil(4 * rayon::current_num_threads()).clamp(1, 256);
+        let answers: Vec<Vec<Result<R, RobotError>>> = joints
+            .par_chunks(run * expected)
+            .map_init(
+                || asker.clone(),
+                |asker, run| run.chunks(expected).map(|joints| ask(asker, setting, joints)).collect(),
+            )
+            .collect();
+        answers.into_iter().flatten().collect()
+    }
+
+    /// Lets pairs touch that nearly always do: those that are in contact in at least this share of some random configurations
+    /// within the joints' limits, as MoveIt's assistant does. A joint value without limits is taken between -pi and pi. Returns the
+    /// pairs, each with its share. The configurations are the same each time.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`].
+    pub fn allow_frequent(
+        &mut self,
+        samples: usize,
+        share: f64,
+    ) -> Result<Vec<([String; 2], f64)>, RobotError> {
+        let model = self.setting.model.clone();
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut joints = Vec::with_capacity(samples * model.numbers.len());
+        for _ in 0..samples {
+            for [lower, upper] in &model.limits {
+                let [lower, upper] = if upper - lower < f64::INFINITY {
+                    [*lower, *upper]
+                } else {
+                    [-std::f64::consts::PI, std::f64::consts::PI]
+                };
+                joints.push(lower + (upper - lower) * random());
+            }
+        }
+        let touching = self.pairs_in_contact_many(&joints)?;
+        let mut frequent = Vec::new();
+        for pair in self.pairs() {
+            let times = touching.iter().filter(|pairs| pairs.contains(&pair)).count();
+            let part = times as f64 / samples.max(1) as f64;
+            if times > 0 && part >= share {
+                self.allow(&pair[0], &pair[1])?;
+                frequent.push((pair, part));
+            }
+        }
+        Ok(frequent)
+    }
+}
+
+/// Returns the names of the bodies of pairs of parts, each once.
+fn names(setting: &Setting, pairs: &[usize]) -> Vec<[String; 2]> {
+    let mut names: Vec<[String; 2]> = Vec::new();
+    for &number in pairs {
+        let bodies = bodies(setting, number);
+        if !names.contains(&bodies) {
+            names.push(bodies);
+        }
+    }
+    names
+}
+
+/// Returns the names of the bodies of a pair of parts.
+pub(crate) fn bodies(setting: &Setting, pair: usize) -> [String; 2] {
+    let pair = &setting.pairs[pair];
+    [pair.a, pair.b].map(|part| setting.name(part).to_owned())
+}
+
+fn of_bodies(setting: &Setting, Nearest { pair, distance, points }: Nearest) -> RobotDistance {
+    RobotDistance { bodies: bodies(setting, pair), nearest: distance, points }
+}

@@ -1,0 +1,502 @@
+//! A robot: its links, what stands around it, and the pairs of both that are asked about.
+
+use crate::asker::Asker;
+use crate::error::RobotError;
+use crate::frame::{Frame, Point, length};
+use crate::model::{Chain, Model};
+use crate::shapes::Shapes;
+use crate::srdf::{self, Group, Semantics, State};
+use crate::urdf;
+use bvh_query::{OwnedShape, Pose, Shape};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Which shapes of links are asked about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Geometry {
+    /// Those that the URDF names for collisions.
+    #[default]
+    Collision,
+    /// Those that it names for pictures.
+    Visual,
+}
+
+/// How the root of a robot is connected with the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Base {
+    /// It stands at the origin.
+    #[default]
+    Fixed,
+    /// It moves in the plane z = 0: three more joint values come first, `base/x`, `base/y` and `base/theta`.
+    Planar,
+    /// It moves freely: seven more joint values come first, `base/x` to `base/z` and a quaternion, `base/qx` to `base/qw`.
+    Floating,
+}
+
+/// How a robot is read.
+#[derive(Debug, Clone)]
+pub struct RobotOptions {
+    /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.
+    pub packages: Vec<PathBuf>,
+    /// An SRDF file, whose disabled pairs are not asked about.
+    pub srdf: Option<PathBuf>,
+    /// Which shapes of links are asked about.
+    pub geometry: Geometry,
+    /// How the root is connected with the world.
+    pub base: Base,
+    /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
+    pub cylinder_error: f64,
+    /// A folder for baked meshes, under names that follow from content, so that they are baked once.
+    pub cache: Option<PathBuf>,
+}
+
+impl Default for RobotOptions {
+    fn default() -> Self {
+        Self {
+            packages: Vec::new(),
+            srdf: None,
+            geometry: Geometry::Collision,
+            base: Base::Fixed,
+            cylinder_error: 1e-3,
+            cache: None,
+        }
+    }
+}
+
+/// A link, an obstacle or an attached object: shapes that do not move against each other.
+#[derive(Clone, Debug)]
+struct Body {
+    name: String,
+    is_link: bool,
+    /// The link that it is attached to.
+    link: Option<usize>,
+}
+
+/// A shape of a body.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) body: usize,
+    /// The group of links that carries it; 0 of what stands in the world.
+    pub(crate) group: usize,
+    /// Whether it is an obstacle.
+    is_still: bool,
+    /// Where it is in the group.
+    pub(crate) origin: Frame,
+    /// With the margin as a part of its radius.
+    pub(crate) shape: OwnedShape,
+    /// The shape as it was given.
+    bare: OwnedShape,
+    /// The middle of a ball around it, in its own frame and in the group, and the ball's radius.
+    pub(crate) middle: Point,
+    pub(crate) centre: Point,
+    pub(crate) radius: f64,
+}
+
+impl Part {
+    fn new(
+        body: usize,
+        (group, is_still): (usize, bool),
+        origin: Frame,
+        bare: OwnedShape,
+        margin: f64,
+    ) -> Result<Self, RobotError> {
+        let shape = bare.clone().rounded(bare.shape().radius() + margin)?;
+        let (middle, radius) = ball(shape.shape());
+        Ok(Self { body, group, is_still, origin, middle, centre: origin.place(middle), shape, bare, radius })
+    }
+}
+
+/// Returns a ball around a shape, in the shape's frame.
+fn ball(shape: Shape<'_>) -> (Point, f64) {
+    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for object in shape.objects() {
+        let [low, high] = object.bounding_box();
+        for k in 0..3 {
+            (lo[k], hi[k]) = (lo[k].min(low[k]), hi[k].max(high[k]));
+        }
+    }
+    let centre = [0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0);
+    let mut radius = length([0, 1, 2].map(|k| (hi[k] - lo[k]) / 2.0));
+    if let [object] = shape.objects() {
+        let (middle, tight) = object.bounding_sphere();
+        if tight < radius {
+            return (middle, (tight + shape.radius()) * ROUNDED_UP);
+        }
+    }
+    radius = (radius + shape.radius()) * ROUNDED_UP;
+    (centre, radius)
+}
+
+/// More than all roundings of a ball's middle and radius.
+const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+
+/// Two parts that are asked about, A before B.
+#[derive(Clone, Debug)]
+pub(crate) struct Pair {
+    pub(crate) a: usize,
+    pub(crate) b: usize,
+    /// The sum of the radii of both balls.
+    pub(crate) reach: f64,
+    /// The joints between both.
+    pub(crate) chain: Arc<Chain>,
+}
+
+/// What does not change while questions are asked: all threads share it.
+#[derive(Clone, Debug)]
+pub(crate) struct Setting {
+    pub(crate) model: Arc<Model>,
+    pub(crate) parts: Vec<Part>,
+    pub(crate) pairs: Vec<Pair>,
+    bodies: Vec<Option<Body>>,
+}
+
+impl Setting {
+    /// Returns the name of the body of a part.
+    pub(crate) fn name(&self, part: usize) -> &str {
+        self.bodies[self.parts[part].body].as_ref().map_or("", |body| &body.name)
+    }
+}
+
+/// A robot among obstacles, asked about with the values of its joints.
+///
+/// A body is a link, an obstacle or an attached object. Questions are about all pairs of bodies that can move against each
+/// other, but for those whose contact is allowed: by [`Robot::allow`], or by the SRDF. Links that only fixed joints connect, and
+/// obstacles among themselves, are never asked about.
+///
+/// All answers are certain, as those of [`Querier`](bvh_query::Querier) are, about the poses that the joint values give in `f64`.
+/// They have the same bits on all systems. Lengths are in the unit of the URDF file, metres; angles are in radians.
+///
+/// A clone shares what the robot holds until one of them changes.
+///
+/// ```
+/// use cbvh_robot::{Robot, RobotOptions};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+/// let mut robot = Robot::from_urdf(path, &RobotOptions::default())?;
+/// let still = vec![0.0; robot.joints().len()];
+/// let mut bent = still.clone();
+/// bent[1] = 0.4;
+/// assert!(!robot.collide(&bent)?);
+/// assert!(robot.is_free(&still, &bent)?);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Robot {
+    pub(crate) setting: Arc<Setting>,
+    pub(crate) asker: Asker,
+    semantics: Arc<Semantics>,
+    /// Pairs of bodies whose contact is allowed, in order.
+    allowed: Arc<HashSet<[usize; 2]>>,
+    /// The setting lacks pairs after a change.
+    is_stale: bool,
+}
+
+impl Clone for Robot {
+    /// Returns a robot that shares what this one holds, and remembers nothing of earlier questions.
+    fn clone(&self) -> Self {
+        Self {
+            setting: Arc::clone(&self.setting),
+            asker: self.asker.clone(),
+            semantics: Arc::clone(&self.semantics),
+            allowed: Arc::clone(&self.allowed),
+            is_stale: self.is_stale,
+        }
+    }
+
+    /// Makes this a robot like another one, which keeps what it remembers of its own questions. None of it affects an answer.
+    fn clone_from(&mut self, source: &Self) {
+        self.setting = Arc::clone(&source.setting);
+        self.semantics = Arc::clone(&source.semantics);
+        self.allowed = Arc::clone(&source.allowed);
+        self.is_stale = source.is_stale;
+    }
+}
+
+impl Robot {
+    /// Reads a URDF file, and bakes the shapes of all links.
+    ///
+    /// # Errors
+    /// [`RobotError`] with the file, the link or joint, and what is wrong.
+    pub fn from_urdf(path: impl AsRef<Path>, options: &RobotOptions) -> Result<Self, RobotError> {
+        let path = path.as_ref();
+        let (model, elements) = urdf::read(path, options)?;
+        let semantics =
+            options.srdf.as_ref().map_or(Ok(Semantics::default()), |srdf| srdf::read(srdf, &model))?;
+        let body =
+            |link: &crate::model::Link| Some(Body { name: link.name.clone(), is_link: true, link: None });
+        let bodies = model.links.iter().map(body).collect();
+        let mut shapes = Shapes::new(path, options);
+        let mut parts = Vec::new();
+        for element in &elements {
+            let shape = shapes.make(element, &model.links[element.link].name)?;
+            let link = &model.links[element.link];
+            let origin = link.origin.of(&element.origin);
+            parts.push(Part::new(element.link, (link.group, false), origin, shape, 0.0)?);
+        }
+        // In the order of the links, so that answers are.
+        parts.sort_by_key(|part| part.body);
+        let disabled = semantics.disabled.iter();
+        let numbers = |[a, b]: &[String; 2]| Some([model.link(a).ok()?, model.link(b).ok()?]);
+        let allowed = disabled.filter_map(numbers).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        let setting = Setting { model: Arc::new(model), parts, pairs: Vec::new(), bodies };
+        let mut robot = Self {
+            setting: Arc::new(setting),
+            asker: Asker::new()?,
+            semantics: Arc::new(semantics),
+            allowed: Arc::new(allowed),
+            is_stale: true,
+        };
+        robot.refresh();
+        Ok(robot)
+    }
+
+    /// Returns a clone to ask questions of on another thread, which does not have to find the pairs again.
+    pub fn snapshot(&mut self) -> Self {
+        self.refresh();
+        self.clone()
+    }
+
+    /// Returns the name of the robot.
+    pub fn name(&self) -> &str {
+        &self.setting.model.name
+    }
+
+    /// Returns the names of the joint values, in their order. That is the order of the joints in the URDF file. A planar joint
+    /// has three, `NAME/x`, `NAME/y` and `NAME/theta`, and a floating one seven: `NAME/x` to `NAME/z`, and a quaternion, `NAME/qx`
+    /// to `NAME/qw`. Fixed joints and joints that mimic others have none.
+    pub fn joints(&self) -> &[String] {
+        &self.setting.model.numbers
+    }
+
+    /// Returns the lower and the upper limit of each joint value, infinite where there is none. No question checks them.
+    pub fn limits(&self) -> &[[f64; 2]] {
+        &self.setting.model.limits
+    }
+
+    /// Returns the names of the links, each after the link that it hangs from.
+    pub fn links(&self) -> impl Iterator<Item = &str> {
+        self.setting.model.links.iter().map(|link| link.name.as_str())
+    }
+
+    /// Returns the groups of the SRDF.
+    pub fn groups(&self) -> &[Group] {
+        &self.semantics.groups
+    }
+
+    /// Returns the named configurations of the SRDF.
+    pub fn states(&self) -> &[State] {
+        &self.semantics.states
+    }
+
+    /// Returns the poses of all links in the world, in the order of [`Robot::links`].
+    ///
+    /// # Errors
+    /// [`RobotError::Count`], [`RobotError::Value`], or [`RobotError::Pose`] if a link is too far away.
+    pub fn link_poses(&self, joints: &[f64]) -> Result<Vec<Pose>, RobotError> {
+        let model = &self.setting.model;
+        model.check(joints)?;
+        let mut frames = Vec::new();
+        model.place(joints, &mut frames);
+        model.links.iter().map(|link| Ok(frames[link.group].of(&link.origin).pose()?)).collect()
+    }
+
+    /// Adds an obstacle: a body that stands in the world.
+    ///
+    /// # Errors
+    /// [`RobotError::Taken`] if a body has the name.
+    pub fn add_obstacle(
+        &mut self,
+        name: impl Into<String>,
+        shape: impl Into<OwnedShape>,
+        pose: &Pose,
+    ) -> Result<(), RobotError> {
+        self.add_body(name.into(), None, shape.into(), pose).map(drop)
+    }
+
+    /// Attaches an object to a link, at a pose in the link's frame. It may touch that link and the given ones.
+    ///
+    /// # Errors
+    /// [`RobotError::Taken`] if a body has the name, and [`RobotError::Unknown`] for a link that the robot does not have.
+    pub fn attach(
+        &mut self,
+        name: impl Into<String>,
+        shape: impl Into<OwnedShape>,
+        link: &str,
+        pose: &Pose,
+        may_touch: &[&str],
+    ) -> Result<(), RobotError> {
+        let model = &self.setting.model;
+        let place = model.link(link)?;
+        let touched = may_touch.iter().map(|name| model.link(name)).collect::<Result<Vec<_>, _>>()?;
+        let body = self.add_body(name.into(), Some(place), shape.into(), pose)?;
+        Arc::make_mut(&mut self.allowed)
+            .extend(touched.into_iter().chain([place]).map(|link| [link.min(body), link.max(body)]));
+        Ok(())
+    }
+
+    fn add_body(
+        &mut self,
+        name: String,
+        link: Option<usize>,
+        shape: OwnedShape,
+        pose: &Pose,
+    ) -> Result<usize, RobotError> {
+        if self.body(&name).is_ok() {
+            return Err(RobotError::Taken(name));
+        }
+        let setting = Arc::make_mut(&mut self.setting);
+        let body = setting.bodies.len();
+        let (group, origin) = match link {
+            Some(link) => {
+                (setting.model.links[link].group, setting.model.links[link].origin.of(&pose.into()))
+            }
+            None => (0, pose.into()),
+        };
+        let part = Part::new(body, (group, link.is_none()), origin, shape, 0.0)?;
+        setting.bodies.push(Some(Body { name, is_link: false, link }));
+        setting.parts.push(part);
+        self.is_stale = true;
+        Ok(body)
+    }
+
+    /// Removes an obstacle or an attached object.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`] if there is no such body, or if it is a link.
+    pub fn remove(&mut self, name: &str) -> Result<(), RobotError> {
+        let body = self.own_body(name)?;
+        let setting = Arc::make_mut(&mut self.setting);
+        setting.bodies[body] = None;
+        setting.parts.retain(|part| part.body != body);
+        Arc::make_mut(&mut self.allowed).retain(|pair| !pair.contains(&body));
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Moves an obstacle, or an attached object in the frame of its link.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::remove`].
+    pub fn set_pose(&mut self, name: &str, pose: &Pose) -> Result<(), RobotError> {
+        let body = self.own_body(name)?;
+        let setting = Arc::make_mut(&mut self.setting);
+        let link = setting.bodies[body].as_ref().and_then(|body| body.link);
+        for part in setting.parts.iter_mut().filter(|part| part.body == body) {
+            let origin =
+                link.map_or(Frame::IDENTITY, |link| setting.model.links[link].origin).of(&pose.into());
+            (part.origin, part.centre) = (origin, origin.place(part.middle));
+        }
+        Ok(())
+    }
+
+    /// Sets how near others may come to a body, in mesh units. What is nearer than the margins of both counts as contact, and
+    /// distances are those of the bodies with their margins.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`], and [`RobotError::Query`] if the margin is negative or not finite.
+    pub fn set_margin(&mut self, name: &str, margin: f64) -> Result<(), RobotError> {
+        let number = self.body(name)?;
+        let setting = Arc::make_mut(&mut self.setting);
+        let mut parts = setting.parts.clone();
+        for part in parts.iter_mut().filter(|part| part.body == number) {
+            let (on, bare) = ((part.group, part.is_still), part.bare.clone());
+            *part = Part::new(number, on, part.origin, bare, margin)?;
+        }
+        setting.parts = parts;
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Lets two bodies touch: questions are no longer about them.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`].
+    pub fn allow(&mut self, a: &str, b: &str) -> Result<(), RobotError> {
+        let pair = self.bodies(a, b)?;
+        Arc::make_mut(&mut self.allowed).insert(pair);
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Asks about two bodies again, unless they cannot move against each other.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`].
+    pub fn disallow(&mut self, a: &str, b: &str) -> Result<(), RobotError> {
+        let pair = self.bodies(a, b)?;
+        Arc::make_mut(&mut self.allowed).remove(&pair);
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Returns the pairs of bodies that are asked about.
+    pub fn pairs(&mut self) -> Vec<[String; 2]> {
+        self.refresh();
+        let setting = &self.setting;
+        let name = |part: usize| setting.name(part).to_owned();
+        let mut seen = HashSet::new();
+        let pairs =
+            setting.pairs.iter().filter(|pair| seen.insert([pair.a, pair.b].map(|p| setting.parts[p].body)));
+        pairs.map(|pair| [name(pair.a), name(pair.b)]).collect()
+    }
+
+    fn bodies(&self, a: &str, b: &str) -> Result<[usize; 2], RobotError> {
+        let (a, b) = (self.body(a)?, self.body(b)?);
+        Ok([a.min(b), a.max(b)])
+    }
+
+    /// Returns the number of a body.
+    fn body(&self, name: &str) -> Result<usize, RobotError> {
+        let bodies = &self.setting.bodies;
+        let is_named = |body: &Option<Body>| body.as_ref().is_some_and(|body| body.name == name);
+        bodies.iter().position(is_named).ok_or_else(|| RobotError::Unknown {
+            what: "body",
+            name: name.to_owned(),
+            known: bodies.iter().flatten().map(|body| body.name.clone()).collect(),
+        })
+    }
+
+    /// Returns the number of a body that is no link.
+    fn own_body(&self, name: &str) -> Result<usize, RobotError> {
+        let bodies = &self.setting.bodies;
+        let is_own = |number: &usize| bodies[*number].as_ref().is_some_and(|body| !body.is_link);
+        self.body(name).ok().filter(is_own).ok_or_else(|| RobotError::Unknown {
+            what: "obstacle or attached object",
+            name: name.to_owned(),
+            known: bodies
+                .iter()
+                .flatten()
+                .filter(|body| !body.is_link)
+                .map(|body| body.name.clone())
+                .collect(),
+        })
+    }
+
+    /// Lists the pairs that are asked about, after a change.
+    pub(crate) fn refresh(&mut self) {
+        if !std::mem::take(&mut self.is_stale) {
+            return;
+        }
+        let setting = Arc::make_mut(&mut self.setting);
+        let mut chains: HashMap<[usize; 2], Arc<Chain>> = HashMap::new();
+        let mut pairs = Vec::new();
+        for (a, one) in setting.parts.iter().enumerate() {
+            for (b, other) in setting.parts.iter().enumerate().skip(a + 1) {
+                // An obstacle is asked about with all links, also with those that never move.
+                let is_rigid = one.group == other.group && one.is_still == other.is_still;
+                if is_rigid || self.allowed.contains(&[one.body, other.body]) {
+                    continue;
+                }
+                let key = [one.group, other.group];
+                let chain =
+                    chains.entry(key).or_insert_with(|| Arc::new(setting.model.chain(key[0], key[1])));
+                let reach = (one.radius + other.radius) * ROUNDED_UP;
+                pairs.push(Pair { a, b, reach, chain: Arc::clone(chain) });
+            }
+        }
+        setting.pairs = pairs;
+    }
+}
