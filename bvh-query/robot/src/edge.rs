@@ -17,8 +17,12 @@
 //! y'' = a x y + w x (w x y) + 2 w x Q z' + Q z''; w x y is no longer than w R. A step and its inverse have the same bounds, with the
 //! slide of an inverse planar or floating joint before its turn.
 //!
-//! A function on [t0, t1] with a second derivative of at most A leaves its chord by at most A (t1 - t0)^2 / 8. Poses are off by their
-//! roundings: less than 16 u per step of all that has been reached, with u = 2^-53.
+//! A function on [t0, t1] with a second derivative of at most A leaves its chord by at most A (t1 - t0)^2 / 8.
+//!
+//! # Rounding
+//! With u = 2^-53, a step rounds a point within R by less than 16 u R: a product with a rotation 8 u, its sine and cosine 4 u, a
+//! translation 2 u. The angle of a turn is off by less than 2 u n times the sum S of the magnitudes of the n terms of its polynomial,
+//! which moves the point by that times R. A point and both ends of its chord are off: 64 u R (1 + n S) for each step.
 
 use crate::asker::{Asker, failed};
 use crate::error::RobotError;
@@ -26,7 +30,7 @@ use crate::frame::{Frame, Point, length};
 use crate::model::{Kind, Model, Value, quaternion_length};
 use crate::questions::bodies;
 use crate::robot::{Pair, Robot, Setting};
-use bvh_query::{Distance, MotionAnswer, MotionOptions, Pose, RigidPath};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, Pose, PoseError, RigidPath};
 use rayon::prelude::*;
 
 /// A motion of all joints: a polynomial of time, from 0 to 1, for each joint value.
@@ -60,7 +64,8 @@ impl Edge {
     fn bounds(&self, number: usize) -> Bounds {
         let of = &self.coefficients[number];
         let first = derivative(of);
-        Bounds { way: most(of), rate: most(&first), acceleration: most(&derivative(&first)) }
+        let terms = of.len() as f64 * of.iter().map(|coefficient| coefficient.abs()).sum::<f64>();
+        Bounds { way: most(of), rate: most(&first), acceleration: most(&derivative(&first)), terms }
     }
 
     /// Returns bounds of a joint that turns or slides by a multiple of a value.
@@ -71,6 +76,7 @@ impl Edge {
             way: factor * of.way + by.offset.abs(),
             rate: factor * of.rate,
             acceleration: factor * of.acceleration,
+            terms: factor * of.terms + by.offset.abs(),
         }
     }
 }
@@ -81,13 +87,20 @@ struct Bounds {
     way: f64,
     rate: f64,
     acceleration: f64,
+    /// The sum of the magnitudes of the terms that are added up, times their number: what roundings are proportional to.
+    terms: f64,
 }
 
 impl Bounds {
     /// Returns bounds of the length of a vector of values.
     fn long<const N: usize>(of: [Self; N]) -> Self {
         let norm = |part: fn(&Self) -> f64| of.iter().map(|of| part(of).powi(2)).sum::<f64>().sqrt();
-        Self { way: norm(|of| of.way), rate: norm(|of| of.rate), acceleration: norm(|of| of.acceleration) }
+        Self {
+            way: norm(|of| of.way),
+            rate: norm(|of| of.rate),
+            acceleration: norm(|of| of.acceleration),
+            terms: norm(|of| of.terms),
+        }
     }
 }
 
@@ -226,7 +239,7 @@ impl Asker {
             }
         }
         for pair in &setting.pairs {
-            let path = PairPath::new(setting, pair, edge);
+            let path = PairPath::new(setting, pair, edge)?;
             if path.stays_apart(options) {
                 continue;
             }
@@ -248,7 +261,7 @@ impl Asker {
         check(setting, edge)?;
         let (mut free_until, mut first): (f64, Option<(bool, f64, usize, Distance)>) = (1.0, None);
         for (number, pair) in setting.pairs.iter().enumerate() {
-            let path = PairPath::new(setting, pair, edge);
+            let path = PairPath::new(setting, pair, edge)?;
             if path.stays_apart(options) {
                 continue;
             }
@@ -302,23 +315,24 @@ struct PairPath<'a> {
     setting: &'a Setting,
     pair: &'a Pair,
     edge: &'a Edge,
-    /// Bounds of the acceleration, of the speed and of the reach of a point of B: at B's origin, and more per distance from it.
-    acceleration: [f64; 2],
-    speed: [f64; 2],
-    reach: f64,
+    /// Bounds for a point of B: at B's origin, and at distance 1 from it. They are linear in the distance.
+    bounds: [Bound; 2],
 }
 
 impl<'a> PairPath<'a> {
-    fn new(setting: &'a Setting, pair: &'a Pair, edge: &'a Edge) -> Self {
-        let [at_0, at_1] = [0.0, 1.0].map(|radius| Bound::along(setting, pair, edge, radius));
-        Self {
-            setting,
-            pair,
-            edge,
-            acceleration: [at_0.acceleration, at_1.acceleration - at_0.acceleration],
-            speed: [at_0.speed, at_1.speed - at_0.speed],
-            reach: at_0.reach,
-        }
+    fn new(setting: &'a Setting, pair: &'a Pair, edge: &'a Edge) -> Result<Self, RobotError> {
+        let bounds = [0.0, 1.0].map(|radius| Bound::along(setting, pair, edge, radius));
+        let path = Self { setting, pair, edge, bounds };
+        let part = &setting.parts[pair.b];
+        let reach = path.bound(length(part.middle) + part.radius, |bound| bound.reach);
+        // NaN does not stay below anything.
+        if reach < MOST_REACH { Ok(path) } else { Err(PoseError::TooFar(reach).into()) }
+    }
+
+    /// Returns a bound for points of B within a radius.
+    fn bound(&self, radius: f64, of: impl Fn(&Bound) -> f64) -> f64 {
+        let [at_0, at_1] = [&self.bounds[0], &self.bounds[1]].map(of);
+        (at_0 + (at_1 - at_0) * radius) * ROUNDED_UP
     }
 
     /// Returns the frame of B in A's.
@@ -343,8 +357,8 @@ impl<'a> PairPath<'a> {
         let parts = [self.pair.a, self.pair.b].map(|part| &self.setting.parts[part]);
         let [of_a, of_b] = parts.map(|part| part.middle);
         let far = length(of_b) + parts[1].radius;
-        let rounding = ROUNDING * (self.reach + far);
-        let speed = self.speed[0] + self.speed[1] * far;
+        let [rounding, speed] =
+            [self.bound(far, |bound| bound.rounding), self.bound(far, |bound| bound.speed)];
         let limit = self.pair.reach + options.clearance + options.tolerance.unwrap_or(0.0) + rounding;
         let is_apart = |[t0, t1]: [f64; 2]| {
             let middle = self.frame((t0 + t1) / 2.0).place(of_b);
@@ -372,8 +386,12 @@ impl<'a> PairPath<'a> {
 const MOST_INTERVALS: u32 = 12;
 /// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball.
 const DEFAULT_TOLERANCE: f64 = 4e-6;
-/// More than the roundings of a frame along a chain of a few hundred joints, as a part of what it reaches: 16 u for each.
-const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+/// 64 u: see above.
+const ROUNDING: f64 = 1.0 / (1u64 << 47) as f64;
+/// More than the relative error of all arithmetic with bounds.
+const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+/// Paths that reach farther have no poses, as [`Pose::new`] says.
+const MOST_REACH: f64 = (1u128 << 118) as f64;
 
 impl RigidPath for PairPath<'_> {
     fn pose(&self, t: f64) -> Pose {
@@ -382,23 +400,24 @@ impl RigidPath for PairPath<'_> {
     }
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
-        let acceleration = self.acceleration[0] + self.acceleration[1] * radius;
-        acceleration * (1.0 + ROUNDING) * (t1 - t0).powi(2) / 8.0 + ROUNDING * (self.reach + radius)
+        let acceleration = self.bound(radius, |bound| bound.acceleration);
+        acceleration * (t1 - t0).powi(2) / 8.0 + self.bound(radius, |bound| bound.rounding)
     }
 }
 
-/// Where a point of B may be in the frame that has been reached, and how it moves there.
+/// Where a point of B may be in the frame that has been reached, how it moves there, and how far it is off.
 struct Bound {
     reach: f64,
     speed: f64,
     acceleration: f64,
+    rounding: f64,
 }
 
 impl Bound {
     /// Follows a point at a distance from B's origin to A's frame.
     fn along(setting: &Setting, pair: &Pair, edge: &Edge, radius: f64) -> Self {
         let (model, parts) = (&setting.model, &setting.parts);
-        let mut bound = Self { reach: radius, speed: 0.0, acceleration: 0.0 };
+        let mut bound = Self { reach: radius, speed: 0.0, acceleration: 0.0, rounding: 0.0 };
         bound.shift(parts[pair.b].origin.translation);
         for &joint in pair.chain.down.iter().rev() {
             let joint = &model.joints[joint];
@@ -407,7 +426,7 @@ impl Bound {
             bound.slide(slide);
             bound.shift(joint.origin.translation);
         }
-        for &joint in &pair.chain.up {
+        for &joint in pair.chain.up.iter().rev() {
             let joint = &model.joints[joint];
             let [turn, slide] = parts_of(&joint.kind, edge);
             bound.shift(joint.origin.translation);
@@ -420,17 +439,20 @@ impl Bound {
 
     fn shift(&mut self, by: Point) {
         self.reach += length(by);
+        self.rounding += ROUNDING * self.reach;
     }
 
     fn turn(&mut self, of: Bounds) {
         self.acceleration += 2.0 * of.rate * self.speed + (of.rate * of.rate + of.acceleration) * self.reach;
         self.speed += of.rate * self.reach;
+        self.rounding += ROUNDING * self.reach * (1.0 + of.terms);
     }
 
     fn slide(&mut self, of: Bounds) {
         self.reach += of.way;
         self.speed += of.rate;
         self.acceleration += of.acceleration;
+        self.rounding += ROUNDING * (self.reach + of.terms);
     }
 }
 
@@ -445,7 +467,7 @@ fn parts_of(kind: &Kind, edge: &Edge) -> [Bounds; 2] {
         }
         &Kind::Floating(first) => {
             let angle = Turning::of(edge, first).angle;
-            let turn = Bounds { way: angle, rate: angle, acceleration: 0.0 };
+            let turn = Bounds { way: angle, rate: angle, acceleration: 0.0, terms: 4.0 };
             [turn, Bounds::long([0, 1, 2].map(|k| edge.bounds(first + k)))]
         }
     }
@@ -515,9 +537,9 @@ mod tests {
     use crate::testing::{robot, tree, values};
     use cbvh_testkit::Random;
 
-    /// Returns how far a point of B is at most from its chord in A's frame, as a share of the bound, at one of three scales.
+    /// Returns how far a point of B is at most from its chord in A's frame, as a share of the bound, at one of some scales.
     fn departure(path: &PairPath<'_>, random: &mut Random) -> f64 {
-        let long = [1.0, 0.1, 1e-3][random.below(3)];
+        let long = [1.0, 0.1, 1e-3, 1e-9][random.below(4)];
         let t0 = (1.0 - long) * random.unit();
         let t1 = t0 + long;
         let radius = 0.5 * random.unit();
@@ -543,7 +565,7 @@ mod tests {
             let base = [Base::Fixed, Base::Planar, Base::Floating][round % 3];
             let mut robot = robot(&tree(random, 2 + round % 9), base);
             robot.refresh();
-            let far = [0.3, 3.0][round % 2];
+            let far = [0.3, 3.0, 1e5][round % 3];
             let [from, to] = [(); 2].map(|()| values(random, &robot, far));
             let mut edge = Edge::straight(&from, &to).unwrap();
             let is_turning = robot.joints().iter().any(|name| name.ends_with("/qx"));
@@ -553,7 +575,7 @@ mod tests {
                 }
             }
             for pair in &robot.setting.pairs {
-                let path = PairPath::new(&robot.setting, pair, &edge);
+                let path = PairPath::new(&robot.setting, pair, &edge).unwrap();
                 for _ in 0..4 {
                     let ratio = departure(&path, random);
                     assert!(ratio <= 1.0, "{ratio} in round {round}");
@@ -576,7 +598,7 @@ mod tests {
             let [from, to] = [(); 2].map(|()| values(random, &robot, 0.6));
             let edge = Edge::straight(&from, &to).unwrap();
             for pair in &robot.setting.pairs {
-                let path = PairPath::new(&robot.setting, pair, &edge);
+                let path = PairPath::new(&robot.setting, pair, &edge).unwrap();
                 all += 1;
                 if !path.stays_apart(&MotionOptions::new().clearance(0.01)) {
                     continue;

@@ -99,6 +99,14 @@ fn numbers_that_no_joint_can_have_are_refused() {
         robot.motion(&Edge::polynomials(vec![]), &MotionOptions::new()),
         Err(RobotError::Count { .. })
     ));
+    // Far, and too far.
+    let slide = read(&with(&JOINT.replace("revolute", "prismatic"), BALL).replace(
+        "<link name=\"a\"/>",
+        &format!("<link name=\"a\"><collision><geometry>{BALL}</geometry></collision></link>"),
+    ));
+    let mut slide = slide.unwrap();
+    assert!(slide.is_free(&[3.0], &[1e6]).unwrap() && !slide.is_free(&[0.0], &[1e6]).unwrap());
+    assert!(matches!(slide.is_free(&[3.0], &[1e40]), Err(RobotError::Pose(_))));
     let clearance = MotionOptions::new().clearance(-1.0);
     robot.add_obstacle("o", robot_shape(), &Pose::IDENTITY).unwrap();
     assert!(robot.is_edge_free(&Edge::straight(&[0.0], &[1.0]).unwrap(), &clearance).is_err());
