@@ -30,7 +30,7 @@ use crate::frame::{Frame, Point, length};
 use crate::model::{Kind, Model, Value, quaternion_length};
 use crate::questions::bodies;
 use crate::robot::{Pair, Robot, Setting};
-use bvh_query::{Distance, MotionAnswer, MotionOptions, Pose, PoseError, RigidPath};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, NumberError, Pose, PoseError, QueryError, RigidPath};
 use rayon::prelude::*;
 
 /// A motion of all joints: a polynomial of time, from 0 to 1, for each joint value.
@@ -229,7 +229,7 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<bool, RobotError> {
-        check(setting, edge)?;
+        check(setting, edge, options)?;
         // Most motions that are not free touch at one of these.
         if options.clearance == 0.0 {
             for t in [1.0, 0.5, 0.25, 0.75] {
@@ -258,7 +258,7 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<RobotMotion, RobotError> {
-        check(setting, edge)?;
+        check(setting, edge, options)?;
         let (mut free_until, mut first): (f64, Option<(bool, f64, usize, Distance)>) = (1.0, None);
         for (number, pair) in setting.pairs.iter().enumerate() {
             let path = PairPath::new(setting, pair, edge)?;
@@ -291,8 +291,17 @@ impl Asker {
     }
 }
 
-/// Returns an error unless the edge is of all joint values, and both ends are valid. Quaternions only turn at a constant rate.
-fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
+/// Returns an error unless the edge is of all joint values, both ends are valid, and so are the options: no pair that stays apart
+/// would refuse them. Quaternions only turn at a constant rate.
+fn check(setting: &Setting, edge: &Edge, options: &MotionOptions) -> Result<(), RobotError> {
+    let is_finite = |number: f64| (0.0..=f64::MAX).contains(&number);
+    let refused = |found| Err(QueryError::from(found).into());
+    if !is_finite(options.clearance) {
+        return refused(NumberError::Clearance(options.clearance));
+    }
+    if let Some(found) = options.tolerance.filter(|&found| !is_finite(found) || found == 0.0) {
+        return refused(NumberError::Tolerance(found));
+    }
     let model = &setting.model;
     for t in [0.0, 1.0] {
         let numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();

@@ -107,9 +107,23 @@ fn numbers_that_no_joint_can_have_are_refused() {
     let mut slide = slide.unwrap();
     assert!(slide.is_free(&[3.0], &[1e6]).unwrap() && !slide.is_free(&[0.0], &[1e6]).unwrap());
     assert!(matches!(slide.is_free(&[3.0], &[1e40]), Err(RobotError::Pose(_))));
-    let clearance = MotionOptions::new().clearance(-1.0);
+    // Also if no pair comes near.
     robot.add_obstacle("o", robot_shape(), &Pose::IDENTITY).unwrap();
-    assert!(robot.is_edge_free(&Edge::straight(&[0.0], &[1.0]).unwrap(), &clearance).is_err());
+    robot
+        .add_obstacle("far", robot_shape(), &Pose::new(*Pose::IDENTITY.rotation(), [9.0; 3]).unwrap())
+        .unwrap();
+    let edge = Edge::straight(&[0.0], &[1.0]).unwrap();
+    for near in ["o", "far"] {
+        for bad in [-1.0, f64::NAN, f64::INFINITY] {
+            for options in [MotionOptions::new().clearance(bad), MotionOptions::new().tolerance(bad)] {
+                assert!(matches!(robot.is_edge_free(&edge, &options), Err(RobotError::Query(_))), "{near}");
+                assert!(matches!(robot.motion(&edge, &options), Err(RobotError::Query(_))), "{near}");
+            }
+        }
+        robot.allow("b", "o").unwrap();
+    }
+    assert!(robot.is_edge_free(&edge, &MotionOptions::new().clearance(1.0).tolerance(0.1)).unwrap());
+    assert!(robot.is_edge_free(&edge, &MotionOptions::new().tolerance(0.0)).is_err());
     assert!(matches!(robot.add_obstacle("o", robot_shape(), &Pose::IDENTITY), Err(RobotError::Taken(_))));
     assert!(matches!(robot.set_margin("o", f64::NAN), Err(RobotError::Query(_))));
     for result in [robot.allow("a", "nothing"), robot.remove("a"), robot.set_pose("b", &Pose::IDENTITY)] {
