@@ -26,6 +26,8 @@ struct Shared {
 
 /// The nearest bodies: whether there are any, the distance and its bounds, both names, and the points in the world.
 type Nearest = (bool, [f64; 3], [String; 2], [[f64; 3]; 2]);
+/// A named configuration: its group, its name, and values at the places of joints.
+type State = (String, String, Vec<(usize, f64)>);
 /// How a motion ends: 0 free, 1 hit, 2 near; until when it is free, when it ends, with what joint values, bodies and distance.
 type Motion = (u8, f64, f64, Vec<f64>, [String; 2], f64);
 
@@ -167,8 +169,7 @@ impl Robot {
         shared.robot.groups().iter().map(|group| (group.name.clone(), group.joints.clone())).collect()
     }
 
-    /// The groups, names, and values at places of named configurations.
-    fn states(&self) -> Vec<(String, String, Vec<(usize, f64)>)> {
+    fn states(&self) -> Vec<State> {
         let shared = locked(&self.0);
         let state = |of: &cbvh_robot::State| (of.group.clone(), of.name.clone(), of.values.clone());
         shared.robot.states().iter().map(state).collect()

@@ -3,7 +3,7 @@
 Answers to one question alone are plain values, to N questions arrays (Any)."""
 
 import os
-from typing import Any, Callable, final
+from typing import Any, Callable, Sequence, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,7 @@ __all__ = [
     "FormatError",
     "Mesh",
     "Paths",
+    "Robot",
     "Scene",
     "all_hits",
     "any_hits",
@@ -160,6 +161,7 @@ class Robot:
         self, coefficients: _Floats, clearance: float, tolerance: float | None
     ) -> tuple[int, float, float, list[float], list[str], float]: ...
 
+@final
 class Scene:
     def __new__(cls) -> Scene: ...
     @staticmethod

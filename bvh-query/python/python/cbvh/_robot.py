@@ -65,6 +65,7 @@ class Robot:
     """
 
     __slots__ = ("_robot",)
+    _robot: _cbvh.Robot
 
     def __init__(self) -> None:
         raise TypeError("Robot: use Robot.from_urdf")
@@ -238,7 +239,7 @@ class Robot:
     def link_poses(self, q: ArrayLike) -> NDArray[np.float64]:
         """The poses of all links in the world, in the order of `links`: shape (links, 4, 4) or (N, links, 4, 4)."""
         rows, one = self._rows(q)
-        poses = self._robot.link_poses(rows).reshape(len(rows), -1, 4, 4)
+        poses = self._robot.link_poses(rows).reshape(len(rows), len(self.links), 4, 4)
         return poses[0] if one else poses
 
     def collide(self, q: ArrayLike, *, parallel: bool = False) -> Any:

@@ -1,0 +1,693 @@
+"""Tests of robots: kinematics in numpy, questions about meshes pair by pair, samples of motions, misuse and threads."""
+
+import concurrent.futures
+import importlib.metadata
+import itertools
+import math
+import pathlib
+import tempfile
+import threading
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+
+import cbvh
+from cbvh import MotionKind
+from common import TESTDATA, check_errors, shifts
+
+URDF = TESTDATA / "robot" / "robot.urdf"
+NEIGHBOURS = [("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand")]
+
+# All kinds of joints, with joints before those that they hang from, an axis that is not of length 1, and two shapes of a link.
+KINDS = """<robot name="kinds">
+<link name="foot"><collision><geometry><box size="0.3 0.2 0.1"/></geometry></collision>
+<collision><origin xyz="0 0 0.2" rpy="0.3 0 0"/><geometry><capsule radius="0.05" length="0.2"/></geometry></collision></link>
+<link name="a"><collision><origin xyz="0.1 0 0"/><geometry><sphere radius="0.05"/></geometry></collision></link>
+<link name="b"><collision><geometry><cylinder radius="0.05" length="0.2"/></geometry></collision></link>
+<link name="c"/><link name="d"/><link name="e"/><link name="f"/><link name="g"/>
+<joint name="follow" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+<mimic joint="slide" multiplier="-2" offset="0.1"/></joint>
+<joint name="turn" type="continuous"><parent link="foot"/><child link="a"/><origin xyz="0.1 0.2 0.3" rpy="0.1 -0.7 2"/>
+<axis xyz="1 2 -2"/></joint>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><origin rpy="1 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-0.1" upper="0.4" effort="1" velocity="1"/></joint>
+<joint name="glue" type="fixed"><parent link="b"/><child link="d"/><origin xyz="0 0.2 0" rpy="0 0 1"/></joint>
+<joint name="again" type="revolute"><parent link="d"/><child link="e"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="2" effort="1" velocity="1"/><mimic joint="follow" multiplier="0.5" offset="1"/></joint>
+<joint name="plane" type="planar"><parent link="foot"/><child link="f"/><origin xyz="0 0 1" rpy="0.2 0 0"/></joint>
+<joint name="float" type="floating"><parent link="e"/><child link="g"/><origin xyz="1 0 0" rpy="0 0.5 0"/></joint>
+</robot>"""
+
+
+def turned(axis, angle):
+    """The rotation about an axis of length 1, after Rodrigues."""
+    x, y, z = axis
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
+
+
+def placed(rotation=np.eye(3), translation=(0, 0, 0)):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, translation
+    return pose
+
+
+def numbers(element, name, default):
+    return np.array([float(n) for n in element.get(name).split()] if element is not None and element.get(name) else default)
+
+
+def origin_of(element):
+    origin = element.find("origin")
+    roll, pitch, yaw = numbers(origin, "rpy", [0, 0, 0])
+    rotation = turned((0, 0, 1), yaw) @ turned((0, 1, 0), pitch) @ turned((1, 0, 0), roll)
+    return placed(rotation, numbers(origin, "xyz", [0, 0, 0]))
+
+
+class Kinematics:
+    """Where the links of a URDF file are: what robots are compared with."""
+
+    def __init__(self, path):
+        self.root = ElementTree.parse(path).getroot()
+        self.joints = {joint.get("name"): joint for joint in self.root.findall("joint")}
+        self.moved_by = {joint.find("child").get("link"): joint for joint in self.joints.values()}
+
+    def value(self, joint, values):
+        mimic = joint.find("mimic")
+        if mimic is None:
+            return values[joint.get("name")]
+        leader = self.value(self.joints[mimic.get("joint")], values)
+        return float(mimic.get("multiplier", 1)) * leader + float(mimic.get("offset", 0))
+
+    def pose(self, link, values):
+        """The pose of a link in the world, given joint values by name."""
+        joint = self.moved_by.get(link)
+        if joint is None:
+            return np.eye(4)
+        name, kind = joint.get("name"), joint.get("type")
+        here = self.pose(joint.find("parent").get("link"), values) @ origin_of(joint)
+        if kind == "fixed":
+            return here
+        if kind == "planar":
+            x, y, theta = (values[f"{name}/{part}"] for part in ("x", "y", "theta"))
+            return here @ placed(turned((0, 0, 1), theta), (x, y, 0))
+        if kind == "floating":
+            x, y, z, *quaternion = (values[f"{name}/{part}"] for part in ("x", "y", "z", "qx", "qy", "qz", "qw"))
+            return here @ cbvh.pose([x, y, z], np.array(quaternion) / np.linalg.norm(quaternion))
+        axis = numbers(joint.find("axis"), "xyz", [1, 0, 0])
+        axis = axis / np.linalg.norm(axis)
+        value = self.value(joint, values)
+        return here @ (placed(translation=value * axis) if kind == "prismatic" else placed(turned(axis, value)))
+
+
+def read_obj(path):
+    lines = [line.split() for line in path.read_text().splitlines()]
+    vertices = np.array([[float(n) for n in line[1:4]] for line in lines if line[:1] == ["v"]])
+    faces = np.array([[int(n.split("/")[0]) - 1 for n in line[1:4]] for line in lines if line[:1] == ["f"]])
+    return vertices, faces
+
+
+def meshes_of(kinematics):
+    """For each link of the test's robot its mesh, and where that is in the link."""
+    meshes = {}
+    for link in kinematics.root.findall("link"):
+        collision = link.find("collision")
+        mesh = collision.find("geometry/mesh")
+        vertices, faces = read_obj(URDF.parent / mesh.get("filename"))
+        meshes[link.get("name")] = cbvh.bake(vertices * numbers(mesh, "scale", [1, 1, 1]), faces), origin_of(collision)
+    return meshes
+
+
+def cell():
+    """The arm among obstacles, with something in its hand, and the same by hand: name, link, mesh, pose."""
+    robot = cbvh.Robot.from_urdf(URDF)
+    for a, b in NEIGHBOURS:
+        robot.allow(a, b)
+    others = [
+        ("pillar", None, cbvh.box([0.1, 0.1, 1.5]), shifts([0.45, 0, 0.75])[0]),
+        ("shelf", None, cbvh.box([0.4, 1.0, 0.02]), shifts([-0.5, 0, 0.9])[0]),
+        ("ball", None, cbvh.sphere(0.1), shifts([0, 0.5, 0.5])[0]),
+        ("tool", "hand", cbvh.box([0.02, 0.02, 0.2]), shifts([0, 0, 0.2])[0]),
+    ]
+    for name, link, mesh, pose in others:
+        if link is None:
+            robot.add_obstacle(mesh, pose, name=name)
+        else:
+            robot.attach(mesh, link, pose, name=name, may_touch=["forearm"])
+    of_links = [(name, name, mesh, pose) for name, (mesh, pose) in meshes_of(Kinematics(URDF)).items()]
+    return robot, of_links + others
+
+
+def random_rows(robot, seed, count, reach=1.0):
+    limits = np.clip(robot.limits, -math.pi, math.pi)
+    return reach * np.random.default_rng(seed).uniform(limits[:, 0], limits[:, 1], (count, len(limits)))
+
+
+class Describing(unittest.TestCase):
+    """What the files say."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, name, text):
+        (self.folder / name).write_text(text)
+        return self.folder / name
+
+    def test_links_are_where_numpy_has_them(self):
+        for path in (URDF, self.write("kinds.urdf", KINDS)):
+            robot, kinematics = cbvh.Robot.from_urdf(path), Kinematics(path)
+            rows = np.random.default_rng(1).uniform(-2, 2, (50, len(robot.joints)))
+            found = robot.link_poses(rows)
+            self.assertEqual(found.shape, (50, len(robot.links), 4, 4))
+            for row, poses in zip(rows, found):
+                values = dict(zip(robot.joints, row))
+                for link, pose in zip(robot.links, poses):
+                    np.testing.assert_allclose(pose, kinematics.pose(link, values), atol=1e-14)
+            self.assertTrue(np.array_equal(robot.link_poses(rows[3]), found[3]))
+
+    def test_joints_have_a_name_for_each_number(self):
+        robot = cbvh.Robot.from_urdf(self.write("kinds.urdf", KINDS))
+        planar, floating = ["plane/x", "plane/y", "plane/theta"], [f"float/{of}" for of in "x y z qx qy qz qw".split()]
+        self.assertEqual(robot.joints, ["turn", "slide", *planar, *floating])
+        self.assertEqual(robot.limits.shape, (12, 2))
+        self.assertEqual(robot.limits[:3].tolist(), [[-math.inf, math.inf], [-0.1, 0.4], [-math.inf, math.inf]])
+        self.assertEqual(robot.limits[8:].tolist(), [[-1, 1]] * 4)
+        self.assertEqual((robot.name, robot.links[0], len(robot.links)), ("kinds", "foot", 8))
+        self.assertEqual(repr(robot), "<Robot 'kinds': 12 joint values, 8 links>")
+        q = robot.q({"turn": 0.5}, slide=0.25)
+        self.assertEqual(q.tolist(), [0.5, 0.25] + 9 * [0.0] + [1.0])
+        robot.collide(q)
+        # Of links that nothing moves against each other, and of links without shapes, there are no pairs.
+        self.assertEqual(robot.pairs, [("foot", "a"), ("foot", "b"), ("a", "b")])
+        for base, more in (("planar", 3), ("floating", 7)):
+            moving = cbvh.Robot.from_urdf(self.folder / "kinds.urdf", base=base)
+            self.assertEqual(moving.joints[more:], robot.joints)
+            self.assertTrue(all(name.startswith("base/") for name in moving.joints[:more]))
+
+    def test_a_base_moves_the_robot(self):
+        robot = cbvh.Robot.from_urdf(URDF)
+        row = random_rows(robot, 1, 1)[0]
+        still = robot.link_poses(row)
+        planar = cbvh.Robot.from_urdf(URDF, base="planar").link_poses([0.3, -2, 0.7, *row])
+        np.testing.assert_allclose(planar, placed(turned((0, 0, 1), 0.7), (0.3, -2, 0)) @ still, atol=1e-14)
+        quaternion = np.array([0.1, -0.5, 0.3, 0.8])
+        floating = cbvh.Robot.from_urdf(URDF, base="floating").link_poses([0.3, -2, 1, *quaternion, *row])
+        pose = cbvh.pose([0.3, -2, 1], quaternion / np.linalg.norm(quaternion))
+        np.testing.assert_allclose(floating, pose @ still, atol=1e-14)
+
+    def test_primitives_are_solid_and_exact(self):
+        robot = cbvh.Robot.from_urdf(self.write("kinds.urdf", KINDS), cylinder_error=1e-4)
+        q, kinematics = robot.q(), Kinematics(self.folder / "kinds.urdf")
+        values = dict(zip(robot.joints, q))
+        robot.allow("foot", "b")
+        robot.allow("foot", "a")
+        # The ball of a, 0.1 off its link, whose distance from what a box holds follows by hand.
+        robot.allow("a", "b")
+        robot.add_obstacle(cbvh.sphere(0.01), name="probe")
+        for _ in range(20):
+            at = np.random.default_rng(2).uniform(-1, 1, 3)
+            robot.set_pose("probe", shifts(at)[0])
+            centre = (kinematics.pose("a", values) @ shifts([0.1, 0, 0])[0])[:3, 3]
+            self.assertLessEqual(robot.distance(q).distance, np.linalg.norm(at - centre) - 0.06 + 1e-12)
+        robot.set_pose("probe", np.eye(4))  # Deep inside the box of the foot.
+        self.assertIn(("foot", "probe"), robot.pairs_in_contact(q))
+        self.assertEqual(robot.distance(q).distance, 0)
+
+    def test_srdf_disables_pairs_and_names_states(self):
+        srdf = self.write(
+            "arm.srdf",
+            """<robot name="small_arm">
+            <group name="arm"><chain base_link="base" tip_link="forearm"/></group>
+            <group name="wrist"><joint name="wrist"/></group>
+            <group name="all"><group name="arm"/><group name="wrist"/></group>
+            <group_state name="up" group="arm"><joint name="shoulder" value="-0.5"/><joint name="elbow" value="0.25"/></group_state>
+            <group_state name="rest" group="wrist"><joint name="wrist" value="1"/></group_state>
+            <disable_collisions link1="base" link2="turret" reason="Adjacent"/>
+            <disable_collisions link1="hand" link2="base" reason="Never"/>
+            <disable_collisions link1="hand" link2="of another robot" reason="Never"/>
+            </robot>""",
+        )
+        robot, bare = cbvh.Robot.from_urdf(URDF, srdf=srdf), cbvh.Robot.from_urdf(URDF)
+        self.assertEqual(set(bare.pairs) - set(robot.pairs), {("base", "turret"), ("base", "hand")})
+        self.assertEqual(len(bare.pairs), 10)
+        arm = ["waist", "shoulder", "elbow"]
+        self.assertEqual(robot.groups, {"arm": arm, "wrist": ["wrist"], "all": [*arm, "wrist"]})
+        states = {"arm": {"up": {"shoulder": -0.5, "elbow": 0.25}}, "wrist": {"rest": {"wrist": 1.0}}}
+        self.assertEqual(robot.states, states)
+        q = robot.q(robot.states["arm"]["up"], **robot.states["wrist"]["rest"])
+        self.assertEqual(q.tolist(), [0, -0.5, 0.25, 1])
+        self.assertEqual((bare.groups, bare.states), ({}, {}))
+
+    def test_packages_and_a_cache(self):
+        package = self.folder / "ros" / "my_arm"
+        (package / "meshes").mkdir(parents=True)
+        for name in ("base", "link", "hand"):
+            (package / "meshes" / f"{name}.obj").write_text((URDF.parent / f"{name}.obj").read_text())
+        text = URDF.read_text().replace('filename="', 'filename="package://my_arm/meshes/')
+        path = self.write("arm.urdf", text)
+        with self.assertRaises(ValueError) as caught:
+            cbvh.Robot.from_urdf(path)
+        self.assertIn("package://my_arm/meshes/base.obj", str(caught.exception))
+        expected = cbvh.Robot.from_urdf(URDF).distance([0.1, 0.2, 0.3, 0.4])
+        for folders in ([self.folder / "ros"], str(self.folder / "ros"), [package]):
+            for _ in range(2):
+                robot = cbvh.Robot.from_urdf(path, folders, cache=self.folder / "cache")
+                found = robot.distance([0.1, 0.2, 0.3, 0.4])
+                self.assertEqual((found.distance, found.bodies), (expected.distance, expected.bodies))
+        self.assertTrue(any((self.folder / "cache").iterdir()))
+
+    def test_robots_without_joints(self):
+        path = self.write(
+            "post.urdf",
+            '<robot name="post"><link name="post"><collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>',
+        )
+        robot = cbvh.Robot.from_urdf(path)
+        self.assertEqual((robot.joints, robot.pairs, robot.limits.shape), ([], [], (0, 2)))
+        self.assertIs(robot.collide([]), False)
+        self.assertIs(robot.is_free([], []), True)
+        nearest = robot.distance([])
+        self.assertEqual((nearest.distance, nearest.bodies), (math.inf, None))
+        robot.add_obstacle(cbvh.sphere(0.5), shifts([1.5, 0, 0])[0], name="ball")
+        self.assertEqual(robot.pairs, [("post", "ball")])
+        for parallel in (False, True):
+            self.assertEqual(robot.collide(np.zeros((3, 0)), parallel=parallel).tolist(), [False] * 3)
+            self.assertEqual(robot.distance(np.zeros((3, 0)), parallel=parallel).distance.tolist(), [0.5] * 3)
+            self.assertEqual(robot.is_free(np.zeros((3, 0)), [], parallel=parallel).tolist(), [True] * 3)
+        robot.set_pose("ball", shifts([1, 0, 0])[0])
+        self.assertIs(robot.collide([]), True)
+        self.assertIs(robot.is_free([], []), False)
+        self.assertEqual(robot.motion([], []).kind, MotionKind.HIT)
+
+
+class Asking(unittest.TestCase):
+    """Answers beside those about meshes."""
+
+    def test_pairs_are_those_of_meshes(self):
+        robot, bodies = cell()
+        self.assertEqual(robot.joints, ["waist", "shoulder", "elbow", "wrist"])
+        rows, kinematics = random_rows(robot, 2, 300), Kinematics(URDF)
+        of = {name: (link, mesh, pose) for name, link, mesh, pose in bodies}
+        standing = {name for name, link, *_ in bodies if link is None}
+        allowed = {frozenset(pair) for pair in [*NEIGHBOURS, ("hand", "tool"), ("forearm", "tool")]}
+        pairs = [
+            pair
+            for pair in itertools.combinations(of, 2)
+            # The base does not move either, but obstacles may stand in it.
+            if not set(pair) <= standing and frozenset(pair) not in allowed
+        ]
+        self.assertEqual({frozenset(pair) for pair in robot.pairs}, {frozenset(pair) for pair in pairs})
+        touching, nearest = robot.pairs_in_contact(rows), robot.distance(rows)
+        for number, row in enumerate(rows):
+            values = dict(zip(robot.joints, row))
+            world = {n: (kinematics.pose(link, values) if link else np.eye(4)) @ pose for n, (link, _, pose) in of.items()}
+            poses = {pair: cbvh.relative(world[pair[0]], world[pair[1]]) for pair in robot.pairs}
+            expected = [(a, b) for (a, b), pose in poses.items() if of[a][1].collide(of[b][1], pose)]
+            self.assertEqual(touching[number], expected)
+            least = min(of[a][1].distance(of[b][1], pose).distance for (a, b), pose in poses.items())
+            self.assertAlmostEqual(nearest.distance[number], least, delta=1e-12)
+            self.assertLessEqual(nearest.lower[number], nearest.distance[number])
+            self.assertLessEqual(nearest.distance[number], nearest.upper[number])
+            apart = np.linalg.norm(np.subtract(*nearest.points[number]))
+            self.assertAlmostEqual(apart, least, delta=1e-9)
+            a, b = nearest.bodies[number]
+            self.assertAlmostEqual(of[a][1].distance(of[b][1], poses[a, b]).distance, least, delta=1e-12)
+        collide = robot.collide(rows)
+        self.assertEqual(collide.tolist(), [bool(pairs) for pairs in touching])
+        self.assertTrue(30 < collide.sum() < 270)
+
+    def test_one_or_many_serial_or_parallel(self):
+        robot, _ = cell()
+        rows = random_rows(robot, 3, 100)
+        ends = rows + random_rows(robot, 4, 100, 0.2)
+        answers = {}
+        for parallel in (False, True):
+            kinds = {"parallel": parallel}
+            distance = robot.distance(rows, **kinds)
+            answers[parallel] = (
+                robot.collide(rows, **kinds).tolist(),
+                robot.pairs_in_contact(rows, **kinds),
+                [np.asarray(of).tolist() for of in distance],
+                robot.is_free(rows, ends, **kinds).tolist(),
+            )
+        self.assertEqual(*answers.values())
+        collide, pairs, (distance, lower, upper, bodies, points), free = answers[False]
+        self.assertEqual((len(collide), np.shape(points)), (100, (100, 2, 3)))
+        self.assertTrue(10 < sum(free) < 90)
+        for number, (row, end) in enumerate(zip(rows.tolist(), ends)):
+            self.assertIs(robot.collide(row), collide[number])
+            self.assertEqual(robot.pairs_in_contact(row), pairs[number])
+            one = robot.distance(tuple(row))
+            self.assertEqual((one.distance, one.lower, one.upper), (distance[number], lower[number], upper[number]))
+            self.assertEqual((list(one.bodies), one.points.tolist()), (bodies[number], points[number]))
+            self.assertIs(robot.is_free(row, end), free[number])
+        # One row serves all of the other argument, and arrays may be of any kind.
+        first = [robot.is_free(rows[0], end) for end in ends]
+        self.assertEqual(robot.is_free(rows[0], ends).tolist(), first)
+        self.assertEqual(robot.is_free(ends, rows[0]).tolist(), [robot.is_free(end, rows[0]) for end in ends])
+        strided = np.asfortranarray(np.repeat(rows, 2, axis=0))[::2]
+        self.assertEqual(robot.collide(strided).tolist(), collide)
+        self.assertEqual(robot.collide(np.zeros((1, 4), dtype=int)).shape, (1,))
+        none = np.zeros((0, 4))
+        for parallel in (False, True):
+            self.assertEqual(robot.collide(none, parallel=parallel).shape, (0,))
+            self.assertEqual(robot.pairs_in_contact(none, parallel=parallel), [])
+            self.assertEqual(robot.distance(none, parallel=parallel).points.shape, (0, 2, 3))
+            self.assertEqual(robot.is_free(none, none, parallel=parallel).shape, (0,))
+        self.assertEqual(robot.link_poses(none).shape, (0, 5, 4, 4))
+
+    def test_motions_are_free_at_all_samples(self):
+        robot, _ = cell()
+        starts, times = random_rows(robot, 5, 120), np.linspace(0, 1, 401)[:, None]
+        reach = np.where(np.arange(120) % 3, 0.3, 1.0)[:, None]
+        ends = starts + reach * (random_rows(robot, 6, 120) - starts)
+        free = robot.is_free(starts, ends)
+        self.assertTrue(30 < free.sum() < 90)
+        for start, end, is_free in zip(starts, ends, free):
+            along = start + times * (end - start)
+            found = robot.motion(start, end)
+            self.assertEqual(found.kind == MotionKind.FREE, is_free)
+            touching = robot.collide(along)
+            self.assertFalse(touching[times[:, 0] < found.free_until].any())
+            if is_free:
+                self.assertFalse(touching.any())
+                self.assertEqual((found.free_until, found.bodies, found.distance), (1.0, None, math.inf))
+                self.assertTrue(math.isnan(found.touching_at) and found.joints.size == 0)
+                continue
+            self.assertEqual((found.kind, found.distance), (MotionKind.HIT, 0.0))
+            self.assertLessEqual(found.free_until, found.touching_at)
+            np.testing.assert_allclose(found.joints, start + found.touching_at * (end - start), atol=1e-14)
+            self.assertIn(found.bodies, robot.pairs_in_contact(found.joints))
+
+    def test_clearances_of_motions(self):
+        robot, _ = cell()
+        starts, times = random_rows(robot, 7, 40), np.linspace(0, 1, 101)[:, None]
+        ends = starts + random_rows(robot, 8, 40, 0.1)
+        free = robot.is_free(starts, ends, clearance=0.02)
+        self.assertTrue(5 < free.sum() < 35)
+        self.assertTrue((robot.is_free(starts, ends) >= free).all())
+        for start, end, is_free in zip(starts, ends, free):
+            gaps = robot.distance(start + times * (end - start)).distance
+            self.assertTrue(not is_free or gaps.min() > 0.02)
+            # Within the clearance at no sample, nor nearly.
+            self.assertTrue(is_free or gaps.min() < 0.03)
+        # With a tolerance of 5 cm it is the gap that decides, and the kind says so.
+        gap = robot.distance(starts[free][0])
+        near = robot.motion(starts[free][0], starts[free][0], clearance=gap.distance - 1e-3, tolerance=0.05)
+        self.assertIn(near.kind, (MotionKind.FREE, MotionKind.NEAR))
+
+    def test_what_is_between_samples_is_found(self):
+        robot = cbvh.Robot.from_urdf(URDF)
+        for a, b in NEIGHBOURS:
+            robot.allow(a, b)
+        name = robot.add_obstacle(cbvh.box([0.6, 1e-6, 0.6]), shifts([0.3, 0.00213, 0.8])[0])
+        self.assertEqual(name, "obstacle 1")
+        start, end = np.array([-0.5, 1.2, 0, 0]), np.array([0.5, 1.2, 0, 0])
+        self.assertFalse(robot.is_free(start, end))
+        self.assertEqual(robot.motion(start, end).bodies[1], "obstacle 1")
+        robot.remove(name)
+        self.assertTrue(robot.is_free(start, end))
+
+    def test_polynomials(self):
+        robot, _ = cell()
+        rng, kinds = np.random.default_rng(9), set()
+        times = np.linspace(0, 1, 301)
+        for _ in range(40):
+            coefficients = rng.normal(size=(4, 4)) * [1.0, 0.3, 0.3, 0.2]
+            along = sum(np.outer(times**power, coefficients[:, power]) for power in range(4))
+            found = robot.motion_along(coefficients)
+            kinds.add(found.kind)
+            touching = robot.collide(along)
+            self.assertFalse(touching[times < found.free_until].any())
+            self.assertEqual(bool(touching.any()) and found.kind == MotionKind.FREE, False)
+            if found.kind == MotionKind.HIT:
+                expected = sum(coefficients[:, power] * found.touching_at**power for power in range(4))
+                np.testing.assert_allclose(found.joints, expected, atol=1e-13)
+                self.assertTrue(robot.collide(found.joints))
+        self.assertEqual(kinds, {MotionKind.FREE, MotionKind.HIT})
+        q = random_rows(robot, 1, 1)[0]
+        self.assertEqual(robot.motion_along(q[:, None]).kind == MotionKind.FREE, not robot.collide(q))
+        # Out to where there are no poses and back again: that is not certainly free.
+        far = np.zeros((4, 3))
+        far[0] = [0, 1e300, -1e300]
+        try:
+            self.assertNotEqual(robot.motion_along(far).kind, MotionKind.FREE)
+        except ValueError:
+            pass
+
+    def test_turns_of_a_floating_base(self):
+        robot = cbvh.Robot.from_urdf(URDF, base="floating")
+        for a, b in itertools.combinations(robot.links, 2):
+            robot.allow(a, b)
+        robot.add_obstacle(cbvh.sphere(0.05), shifts([0, 0.9, 0])[0], name="ball")
+        # The arm stands up along z. It turns about x by 1.56 rad one way or the other: away from the ball, or towards it.
+        for sign, is_free in ((1, True), (-1, False)):
+            end = robot.q({"base/qx": sign * math.sin(0.78), "base/qw": math.cos(0.78)})
+            self.assertEqual(robot.is_free(robot.q(), end), is_free)
+            end[3:7] *= -1  # The same rotation.
+            self.assertEqual(robot.is_free(robot.q(), end), is_free)
+
+
+class Changing(unittest.TestCase):
+    """Obstacles, attached objects, margins and allowed pairs."""
+
+    def setUp(self):
+        self.robot, self.q = cbvh.Robot.from_urdf(URDF), np.zeros(4)
+
+    def test_allowed_pairs_are_not_asked_about(self):
+        robot, q = self.robot, self.q
+        self.assertEqual(len(robot.pairs), 10)
+        touching = robot.pairs_in_contact(q)
+        self.assertTrue(touching)
+        for a, b in touching:
+            robot.allow(b, a)
+        self.assertFalse(robot.collide(q))
+        self.assertEqual(robot.pairs_in_contact(q), [])
+        robot.allow(*touching[0], allowed=False)
+        self.assertEqual(robot.pairs_in_contact(q), touching[:1])
+        for a, b in robot.pairs:
+            robot.allow(a, b)
+        self.assertEqual(robot.pairs, [])
+        nearest = robot.distance(q)
+        self.assertEqual((nearest.distance, nearest.lower, nearest.upper, nearest.bodies), (math.inf,) * 3 + (None,))
+        self.assertTrue(np.isnan(nearest.points).all() and nearest.points.shape == (2, 3))
+
+    def test_pairs_that_nearly_always_touch(self):
+        found = self.robot.allow_frequent(200, 0.99)
+        self.assertEqual(found, cbvh.Robot.from_urdf(URDF).allow_frequent(200, 0.99))
+        self.assertTrue(found)
+        for pair, share in found:
+            self.assertIn(pair, NEIGHBOURS)
+            self.assertTrue(0.99 <= share <= 1)
+            self.assertNotIn(pair, self.robot.pairs)
+
+    def test_obstacles_come_move_and_go(self):
+        robot, q = self.robot, self.q
+        for a, b in robot.pairs:
+            robot.allow(a, b)
+        wall = cbvh.box([0.1, 1, 2])
+        self.assertEqual(robot.add_obstacle(wall, shifts([0.5, 0, 1])[0]), "obstacle 1")
+        self.assertEqual(robot.add_obstacle(wall, shifts([9, 0, 1])[0], name="far"), "far")
+        self.assertEqual(robot.add_obstacle(wall, shifts([8, 0, 1])[0]), "obstacle 2")
+        gap = robot.distance(q)
+        self.assertEqual(gap.bodies[1], "obstacle 1")
+        robot.set_margin("obstacle 1", gap.distance * 0.75)
+        self.assertAlmostEqual(robot.distance(q).distance, gap.distance * 0.25, delta=1e-12)
+        robot.set_margin(gap.bodies[0], gap.distance * 0.26)
+        self.assertTrue(robot.collide(q))
+        self.assertFalse(robot.is_free(q, q))
+        robot.set_margin("obstacle 1", 0)
+        robot.set_margin(gap.bodies[0], 0)
+        self.assertEqual(robot.distance(q).distance, gap.distance)
+        before = robot.copy()
+        robot.set_pose("obstacle 1", shifts([0.1, 0, 1])[0])
+        self.assertTrue(robot.collide(q))
+        self.assertFalse(before.collide(q))
+        robot.remove("obstacle 1")
+        self.assertFalse(robot.collide(q))
+        self.assertEqual(before.distance(q).distance, gap.distance)
+        self.assertEqual(robot.add_obstacle(cbvh.sphere(1)), "obstacle 1")
+        self.assertTrue(robot.collide(q))
+
+    def test_attached_objects_move_with_their_link(self):
+        robot, rows = self.robot, random_rows(self.robot, 1, 100)
+        for a, b in robot.pairs:
+            robot.allow(a, b)
+        pose, hand = shifts([0, 0.05, 0.3])[0], robot.links.index("hand")
+        self.assertEqual(robot.attach(cbvh.sphere(0.02), "hand", pose, may_touch=["forearm"]), "attached 1")
+        self.assertEqual(set(robot.pairs), {(link, "attached 1") for link in ("base", "turret", "upper_arm")})
+        robot.add_obstacle(cbvh.sphere(0.3), shifts([0.5, 0, 0.5])[0], name="ball")
+        for link in ("base", "turret", "upper_arm", "forearm", "hand"):
+            robot.allow(link, "ball")
+            if link not in ("forearm", "hand"):
+                robot.allow(link, "attached 1")
+        for pose in (pose, shifts([0.1, 0, 0.2])[0]):
+            robot.set_pose("attached 1", pose)
+            centres = (robot.link_poses(rows)[:, hand] @ pose)[:, :3, 3]
+            expected = np.maximum(np.linalg.norm(centres - [0.5, 0, 0.5], axis=1) - 0.32, 0)
+            np.testing.assert_allclose(robot.distance(rows).distance, expected, atol=1e-12)
+            self.assertEqual(robot.collide(rows).tolist(), (expected == 0).tolist())
+        robot.remove("attached 1")
+        self.assertEqual(robot.pairs, [])
+
+    def test_threads_share_a_robot(self):
+        robot, _ = cell()
+        rows = random_rows(robot, 3, 50)
+        expected = robot.collide(rows).tolist(), robot.distance(rows).distance.tolist()
+        robot.add_obstacle(cbvh.sphere(0.1), shifts([50, 0, 0])[0], name="moving")
+        stop = threading.Event()
+
+        def change():
+            number = 0
+            while not stop.is_set():
+                number += 1
+                robot.set_pose("moving", shifts([50 + number % 7, 0, 0])[0])
+                robot.add_obstacle(cbvh.sphere(0.1), shifts([90, 0, 0])[0], name=f"passing {number}")
+                robot.remove(f"passing {number}")
+
+        def ask(thread):
+            for _ in range(10):
+                found = robot.collide(rows).tolist(), robot.distance(rows, parallel=thread % 2 == 0).distance.tolist()
+                if found != expected:
+                    return False
+            return True
+
+        with concurrent.futures.ThreadPoolExecutor(5) as pool:
+            changing = pool.submit(change)
+            try:
+                self.assertTrue(all(pool.map(ask, range(4))))
+            finally:
+                stop.set()
+            changing.result()
+
+
+class Misuse(unittest.TestCase):
+    """Errors say what is wrong."""
+
+    def test_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+
+            def of(text, **options):
+                path = folder / "robot.urdf"
+                path.write_text(text)
+                return cbvh.Robot.from_urdf(path, **options)
+
+            link = '<link name="a"/>'
+            mesh = '<link name="a"><collision><geometry><mesh filename="{}"/></geometry></collision></link>'
+            (folder / "broken.obj").write_text("v 1 2\n")
+            check_errors(
+                self,
+                [
+                    (TypeError, "from_urdf", cbvh.Robot),
+                    (FileNotFoundError, "nothing.urdf", cbvh.Robot.from_urdf, folder / "nothing.urdf"),
+                    (FileNotFoundError, "no.srdf", lambda: cbvh.Robot.from_urdf(URDF, srdf=folder / "no.srdf")),
+                    (ValueError, "robot.urdf", of, "this is no XML"),
+                    (ValueError, "expected", of, "<scene/>"),
+                    (ValueError, "another link", of, f"<robot>{link}{link}</robot>"),
+                    (ValueError, "one link that no joint moves", of, f'<robot>{link}<link name="b"/></robot>'),
+                    (ValueError, "absent.obj", of, f"<robot>{mesh.format('absent.obj')}</robot>"),
+                    (cbvh.BakeError, "broken.obj", of, f"<robot>{mesh.format('broken.obj')}</robot>"),
+                    (ValueError, "base: expected one of fixed, planar, floating", lambda: of("", base="free")),
+                    (ValueError, "geometry: expected one of collision, visual", lambda: of("", geometry="both")),
+                    (ValueError, "NaN", lambda: of(KINDS, cylinder_error=math.nan)),
+                ],
+            )
+
+    def test_arguments(self):
+        robot, _ = cell()
+        q, ball = np.zeros(4), cbvh.sphere(0.1)
+        none = [0, 0, math.nan, 0]
+        check_errors(
+            self,
+            [
+                (ValueError, "q: expected shape (4,) or (N, 4), found (3,)", robot.collide, [0, 0, 0]),
+                (ValueError, "found (2, 2, 4)", robot.pairs_in_contact, np.zeros((2, 2, 4))),
+                (ValueError, "found (4, 3)", robot.link_poses, np.zeros((4, 3))),
+                (ValueError, "q1: expected shape", robot.is_free, q, [1]),
+                (ValueError, "q1: expected 2 rows, as q0, found 3", robot.is_free, np.zeros((2, 4)), np.zeros((3, 4))),
+                (ValueError, "joint elbow: expected a finite value, found NaN", robot.collide, none),
+                (ValueError, "elbow", robot.distance, [q, none]),
+                (ValueError, "elbow", robot.link_poses, none),
+                (ValueError, "elbow", robot.is_free, q, none),
+                (ValueError, "elbow", lambda: robot.collide([q, none], parallel=True)),
+                (ValueError, "clearance", lambda: robot.is_free(q, q, clearance=-1)),
+                (ValueError, "clearance", lambda: robot.motion(q, q, clearance=math.inf)),
+                (ValueError, "tolerance", lambda: robot.is_free(q, q, tolerance=math.nan)),
+                (ValueError, "one configuration each", robot.motion, [q], q),
+                (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((3, 2))),
+                (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((4, 0))),
+                (ValueError, "could not convert", robot.collide, ["a", "b", "c", "d"]),
+                (KeyError, "'elbo'", robot.q, {"elbo": 1}),
+                (KeyError, "'finger'; there are base, turret", robot.allow, "hand", "finger"),
+                (KeyError, "'finger'", robot.attach, ball, "finger"),
+                (KeyError, "'finger'", lambda: robot.attach(ball, "hand", may_touch=["finger"])),
+                (KeyError, "'hand'; there are pillar", robot.remove, "hand"),
+                (KeyError, "'hand'", robot.set_pose, "hand", np.eye(4)),
+                (KeyError, "'cup'", robot.set_margin, "cup", 1),
+                (ValueError, "pillar", lambda: robot.add_obstacle(ball, name="pillar")),
+                (ValueError, "hand", lambda: robot.attach(ball, "hand", name="hand")),
+                (ValueError, "pose", robot.add_obstacle, ball, np.eye(3)),
+                (ValueError, "scaled by 2", robot.add_obstacle, ball, np.diag([2.0, 2, 2, 1])),
+                (ValueError, "-1", robot.set_margin, "pillar", -1),
+            ],
+        )
+        # Nothing of that has changed anything.
+        names = {name for pair in robot.pairs for name in pair}
+        self.assertEqual(names, {"base", "turret", "upper_arm", "forearm", "hand", "pillar", "shelf", "ball", "tool"})
+        moving = cbvh.Robot.from_urdf(URDF, base="floating")
+        with self.assertRaises(ValueError) as caught:
+            moving.collide(np.zeros(11))
+        self.assertIn("quaternion", str(caught.exception))
+
+
+try:
+    ROBOTS = pathlib.Path(
+        str(importlib.metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
+    )
+except importlib.metadata.PackageNotFoundError:
+    ROBOTS = None
+
+
+@unittest.skipIf(ROBOTS is None, "example-robot-data is not installed")
+class RealRobots(unittest.TestCase):
+    """Robots of example-robot-data, with their own semantics, links and meshes."""
+
+    FILES = {
+        "panda": ("panda_description/urdf/panda.urdf", "panda_description/srdf/panda.srdf", 9),
+        "xarm7": ("xarm_description/urdf/xarm7.urdf", "xarm_description/srdf/xarm7.srdf", 7),
+        "pr2": ("pr2_description/urdf/pr2.urdf", "pr2_description/srdf/pr2.srdf", None),
+        "talos": ("talos_data/robots/talos_reduced.urdf", "talos_data/srdf/talos.srdf", None),
+    }
+
+    def test_kinematics_and_motions(self):
+        for name, (urdf, srdf, _) in self.FILES.items():
+            with self.subTest(name):
+                robot = cbvh.Robot.from_urdf(ROBOTS / urdf, srdf=ROBOTS / srdf)
+                rows, kinematics = random_rows(robot, 1, 20), Kinematics(ROBOTS / urdf)
+                for row, poses in zip(rows, robot.link_poses(rows)):
+                    values = dict(zip(robot.joints, row))
+                    for link, pose in zip(robot.links, poses):
+                        np.testing.assert_allclose(pose, kinematics.pose(link, values), atol=1e-12)
+                ends = rows + random_rows(robot, 2, 20, 0.1)
+                free, touching = robot.is_free(rows, ends), robot.pairs_in_contact(rows)
+                self.assertEqual(robot.collide(rows).tolist(), [bool(pairs) for pairs in touching])
+                distance = robot.distance(rows)
+                self.assertEqual((distance.distance == 0).tolist(), [bool(pairs) for pairs in touching])
+                for row, end, is_free in zip(rows, ends, free):
+                    along = row + np.linspace(0, 1, 101)[:, None] * (end - row)
+                    self.assertFalse(is_free and robot.collide(along).any())
+
+    def test_disabled_pairs_are_not_asked_about(self):
+        for name, (urdf, srdf, _) in self.FILES.items():
+            with self.subTest(name):
+                robot = cbvh.Robot.from_urdf(ROBOTS / urdf, srdf=ROBOTS / srdf)
+                root = ElementTree.parse(ROBOTS / srdf).getroot()
+                disabled = {frozenset([of.get("link1"), of.get("link2")]) for of in root.findall("disable_collisions")}
+                self.assertTrue(robot.pairs)
+                self.assertFalse(disabled & {frozenset(pair) for pair in robot.pairs})
+
+
+if __name__ == "__main__":
+    unittest.main()
